@@ -1,0 +1,126 @@
+# StereoCell. Make drives the phases, each a real file; the engine inside drives the units.
+.DEFAULT_GOAL := help
+SHELL := /bin/bash
+
+PYTHON ?= python3
+SAMPLE ?= cycif
+WORKERS ?= $(shell nproc)
+ARGS ?=
+ifeq ($(SAMPLE),brain-cells)
+OUT ?= out/brain-cells
+DEMO_INPUT := out/samples/brain-cells.ome.tif
+DEMO_ARGS := --preset lightsheet --grid 2x2
+else
+OUT ?= out/demo
+DEMO_INPUT := out/samples/cycif.ome.zarr
+DEMO_ARGS := --preset cycif --grid 5x2
+endif
+
+VENV := .venv
+BIN := $(VENV)/bin
+RUN := $(BIN)/stereocell
+READY := $(VENV)/.ready
+VIEWER := viewer_gltf
+VIEWER_READY := $(VIEWER)/node_modules/.ready
+VIEWER_DIST := $(VIEWER)/dist/index.html
+VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/index.html $(VIEWER)/*.ts $(VIEWER)/*.json schemas -type f 2>/dev/null)
+CHROMIUM ?= $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
+export CHROMIUM
+# real volumes, where they are at hand; tests that want them skip without
+ifneq ($(wildcard ../shared/data),)
+export STEREOCELL_DATA ?= $(abspath ../shared/data)
+endif
+
+.PHONY: help setup demo plan units stage bundle view report check lint test test-fast bench lock clean browser need-input
+
+help: ## Show this help
+	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20+)
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "setup: $(PYTHON) is $$($(PYTHON) --version), expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VIEWER_READY): $(VIEWER)/package-lock.json
+	@node -e 'process.exit(+(process.versions.node.split(".")[0] < 20))' || \
+	  { echo "setup: node is missing or older than 20, expected Node.js 20 or newer" >&2; exit 1; }
+	cd $(VIEWER) && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+$(VIEWER_DIST): $(VIEWER_READY) $(VIEWER_SOURCES)
+	cd $(VIEWER) && npm run --silent build
+	@touch $@
+
+browser: ## Install Debian's chromium for the browser tests, if it is missing and we may
+	@if [ -n "$(CHROMIUM)" ]; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
+	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
+	else echo "browser: no chromium, so the browser tests are skipped; get it by: sudo apt-get install chromium"; fi
+
+demo: setup ## Run it all on an embedded sample (SAMPLE=cycif or brain-cells)
+	@mkdir -p out/samples
+	test -e $(DEMO_INPUT) || $(RUN) sample $(SAMPLE) $(DEMO_INPUT)
+	$(RUN) build $(DEMO_INPUT) -o $(OUT) --workers $(WORKERS) $(DEMO_ARGS) $(ARGS)
+	@echo
+	@du -sh $(OUT)/stage $(OUT)/bundle $(OUT)/report
+	@echo "look at it:  make view OUT=$(OUT)      check it:  make check OUT=$(OUT)"
+
+need-input:
+	@test -n "$(INPUT)" || { echo "make: INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder" >&2; exit 2; }
+
+plan: need-input $(OUT)/plan.json ## Settle what is built:  INPUT=... OUT=... [ARGS="--grid 5x2"]
+units: need-input $(OUT)/units/done.json ## ... then meshes and volumes of every tile and channel
+stage: need-input $(OUT)/stage/stage.usda ## ... then the USD stage
+bundle: need-input $(OUT)/bundle/manifest.json ## ... then the web bundle
+report: need-input $(OUT)/report/index.html ## ... then the page with pictures
+
+$(OUT)/plan.json: $(wildcard $(INPUT)) | setup
+	$(RUN) plan $(INPUT) -o $(OUT) $(ARGS)
+$(OUT)/units/done.json: $(OUT)/plan.json
+	$(RUN) units $(OUT) --workers $(WORKERS)
+	@touch $@
+$(OUT)/stage/stage.usda: $(OUT)/units/done.json
+	$(RUN) stage $(OUT) --workers $(WORKERS)
+	@touch $@
+$(OUT)/bundle/manifest.json: $(OUT)/stage/stage.usda $(VIEWER_DIST)
+	$(RUN) bundle $(OUT) --workers $(WORKERS)
+	@touch $@
+$(OUT)/report/index.html: $(OUT)/bundle/manifest.json
+	$(RUN) report $(OUT)
+
+check: setup ## Hold OUT against schemas, USD, glTF and KTX2 rules
+	$(RUN) check $(OUT)
+
+view: setup ## Serve OUT's bundle on localhost and open a browser
+	$(RUN) view $(OUT)
+
+lint: setup ## ruff, mypy, biome, tsc
+	$(BIN)/ruff check pipeline tests
+	$(BIN)/ruff format --check pipeline tests
+	$(BIN)/mypy
+	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
+
+test-fast: setup ## Unit tests only
+	$(BIN)/pytest -m "not slow"
+	cd $(VIEWER) && npm run --silent test
+
+test: setup browser ## All tests, in headless Chromium too
+	$(BIN)/pytest
+	cd $(VIEWER) && npm run --silent test
+
+bench: setup ## Ratios of two things in one run, medians
+	$(BIN)/python tests/bench/bench.py
+
+lock: setup ## Resolve requirements.lock anew from pyproject.toml
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
+
+clean: ## Remove .venv, the viewer's packages and build, and out/
+	rm -rf $(VENV) $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,234 @@
+"""The phases of a build, each a function on OUT: plan -> units -> stage -> bundle (-> report).
+
+Every phase skips what is done already: results are named by what they depend on.
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlparse
+
+import numpy as np
+
+from stereocell import report, specimen, transfer
+from stereocell.assets import viewer_dist
+from stereocell.config import Settings, to_dict, to_toml
+from stereocell.engine import Engine, console
+from stereocell.errors import OutputError
+from stereocell.plan import PALETTE, Channel, Plan, choose_level, make_plan
+from stereocell.rounds import run_rounds
+from stereocell.sources import SourceRef, open_source
+from stereocell.specimen import ChannelContent, Look, TileContent
+from stereocell.store import Store, key_of, load_lods, write_json
+from stereocell.write import bundle as bundle_writer
+from stereocell.write import usd
+from stereocell.write.generator import GENERATOR
+
+
+def make(source: str, out: Path, settings: Settings) -> Plan:
+    """Write OUT/plan.json (and the settings used, as TOML). The same plan again changes nothing."""
+    store = Store(out)
+    with _phase(store, "plan") as phase:
+        location = source if urlparse(source).scheme else str(Path(source).absolute())
+        options = settings.plan
+        dataset = open_source(SourceRef(location, options.time, options.spacing_um))
+        if dataset.time_points > 1:
+            console.print(
+                f"plan: {dataset.time_points} points in time; building --time {options.time}"
+            )
+        indices = dataset.find_channels(options.channels) if options.channels else None
+        chosen = range(len(dataset.channels)) if indices is None else indices
+        channels = [
+            Channel(
+                index,
+                dataset.channels[index].name,
+                dataset.channels[index].color or PALETTE[place % len(PALETTE)],
+            )
+            for place, index in enumerate(chosen)
+        ]
+        level = choose_level(dataset.levels, len(channels), settings)
+        origin = dataset.levels[level[0]].origin_um
+        plan = make_plan(
+            location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
+            settings,
+        )  # fmt: skip
+        store.require_writable()
+        phase.is_up_to_date = not store.save_plan(plan)
+        store.write_text(store.settings_file, to_toml(plan.settings))
+        write_json(out / "provenance.json", provenance(plan))
+    shape = " x ".join(str(n) for n in plan.region.shape)
+    console.print(
+        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
+        f"{len(plan.tiles)} tiles x {len(plan.channels)} channels"
+    )
+    return plan
+
+
+def provenance(plan: Plan) -> dict[str, Any]:
+    """Return what a reader of the results may know of their making: no paths, no identities."""
+    settings = to_dict(plan.settings)
+    return {
+        "generator": GENERATOR,
+        "fingerprint": plan.fingerprint,
+        "level": plan.level,
+        "spacing_um": list(plan.spacing_um),
+        "settings": settings,
+    }
+
+
+def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
+    """Find windows and iso-values for all units, then build the units (or `only` one of them)."""
+    store = Store(out)
+    plan = store.plan()
+    with _phase(store, "units") as phase:
+        phase.is_up_to_date = not run_rounds(store, plan, engine, only)
+
+
+@dataclass(frozen=True, slots=True)
+class TileTask:
+    stage_dir: Path
+    content: TileContent  # without its channels
+    units: tuple[tuple[str, Path], ...]  # channel id, unit folder
+
+
+def run_tile(task: TileTask) -> None:
+    """Write one tile of the stage from its units."""
+    channels = tuple(
+        ChannelContent(channel_id, load_lods(folder), np.load(folder / "volume.npy"))
+        for channel_id, folder in task.units
+    )
+    usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
+
+
+def run_stage(out: Path, engine: Engine) -> None:
+    """Write OUT/stage from the units. Layers of the user's own that lie there are left alone."""
+    store = Store(out)
+    plan = store.plan()
+    with _phase(store, "stage") as phase:
+        index, content = store.index(), store.survey()
+        looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
+        tiles = [_tile_task(store, plan, index, tile.id) for tile in plan.tiles]
+        about = provenance(plan)
+        depends = [index, [asdict(look) for look in looks], about, plan.name]
+        key = key_of(depends, usd, specimen, transfer)
+        if phase.is_done(key, store.stage_file):
+            return
+        engine.run("stage", run_tile, tiles)
+        extents = [
+            usd.TileExtent(t.content.id, t.content.first_um, t.content.last_um, plan.spacing_um)
+            for _, t in tiles
+        ]
+        usd.write_stage(store.stage_dir, plan.name, looks, extents, about)
+        store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
+
+
+def _tile_task(
+    store: Store, plan: Plan, index: Mapping[str, str], tile_id: str
+) -> tuple[str, TileTask]:
+    tile = plan.tile(tile_id)
+    lattice = tile.lattice(plan.region)
+    units = []
+    for channel in plan.channels:
+        name = f"{tile_id}/{channel.id}"
+        if name not in index:
+            raise OutputError(
+                f"{store.index_file}: unit {tile_id}/{channel.name} is missing: "
+                "run `stereocell units OUT`"
+            )
+        units.append((channel.id, store.unit_dir(tile_id, channel.id, index[name])))
+    content = TileContent(
+        id=tile_id,
+        spacing_um=plan.spacing_um,
+        first_um=plan.position_um(lattice.start),
+        last_um=plan.position_um([end - 1 for end in lattice.stop]),
+        own_shape=tile.box.shape,
+        channels=(),
+    )
+    return tile_id, TileTask(store.stage_dir, content, tuple(units))
+
+
+def look_from(content: Mapping[str, Any]) -> Look:
+    """Return the look that survey.json holds."""
+    functions = {
+        name: tuple((float(x), float(opacity)) for x, opacity in points)
+        for name, points in content["transfer_functions"].items()
+    }
+    return Look(
+        content["name"],
+        tuple(content["color"]),
+        tuple(content["window"]),
+        content["iso_value"],
+        content["iso_confidence"],
+        functions,
+    )
+
+
+def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
+    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it."""
+    store = Store(out)
+    with _phase(store, "bundle") as phase:
+        path = stage if stage is not None else store.stage_file
+        if not path.is_file():
+            raise OutputError(f"{path} is missing: run `stereocell stage OUT` first")
+        viewer = viewer_dist()
+        key = key_of([str(path.absolute()), _state(path.parent), _state(store.stage_dir),
+                      _state(viewer) if viewer else None], bundle_writer)  # fmt: skip
+        if phase.is_done(key, store.bundle_dir / "manifest.json"):
+            return
+        bundle_writer.write_bundle(path, store.bundle_dir, viewer, workers=engine.workers)
+    if viewer is None:
+        console.print(
+            "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
+        )
+
+
+def _state(folder: Path) -> list[tuple[str, int, int]]:
+    """Return names, sizes and times of change of all files below: what an edit alters."""
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    stats = [(file, file.stat()) for file in files]
+    return [(str(f.relative_to(folder)), s.st_size, s.st_mtime_ns) for f, s in stats]
+
+
+def run_report(out: Path) -> None:
+    """Write OUT/report/index.html: pictures, sizes, times."""
+    store = Store(out)
+    with _phase(store, "report") as phase:
+        content = [store.index(), store.survey(), provenance(store.plan())]
+        phases = [store.phase(name).get("key") for name in ("stage", "bundle")]
+        if phase.is_done(key_of([content, phases], *report.MODULES), store.report_file):
+            return
+        report.write_report(out)
+
+
+class _Phase:
+    """One phase at work: does it have anything to do, and how long does it take."""
+
+    def __init__(self, store: Store, name: str) -> None:
+        self.store, self.name = store, name
+        self.key = ""
+        self.is_up_to_date = False
+
+    def is_done(self, key: str, result: Path) -> bool:
+        """Return whether the result stands and was made from the same things."""
+        self.key = key
+        self.is_up_to_date = result.is_file() and self.store.phase(self.name).get("key") == key
+        if not self.is_up_to_date:
+            self.store.save_phase(self.name, "", 0.0)  # killed half-way, it is not done
+        return self.is_up_to_date
+
+
+@contextmanager
+def _phase(store: Store, name: str) -> Iterator[_Phase]:
+    """Tell how long a phase took and keep it for the report; one with nothing to do says so."""
+    start = time.perf_counter()
+    phase = _Phase(store, name)
+    yield phase
+    seconds = time.perf_counter() - start
+    if phase.is_up_to_date:
+        console.print(f"{name}: up to date")
+    else:
+        store.save_phase(name, phase.key or "done", seconds)
+        console.print(f"{name}: {seconds:.1f} s")

@@ -1,0 +1,241 @@
+"""Hold what a build left against the rules of its formats: the body of `stereocell check OUT`.
+
+Each check is one line, and none keeps the others from running. Other people's validators do most
+of it: JSON Schema, UsdValidation, the Khronos glTF validator, ktx-parse. The last two are node
+packages; where node or they are missing, their line fails and says how to get them.
+"""
+
+import hashlib
+import json
+import shutil
+import struct
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import best_match
+
+from stereocell.assets import find_asset, schema_path
+from stereocell.errors import CheckError, StereoCellError
+from stereocell.validate_usd import validate_stage
+from stereocell.write.bundle import FILES, MANIFEST
+
+_MOST_SHOWN = 3  # problems in one line
+_NODE_TIMEOUT_S = 1200.0
+_GET_NODE = "install Node 20 or newer, then run `make setup`"
+
+
+@dataclass(frozen=True, slots=True)
+class CheckLine:
+    """One line of the answer. `detail`: what was looked at, or what is wrong."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+def check(out: Path) -> Iterator[CheckLine]:
+    """Yield a line for each check of a build's folder: plan, stage and bundle."""
+    bundle = out / "bundle"
+    checks: list[tuple[str, Callable[[], str]]] = [
+        ("plan", lambda: _check_json(out / "plan.json", "plan.schema.json")),
+        ("stage", lambda: _check_stage(out / "stage" / "stage.usda")),
+        ("manifest", lambda: _check_json(bundle / MANIFEST, "bundle.schema.json")),
+        ("file list", lambda: _check_json(bundle / FILES, "bundle.schema.json", "FileIndex")),
+        ("volume lists", lambda: _check_volume_lists(bundle)),
+        ("tilesets", lambda: _check_tilesets(bundle)),
+        ("hashes", lambda: _check_hashes(bundle)),
+        ("glTF validator", lambda: _run_node("check_glb.mjs", sorted(bundle.rglob("*.glb")))),
+        ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
+    ]
+    for name, run in checks:
+        try:
+            yield CheckLine(name, True, run())
+        except StereoCellError as error:
+            yield CheckLine(name, False, str(error))
+
+
+def _check_json(path: Path, schema_name: str, definition: str | None = None) -> str:
+    _validate(path, _read_json(path), schema_name, definition)
+    return f"{path.name} fits {schema_name}"
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except OSError as error:
+        raise CheckError(f"{path}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise CheckError(f"{path}: no JSON: {error}") from error
+
+
+def _validate(path: Path, content: Any, schema_name: str, definition: str | None = None) -> None:
+    schema = json.loads(schema_path(schema_name).read_bytes())
+    if definition is not None:
+        schema = {"$defs": schema["$defs"], "$ref": f"#/$defs/{definition}"}
+    error = best_match(Draft202012Validator(schema).iter_errors(content))
+    if error is not None:
+        raise CheckError(f"{path}: {error.json_path}: {error.message}")
+
+
+def _check_stage(path: Path) -> str:
+    findings = validate_stage(path)
+    _raise_on([str(finding) for finding in findings])
+    return f"{path.name}: nothing found by UsdValidation and by our own rules"
+
+
+def _check_volume_lists(bundle: Path) -> str:
+    """Check each volumes.json, and what it says of the levels' places in the textures."""
+    problems = []
+    volumes = 0
+    for channel in _channels(bundle):
+        path = bundle / channel["volumes"]["path"]
+        content = _read_json(path)
+        _validate(path, content, "volumes.schema.json")
+        for volume in content["volumes"]:
+            volumes += 1
+            listed = [(level["offset"], level["length"]) for level in volume["levels"]]
+            if _levels_of(bundle / volume["file"]["path"], len(listed)) != listed:
+                problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
+    _raise_on(problems)
+    return f"{volumes} volumes"
+
+
+def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
+    """Return offset and length of a KTX2 file's levels; nothing if it has another number."""
+    try:
+        with texture.open("rb") as file:
+            head = file.read(80 + 24 * count)
+    except OSError as error:
+        raise CheckError(f"{texture}: {error.strerror or error}") from error
+    if len(head) < 80 + 24 * count or struct.unpack_from("<I", head, 40) != (count,):
+        return []
+    return [struct.unpack_from("<2Q", head, 80 + 24 * k) for k in range(count)]
+
+
+def _channels(bundle: Path) -> list[dict[str, Any]]:
+    path = bundle / MANIFEST
+    manifest = _read_json(path)
+    _validate(path, manifest, "bundle.schema.json")
+    channels: list[dict[str, Any]] = manifest["channels"]
+    return channels
+
+
+def _check_tilesets(bundle: Path) -> str:
+    contents = 0
+    problems = []
+    for channel in _channels(bundle):
+        if channel["tileset"] is None:
+            continue
+        path = bundle / channel["tileset"]["path"]
+        tileset = _read_json(path)
+        try:
+            for uri, error, limit in _walk(tileset["root"], tileset["geometricError"]):
+                contents += 1
+                if not (path.parent / uri).is_file():
+                    problems.append(f"{path}: no file at {uri}")
+                if error > limit:
+                    problems.append(f"{path}: {uri} has a larger geometricError than its parent")
+        except (KeyError, TypeError) as error:
+            problems.append(f"{path}: no 3D Tiles tileset: {error!r}")
+    _raise_on(problems)
+    return f"{contents} contents"
+
+
+def _walk(tile: dict[str, Any], limit: float) -> Iterator[tuple[str, float, float]]:
+    """Yield address, geometricError and the parent's geometricError of each content."""
+    error = tile["geometricError"]
+    if "content" in tile:
+        yield tile["content"]["uri"], error, limit
+    for child in tile.get("children", ()):
+        yield from _walk(child, error)
+
+
+def _check_hashes(bundle: Path) -> str:
+    """Check every file against files.json, every reference too, and that no file is unlisted."""
+    manifest = _read_json(bundle / MANIFEST)
+    listed = _read_json(bundle / FILES)
+    _validate(bundle / FILES, listed, "bundle.schema.json", "FileIndex")
+    problems = []
+    found = {p.relative_to(bundle).as_posix(): p for p in bundle.rglob("*") if p.is_file()}
+    for path, entry in listed.items():
+        if path not in found:
+            problems.append(f"{path}: missing")
+        elif _measure(found[path]) != entry:
+            problems.append(f"{path}: not the bytes that {FILES} says")
+    problems += [
+        f"{path}: not in {FILES}" for path in found.keys() - listed.keys() - {MANIFEST, FILES}
+    ]
+    references = list(_references(manifest))
+    for channel in _channels(bundle):
+        references += _references(_read_json(bundle / channel["volumes"]["path"]))
+    for reference in references:
+        entry = {"bytes": reference["bytes"], "sha256": reference["sha256"]}
+        expected = listed.get(reference["path"])
+        if reference["path"] == FILES:
+            expected = _measure(bundle / FILES)
+        if entry != expected:
+            problems.append(f"{reference['path']}: a reference to it has another hash")
+    _raise_on(sorted(problems))
+    return f"{len(listed)} files, {len(references)} references"
+
+
+def _measure(path: Path) -> dict[str, Any]:
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
+    return {"bytes": path.stat().st_size, "sha256": digest.hexdigest()}
+
+
+def _references(content: Any) -> Iterator[dict[str, Any]]:
+    if isinstance(content, list):
+        for item in content:
+            yield from _references(item)
+    elif isinstance(content, dict):
+        if content.keys() == {"path", "bytes", "sha256"}:
+            yield content
+        for item in content.values():
+            yield from _references(item)
+
+
+def _textures(bundle: Path) -> list[Path]:
+    return sorted([*bundle.rglob("*.ktx2"), *bundle.rglob("*.glb")])
+
+
+def _run_node(script_name: str, paths: list[Path]) -> str:
+    """Run one of viewer_gltf/tools over all files at once."""
+    if not paths:
+        raise CheckError("no file to check, expected some in the bundle")
+    try:
+        script = find_asset(f"viewer_gltf/tools/{script_name}")
+    except FileNotFoundError as error:
+        raise CheckError(f"{script_name} comes with a checkout of StereoCell only") from error
+    node = shutil.which("node")
+    if node is None:
+        raise CheckError(f"no `node` to run {script_name}: {_GET_NODE}")
+    try:
+        answer = subprocess.run(
+            [node, str(script)],
+            input=json.dumps([str(path) for path in paths]),
+            capture_output=True,
+            text=True,
+            timeout=_NODE_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise CheckError(f"{script_name} was not done after {_NODE_TIMEOUT_S:g} s") from error
+    if "ERR_MODULE_NOT_FOUND" in answer.stderr:
+        raise CheckError(f"{script.parent.parent}: its node packages are missing: {_GET_NODE}")
+    if answer.returncode != 0:
+        raise CheckError(f"{script_name} failed: {' '.join(answer.stderr.split())[-300:]}")
+    results = json.loads(answer.stdout)
+    _raise_on([f"{result['path']}: {p}" for result in results for p in result["problems"]])
+    return f"{len(results)} files"
+
+
+def _raise_on(problems: list[str]) -> None:
+    if problems:
+        more = f" (and {len(problems) - _MOST_SHOWN} more)" if len(problems) > _MOST_SHOWN else ""
+        raise CheckError("; ".join(problems[:_MOST_SHOWN]) + more)

@@ -1,0 +1,331 @@
+"""The command `stereocell`: one subcommand per phase, and one that runs them all."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from stereocell.errors import StereoCellError
+
+Handler = Callable[[argparse.Namespace], int]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
+    options = _parser().parse_args(arguments)
+    try:
+        code: int = options.handler(options)
+        return code
+    except StereoCellError as error:
+        print(f"stereocell: {error}", file=sys.stderr)
+        return error.exit_code
+    except OSError as error:  # the disk is full, a folder was taken away
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"stereocell: {place}{error.strerror or error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("stereocell: stopped; the same command goes on from here", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="stereocell",
+        description="Turn a multi-channel volume into a USD stage, a web bundle and a stereo view.",
+        epilog="example: stereocell build my.ome.zarr -o out/mine && stereocell view out/mine",
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, (about, example, declare, handler) in COMMANDS.items():
+        command = commands.add_parser(
+            name,
+            help=about,
+            description=f"{about[0].upper()}{about[1:]}.",
+            epilog=f"example: stereocell {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        declare(command)
+        command.set_defaults(handler=handler)
+    return parser
+
+
+# --- arguments
+
+
+def _input(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument("--preset", help="cycif, lightsheet, mri, or a TOML file of your own")
+    parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
+    plan = parser.add_argument_group("what to build")
+    plan.add_argument("--level", type=int, help="resolution level, 0 is the finest")
+    plan.add_argument("--channels", help="names or indices, as CD31,MART1")
+    plan.add_argument("--region", help="z0:z1,y0:y1,x0:x1 in voxels of the level")
+    plan.add_argument("--tile-size", help="z,y,x in voxels")
+    plan.add_argument("--grid", help="columns x rows, as 5x2, instead of --tile-size")
+    plan.add_argument("--time", type=int, help="index into a time series")
+    plan.add_argument("--spacing-um", help="z,y,x voxel spacing in um, instead of the file's")
+    plan.add_argument(
+        "--iso-value",
+        action="append",
+        metavar="CHANNEL=VALUE",
+        help="use this iso-value (voxel values) for a channel; may be repeated",
+    )
+
+
+def _workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--workers",
+        type=_count,
+        default=os.cpu_count() or 1,
+        help="worker processes; 0 runs inline (default: this machine's cores)",
+    )
+
+
+def _out(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("out", type=Path, help="folder of a build")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 0")
+    return int(text)
+
+
+def _numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
+    from stereocell.errors import UsageError
+
+    try:
+        values = [kind(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3:
+        raise UsageError(f"{flag} is {text!r}, expected three numbers z,y,x")
+    return values
+
+
+def _flags(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the flags as the TOML's sections and keys."""
+    from stereocell.errors import UsageError
+
+    plan: dict[str, Any] = {}
+    for key in ("level", "region", "grid", "time"):
+        if getattr(options, key) is not None:
+            plan[key] = getattr(options, key)
+    if options.channels is not None:
+        plan["channels"] = [name.strip() for name in options.channels.split(",")]
+    if options.tile_size is not None:
+        plan["tile_size"] = _numbers(options.tile_size, int, "--tile-size")
+    if options.spacing_um is not None:
+        plan["spacing_um"] = _numbers(options.spacing_um, float, "--spacing-um")
+    iso_values: dict[str, float] = {}
+    for text in options.iso_value or []:
+        name, _, value = text.rpartition("=")
+        try:
+            iso_values[name] = float(value)
+        except ValueError:
+            name = ""
+        if not name:
+            raise UsageError(f"--iso-value is {text!r}, expected CHANNEL=VALUE")
+    return {"plan": plan, "iso_values": iso_values}
+
+
+# --- handlers; heavy imports wait until they are needed, so that --help is quick
+
+
+def _settings(options: argparse.Namespace) -> int:
+    from stereocell import config
+
+    sys.stdout.write(config.to_toml(config.load(options.preset, options.config, {})))
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> int:
+    from stereocell import build, config
+
+    settings = config.load(options.preset, options.config, _flags(options))
+    build.make(options.input, options.out, settings)
+    return 0
+
+
+def _phases(options: argparse.Namespace, *names: str) -> int:
+    from stereocell import build
+    from stereocell.engine import Engine
+
+    engine = Engine(getattr(options, "workers", 0))
+    try:
+        for name in names:
+            if name == "units":
+                build.run_units(options.out, engine, getattr(options, "only", None))
+            elif name == "stage":
+                build.run_stage(options.out, engine)
+            elif name == "bundle":
+                build.run_bundle(options.out, engine, getattr(options, "stage", None))
+            else:
+                build.run_report(options.out)
+    finally:
+        engine.close()
+    return 0
+
+
+def _build(options: argparse.Namespace) -> int:
+    _plan(options)
+    _phases(options, "units", "stage", "bundle", "report")
+    print(f"stage    {options.out}/stage/stage.usda")
+    print(f"bundle   {options.out}/bundle/index.html")
+    print(f"report   {options.out}/report/index.html")
+    print(f"look at it: stereocell view {options.out}")
+    return 0
+
+
+def _sample(options: argparse.Namespace) -> int:
+    from stereocell import samples
+
+    if options.name == "cycif":
+        columns, _, rows = options.grid.partition("x")
+        if not (columns.isdecimal() and rows.isdecimal() and int(columns) and int(rows)):
+            from stereocell.errors import UsageError
+
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+        z, y, x = _numbers(options.tile_size, int, "--tile-size")
+        samples.write_cycif(
+            options.out,
+            grid=(int(columns), int(rows)),
+            tile_size=(z, y, x),
+            seed=options.seed,
+            brightness_spread=options.brightness_spread,
+        )
+    else:
+        samples.write_brain_cells(options.out)
+    print(f"wrote {options.out}")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from stereocell.check import check
+
+    failed = 0
+    for line in check(options.out):
+        failed += not line.ok
+        print(f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
+    return 1 if failed else 0
+
+
+def _view(options: argparse.Namespace) -> int:
+    from stereocell.serve import serve
+
+    serve(options.out / "bundle", options.port, not options.no_browser)
+    return 0
+
+
+def _declare_settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--preset", help="cycif, lightsheet, mri, or a TOML file of your own")
+    parser.add_argument("--config", type=Path, help="a TOML file of settings")
+
+
+def _declare_build(parser: argparse.ArgumentParser) -> None:
+    _input(parser)
+    _workers(parser)
+
+
+def _declare_units(parser: argparse.ArgumentParser) -> None:
+    _out(parser)
+    _workers(parser)
+    parser.add_argument("--only", metavar="TILE/CHANNEL", help="build one unit, as r0_c3/CD31")
+
+
+def _declare_stage(parser: argparse.ArgumentParser) -> None:
+    _out(parser)
+    _workers(parser)
+
+
+def _declare_bundle(parser: argparse.ArgumentParser) -> None:
+    _out(parser)
+    _workers(parser)
+    parser.add_argument("--stage", type=Path, help="an edited stage, instead of OUT/stage")
+
+
+def _declare_sample(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", choices=["cycif", "brain-cells"])
+    parser.add_argument("out", type=Path, metavar="OUT", help="file or folder to write")
+    cycif = parser.add_argument_group("cycif")
+    cycif.add_argument("--grid", default="5x2", help="columns x rows of tiles (default 5x2)")
+    cycif.add_argument("--tile-size", default="64,128,128", help="z,y,x (default 64,128,128)")
+    cycif.add_argument("--seed", type=int, default=0)
+    cycif.add_argument(
+        "--brightness-spread", type=float, default=1.0, help="cells are up to 1 + this as bright"
+    )
+
+
+def _declare_view(parser: argparse.ArgumentParser) -> None:
+    _out(parser)
+    parser.add_argument("--port", type=_count, default=8000, help="default 8000; 0: any free one")
+    parser.add_argument("--no-browser", action="store_true", help="don't open a browser")
+
+
+COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], Handler]] = {
+    "build": (
+        "do all of it: plan, units, stage, bundle, report",
+        "build my.ome.zarr -o out/mine --preset cycif --grid 5x2",
+        _declare_build,
+        _build,
+    ),
+    "plan": (
+        "settle what is built: level, region, tiles, channels",
+        "plan my.ome.tif -o out/mine --channels CD31,MART1",
+        _input,
+        _plan,
+    ),
+    "units": (
+        "find iso-values, build meshes and volumes of every tile and channel",
+        "units out/mine --workers 4 --only r0_c3/CD31",
+        _declare_units,
+        lambda options: _phases(options, "units"),
+    ),
+    "stage": (
+        "write the USD stage from the units",
+        "stage out/mine",
+        _declare_stage,
+        lambda options: _phases(options, "stage"),
+    ),
+    "bundle": (
+        "export the web bundle from the composed USD stage",
+        "bundle out/mine --stage edited.usda",
+        _declare_bundle,
+        lambda options: _phases(options, "bundle"),
+    ),
+    "report": (
+        "write a page with pictures, sizes and times",
+        "report out/mine",
+        _out,
+        lambda options: _phases(options, "report"),
+    ),
+    "check": (
+        "hold everything that was written against its format's rules",
+        "check out/mine",
+        _out,
+        _check,
+    ),
+    "view": (
+        "serve the bundle on localhost and open a browser",
+        "view out/mine",
+        _declare_view,
+        _view,
+    ),
+    "sample": (
+        "write a sample volume, with no network",
+        "sample cycif demo.ome.zarr --grid 5x2 --seed 1",
+        _declare_sample,
+        _sample,
+    ),
+    "settings": (
+        "print every setting as TOML, with its default and a comment",
+        "settings --preset cycif > stereocell.toml",
+        _declare_settings,
+        _settings,
+    ),
+}
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,6 @@
+"""Sources become lazy datasets: voxels (z, y, x), lengths in um, whatever the format held."""
+
+from stereocell.read.dataset import ChannelInfo, Dataset, Level
+from stereocell.read.opening import open
+
+__all__ = ["ChannelInfo", "Dataset", "Level", "open"]

@@ -1,0 +1,175 @@
+"""A source's channels, levels and voxels, read only where they are asked for."""
+
+import difflib
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from stereocell.errors import SourceError
+from stereocell.read.faults import one_line
+from stereocell.read.fingerprint import fingerprint_of
+from stereocell.read.spacing import Level, Triple
+from stereocell.tiling import Box
+from stereocell.volume import Volume
+
+__all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelInfo:
+    """One channel. `color` is linear RGB, 0..1, or None where the source states none."""
+
+    name: str
+    color: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class VoxelArray:
+    """One level's voxels as they are stored.
+
+    axes  what the array's dimensions are: `t`, `c`, `z`, `y`, `x` in any order; any other name
+          stands for a dimension of length 1
+    """
+
+    array: zarr.Array[Any]
+    axes: tuple[str, ...]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels (z, y, x)."""
+        z, y, x = (self.size(axis) for axis in "zyx")
+        return z, y, x
+
+    @property
+    def chunk(self) -> tuple[int, int, int]:
+        """The block (z, y, x) that the file reads and decodes at once."""
+        z, y, x = (self.array.chunks[self.axes.index(axis)] for axis in "zyx")
+        return z, y, x
+
+    def size(self, axis: str) -> int:
+        """The length along one axis; 1 where the array has none."""
+        return int(self.array.shape[self.axes.index(axis)]) if axis in self.axes else 1
+
+    def window(self, time: int, channel: int, box: Box) -> NDArray[Any]:
+        """Return the voxels of a box, (z, y, x), in this machine's byte order."""
+        wanted: dict[str, int | slice] = dict(zip("zyx", box.slices, strict=True))
+        wanted |= {"t": time, "c": channel}
+        stored = self.array[tuple(wanted.get(axis, 0) for axis in self.axes)]
+        order = [axis for axis in self.axes if axis in "zyx"]
+        voxels = np.asarray(stored).transpose([order.index(axis) for axis in "zyx"])
+        return np.ascontiguousarray(voxels, dtype=voxels.dtype.newbyteorder("="))
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """One image of a source at one time point.
+
+    name         the file's name without its suffix, to show
+    dtype        uint8, uint16 or float32
+    levels       finest first
+    channels     in the source's order
+    has_channel_names  False: at least one name is made up (`Channel0`)
+    time_points  how many the source holds; `time` is the one that is read
+    images       how many the source holds; the first is the one that is read
+    """
+
+    source: str
+    name: str
+    dtype: np.dtype[Any]
+    levels: tuple[Level, ...]
+    channels: tuple[ChannelInfo, ...]
+    has_channel_names: bool
+    time_points: int
+    time: int
+    images: int
+    spacing_um: Triple | None = field(repr=False)  # as given to `open`
+    arrays: tuple[VoxelArray, ...] = field(repr=False)
+    shown: str = field(repr=False)  # the source without secrets, for messages
+    on_close: Callable[[], None] | None = field(repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        if self.on_close is not None:
+            weakref.finalize(self, self.on_close)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Workers open the source anew: open files and event loops don't travel."""
+        from stereocell.read.opening import reopen  # opening imports this module
+
+        return reopen, (self.source, self.time, self.spacing_um)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hex digest of the metadata and of voxels, read when first asked for.
+
+        It depends on neither path nor date. All voxels are hashed as long as they fit the budget
+        (64 MB), else a spread of blocks of the coarsest and of the finest level.
+        """
+        with one_line(self.shown, "chunks that are whole"):
+            return fingerprint_of(self)
+
+    def read(self, channel: int, box: Box, level: int = 0) -> Volume:
+        """Return the voxels of `box`, in the source's dtype; `origin_um` is from level 0's origin.
+
+        Only the chunks that the box touches are read. Raises SourceError if one of them can't be
+        decoded or holds NaN or infinity, ValueError for a channel, level or box out of range.
+        """
+        if not 0 <= channel < len(self.channels) or not 0 <= level < len(self.levels):
+            raise ValueError(f"channel {channel} of level {level} doesn't exist")
+        place = self.levels[level]
+        bounds = zip(box.start, box.stop, place.shape, strict=True)
+        if not all(0 <= start < stop <= size for start, stop, size in bounds):
+            raise ValueError(f"{box} leaves level {level} of shape {place.shape}")
+        where = (
+            f"{self.shown}: channel {self.channels[channel].name!r}, level {level}, "
+            f"voxels {_range(box)}"
+        )
+        with one_line(where, "chunks that are whole"):
+            voxels = self.arrays[level].window(self.time, channel, box)
+        if voxels.dtype.kind == "f" and not np.isfinite(voxels).all():
+            bad = int(np.count_nonzero(~np.isfinite(voxels)))
+            raise SourceError(f"{where}: found {bad} NaN or infinite, expected finite voxels")
+        z, y, x = (
+            origin + start * spacing
+            for origin, start, spacing in zip(
+                place.origin_um, box.start, place.spacing_um, strict=True
+            )
+        )
+        return Volume(voxels, place.spacing_um, (z, y, x))
+
+    def find_channels(self, selection: Sequence[str]) -> tuple[int, ...]:
+        """Return the indices of channels given by name or index, in that order, each once.
+
+        A name goes before an index. Raises SourceError for what isn't there, with the names.
+        """
+        names = [channel.name for channel in self.channels]
+        found = []
+        for wanted in selection:
+            if wanted in names and self.has_channel_names:
+                found.append(names.index(wanted))
+            elif wanted.isdecimal() and int(wanted) < len(names):
+                found.append(int(wanted))
+            else:
+                raise SourceError(f"{self.shown}: channel {wanted!r}: {self._remedy(wanted)}")
+        return tuple(dict.fromkeys(found))
+
+    def _remedy(self, wanted: str) -> str:
+        names = [channel.name for channel in self.channels]
+        last = len(names) - 1
+        if wanted.isdecimal():
+            return f"not found, expected an index from 0 to {last}"
+        if not self.has_channel_names:
+            return f"the source holds no channel names, expected an index from 0 to {last}"
+        lower = {name.lower(): name for name in reversed(names)}
+        near = difflib.get_close_matches(wanted.lower(), list(lower), n=1, cutoff=0.5)
+        hint = f" (did you mean {lower[near[0]]!r}?)" if near else ""
+        return f"not found{hint}, expected one of {', '.join(names)} or an index"
+
+
+def _range(box: Box) -> str:
+    return ",".join(f"{a}:{b}" for a, b in zip(box.start, box.stop, strict=True))

@@ -1,0 +1,62 @@
+"""What tells one dataset from another, whatever its path, date and container.
+
+A digest over the metadata that a build depends on and over voxels, at a bounded cost: everything
+if it fits the budget, else the coarsest level (which the finer ones were averaged into) and blocks
+of the finest, spread evenly.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stereocell.tiling import Box
+
+if TYPE_CHECKING:
+    from stereocell.read.dataset import Dataset
+
+BUDGET_BYTES = 64_000_000  # decoded; half for the coarsest level, half for the finest
+_GOLDEN = 0.6180339887498949
+
+
+def fingerprint_of(dataset: "Dataset") -> str:
+    """Return the digest, 64 hex digits. Raises what the format libraries raise."""
+    metadata = {
+        "dtype": dataset.dtype.name,
+        "time": dataset.time,
+        "levels": [[level.shape, level.spacing_um, level.origin_um] for level in dataset.levels],
+        "channels": [[channel.name, channel.color] for channel in dataset.channels],
+    }
+    digest = hashlib.sha256(json.dumps(metadata, sort_keys=True).encode())
+    last = len(dataset.levels) - 1
+    budget = BUDGET_BYTES // (2 if last else 1)
+    for level in sorted({last, 0}, reverse=True):
+        for channel, box in _spread(dataset, level, budget):
+            voxels = dataset.arrays[level].window(dataset.time, channel, box)
+            digest.update(repr((level, channel, box.start, box.stop)).encode())
+            digest.update(voxels.astype(voxels.dtype.newbyteorder("<")).tobytes())
+    return digest.hexdigest()
+
+
+def _spread(dataset: "Dataset", level: int, budget: int) -> Iterator[tuple[int, Box]]:
+    """Yield (channel, box): the whole level within the budget, else chunks (one at least)."""
+    whole = dataset.levels[level].box
+    channels = len(dataset.channels)
+    if channels * math.prod(whole.shape) * dataset.dtype.itemsize <= budget:
+        yield from ((channel, whole) for channel in range(channels))
+        return
+    chunk = dataset.arrays[level].chunk
+    counts = (channels, *(-(-n // c) for n, c in zip(whole.shape, chunk, strict=True)))
+    wanted = max(1, min(math.prod(counts), budget // (math.prod(chunk) * dataset.dtype.itemsize)))
+    # Multiples of the golden ratio fall evenly and never line up with an axis.
+    indices = {int((k + 0.5) * _GOLDEN % 1.0 * math.prod(counts)) for k in range(wanted)}
+    for index in sorted(indices):
+        channel, *cell = (int(i) for i in np.unravel_index(index, counts))
+        z, y, x = (i * c for i, c in zip(cell, chunk, strict=True))
+        end_z, end_y, end_x = (
+            min(a + c, n) for a, c, n in zip((z, y, x), chunk, whole.shape, strict=True)
+        )
+        yield channel, Box((z, y, x), (end_z, end_y, end_x))

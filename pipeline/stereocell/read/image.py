@@ -1,0 +1,37 @@
+"""What a format's reader hands over: arrays and metadata, before names and spacings are settled."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.spacing import Grid
+
+Color = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """The first image of a source.
+
+    arrays, grids  one for each level, finest first
+    names, colors  one for each channel; None: not said. Colours are linear RGB, 0..1
+    images         how many the source holds
+    close          frees open files, or None
+    """
+
+    arrays: tuple[VoxelArray, ...]
+    grids: tuple[Grid, ...]
+    names: tuple[str | None, ...]
+    colors: tuple[Color | None, ...]
+    images: int
+    close: Callable[[], None] | None = None
+
+
+def linear_color(rgb: tuple[int, int, int]) -> Color:
+    """Return linear RGB, 0..1, of sRGB bytes (IEC 61966-2-1)."""
+    red, green, blue = (_linear(value / 255.0) for value in rgb)
+    return red, green, blue
+
+
+def _linear(value: float) -> float:
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4

@@ -1,0 +1,105 @@
+"""Where a source lies: a local path or an address that fsspec opens."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import fsspec
+
+_TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
+_ZARR_SUFFIXES = (".ome.zarr", ".zarr")
+_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
+_AWS_CREDENTIALS = (
+    "AWS_ACCESS_KEY_ID",
+    "AWS_PROFILE",
+    "AWS_WEB_IDENTITY_TOKEN_FILE",
+    "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
+    "AWS_CONTAINER_CREDENTIALS_FULL_URI",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """One source.
+
+    source    an absolute local path or an address, as the format libraries take it
+    is_local  a path on this machine
+    """
+
+    source: str
+    is_local: bool
+
+    @classmethod
+    def of(cls, source: str | Path) -> "Location":
+        """Return the location of a path or of an address such as `https://...` or `s3://...`."""
+        text = str(source)
+        if "://" not in text:
+            return cls(os.path.abspath(os.path.expanduser(text)), True)
+        parts = urlsplit(text)
+        if parts.scheme == "file":
+            return cls(os.path.abspath(unquote(parts.path)), True)
+        return cls(text, False)
+
+    @property
+    def shown(self) -> str:
+        """The source without what an address may hold in secret (user, password, signature)."""
+        if self.is_local:
+            return self.source
+        parts = urlsplit(self.source)
+        host = parts.netloc.rpartition("@")[2]
+        return f"{parts.scheme}://{host}{parts.path}"
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names along the path."""
+        path = self.source if self.is_local else self.shown.partition("://")[2]
+        return tuple(part for part in path.split("/") if part)
+
+    @property
+    def name(self) -> str:
+        """The file's name without its suffix, to show; `plate.zarr/0` becomes `plate-0`."""
+        parts = self.parts
+        first = next((i for i, part in enumerate(parts) if part.endswith(".zarr")), len(parts) - 1)
+        return "-".join(_stem(part) for part in parts[first:]) or "dataset"
+
+    @property
+    def format(self) -> str | None:
+        """`ome-zarr`, `ome-tiff`, or None where neither the name nor the folder tells."""
+        if any(part.endswith(".zarr") for part in self.parts):
+            return "ome-zarr"
+        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
+            return "ome-tiff"
+        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
+            return "ome-zarr"
+        return None
+
+    @property
+    def storage_options(self) -> dict[str, Any]:
+        """What fsspec needs beside the address.
+
+        s3: signed requests if this machine's environment holds credentials or `FSSPEC_S3` says
+        so, else anonymous ones, which public buckets take. The endpoint comes from the usual
+        environment (`AWS_ENDPOINT_URL`).
+        """
+        if urlsplit(self.source).scheme not in ("s3", "s3a"):
+            return {}
+        configured = fsspec.config.conf.get("s3", {})
+        if "anon" in configured:
+            return {"anon": configured["anon"]}
+        files = (
+            os.environ.get("AWS_SHARED_CREDENTIALS_FILE", "~/.aws/credentials"),
+            os.environ.get("AWS_CONFIG_FILE", "~/.aws/config"),
+        )
+        signed = any(name in os.environ for name in _AWS_CREDENTIALS) or any(
+            os.path.exists(os.path.expanduser(file)) for file in files
+        )
+        return {"anon": not signed}
+
+
+def _stem(name: str) -> str:
+    for suffix in _TIFF_SUFFIXES + _ZARR_SUFFIXES:
+        if name.lower().endswith(suffix) and len(name) > len(suffix):
+            return name[: -len(suffix)]
+    return name

@@ -1,0 +1,132 @@
+"""OME-TIFF: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
+
+bioio's reader parses the OME-XML (ome-types). Its pixels are not used: it reads level 0 only
+(sub-resolutions, in SubIFDs, are left out), a whole page for each window, and opens the file anew
+for each page. tifffile, on which it stands, serves every level as a Zarr array of the file's own
+strips or tiles.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import fsspec
+import zarr
+from bioio_ome_tiff import Reader
+from tifffile import TiffFile, TiffFrame, TiffPage, TiffPageSeries
+
+from stereocell.errors import SourceError
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.faults import collected_log, one_line, without_warning
+from stereocell.read.image import Color, Image, linear_color
+from stereocell.read.location import Location
+from stereocell.read.spacing import Grid, Triple, um_per
+
+_REMOTE_BLOCK = 1 << 18  # bytes; fsspec's 5 MB of read-ahead would be fetched for every tile
+
+
+def read_image(location: Location) -> Image:
+    """Return the first image of the file. Raises SourceError."""
+    where = location.shown
+    stack = ExitStack()
+    try:
+        with (
+            collected_log("tifffile") as log,
+            one_line(where, "an OME-TIFF file, whole, with its OME-XML"),
+        ):
+            # bioio passes ome-types an argument that it no longer takes
+            with without_warning("As of version 0.4.0, the parser argument", DeprecationWarning):
+                reader = Reader(location.source, fs_kwargs=location.storage_options)
+            tiff = _open(location, stack)
+            series = tiff.series[0]
+            pages = [list(level.pages) for level in series.levels]
+            arrays = [_array(series, index) for index in range(len(pages))]
+        if series.kind != "ome":
+            reason = f" ({log[-1]:.120})" if log else ""
+            raise SourceError(
+                f"{where}: planes don't match the OME-XML{reason}, expected a page for each plane"
+            )
+        for index, level in enumerate(pages):
+            _check_whole(f"{where}: level {index}", tiff, level)
+        return _image(where, reader.ome_metadata.images, arrays, stack.close)
+    except BaseException:
+        stack.close()
+        raise
+
+
+def _image(
+    where: str, images: list[Any], arrays: list[VoxelArray], close: Callable[[], None]
+) -> Image:
+    if not images:
+        raise SourceError(f"{where}: OME-XML: found no Image, expected one")
+    samples = arrays[0].size("s")
+    if samples > 1:
+        raise SourceError(
+            f"{where}: SamplesPerPixel: found {samples}, expected 1 (channels as planes, not RGB)"
+        )
+    pixels = images[0].pixels
+    count = arrays[0].size("c")
+    unnamed = [None] * (count - len(pixels.channels))
+    channels = pixels.channels[:count]
+    return Image(
+        tuple(arrays),
+        (Grid(arrays[0].shape, _spacing(pixels)), *(Grid(level.shape) for level in arrays[1:])),
+        (*((channel.name or "").strip() or None for channel in channels), *unnamed),
+        (*(_color(channel) for channel in channels), *unnamed),
+        len(images),
+        close,
+    )
+
+
+def _open(location: Location, stack: ExitStack) -> TiffFile:
+    if location.is_local:  # by path, so that the files of a set find each other
+        return stack.enter_context(TiffFile(location.source, is_mmstack=False))
+    files, path = fsspec.url_to_fs(location.source, **location.storage_options)
+    file = files.open(path, "rb", block_size=_REMOTE_BLOCK, cache_type="blockcache")
+    stack.callback(file.close)
+    return stack.enter_context(TiffFile(file, is_mmstack=False))
+
+
+def _array(series: TiffPageSeries, level: int) -> VoxelArray:
+    # squeeze=False: axes of length 1 stay, so that a single plane is seen as one
+    axes = tuple(axis.lower() for axis in series.levels[level].get_axes(squeeze=False))
+    store = series.aszarr(level=level, squeeze=False)
+    return VoxelArray(zarr.open_array(store, mode="r", zarr_format=2), axes)
+
+
+def _check_whole(where: str, tiff: TiffFile, pages: Sequence[TiffPage | TiffFrame | None]) -> None:
+    """Raise SourceError for missing planes, which tifffile would read as zeros, and short files."""
+    present = [page for page in pages if page is not None]
+    if len(present) < len(pages):
+        raise SourceError(
+            f"{where}: found {len(present)} planes, expected {len(pages)} "
+            "(the file is cut short, or a file of the set is missing)"
+        )
+    size = tiff.filehandle.size
+    for page in present:
+        if page.parent is tiff and page.dataoffsets:
+            end = page.dataoffsets[-1] + page.databytecounts[-1]
+            if end > size:
+                raise SourceError(
+                    f"{where}: found {size} bytes, expected at least {end} (the file is cut short)"
+                )
+
+
+def _spacing(pixels: Any) -> Triple | None:
+    lengths = []
+    for axis in "zyx":
+        size = getattr(pixels, f"physical_size_{axis}")
+        unit = getattr(pixels, f"physical_size_{axis}_unit")
+        um = um_per(unit.value)
+        if size is None or um is None:
+            return None
+        lengths.append(float(size) * um)
+    z, y, x = lengths
+    return z, y, x
+
+
+def _color(channel: Any) -> Color | None:
+    if "color" not in channel.model_fields_set:
+        return None  # ome-types fills in white
+    red, green, blue = channel.color.as_rgb_tuple(alpha=False)
+    return linear_color((red, green, blue))

@@ -1,0 +1,206 @@
+"""OME-Zarr 0.4 (Zarr v2) and 0.5 (Zarr v3): https://ngff.openmicroscopy.org/0.5/
+
+bioio's reader opens the store and hands over the metadata. Three of its answers are not used:
+- `physical_pixel_sizes` leaves the units out, and takes the first coordinate transformation for a
+  scale without looking; here all transformations are composed.
+- `xarray_dask_data` builds a graph over all chunks of the dataset for every window; here the
+  window is asked of the Zarr array itself.
+- `channel_names` is "" where a label is missing.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import zarr
+from bioio_ome_zarr import Reader
+from zarr.abc.buffer import Buffer
+from zarr.abc.store import ByteRequest, Store
+from zarr.core.buffer import BufferPrototype
+from zarr.storage import FsspecStore, LocalStore, WrapperStore
+
+from stereocell.errors import SourceError
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.faults import one_line
+from stereocell.read.image import Color, Image, linear_color
+from stereocell.read.location import Location
+from stereocell.read.spacing import Grid, Triple, um_per
+
+_BLOSC_HEADER = 16  # bytes; the last four are the length of the compressed chunk, header included
+
+
+def read_image(location: Location) -> Image:
+    """Return the first multiscale image of the group. Raises SourceError."""
+    where = location.shown
+    with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
+        reader = Reader(location.source, fs_kwargs=location.storage_options)
+        metadata = reader.metadata
+    attributes = metadata.attributes
+    ome = attributes.get("ome", attributes)
+    multiscales = ome.get("multiscales") if isinstance(ome, Mapping) else None
+    if not isinstance(multiscales, list) or not multiscales:
+        kind = next((key for key in ("plate", "well", "labels") if key in ome), None)
+        found = f"found a {kind}" if kind else "not found"
+        raise SourceError(
+            f"{where}: no multiscales: {found}, expected the attribute `multiscales` of an image"
+        )
+    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.4 and 0.5"):
+        axes, units = _axes(multiscales[0])
+        datasets = list(multiscales[0]["datasets"])
+        paths = [str(dataset["path"]) for dataset in datasets]
+        placements = [_placement(multiscales[0], dataset, len(axes)) for dataset in datasets]
+    if not paths:
+        raise SourceError(f"{where}: multiscales[0].datasets: found none, expected a level")
+    missing = [axis for axis in "zyx" if axis not in axes]
+    if missing:
+        raise SourceError(
+            f"{where}: a volume needs at least 2 planes: no axis {missing[0]} "
+            f"among {', '.join(axes)}"
+        )
+    store = _store(location)
+    arrays = tuple(_open_array(where, store, path, axes, metadata.zarr_format) for path in paths)
+    grids = tuple(
+        _grid(level, units, scale, shift)
+        for level, (scale, shift) in zip(arrays, placements, strict=True)
+    )
+    channels = ome.get("omero", {}).get("channels", []) if isinstance(ome, Mapping) else []
+    names, colors = _channels(where, channels, arrays[0].size("c"))
+    return Image(arrays, grids, names, colors, len(multiscales))
+
+
+def _axes(multiscale: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[float | None, ...]]:
+    """Return the names of the axes and the um in their units (None: no length)."""
+    axes = multiscale["axes"]
+    if not all(isinstance(axis, Mapping) for axis in axes):
+        raise ValueError("axes are not of OME-Zarr 0.4 or 0.5")
+    names = tuple(str(axis["name"]).lower() for axis in axes)
+    if len(set(names)) != len(names):
+        raise ValueError(f"axes {', '.join(names)} name one twice")
+    return names, tuple(um_per(axis.get("unit")) for axis in axes)
+
+
+def _placement(
+    multiscale: Mapping[str, Any], dataset: Mapping[str, Any], dimensions: int
+) -> tuple[list[float] | None, list[float] | None]:
+    """Return scale and translation of a level, in the axes' units; None: not stated.
+
+    The level's own transformations come first, then those of the whole image.
+    """
+    scale: list[float] | None = None
+    shift: list[float] | None = None
+    own = dataset.get("coordinateTransformations", [])
+    for step in [*own, *multiscale.get("coordinateTransformations", [])]:
+        kind = step["type"]
+        values = [float(value) for value in step.get(kind, [])]
+        if kind == "identity":
+            continue
+        if kind not in ("scale", "translation") or len(values) != dimensions:
+            raise ValueError(
+                f"coordinateTransformations: found {kind} of {len(values)} numbers "
+                f"for {dimensions} axes"
+            )
+        if kind == "scale":
+            scale = [a * b for a, b in zip(scale or [1.0] * dimensions, values, strict=True)]
+            shift = shift and [a * b for a, b in zip(shift, values, strict=True)]
+        else:
+            shift = [a + b for a, b in zip(shift or [0.0] * dimensions, values, strict=True)]
+    return scale, shift
+
+
+def _grid(
+    level: VoxelArray,
+    units: tuple[float | None, ...],
+    scale: Sequence[float] | None,
+    shift: Sequence[float] | None,
+) -> Grid:
+    spacing = None if scale is None else _spatial(level.axes, units, scale)
+    # A scale without a unit is no length: 1.0 is what writers put down when they know nothing.
+    offset = None if shift is None or spacing is None else _spatial(level.axes, units, shift)
+    return Grid(level.shape, spacing, offset)
+
+
+def _spatial(
+    axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float]
+) -> Triple | None:
+    picked = []
+    for axis in "zyx":
+        unit = units[axes.index(axis)]
+        if unit is None:
+            return None
+        picked.append(values[axes.index(axis)] * unit)
+    z, y, x = picked
+    return z, y, x
+
+
+def _channels(
+    where: str, channels: Any, count: int
+) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
+    entries = [entry for entry in channels if isinstance(entry, Mapping)]
+    if len(entries) > count:
+        raise SourceError(
+            f"{where}: omero.channels: found {len(entries)} entries, expected {count} "
+            "(the length of axis c)"
+        )
+    entries += [{}] * (count - len(entries))
+    names = tuple(str(entry["label"]).strip() if entry.get("label") else None for entry in entries)
+    return names, tuple(_color(entry.get("color")) for entry in entries)
+
+
+def _color(text: Any) -> Color | None:
+    match = re.fullmatch(r"#?([0-9a-fA-F]{6})([0-9a-fA-F]{2})?", str(text))
+    if match is None:
+        return None
+    red, green, blue = bytes.fromhex(match[1])
+    return linear_color((red, green, blue))
+
+
+def _store(location: Location) -> Store:
+    if location.is_local:
+        return LocalStore(location.source, read_only=True)
+    with one_line(location.shown, "an address that fsspec opens"):
+        return FsspecStore.from_url(
+            location.source, storage_options=location.storage_options, read_only=True
+        )
+
+
+def _open_array(
+    where: str, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
+) -> VoxelArray:
+    field = f"{where}: level {path!r}"
+    with one_line(field, "a Zarr array"):
+        array = zarr.open_array(store, path=path, mode="r", zarr_format=zarr_format)
+        compressors = array.compressors
+    if any("blosc" in type(codec).__name__.lower() for codec in compressors):
+        array = zarr.open_array(
+            WholeBloscStore(store), path=path, mode="r", zarr_format=zarr_format
+        )
+    if array.ndim != len(axes):
+        raise SourceError(f"{field}: found {array.ndim} dimensions, expected {len(axes)} as `axes`")
+    return VoxelArray(array, axes)
+
+
+class WholeBloscStore(WrapperStore[Store]):
+    """Refuses Blosc chunks that were cut short.
+
+    The decoder trusts the length in the chunk's header and reads past the end of the buffer, so a
+    truncated file would come out as noise, without an error.
+    """
+
+    async def get(
+        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
+    ) -> Buffer | None:
+        value = await self._store.get(key, prototype, byte_range)
+        is_metadata = key.rsplit("/", 1)[-1] in ("zarr.json", ".zarray", ".zattrs", ".zgroup")
+        if value is not None and not is_metadata and byte_range is None:
+            header = value[:_BLOSC_HEADER].to_bytes()
+            length = int.from_bytes(header[12:], "little")
+            if len(header) < _BLOSC_HEADER or len(value) < length:
+                raise OSError(f"chunk {key} is cut short ({len(value)} of {length} bytes)")
+        return value
+
+    async def get_partial_values(
+        self,
+        prototype: BufferPrototype,
+        key_ranges: Iterable[tuple[str, ByteRequest | None]],
+    ) -> list[Buffer | None]:
+        return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]

@@ -1,0 +1,131 @@
+"""Open a source: find its format, read its metadata, check that it is a volume we can build."""
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from stereocell.errors import SourceError
+from stereocell.read.dataset import ChannelInfo, Dataset
+from stereocell.read.image import Image
+from stereocell.read.location import Location
+from stereocell.read.spacing import Triple, levels_of
+
+DTYPES = ("uint8", "uint16", "float32")
+MAX_CHUNK_BYTES = 4 << 30  # a chunk is decoded whole: a header that asks for more is refused
+
+
+def _open_zarr(location: Location) -> Image:
+    from stereocell.read.ome_zarr import read_image  # 2 s to import, and not both are needed
+
+    return read_image(location)
+
+
+def _open_tiff(location: Location) -> Image:
+    from stereocell.read.ome_tiff import read_image
+
+    return read_image(location)
+
+
+READERS: dict[str, Callable[[Location], Image]] = {"ome-zarr": _open_zarr, "ome-tiff": _open_tiff}
+
+
+def open(source: str | Path, *, time: int = 0, spacing_um: Triple | None = None) -> Dataset:
+    """Open OME-Zarr 0.4 or 0.5, or OME-TIFF; no voxels are read yet.
+
+    `source` is a local path or an address (`http://`, `https://`, `s3://`, or another one that
+    fsspec knows). `time` is the time point, from 0. `spacing_um` (z, y, x) replaces the voxel
+    spacing that the source states. Raises SourceError for a source that can't be read as a volume
+    (one line: what, where, what was expected), UsageError for a spacing that is no length.
+    """
+    location = Location.of(source)
+    if location.is_local and not Path(location.source).exists():
+        raise SourceError(f"{location.shown}: not found, expected an OME-Zarr or OME-TIFF file")
+    if location.format is None:
+        raise SourceError(
+            f"{location.shown}: unknown format, "
+            "expected OME-Zarr (NAME.zarr) or OME-TIFF (NAME.ome.tif)"
+        )
+    image = READERS[location.format](location)
+    try:
+        return _dataset(location, image, time, spacing_um)
+    except BaseException:
+        if image.close is not None:
+            image.close()
+        raise
+
+
+def reopen(source: str, time: int, spacing_um: Triple | None) -> Dataset:
+    """`open` with positional arguments, for pickle."""
+    return open(source, time=time, spacing_um=spacing_um)
+
+
+def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | None) -> Dataset:
+    where = location.shown
+    finest = image.arrays[0]
+    _check_arrays(where, image)
+    if not 0 <= time < finest.size("t"):
+        raise SourceError(
+            f"{where}: time: found {time}, expected 0 to {finest.size('t') - 1} "
+            f"(the source holds {finest.size('t')} time points)"
+        )
+    names = _unique(image.names)
+    channels = map(ChannelInfo, names, image.colors)
+    return Dataset(
+        source=location.source,
+        name=location.name,
+        dtype=np.dtype(finest.array.dtype).newbyteorder("="),
+        levels=levels_of(image.grids, spacing_um, where),
+        channels=tuple(channels),
+        has_channel_names=all(name for name in image.names),
+        time_points=finest.size("t"),
+        time=time,
+        images=image.images,
+        spacing_um=spacing_um,
+        arrays=image.arrays,
+        shown=where,
+        on_close=image.close,
+    )
+
+
+def _check_arrays(where: str, image: Image) -> None:
+    finest = image.arrays[0]
+    for index, level in enumerate(image.arrays):
+        dtype = np.dtype(level.array.dtype)
+        if dtype.name not in DTYPES or dtype != np.dtype(finest.array.dtype):
+            expected = ", ".join(DTYPES[:-1]) + f" or {DTYPES[-1]}, the same in all levels"
+            raise SourceError(
+                f"{where}: dtype of level {index}: found {dtype.name}, expected {expected}"
+            )
+        if any(level.size(axis) != finest.size(axis) for axis in "tc"):
+            raise SourceError(
+                f"{where}: level {index}: found {level.size('t')} time points and "
+                f"{level.size('c')} channels, expected {finest.size('t')} and {finest.size('c')} "
+                "as in level 0"
+            )
+        extra = {a: level.size(a) for a in level.axes if a not in "tczyx" and level.size(a) > 1}
+        for axis, size in extra.items():
+            raise SourceError(
+                f"{where}: axis {axis!r} of length {size}, expected only t, c, z, y and x"
+            )
+        bytes_of_one = int(np.prod(level.array.chunks, dtype=np.int64)) * dtype.itemsize
+        if bytes_of_one > MAX_CHUNK_BYTES:
+            raise SourceError(
+                f"{where}: chunk {level.array.chunks} of level {index}: found "
+                f"{bytes_of_one / 2**30:.0f} GiB, expected at most {MAX_CHUNK_BYTES >> 30} GiB"
+            )
+    if finest.shape[0] < 2:
+        raise SourceError(
+            f"{where}: a volume needs at least 2 planes: found {finest.shape[0]} along z"
+        )
+
+
+def _unique(names: tuple[str | None, ...]) -> list[str]:
+    """Fill in missing names, and tell equal ones apart (a marker imaged in every cycle)."""
+    filled = [name or f"Channel{index}" for index, name in enumerate(names)]
+    count = Counter(filled)
+    return [
+        f"{name} (channel {index})" if count[name] > 1 else name
+        for index, name in enumerate(filled)
+    ]

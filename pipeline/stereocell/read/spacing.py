@@ -1,0 +1,159 @@
+"""Voxel spacings and the places of levels, in um, from what the metadata say."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+from stereocell.errors import SourceError, UsageError
+from stereocell.tiling import Box
+
+Triple = tuple[float, float, float]
+
+# Both spellings: OME-Zarr's (UDUNITS-2 names) and OME-XML's (symbols).
+_UM: dict[str, float] = {
+    "angstrom": 1e-4,
+    "\u00c5": 1e-4,
+    "picometer": 1e-6,
+    "pm": 1e-6,
+    "nanometer": 1e-3,
+    "nm": 1e-3,
+    "micrometer": 1.0,
+    "micron": 1.0,
+    "um": 1.0,
+    "\u00b5m": 1.0,  # micro sign
+    "\u03bcm": 1.0,  # Greek mu
+    "millimeter": 1e3,
+    "mm": 1e3,
+    "centimeter": 1e4,
+    "cm": 1e4,
+    "decimeter": 1e5,
+    "dm": 1e5,
+    "meter": 1e6,
+    "m": 1e6,
+    "inch": 25400.0,
+    "in": 25400.0,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One resolution of a dataset; level 0 is the finest.
+
+    shape       voxels (z, y, x)
+    spacing_um  (z, y, x)
+    origin_um   centre of voxel (0, 0, 0), (z, y, x), from level 0's
+    """
+
+    shape: tuple[int, int, int]
+    spacing_um: Triple
+    origin_um: Triple = (0.0, 0.0, 0.0)
+
+    @property
+    def box(self) -> Box:
+        """The whole level."""
+        return Box((0, 0, 0), self.shape)
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """One level as its metadata describe it; None: not said.
+
+    spacing_um, offset_um  (z, y, x); `offset_um` is the centre of voxel (0, 0, 0)
+    """
+
+    shape: tuple[int, int, int]
+    spacing_um: Triple | None = None
+    offset_um: Triple | None = None
+
+
+def um_per(unit: str | None) -> float | None:
+    """Return a length unit in um; None for no unit or one that is no length (`pixel`)."""
+    if unit is None:
+        return None
+    return _UM.get(unit, _UM.get(unit.strip().lower().replace("metre", "meter")))
+
+
+def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> tuple[Level, ...]:
+    """Return the levels, finest first.
+
+    `given_um` (z, y, x), the user's `--spacing-um`, replaces what the metadata say about level 0.
+    A coarser level without a translation has averaged blocks of voxels: its first centre lies at
+    0.5 (f - 1) of level 0's spacing, f being its factor. Raises SourceError if the spacing is
+    missing or isn't a positive length, UsageError if the given one isn't.
+    """
+    if given_um is not None:
+        if len(given_um) != 3 or not all(_is_length(value) for value in given_um):
+            text = ",".join(f"{value:g}" for value in given_um)
+            raise UsageError(f"--spacing-um: found {text}, expected z,y,x in um, each above 0")
+        finest = given_um
+        grids = tuple(grid if _is_sound(grid) else Grid(grid.shape) for grid in grids)
+    elif grids[0].spacing_um is None:
+        raise SourceError(
+            f"{where}: voxel size: not found with a unit of length; "
+            "expected it in the metadata, or give it with --spacing-um z,y,x"
+        )
+    else:
+        finest = grids[0].spacing_um
+    _check(grids, where)
+
+    levels = []
+    for grid in grids:
+        factors = _factors(grid, grids[0])
+        spacing = _triple(s * f for s, f in zip(finest, factors, strict=True))
+        origin = _triple(0.5 * (f - 1.0) * s for s, f in zip(finest, factors, strict=True))
+        if grid.offset_um is not None and grids[0].offset_um is not None:
+            # In level 0's own spacing, so that a given spacing scales the shift as well.
+            stated = grids[0].spacing_um or finest
+            shifts = zip(grid.offset_um, grids[0].offset_um, stated, finest, strict=True)
+            origin = _triple((a - b) / said * used for a, b, said, used in shifts)
+        levels.append(Level(grid.shape, spacing, origin))
+    return tuple(levels)
+
+
+def _check(grids: tuple[Grid, ...], where: str) -> None:
+    for index, grid in enumerate(grids):
+        for axis, value in zip("zyx", grid.spacing_um or (), strict=False):
+            if not _is_length(value):
+                raise SourceError(
+                    f"{where}: voxel size {axis} of level {index}: found {value:g} um, "
+                    "expected a length above 0 (or give --spacing-um z,y,x)"
+                )
+        if any(n < 1 for n in grid.shape):
+            raise SourceError(
+                f"{where}: shape (z, y, x) of level {index}: found {grid.shape}, expected voxels"
+            )
+    for index, (finer, coarser) in enumerate(pairwise(grids), start=1):
+        if any(b > a for a, b in zip(finer.shape, coarser.shape, strict=True)):
+            raise SourceError(
+                f"{where}: shape (z, y, x) of level {index}: found {coarser.shape}, "
+                f"expected at most level {index - 1}'s {finer.shape}"
+            )
+
+
+def _factors(grid: Grid, finest: Grid) -> Triple:
+    """How many voxels of level 0 one voxel of this level spans, (z, y, x)."""
+    if grid.spacing_um is not None and finest.spacing_um is not None:
+        return _triple(a / b for a, b in zip(grid.spacing_um, finest.spacing_um, strict=True))
+    return _triple(_shape_factor(n, m) for n, m in zip(finest.shape, grid.shape, strict=True))
+
+
+def _shape_factor(fine: int, coarse: int) -> float:
+    """The factor between two lengths in voxels: an integer if halving and rounding explain them."""
+    whole = round(fine / coarse)
+    if coarse in (fine // whole, -(-fine // whole)):
+        return float(whole)
+    return fine / coarse
+
+
+def _is_sound(grid: Grid) -> bool:
+    return grid.spacing_um is not None and all(_is_length(value) for value in grid.spacing_um)
+
+
+def _is_length(value: float) -> bool:
+    return math.isfinite(value) and value > 0.0
+
+
+def _triple(values: Iterable[float]) -> Triple:
+    z, y, x = values
+    return float(z), float(y), float(x)

@@ -1,0 +1,74 @@
+"""Curves as inline SVG, made of numbers alone: crisp, small, and coloured by the page's own CSS."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import ArrayLike, NDArray
+
+from stereocell.specimen import OpacityPoints
+
+WIDTH, HEIGHT = 320.0, 120.0
+_BINS = 128
+
+
+def histogram(
+    counts: Sequence[int], functions: Mapping[str, OpacityPoints], iso_normalized: float | None
+) -> Markup:
+    """Return a channel's histogram (log counts) over its window, with opacities and iso-value.
+
+    The lines have the classes `tf` and `tf-<name>`; opacity runs from 0 at the bottom to 1.
+    """
+    summed = np.add.reduceat(counts, np.arange(0, len(counts), max(1, len(counts) // _BINS)))
+    heights = np.log1p(summed) / max(1.0, float(np.log1p(summed).max()))
+    edges = np.linspace(0, 1, len(heights) + 1)
+    steps = _path(np.repeat(edges, 2)[1:-1], np.repeat(heights, 2))
+    parts = [f'<path class="area" d="{steps}V{HEIGHT:g}H0Z"/>']
+    for name, points in functions.items():
+        x, y = np.array(points, dtype=np.float64).T
+        parts.append(f'<path class="tf tf-{name}" d="{_path(x, y)}"/>')
+    if iso_normalized is not None:
+        parts.append(_rule("mark", iso_normalized))
+    return _svg("histogram with transfer functions", parts)
+
+
+def criterion(
+    levels: Sequence[float], score: Sequence[float], taken: float | None, found: float | None
+) -> Markup:
+    """Return the criterion's curve over the levels (voxel values).
+
+    taken  the iso-value, marked `mark`; None: the tile has none of its own
+    found  the criterion's optimum, marked `found` where another value was taken, or none
+    """
+    low, high = levels[0], levels[-1]
+    span = (high - low) or 1.0
+    at = (np.asarray(levels) - low) / span
+    parts = [f'<path class="curve" d="{_path(at, score)}"/>']
+    if found is not None and found != taken:
+        parts.append(_rule("found", (found - low) / span))
+    if taken is not None:
+        parts.append(_rule("mark", (taken - low) / span))
+    return _svg("criterion over levels", parts)
+
+
+def _path(x: ArrayLike, y: ArrayLike) -> str:
+    """Return a path through points in 0..1, y upwards."""
+    points = np.stack([np.asarray(x) * WIDTH, (1 - np.asarray(y)) * (HEIGHT - 4) + 4], axis=1)
+    return "M" + "L".join(_point(point) for point in points)
+
+
+def _point(point: NDArray[np.float64]) -> str:
+    return f"{point[0]:.1f},{point[1]:.1f}"
+
+
+def _rule(kind: str, at: float) -> str:
+    """Return an upright line; one beyond the axis stands at its end."""
+    x = min(max(at, 0.0), 1.0) * WIDTH
+    return f'<path class="{kind}" d="M{x:.1f},0V{HEIGHT:g}"/>'
+
+
+def _svg(label: str, parts: Sequence[str]) -> Markup:
+    return Markup(
+        f'<svg viewBox="-1 0 {WIDTH + 2:g} {HEIGHT:g}" preserveAspectRatio="none" role="img" '
+        f'aria-label="{label}">{"".join(parts)}</svg>'
+    )

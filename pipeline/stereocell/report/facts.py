@@ -1,0 +1,234 @@
+"""What a build left, in numbers: read from OUT, summed up, nothing drawn."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from stereocell.errors import OutputError
+from stereocell.plan import Channel, Plan
+from stereocell.store import Store, read_json
+from stereocell.tiling import Tile
+
+PHASES = ("plan", "units", "stage", "bundle")
+
+
+@dataclass(frozen=True, slots=True)
+class LodFacts:
+    """bytes: of the glb where the bundle has one, else of the unit's own file."""
+
+    triangles: int
+    distance_um: float
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class UnitFacts:
+    """One finished (tile, channel).
+
+    directory   its results
+    iso_file    the criterion's curve, relative to OUT
+    iso_value   None: the tile has none of its own
+    confidence  0..1
+    iso_reason  why the criterion found nothing; empty if it did
+    reason      why there is no surface; empty if there is one
+    voxels      (x, y, z) of the stored volume, its apron among them
+    volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
+    seconds     by step
+    """
+
+    tile: Tile
+    channel: Channel
+    directory: Path
+    iso_file: str
+    iso_value: float | None
+    confidence: float
+    iso_reason: str
+    reason: str
+    lods: tuple[LodFacts, ...]
+    voxels: tuple[int, int, int]
+    volume_bytes: int
+    ktx2_bytes: int
+    fragments_dropped: int
+    cavities_filled: int
+    seconds: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        return f"{self.tile.id}/{self.channel.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class StepFacts:
+    """Seconds that one step of the units took; `slowest` names the unit that took longest."""
+
+    name: str
+    median: float
+    largest: float
+    slowest: str
+    total: float
+
+
+@dataclass(frozen=True, slots=True)
+class FileFacts:
+    """Files of one kind in one part of OUT."""
+
+    part: str
+    suffix: str
+    count: int
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """All of a build. `missing`: units that the plan names and nobody has built."""
+
+    plan: Plan
+    survey: dict[str, Any]
+    units: tuple[UnitFacts, ...]
+    missing: tuple[str, ...]
+    phases: dict[str, float]
+    steps: tuple[StepFacts, ...]
+    files: tuple[FileFacts, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Total:
+    """Sums over units; the distance is the largest. One entry per level of detail in `lods`."""
+
+    lods: tuple[LodFacts, ...]
+    units: int
+    voxels: int
+    volume_bytes: int
+    ktx2_bytes: int
+    fragments_dropped: int
+    cavities_filled: int
+
+
+def gather(store: Store) -> Facts:
+    """Return the facts of OUT. Raises OutputError where plan or units are missing."""
+    plan = store.plan()
+    content, index = store.survey(), store.index()
+    units, missing = [], []
+    for tile in plan.tiles:
+        for channel in plan.channels:
+            if tile.id not in content.get(channel.id, {}).get("iso", {}):
+                raise OutputError(
+                    f"{store.survey_file}: {tile.id}/{channel.name} of plan.json is not in it: "
+                    "run `stereocell units OUT` again"
+                )
+            key = index.get(f"{tile.id}/{channel.id}")
+            if key is None:
+                missing.append(f"{tile.id}/{channel.name}")
+            else:
+                found = content[channel.id]["iso"][tile.id]
+                units.append(_unit(store, tile, channel, key, found))
+    times = store.times()
+    return Facts(
+        plan=plan,
+        survey=content,
+        units=tuple(units),
+        missing=tuple(missing),
+        phases={phase: times[phase] for phase in PHASES if phase in times},
+        steps=_steps(units),
+        files=_files(store),
+    )
+
+
+def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str, Any]) -> UnitFacts:
+    directory = store.unit_dir(tile.id, channel.id, key)
+    record = store.record(tile.id, channel.id, key)
+    bundle = store.bundle_dir
+    lods = []
+    for level, lod in enumerate(record["lods"]):
+        glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
+        file = glb if glb.is_file() else directory / f"lod{level}.npz"
+        lods.append(LodFacts(lod["triangles"], lod["distance_um"], file.stat().st_size))
+    ktx2 = [bundle / "volumes" / tile.id / f"{channel.id}{end}.ktx2" for end in ("", "_bricks")]
+    z, y, x = record["volume"]
+    return UnitFacts(
+        tile=tile,
+        channel=channel,
+        directory=directory,
+        iso_file=found["file"],
+        iso_value=found["value"],
+        confidence=found["confidence"],
+        iso_reason=found["reason"],
+        reason=record["reason"],
+        lods=tuple(lods),
+        voxels=(x, y, z),
+        volume_bytes=x * y * z,
+        ktx2_bytes=sum(file.stat().st_size for file in ktx2 if file.is_file()),
+        fragments_dropped=record["fragments_dropped"],
+        cavities_filled=record["cavities_filled"],
+        seconds=record["seconds"],
+    )
+
+
+def read_curve(out: Path, unit: UnitFacts) -> dict[str, Any]:
+    """Return what the first round wrote of a unit: levels, score, found (none if constant)."""
+    return dict(read_json(out / unit.iso_file, "run `stereocell units OUT` again"))
+
+
+def sum_up(units: Iterable[UnitFacts]) -> Total:
+    """Return the sums over these units."""
+    units = list(units)
+    levels = max((len(unit.lods) for unit in units), default=0)
+    lods = []
+    for level in range(levels):
+        there = [unit.lods[level] for unit in units if level < len(unit.lods)]
+        lods.append(
+            LodFacts(
+                sum(lod.triangles for lod in there),
+                max(lod.distance_um for lod in there),
+                sum(lod.bytes for lod in there),
+            )
+        )
+    return Total(
+        lods=tuple(lods),
+        units=len(units),
+        voxels=sum(int(np.prod(unit.voxels, dtype=np.int64)) for unit in units),
+        volume_bytes=sum(unit.volume_bytes for unit in units),
+        ktx2_bytes=sum(unit.ktx2_bytes for unit in units),
+        fragments_dropped=sum(unit.fragments_dropped for unit in units),
+        cavities_filled=sum(unit.cavities_filled for unit in units),
+    )
+
+
+@dataclass(slots=True)
+class _Spent:
+    seconds: list[float] = field(default_factory=list)
+    largest: float = -1.0
+    slowest: str = ""
+
+
+def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
+    """Return the steps in the order in which units go through them."""
+    spent: dict[str, _Spent] = defaultdict(_Spent)
+    for unit in sorted(units, key=lambda unit: -len(unit.seconds)):  # the longest ways first
+        for step, seconds in unit.seconds.items():
+            entry = spent[step]
+            entry.seconds.append(seconds)
+            if seconds > entry.largest:
+                entry.largest, entry.slowest = seconds, unit.name
+    return tuple(
+        StepFacts(step, median(s.seconds), s.largest, s.slowest, sum(s.seconds))
+        for step, s in spent.items()
+    )
+
+
+def _files(store: Store) -> tuple[FileFacts, ...]:
+    """Return count and bytes of the files in units, stage and bundle, by suffix, largest first."""
+    rows = []
+    for part in (store.out / "units", store.stage_dir, store.bundle_dir):
+        sizes: dict[str, list[int]] = defaultdict(list)
+        for file in part.rglob("*"):
+            if file.is_file() and not file.name.startswith("."):
+                sizes[file.suffix.removeprefix(".") or file.name].append(file.stat().st_size)
+        kinds = [FileFacts(part.name, suffix, len(n), sum(n)) for suffix, n in sizes.items()]
+        rows += sorted(kinds, key=lambda kind: (-kind.bytes, kind.suffix))
+    return tuple(rows)

@@ -1,0 +1,279 @@
+"""Write the report: one page that holds its own pictures, for any browser, with no network.
+
+Pictures and table rows are capped, evenly chosen, so that the page of a whole slide with thousands
+of units stays one that a phone opens; sums and remarks cover all units.
+"""
+
+import base64
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from numpy.typing import NDArray
+
+from stereocell.isofield import IsoField, make_iso_field
+from stereocell.report import charts
+from stereocell.report.choice import choose_level, choose_units, thin_out
+from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
+from stereocell.report.remarks import find_remarks
+from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
+from stereocell.report.slices import cut_unit, draw_slices
+from stereocell.store import Store, load_lods
+from stereocell.tiling import Box, Tile
+from stereocell.unit import APRON
+from stereocell.volume import zyx_to_xyz
+from stereocell.write.atomic import write_bytes
+from stereocell.write.generator import GENERATOR
+
+TEMPLATES = Path(__file__).parents[1] / "templates"
+MOST_PICTURED = 60  # units
+MOST_ROWS = 400  # units in a table
+_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # drawn in one picture
+# pixels: width, and the most height
+_TILE_PX, _WHOLE_PX = (420, 420), (1120, 620)
+
+
+def write_report(out: Path) -> None:
+    """Write OUT/report/index.html from what lies in OUT.
+
+    Stage and bundle may be missing: the page says so. Raises OutputError where plan or units are.
+    """
+    store = Store(out)
+    facts = gather(store)
+    write_bytes(store.report_file, render(store, facts).encode())
+
+
+def render(store: Store, facts: Facts) -> str:
+    """Return the page as HTML."""
+    plan = facts.plan
+    chosen = choose_units(len(plan.tiles), len(plan.channels), MOST_PICTURED)
+    tiles = [plan.tiles[tile] for tile, _ in chosen]
+    units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
+    scenes = [_scene(facts, None), *(_scene(facts, tile) for tile in tiles)]
+    with ThreadPoolExecutor(1) as pool:  # the meshes are drawn by another process meanwhile
+        drawing = pool.submit(draw_scenes, scenes)
+        iso_fields = _iso_fields(facts)
+        cards = [
+            [
+                _card(store, facts, units[key], iso_fields[key[1]])
+                for channel in channels
+                if (key := (plan.tiles[tile].id, plan.channels[channel].id)) in units
+            ]
+            for tile, channels in chosen
+        ]
+        pictures, refusal = drawing.result()
+
+    pictured = [_inline(picture) for picture in pictures]
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
+    return environment.get_template("report.html.j2").render(
+        facts=facts,
+        plan=plan,
+        generator=GENERATOR,
+        region_um=[n * s for n, s in zip(plan.region.shape, plan.spacing_um, strict=True)],
+        refusal=refusal,
+        whole=pictured[0] if pictured else None,
+        whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES),
+        remarks=find_remarks(facts, plan.settings.iso_values),
+        channels=_channels(facts),
+        tiles=[
+            {
+                "id": tile.id,
+                "picture": pictured[i + 1] if pictured else None,
+                "voxels": tile.box.shape[::-1],
+                "cards": cards[i],
+            }
+            for i, tile in enumerate(tiles)
+        ],
+        cards=sum(len(row) for row in cards),
+        rows=_rows(facts.units),
+        total=sum_up(facts.units),
+        has_bundle=any(file.part == "bundle" for file in facts.files),
+        parts={
+            part: [file for file in facts.files if file.part == part]
+            for part in dict.fromkeys(file.part for file in facts.files)
+        },
+        settings=store.settings_file.read_text() if store.settings_file.is_file() else "",
+    )
+
+
+def _channels(facts: Facts) -> list[dict[str, Any]]:
+    """Return what the page says of each channel."""
+    rows = []
+    for channel in facts.plan.channels:
+        entry = facts.survey[channel.id]
+        look = entry["look"]
+        units = [unit for unit in facts.units if unit.channel == channel]
+        values = [unit.iso_value for unit in units if unit.iso_value is not None]
+        low, high = look["window"]
+        normalized = None
+        if look["iso_value"] is not None:
+            normalized = (look["iso_value"] - low) / (high - low)
+        functions = look["transfer_functions"]
+        rows.append(
+            {
+                "name": channel.name,
+                "color": css_color(channel.color),
+                "window": (low, high),
+                "iso_value": look["iso_value"],
+                "confidence": look["iso_confidence"],
+                "spread": (min(values), max(values)) if values else None,
+                "given": channel.name in facts.plan.settings.iso_values,
+                "histogram": charts.histogram(entry["display"]["histogram"], functions, normalized),
+                "functions": list(functions),
+                "total": sum_up(units),
+            }
+        )
+    return rows
+
+
+def _card(store: Store, facts: Facts, unit: UnitFacts, iso: IsoField | None) -> dict[str, Any]:
+    """Return what the page shows of one unit: its slices and its curve."""
+    plan = facts.plan
+    lattice = unit.tile.lattice(plan.region)
+    inner = slice(APRON, -APRON)
+    volume = np.load(unit.directory / "volume.npy")[inner, inner, inner]
+    low, high = facts.survey[unit.channel.id]["look"]["window"]
+    slices = cut_unit(
+        volume,
+        lattice,
+        plan.position_um(lattice.start),
+        plan.spacing_um,
+        load_lods(unit.directory)[0].mesh if unit.lods else None,
+        float(plan.settings.surface.smoothing_um),
+        None if iso is None else partial(_in_eight_bits, iso, low, high),
+    )
+    curve = read_curve(store.out, unit)
+    levels, found = curve.get("levels"), curve.get("found")
+    return {
+        "unit": unit,
+        "color": css_color(unit.channel.color),
+        "slices": _inline(Picture(*draw_slices(slices))),
+        "chart": charts.criterion(levels, curve["score"], unit.iso_value, found)
+        if levels
+        else None,
+        "ends": (levels[0], levels[-1]) if levels else None,
+        "found": found,
+    }
+
+
+def _in_eight_bits(iso: IsoField, low: float, high: float, box: Box) -> NDArray[np.float32]:
+    return (iso.at(box) - np.float32(low)) * np.float32(255 / (high - low))
+
+
+def _iso_fields(facts: Facts) -> dict[str, IsoField | None]:
+    """Return the iso-value as the units took it, by channel id."""
+    return {
+        channel.id: make_iso_field(
+            facts.plan.tiles,
+            {tile: f["value"] for tile, f in facts.survey[channel.id]["iso"].items()},
+        )
+        for channel in facts.plan.channels
+    }
+
+
+def _scene(facts: Facts, tile: Tile | None) -> Scene:
+    """Return a tile with all its channels, or the whole specimen."""
+    tiles = facts.plan.tiles if tile is None else (tile,)
+    most = _WHOLE_TRIANGLES if tile is None else _TILE_TRIANGLES
+    units = [u for u in facts.units if u.lods and (tile is None or u.tile == tile)]
+    level, every = _level(units, most)
+    boxes = [_box_um(facts, t) for t in tiles]
+    corners = np.array(boxes)
+    return Scene(
+        surfaces=tuple(
+            Surface(
+                str((u.directory / f"lod{min(level, len(u.lods) - 1)}.npz").absolute()),
+                srgb(u.channel.color),
+            )
+            for u in (units[i] for i in thin_out(len(units), every))
+        ),
+        boxes=tuple(boxes),
+        frame=(tuple(corners[:, 0].min(axis=0)), tuple(corners[:, 1].max(axis=0))),
+        size=_WHOLE_PX if tile is None else _TILE_PX,
+    )
+
+
+def _level(units: Sequence[UnitFacts], most: int) -> tuple[int, int]:
+    triangles = [[lod.triangles for lod in unit.lods] for unit in units]
+    return choose_level(triangles, most) if triangles else (0, 1)
+
+
+def _drawn_note(units: Sequence[UnitFacts], most: int) -> str:
+    with_surface = [unit for unit in units if unit.lods]
+    level, every = _level(with_surface, most)
+    which = "" if every == 1 else f", about one in {every} of the {len(with_surface):,} surfaces"
+    return f"lod{level}{which}"
+
+
+def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the corners (x, y, z) in world um of the box that a tile's mesh fills."""
+    lattice = tile.lattice(facts.plan.region)
+    ends = [lattice.start, [end - 1 for end in lattice.stop]]
+    corners = zyx_to_xyz([facts.plan.position_um(end) for end in ends])
+    return tuple(corners.min(axis=0).tolist()), tuple(corners.max(axis=0).tolist())
+
+
+def _rows(units: Sequence[UnitFacts]) -> list[UnitFacts]:
+    """Return the units that tables list: all, or evenly chosen ones."""
+    if len(units) <= MOST_ROWS:
+        return list(units)
+    return [units[i * len(units) // MOST_ROWS] for i in range(MOST_ROWS)]
+
+
+def _inline(picture: Picture) -> Mapping[str, Any]:
+    data = base64.b64encode(picture.data).decode()
+    return {
+        "src": f"data:image/webp;base64,{data}",
+        "width": picture.width,
+        "height": picture.height,
+    }
+
+
+def srgb(linear: Sequence[float]) -> tuple[float, float, float]:
+    """Return sRGB 0..1 of linear RGB 0..1 (IEC 61966-2-1)."""
+    red, green, blue = (
+        12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in linear
+    )
+    return red, green, blue
+
+
+def css_color(linear: Sequence[float]) -> str:
+    return "#" + "".join(f"{round(255 * v):02x}" for v in srgb(linear))
+
+
+def _count(number: int) -> str:
+    return f"{number:,}"
+
+
+def _size(count: int) -> str:
+    """Return bytes in words, in powers of 1000."""
+    size, unit = float(count), "B"
+    for larger in ("kB", "MB", "GB", "TB"):
+        if size < 999.5:
+            break
+        size, unit = size / 1000, larger
+    return f"{size:.0f} {unit}" if unit == "B" or size >= 99.5 else f"{size:.3g} {unit}"
+
+
+def _seconds(seconds: float) -> str:
+    if seconds < 0.01:
+        return "< 0.01 s"
+    if seconds >= 7200:
+        return f"{seconds / 3600:.1f} h"
+    return f"{seconds:.2f} s" if seconds < 10 else f"{seconds:,.0f} s"
+
+
+def _um(length: float) -> str:
+    """Return a length in um, three digits that count."""
+    return f"{length:,.0f}" if length >= 999.5 else f"{length:.3g}"

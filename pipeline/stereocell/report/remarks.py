@@ -1,0 +1,96 @@
+"""What a reader of the report should look at: said in words, unit by unit."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from stereocell.report.facts import Facts, UnitFacts
+
+LOW_CONFIDENCE = 0.2
+_MOST_LINES = 30
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """A kind of thing with the units that show it. `is_note`: nothing is wrong, but know it."""
+
+    title: str
+    lines: tuple[str, ...]
+    is_note: bool = False
+
+
+def find_remarks(facts: Facts, given: Mapping[str, float]) -> list[Remark]:
+    """Return the remarks, gravest first. `given`: iso-values by the user's hand, by channel."""
+    units = facts.units
+    with_surface = {u.channel.name for u in units if not u.reason}
+    empty = [u for u in units if u.channel.name not in with_surface]
+    whole = [
+        f"{name}: {next(u.iso_reason or u.reason for u in empty if u.channel.name == name)}"
+        for name in dict.fromkeys(u.channel.name for u in empty)
+    ]
+    bare = [
+        f"{u.name}: {u.reason}" + (f" ({u.iso_reason})" if u.iso_reason else "")
+        for u in units
+        if u.reason and u.channel.name in with_surface
+    ]
+    own = [
+        f"{u.name}: {u.iso_reason}; built with the mean of the channel's other tiles"
+        for u in units
+        if u.iso_reason and not u.reason
+    ]
+    unsure = sorted(
+        (
+            u
+            for u in units
+            if u.iso_value is not None
+            and u.confidence < LOW_CONFIDENCE
+            and u.channel.name not in given
+        ),
+        key=lambda u: u.confidence,
+    )
+    found = [
+        _remark("not built yet", facts.missing),
+        _remark("without a surface in any tile", whole, "channel"),
+        _remark("without an iso-value of their own", own),
+        _remark(
+            f"with low confidence in their iso-value (below {LOW_CONFIDENCE:g})",
+            [f"{u.name}: {u.confidence:.2f} at iso-value {u.iso_value:.5g}" for u in unsure],
+        ),
+        _remark("without a surface, in channels that have some", bare, is_note=True),
+        _counts("fragments dropped", units, lambda u: u.fragments_dropped),
+        _counts("cavities filled", units, lambda u: u.cavities_filled),
+    ]
+    return [remark for remark in found if remark is not None]
+
+
+def _remark(
+    what: str, lines: Sequence[str], noun: str = "unit", is_note: bool = False
+) -> Remark | None:
+    if not lines:
+        return None
+    title = f"{len(lines):,} {noun}{'' if len(lines) == 1 else 's'} {what}"
+    return Remark(title, _cut(lines), is_note)
+
+
+def _counts(
+    what: str, units: Iterable[UnitFacts], count: Callable[[UnitFacts], int]
+) -> Remark | None:
+    """Return a note with the sum, its lines by channel."""
+    by_channel: dict[str, list[UnitFacts]] = {}
+    for unit in units:
+        if count(unit):
+            by_channel.setdefault(unit.channel.name, []).append(unit)
+    lines = []
+    for channel, touched in by_channel.items():
+        most = max(touched, key=count)
+        total = sum(count(unit) for unit in touched)
+        tiles = f"{len(touched):,} {'tile' if len(touched) == 1 else 'tiles'}"
+        lines.append(f"{channel}: {total:,} in {tiles}, most in {most.tile.id} ({count(most):,})")
+    if not lines:
+        return None
+    total = sum(count(unit) for touched in by_channel.values() for unit in touched)
+    return Remark(f"{total:,} {what}", _cut(lines), is_note=True)
+
+
+def _cut(lines: Sequence[str]) -> tuple[str, ...]:
+    more = len(lines) - _MOST_LINES
+    return (*lines[:_MOST_LINES], *([f"and {more:,} more"] if more > 0 else []))

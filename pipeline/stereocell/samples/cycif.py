@@ -1,0 +1,267 @@
+"""The sample `cycif`: a synthetic CyCIF block as OME-Zarr 0.5, and the truth it was made from."""
+
+import json
+import math
+import os
+import shutil
+from itertools import pairwise, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from zarr.codecs import ZstdCodec
+
+from stereocell.errors import OutputError, UsageError
+from stereocell.samples import fluorescence
+from stereocell.samples.fluorescence import BLUR_UM, SPACING_UM, STAINS
+from stereocell.samples.tissue import Tissue, grow_tissue
+from stereocell.tiling import Box
+
+SUFFIX = ".ome.zarr"
+_CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
+_COARSEST = 64  # voxels: the pyramid ends when the longer side in the plane is no longer than this
+
+
+def write_cycif(
+    path: Path,
+    grid: tuple[int, int] = (5, 2),
+    tile_size: tuple[int, int, int] = (64, 160, 160),
+    seed: int = 0,
+    brightness_spread: float = 1.0,
+) -> None:
+    """Write the sample to `path` (NAME.ome.zarr) and its truth to NAME.truth.json beside it.
+
+    `grid` is columns x rows of tiles of `tile_size` (z, y, x) voxels. Brightness of the cells is
+    log-uniform over 1 .. 1 + `brightness_spread`. The same arguments give the same bytes; where
+    they are there already, nothing is done. Raises UsageError for arguments that make no volume,
+    OutputError if something else lies at `path` or it can't be written.
+    """
+    _check(path, grid, tile_size, seed, brightness_spread)
+    depth, height, width = tile_size
+    shape = (depth, grid[1] * height, grid[0] * width)
+    size_um = tuple(n * h for n, h in zip(shape, SPACING_UM, strict=True))
+    settings = {
+        "grid": list(grid),
+        "tile_size": list(tile_size),
+        "seed": seed,
+        "brightness_spread": brightness_spread,
+    }
+    attributes = _attributes(shape, settings)
+    truth_path = path.with_name(path.name.removesuffix(SUFFIX) + ".truth.json")
+    try:
+        is_there = _is_there(path, attributes)
+        if is_there and truth_path.exists():
+            return
+        tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed, brightness_spread)
+        truth = json.dumps(_truth(tissue, shape, settings), indent=1) + "\n"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not is_there:
+            temporary = path.with_name(f".{path.name}.{os.getpid()}")
+            try:
+                _write_zarr(temporary, tissue, shape, tile_size, attributes, seed)
+                os.rename(temporary, path)
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
+        temporary = truth_path.with_name(f".{truth_path.name}.{os.getpid()}")
+        try:
+            temporary.write_text(truth, encoding="utf-8")
+            os.replace(temporary, truth_path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
+
+
+def _check(
+    path: Path,
+    grid: tuple[int, int],
+    tile_size: tuple[int, int, int],
+    seed: int,
+    brightness_spread: float,
+) -> None:
+    if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
+        raise UsageError(f"{path}: the sample is an OME-Zarr, expected a name like NAME{SUFFIX}")
+    if min(grid) < 1:
+        raise UsageError(f"--grid: found {grid[0]}x{grid[1]}, expected columns x rows from 1x1")
+    if min(tile_size) < 8:
+        found = ",".join(map(str, tile_size))
+        raise UsageError(f"--tile-size: found {found}, expected z,y,x of at least 8 voxels each")
+    if seed < 0:
+        raise UsageError(f"--seed: found {seed}, expected 0 or more")
+    if not (math.isfinite(brightness_spread) and 0.0 <= brightness_spread <= 20.0):
+        raise UsageError(f"--brightness-spread: found {brightness_spread:g}, expected 0 to 20")
+
+
+def _is_there(path: Path, attributes: dict[str, Any]) -> bool:
+    if not path.exists():
+        return False
+    metadata = path / "zarr.json"
+    found = json.loads(metadata.read_text(encoding="utf-8")) if metadata.is_file() else {}
+    if found.get("attributes") != attributes:
+        raise OutputError(
+            f"{path}: holds something else, expected nothing or this very sample: "
+            "remove it or choose another name"
+        )
+    return True
+
+
+def _level_shapes(shape: tuple[int, int, int]) -> list[tuple[int, int, int]]:
+    shapes = [shape]
+    while max(shapes[-1][1:]) > _COARSEST and min(shapes[-1][1:]) >= 2:
+        depth, height, width = shapes[-1]
+        shapes.append((depth, height // 2, width // 2))
+    return shapes
+
+
+def _attributes(shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the attributes of the group, OME-Zarr 0.5."""
+    axes: list[dict[str, str]] = [{"name": "c", "type": "channel"}]
+    axes += [{"name": axis, "type": "space", "unit": "micrometer"} for axis in "zyx"]
+    depth_um, height_um, width_um = SPACING_UM
+    datasets = []
+    for level in range(len(_level_shapes(shape))):
+        factor = 2**level
+        scale = [1.0, depth_um, height_um * factor, width_um * factor]
+        shift = [0.0, 0.0, 0.5 * (factor - 1) * height_um, 0.5 * (factor - 1) * width_um]
+        steps = [
+            {"type": "scale", "scale": scale},
+            {"type": "translation", "translation": shift},
+        ]
+        datasets.append({"path": str(level), "coordinateTransformations": steps})
+    channels = [
+        {
+            "label": stain.name,
+            "color": stain.color,
+            "active": True,
+            "window": {"min": 0, "max": 65535, "start": 100, "end": 100 + 2 * stain.amplitude},
+        }
+        for stain in STAINS
+    ]
+    return {
+        "ome": {
+            "version": "0.5",
+            "multiscales": [
+                {"name": "cycif", "axes": axes, "datasets": datasets, "type": "mean 2x2 in-plane"}
+            ],
+            "omero": {"channels": channels},
+        },
+        "stereocell_sample": {"name": "cycif", **settings},
+    }
+
+
+def _write_zarr(
+    path: Path,
+    tissue: Tissue,
+    shape: tuple[int, int, int],
+    tile_size: tuple[int, int, int],
+    attributes: dict[str, Any],
+    seed: int,
+) -> None:
+    group = zarr.open_group(path, mode="w", zarr_format=3, attributes=attributes)
+    shapes = _level_shapes(shape)
+    arrays = [
+        group.create_array(
+            str(level),
+            shape=(len(STAINS), *size),
+            chunks=tuple(min(a, b) for a, b in zip(_CHUNK, (1, *size), strict=True)),
+            dtype="uint16",
+            compressors=ZstdCodec(level=3),  # one thread, no dictionary: the same bytes every time
+            dimension_names=("c", "z", "y", "x"),
+        )
+        for level, size in enumerate(shapes)
+    ]
+    _, height, width = tile_size
+    for y in range(0, shape[1], height):
+        for stain in range(len(STAINS)):
+            # A whole row of tiles at a time, so that few chunks are written twice.
+            row = np.concatenate(
+                [
+                    fluorescence.record(tissue, stain, box, seed)
+                    for x in range(0, shape[2], width)
+                    for box in [Box((0, y, x), (shape[0], y + height, x + width))]
+                ],
+                axis=2,
+            )
+            arrays[0][stain, :, y : y + height, :] = row
+    for finer, coarser in pairwise(arrays):
+        _halve(finer, coarser)
+
+
+def _halve(finer: zarr.Array[Any], coarser: zarr.Array[Any]) -> None:
+    """Fill a level with the means of 2 x 2 voxels of the finer one, rounded half up."""
+    channels, depth, height, width = coarser.shape
+    for c, y, x in product(range(channels), range(0, height, 128), range(0, width, 512)):
+        rows, columns = min(128, height - y), min(512, width - x)
+        block = np.asarray(finer[c, :, 2 * y : 2 * (y + rows), 2 * x : 2 * (x + columns)])
+        sums = block.reshape(depth, rows, 2, columns, 2).sum(axis=(2, 4), dtype=np.uint32)
+        coarser[c, :, y : y + rows, x : x + columns] = ((sums + 2) // 4).astype(np.uint16)
+
+
+def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what the voxels were made from. Lengths in um, positions (z, y, x)."""
+    waves = [
+        fluorescence.waves_of(index, tissue.size_um, settings["seed"])
+        for index in range(len(STAINS))
+    ]
+    centers = np.array([nucleus.center_um for nucleus in tissue.nuclei]).reshape(-1, 3)
+    z, y, x = centers.T
+    levels = fluorescence.background(STAINS[0], waves[0], (z, y, x))
+    return {
+        "sample": {"name": "cycif", **settings},
+        "note": "positions are (z, y, x) in um; the centre of voxel (0, 0, 0) is the origin. "
+        "A dye's boundary lies where the voxels hold background + amplitude * brightness / 2.",
+        "shape": list(shape),
+        "spacing_um": list(SPACING_UM),
+        "blur_sigma_um": list(BLUR_UM),
+        "noise": {
+            "offset": fluorescence.OFFSET,
+            "counts_per_electron": fluorescence.GAIN,
+            "read_sigma": fluorescence.READ_NOISE,
+        },
+        "channels": [
+            {
+                "name": stain.name,
+                "amplitude": stain.amplitude,
+                "background": {
+                    "offset": fluorescence.OFFSET,
+                    "mean": stain.background,
+                    "waves": [
+                        {"k_per_um": list(wave.k), "phase": wave.phase, "weight": wave.weight}
+                        for wave in waves[index]
+                    ],
+                },
+            }
+            for index, stain in enumerate(STAINS)
+        ],
+        "nuclei": [
+            {
+                "center_um": list(nucleus.center_um),
+                "semi_axes_um": list(nucleus.semi_axes_um),
+                "rotation": nucleus.rotation.tolist(),
+                "brightness": nucleus.brightness,
+                "boundary_intensity": float(level + STAINS[0].amplitude * nucleus.brightness / 2),
+            }
+            for nucleus, level in zip(tissue.nuclei, levels, strict=True)
+        ],
+        "membrane_um": fluorescence.MEMBRANE_UM,
+        "cytoplasm": fluorescence.CYTOPLASM,
+        "cells": [
+            {
+                "center_um": list(cell.center_um),
+                "radius_um": cell.cell_um,
+                "brightness": cell.brightness,
+            }
+            for cell in tissue.nuclei
+            if cell.cell_um > 0.0
+        ],
+        "vessel_wall_um": fluorescence.WALL_UM,
+        "vessels": [
+            {
+                "start_um": list(tube.start_um),
+                "end_um": list(tube.end_um),
+                "radius_um": tube.radius_um,
+            }
+            for tube in tissue.vessels
+        ],
+    }

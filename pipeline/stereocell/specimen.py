@@ -1,0 +1,84 @@
+"""What the stages make of a volume, and the stage writer takes: looks, and the content of tiles."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.mesh import Lod
+from stereocell.names import to_identifier
+
+OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How one channel is drawn in all tiles.
+
+    color             linear RGB, 0..1
+    window            the voxel values that become 0 and 1 in the 8-bit volumes
+    iso_value         mean over the tiles, in voxel values; None: no tile has a surface
+    iso_confidence    0..1, mean over the tiles
+    transfer_functions  opacity points by name; `default` is among them
+    """
+
+    name: str
+    color: tuple[float, float, float]
+    window: tuple[float, float]
+    iso_value: float | None
+    iso_confidence: float
+    transfer_functions: dict[str, OpacityPoints]
+
+    @property
+    def id(self) -> str:
+        return to_identifier(self.name)
+
+    @property
+    def iso_normalized(self) -> float | None:
+        """The iso-value on the window's scale, 0..1."""
+        low, high = self.window
+        return None if self.iso_value is None else (self.iso_value - low) / (high - low)
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelContent:
+    """One (tile, channel): what a unit of work leaves.
+
+    lods    finest first; empty: no surface
+    volume  uint8 (z, y, x), window applied, with an apron of 1 voxel on every side
+    """
+
+    channel_id: str
+    lods: tuple[Lod, ...]
+    volume: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class TileContent:
+    """One tile with all its channels.
+
+    first_um, last_um  (z, y, x) centres of its first own voxel and of its last lattice point: the
+                       box that its meshes fill and that its volume shows
+    own_shape          voxels (z, y, x) without the apron and without the neighbours' shared plane.
+                       The volumes' shape is the lattice's (own + shared planes) + 2
+    """
+
+    id: str
+    spacing_um: tuple[float, float, float]
+    first_um: tuple[float, float, float]
+    last_um: tuple[float, float, float]
+    own_shape: tuple[int, int, int]
+    channels: tuple[ChannelContent, ...]
+
+
+Provenance = dict[str, Any]
+
+
+def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:
+    """Return the opacity at `size` intensities from 0 to 1, straight lines between the points.
+
+    float32 (size,). Before the first and after the last point the opacity stays as it is there.
+    """
+    intensities, opacities = np.array(points, dtype=np.float64).T
+    return np.interp(np.linspace(0, 1, size), intensities, opacities).astype(np.float32)

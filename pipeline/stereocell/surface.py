@@ -1,0 +1,141 @@
+"""Turn a window of voxels into the triangles of its iso-surface, without cracks between tiles.
+
+Neighbouring tiles share a plane of lattice points and each extracts only its own cells. Whatever
+the field depends on is dataset-wide or lies inside the halo, so both see the same values on the
+common plane, and the vertices there come out equal bit by bit: positions are found in lattice
+units and put into the world in float64, by the same arithmetic for every tile.
+
+Extraction is Flying Edges (Schroeder, Maynard & Geveci, LDAV 2015) as VTK has it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
+from stereocell.mesh import Mesh
+from stereocell.tiling import Box
+from stereocell.volume import Volume, zyx_to_xyz
+
+SMOOTHING_REACH = 4.0  # sigmas of the Gaussian that are summed
+# Values nearer to zero than this share of the distance's clip are moved off it: a vertex on a
+# lattice point would make degenerate triangles.
+SNAP = 0.01
+
+
+def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
+    """Return the voxels (z, y, x) after a Gaussian of `sigma_um`, float32; 0 turns it off."""
+    field = volume.voxels.astype(np.float32)
+    if sigma_um > 0:
+        sigma = sigma_um / np.asarray(volume.spacing_um)
+        field = ndimage.gaussian_filter(field, sigma, mode="nearest", truncate=SMOOTHING_REACH)
+    return field
+
+
+def signed_distance(
+    field: NDArray[np.float32],
+    iso_value: NDArray[np.float32],
+    spacing_um: tuple[float, float, float],
+    value_range: float,
+) -> NDArray[np.float32]:
+    """Return the first-order distance to the surface f = iso in um, positive inside.
+
+    It is (f - iso) / |grad f|, true to a fraction of a voxel near the surface, and clipped to two
+    of the coarsest spacings, beyond which it means nothing. `iso_value` broadcasts over the field;
+    `value_range` (dataset-wide, voxel values) bounds the division where the field is flat.
+    """
+    squares = np.zeros_like(field)
+    for axis, step in enumerate(spacing_um):
+        squares += np.gradient(field, np.float32(step), axis=axis) ** 2
+    slope = np.sqrt(squares, out=squares)
+    slope += np.float32(1e-6 * value_range)
+    distance = np.subtract(field, iso_value, dtype=np.float32)
+    distance /= slope
+    limit = np.float32(2 * max(spacing_um))
+    return np.clip(distance, -limit, limit, out=distance)
+
+
+def extract_surface(
+    distance: NDArray[np.float32],
+    window: Box,
+    lattice: Box,
+    region: Box,
+    spacing_um: tuple[float, float, float],
+    origin_um: tuple[float, float, float],
+) -> Mesh:
+    """Return the surface distance = 0 inside `lattice`, in world um; empty if there is none.
+
+    `distance` (z, y, x) covers `window`. The mesh is open where another tile follows, and closed
+    by a cap, within one voxel, where `region` (all that is built) ends. Normals come from the
+    field's gradient, which halos make continuous across tiles.
+    """
+    inner = tuple(
+        slice(a - w, b - w)
+        for a, b, w in zip(lattice.start, lattice.stop, window.start, strict=True)
+    )
+    limit = np.float32(2 * max(spacing_um))
+    cap = [
+        (int(a == low), int(b == high))
+        for a, b, low, high in zip(
+            lattice.start, lattice.stop, region.start, region.stop, strict=True
+        )
+    ]
+    # where the lattice ends with the region, so does the window: both get the same margin
+    margin = np.array([low for low, _ in cap])
+    distance = np.pad(distance, cap, constant_values=-limit)
+    values = distance[
+        tuple(
+            slice(part.start, part.stop + low + high)
+            for part, (low, high) in zip(inner, cap, strict=True)
+        )
+    ].copy()
+    snap = np.float32(SNAP) * limit
+    near = np.abs(values) < snap
+    values[near] = np.where(values[near] > 0, snap, -snap)
+    points, triangles = _flying_edges(values)
+    if not len(triangles):
+        empty = np.zeros((0, 3), np.float32)
+        return Mesh(empty, np.zeros((0, 3), np.uint32), empty)
+
+    steps, origin = np.asarray(spacing_um), np.asarray(origin_um)
+    lattice_zyx = points[:, ::-1].astype(np.float64) + (np.asarray(lattice.start) - margin)
+    positions = zyx_to_xyz(lattice_zyx * steps + origin).astype(np.float32)
+    normals = _normals(distance, lattice_zyx - np.asarray(window.start) + margin, steps)
+    # VTK winds by the image's own axes; the world mirrors y, which turns every triangle over
+    return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
+
+
+def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Return points (x, y, z) in lattice units and triangles of values = 0."""
+    image = vtkImageData()
+    image.SetDimensions(*values.shape[::-1])
+    scalars = np.ascontiguousarray(values).ravel()  # VTK borrows it: it must outlive the filter
+    image.GetPointData().SetScalars(numpy_to_vtk(scalars))
+    filter_ = vtkFlyingEdges3D()
+    filter_.SetInputData(image)
+    filter_.SetValue(0, 0.0)
+    filter_.ComputeNormalsOff()
+    filter_.ComputeScalarsOff()
+    filter_.Update()
+    output = filter_.GetOutput()
+    if not output.GetNumberOfPolys():
+        return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)
+    points = vtk_to_numpy(output.GetPoints().GetData()).astype(np.float32)
+    triangles = vtk_to_numpy(output.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    return points, triangles.astype(np.uint32)
+
+
+def _normals(
+    distance: NDArray[np.float32], at: NDArray[np.float64], spacing_um: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Return unit normals (x, y, z), pointing out of {distance > 0}, at window indices (n, 3)."""
+    gradient = np.empty((3, len(at)), np.float32)
+    coordinates = at.T
+    for axis, step in enumerate(spacing_um):
+        slope = np.gradient(distance, np.float32(step), axis=axis)
+        gradient[axis] = ndimage.map_coordinates(slope, coordinates, order=1, mode="nearest")
+    outward = zyx_to_xyz(-gradient.T)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    return (outward / np.maximum(length, 1e-20)).astype(np.float32)

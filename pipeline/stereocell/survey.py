@@ -1,0 +1,55 @@
+"""What must be known of the whole dataset before any unit: windows, histograms, transfer functions.
+
+8 bits mean the same in every tile, so a channel's window comes from all of the region, on a coarse
+level. Iso-values are found per tile; transfer functions need their mean.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.config import WindowOptions
+from stereocell.specimen import Look
+from stereocell.transfer import make_transfer_functions
+
+BINS = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """One channel's window in voxel values, and voxel counts (int64, 256 bins) inside it."""
+
+    window: tuple[float, float]
+    histogram: tuple[int, ...]
+
+
+def find_display(voxels: NDArray[Any], options: WindowOptions) -> Display:
+    """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide."""
+    percentiles = (options.low_percentile, options.high_percentile)
+    low, high = (float(v) for v in np.percentile(voxels, percentiles))
+    if not high > low:  # sparse channels: fewer bright voxels than the percentile leaves out
+        low, high = float(voxels.min()), float(voxels.max())
+    if not high > low:
+        high = low + 1.0
+    counts, _ = np.histogram(np.clip(voxels, low, high), BINS, (low, high))
+    return Display((low, high), tuple(int(n) for n in counts))
+
+
+def make_look(
+    name: str,
+    color: tuple[float, float, float],
+    display: Display,
+    iso_values: Mapping[str, float | None],
+    confidences: Mapping[str, float],
+) -> Look:
+    """Return how a channel is drawn; iso-values and confidences by tile id."""
+    known = {tile: value for tile, value in iso_values.items() if value is not None}
+    iso_value = float(np.mean(list(known.values()))) if known else None
+    confidence = float(np.mean([confidences[tile] for tile in known])) if known else 0.0
+    low, high = display.window
+    normalized = None if iso_value is None else (iso_value - low) / (high - low)
+    functions = make_transfer_functions(np.asarray(display.histogram), normalized)
+    return Look(name, color, display.window, iso_value, confidence, functions)

@@ -1,0 +1,76 @@
+"""Cut a lattice of voxels into tiles that share their border planes.
+
+Neighbours share ONE plane of lattice points: a tile's own points run from `start` to `stop`
+inclusive where another tile follows, so that each cell belongs to exactly one tile and surfaces
+meet without cracks and without clipping.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Half-open box of voxels, (z, y, x), in indices of the level that is built."""
+
+    start: tuple[int, int, int]
+    stop: tuple[int, int, int]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        z, y, x = (b - a for a, b in zip(self.start, self.stop, strict=True))
+        return z, y, x
+
+    @property
+    def slices(self) -> tuple[slice, slice, slice]:
+        z, y, x = (slice(a, b) for a, b in zip(self.start, self.stop, strict=True))
+        return z, y, x
+
+    def grown(self, halo: tuple[int, int, int], within: "Box") -> "Box":
+        """Return the box larger by `halo` voxels on each side, clipped to `within`."""
+        start = (max(a - h, low) for a, h, low in zip(self.start, halo, within.start, strict=True))
+        stop = (min(b + h, high) for b, h, high in zip(self.stop, halo, within.stop, strict=True))
+        z0, y0, x0 = start
+        z1, y1, x1 = stop
+        return Box((z0, y0, x0), (z1, y1, x1))
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """`id` is `r<row>_c<column>`, with `_z<k>` where the depth is split. `box`: its own voxels."""
+
+    id: str
+    box: Box
+
+    def lattice(self, region: Box) -> Box:
+        """Return the box of the lattice points between which the tile's cells lie.
+
+        It holds one plane more than `box` on each side where another tile follows.
+        """
+        z, y, x = (min(b + 1, end) for b, end in zip(self.box.stop, region.stop, strict=True))
+        return Box(self.box.start, (z, y, x))
+
+
+def cut(region: Box, tile_size: tuple[int, int, int]) -> tuple[Tile, ...]:
+    """Return the tiles of `region`, row by row; the last of an axis may be smaller.
+
+    A last tile of a single plane would hold no cells: it joins its neighbour.
+    """
+    axes = []
+    for low, high, size in zip(region.start, region.stop, tile_size, strict=True):
+        edges = list(range(low, high, size))
+        if len(edges) > 1 and high - edges[-1] < 2:
+            edges.pop()
+        axes.append(list(zip(edges, [*edges[1:], high], strict=True)))
+    deep = len(axes[0]) > 1
+    tiles = []
+    for (r, ys), (c, xs), (k, zs) in product(*(list(enumerate(axes[i])) for i in (1, 2, 0))):
+        box = Box((zs[0], ys[0], xs[0]), (zs[1], ys[1], xs[1]))
+        tiles.append(Tile(f"r{r}_c{c}" + (f"_z{k}" if deep else ""), box))
+    return tuple(tiles)
+
+
+def size_of_grid(region: Box, columns: int, rows: int) -> tuple[int, int, int]:
+    """Return the tile size that cuts `region` into columns x rows (ceiling division)."""
+    depth, height, width = region.shape
+    return depth, -(-height // rows), -(-width // columns)

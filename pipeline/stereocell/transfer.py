@@ -1,0 +1,45 @@
+"""Transfer functions: from a channel's intensities to opacity, made from histogram and iso-value.
+
+Intensity 0..1 is the channel's window. Opacity is what one finest voxel spacing of the material
+absorbs; the marcher corrects it for its own step. Colour is the channel's, kept apart, so that a
+recoloured channel needs no new table.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.specimen import OpacityPoints
+
+NAMES = ("default", "soft", "sharp", "surface")
+
+
+def make_transfer_functions(
+    histogram: NDArray[np.int64], iso_normalized: float | None
+) -> dict[str, OpacityPoints]:
+    """Return the opacity points of every name in NAMES.
+
+    `histogram`: voxel counts over 0..1 in equal bins. Background is what most voxels are: opacity
+    starts above its 90th percentile, and half-way to the iso-value where that lies higher. A
+    channel without a surface gets its 99th percentile as the level.
+    """
+    share = np.cumsum(histogram) / max(1, int(histogram.sum()))
+    bins = len(histogram)
+    percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.9, 0.99)}
+    level = percentile[0.99] if iso_normalized is None else iso_normalized
+    level = float(np.clip(level, 0.02, 0.96))
+    floor = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
+    bright = max(level + 0.5 * (1 - level), level + 0.02)
+    return {
+        "default": _points((floor, 0.0), (level, 0.12), (bright, 0.45), (1.0, 0.6)),
+        "soft": _points((0.6 * floor, 0.0), (level, 0.04), (1.0, 0.2)),
+        "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
+        "surface": _points(
+            (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
+        ),
+    }
+
+
+def _points(*points: tuple[float, float]) -> OpacityPoints:
+    """Return the points with both ends of the range, rounded so that text files repeat."""
+    inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]
+    return ((0.0, 0.0), *inner)

@@ -1,0 +1,143 @@
+"""The unit of work: one (tile, channel), from voxels to meshes and an 8-bit volume. Pure."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.config import Settings
+from stereocell.isofield import IsoField
+from stereocell.lod import measure_distance, simplify
+from stereocell.mesh import Lod, Mesh
+from stereocell.repair import RepairOptions, repair
+from stereocell.surface import extract_surface, signed_distance, smooth
+from stereocell.tiling import Box
+from stereocell.unwrap import bake_normals, unwrap
+from stereocell.volume import Volume
+
+APRON = 1
+
+
+@dataclass(frozen=True, slots=True)
+class UnitInput:
+    """What a unit depends on, besides its voxels.
+
+    window, lattice, region  what was read, the tile's lattice points, all that is built (voxels)
+    iso                      the iso-value field near the tile; None: no surface
+    display                  voxel values that become 0 and 255
+    """
+
+    window: Box
+    lattice: Box
+    region: Box
+    iso: IsoField | None
+    display: tuple[float, float]
+    settings: Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What a unit leaves.
+
+    volume   uint8 (z, y, x): the lattice's voxels, window applied, 1 voxel of apron on every side
+    reason   why there is no surface; empty if there is one
+    seconds  by step
+    """
+
+    lods: tuple[Lod, ...]
+    volume: NDArray[np.uint8]
+    reason: str
+    fragments_dropped: int
+    cavities_filled: int
+    seconds: dict[str, float]
+
+
+def build_unit(volume: Volume, given: UnitInput) -> Unit:
+    """Return meshes and volume of one unit. `volume` covers `given.window`; origin of voxel 0 0 0.
+
+    A unit whose part of the field never crosses the iso-value has no surface, and says so.
+    """
+    clock = _Clock()
+    with clock("volume"):
+        eight_bit = to_eight_bit(volume.voxels, given)
+    if given.iso is None:
+        return Unit((), eight_bit, "the channel has no iso-value", 0, 0, clock.seconds)
+
+    surface = given.settings.surface
+    spacing = volume.spacing_um
+    with clock("distance"):
+        field = smooth(volume, float(surface.smoothing_um))
+        value_range = given.display[1] - given.display[0]
+        distance = signed_distance(field, given.iso.at(given.window), spacing, value_range)
+    with clock("repair"):
+        lengths = (surface.alpha_um, surface.min_diagonal_um, surface.max_cavity_um)
+        repaired = repair(distance, spacing, RepairOptions(*(float(um) for um in lengths)))
+    with clock("extract"):
+        origin = np.asarray(volume.origin_um) - np.asarray(given.window.start) * spacing
+        z, y, x = (float(o) for o in origin)
+        fine = extract_surface(
+            repaired.distance, given.window, given.lattice, given.region, spacing, (z, y, x)
+        )
+    counts = repaired.fragments_dropped, repaired.cavities_filled
+    if not len(fine.triangles):
+        return Unit((), eight_bit, "no voxel crosses the iso-value", *counts, clock.seconds)
+    lods = _make_lods(fine, spacing, given.settings, clock)
+    return Unit(lods, eight_bit, "", *counts, clock.seconds)
+
+
+def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
+    """Return the lattice's voxels and an apron, window applied; ends of the region repeat."""
+    index = [
+        np.clip(np.arange(a - APRON, b + APRON), low, high - 1) - w
+        for a, b, low, high, w in zip(
+            given.lattice.start,
+            given.lattice.stop,
+            given.region.start,
+            given.region.stop,
+            given.window.start,
+            strict=True,
+        )
+    ]
+    low, high = given.display
+    values = voxels[np.ix_(*index)].astype(np.float32)
+    return np.round(np.clip((values - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+
+
+def _make_lods(
+    fine: Mesh, spacing: tuple[float, float, float], settings: Settings, clock: "_Clock"
+) -> tuple[Lod, ...]:
+    options = settings.lod
+    lods: list[Lod] = []
+    mesh = fine
+    for level, error in enumerate(options.errors):
+        with clock("simplify"):
+            mesh = simplify(mesh, error * max(spacing))
+        with clock("measure"):
+            distance = measure_distance(fine, mesh, options.samples)
+            # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
+            distance = max(distance, lods[-1].distance_um if lods else 0.0)
+        if level >= len(options.errors) - settings.unwrap.coarse_lods and len(mesh.triangles):
+            with clock("unwrap"):
+                unwrapped, size = unwrap(mesh, settings.unwrap.max_texture, max(spacing))
+            with clock("bake"):
+                lods.append(Lod(unwrapped, distance, bake_normals(unwrapped, fine, size)))
+        else:
+            lods.append(Lod(mesh, distance))
+    return tuple(lods)
+
+
+class _Clock:
+    """Seconds spent, by step."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, step: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start

@@ -1,0 +1,193 @@
+"""Write the web bundle of a composed stage: DESIGN section 6; schemas/bundle.schema.json.
+
+    manifest.json  files.json                      written last: they hash all others
+    channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb
+    volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
+    luts/<channel>.ktx2
+    index.html  assets/                            the viewer
+
+The stage is the only source. It is written beside its place and put there as a whole.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stereocell.errors import OutputError, StageError
+from stereocell.specimen import evaluate
+from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
+from stereocell.write.composed import hinted_box, open_stage, specimen_name, tile_prims
+from stereocell.write.composed_look import ComposedLook, read_looks
+from stereocell.write.generator import GENERATOR
+from stereocell.write.gltf import choose_step
+from stereocell.write.ktx2 import encode_2d
+from stereocell.write.tiles3d import make_tileset
+
+MANIFEST = "manifest.json"
+FILES = "files.json"
+
+
+def write_bundle(
+    stage_path: Path, bundle_dir: Path, viewer_dist: Path | None, workers: int = 0
+) -> None:
+    """Write the bundle of a stage, or of a layer over it, in place of an older one.
+
+    viewer_dist  the built viewer, copied into the bundle; None: no viewer
+    workers      processes that share the tiles; 0: this one. The bytes don't depend on it
+
+    Raises StageError where the stage lacks something, naming prim and file; OutputError where
+    `bundle_dir` can't be written, or is something else.
+    """
+    if bundle_dir.exists() and not (bundle_dir / MANIFEST).is_file() and _holds(bundle_dir):
+        raise OutputError(f"{bundle_dir}: exists and is no bundle: no {MANIFEST} in it")
+    if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
+        raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
+    partial_dir = bundle_dir.with_name(f".{bundle_dir.name}.partial")
+    try:
+        shutil.rmtree(partial_dir, ignore_errors=True)  # of a killed run
+        partial_dir.mkdir(parents=True)
+        _fill(stage_path, partial_dir, viewer_dist, workers)
+        _swap(partial_dir, bundle_dir)
+    except OSError as error:
+        raise OutputError(f"{bundle_dir}: can't be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(partial_dir, ignore_errors=True)
+
+
+def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, workers: int) -> None:
+    stage = open_stage(stage_path)
+    looks = read_looks(stage)
+    prims = tile_prims(stage)
+    if not prims:
+        raise StageError(f"{stage_path}: no tile is visible")
+    boxes = [hinted_box(prim) for prim in prims]
+    step_m = choose_step(float(max((high - low).max() for low, high in boxes)))
+    export = partial(
+        export_tile,
+        stage_path,
+        root,
+        channel_ids=tuple(look.id for look in looks),
+        step_m=step_m,
+    )
+    tiles = _run(export, [str(prim.GetName()) for prim in prims], workers)
+
+    files = [ref for tile in tiles for channel in tile.channels for ref in channel.files]
+    channels = []
+    for i, look in enumerate(looks):
+        entry, written = _write_channel(root, look, [(t.id, t.channels[i]) for t in tiles])
+        channels.append(entry)
+        files += written
+    if viewer_dist is not None:
+        files += _copy_viewer(viewer_dist, root)
+    listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
+    index = write_file(root, FILES, _json(dict(sorted(listed.items()))))
+    manifest = {
+        "format": "stereocell-bundle",
+        "version": 1,
+        "generator": GENERATOR,
+        "specimen": {"name": specimen_name(stage), "bounds_um": _bounds(tiles)},
+        "tiles": [{"id": tile.id, "bounds_um": _bounds([tile])} for tile in tiles],
+        "channels": channels,
+        "files": asdict(index),
+    }
+    write_file(root, MANIFEST, _json(manifest))
+
+
+def _run(export: "partial[BundleTile]", tile_ids: list[str], workers: int) -> list[BundleTile]:
+    processes = min(workers, len(tile_ids))
+    if processes < 2:
+        return [export(tile_id) for tile_id in tile_ids]
+    # not forked: USD's threads would be lost halfway through what they do
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        return list(pool.map(export, tile_ids))
+
+
+def _write_channel(
+    root: Path, look: ComposedLook, tiles: Sequence[tuple[str, TileChannel]]
+) -> tuple[dict[str, Any], list[FileRef]]:
+    """Write what a channel has once; return its entry in the manifest, and the files."""
+    folder = f"channels/{look.id}"
+    drawn = [channel.lods for _, channel in tiles if channel.lods]
+    tileset = None
+    if drawn:
+        tileset = write_file(root, f"{folder}/tileset.json", _json(make_tileset(drawn)))
+    entries = [channel.volume for _, channel in tiles if channel.volume is not None]
+    volumes = write_file(root, f"{folder}/volumes.json", _json({"volumes": entries}))
+    lut = write_file(root, f"luts/{look.id}.ktx2", encode_2d(_bake(look)).data)
+    entry = {
+        "id": look.id,
+        "name": look.name,
+        "color": list(look.color),
+        "window": list(look.window),
+        "iso_value": look.iso_value,
+        "iso_normalized": look.iso_normalized,
+        "transfer_function": look.chosen,
+        "transfer_functions": list(look.transfer_functions),
+        "lut": asdict(lut),
+        "tileset": None if tileset is None else asdict(tileset),
+        "triangles": _totals([channel.triangles for _, channel in tiles]),
+        "volumes": asdict(volumes),
+    }
+    return entry, [ref for ref in (tileset, volumes, lut) if ref is not None]
+
+
+def _bake(look: ComposedLook) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Return a row of 256 texels RGBA for each transfer function, uint8 (n, 256, 4)."""
+    table = np.full((len(look.transfer_functions), 256, 4), 255, dtype=np.uint8)
+    for row, points in zip(table, look.transfer_functions.values(), strict=True):
+        row[:, 3] = np.rint(evaluate(points) * 255)
+    return table
+
+
+def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
+    """Return the triangles of all tiles by level; a tile with fewer levels repeats its last."""
+    given = [triangles for triangles in tiles if triangles]
+    count = max((len(triangles) for triangles in given), default=0)
+    return [sum(t[min(level, len(t) - 1)] for t in given) for level in range(count)]
+
+
+def _bounds(tiles: Sequence[BundleTile]) -> dict[str, list[float]]:
+    return {
+        "min": [min(tile.low[axis] for tile in tiles) for axis in range(3)],
+        "max": [max(tile.high[axis] for tile in tiles) for axis in range(3)],
+    }
+
+
+def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
+    """Copy the built viewer; return its files. Raises OutputError on a clash of names."""
+    refs = []
+    for source in sorted(viewer_dist.rglob("*")):
+        if not source.is_file():
+            continue
+        path = source.relative_to(viewer_dist).as_posix()
+        if path in (MANIFEST, FILES) or (root / path).exists():
+            raise OutputError(f"{source}: the bundle has a {path} of its own")
+        refs.append(write_file(root, path, source.read_bytes()))
+    return refs
+
+
+def _json(content: object) -> bytes:
+    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def _holds(folder: Path) -> bool:
+    return not folder.is_dir() or any(folder.iterdir())
+
+
+def _swap(made: Path, place: Path) -> None:
+    """Put one folder in the place of another; a folder that isn't empty can't be renamed over."""
+    old = place.with_name(f".{place.name}.old")
+    shutil.rmtree(old, ignore_errors=True)
+    if place.exists():
+        os.replace(place, old)
+    os.replace(made, place)
+    shutil.rmtree(old, ignore_errors=True)

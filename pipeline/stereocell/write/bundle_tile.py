@@ -1,0 +1,180 @@
+"""Write what one tile brings to a bundle: its meshes and volumes. Tiles are independent."""
+
+import hashlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+from pxr import Usd
+
+from stereocell.bricks import min_max_bricks, mip_levels
+from stereocell.errors import StageError
+from stereocell.write.atomic import write_bytes
+from stereocell.write.composed import (
+    ComposedLod,
+    ComposedVolume,
+    hinted_box,
+    loaded,
+    open_stage,
+    read_lods,
+    read_volume,
+    world_box,
+)
+from stereocell.write.composed_values import Point
+from stereocell.write.exr import read_atlas
+from stereocell.write.gltf import Glb, encode_glb
+from stereocell.write.ktx2 import encode_3d, encode_normal_map
+from stereocell.write.tiles3d import TileLod
+
+
+@dataclass(frozen=True, slots=True)
+class FileRef:
+    """A file of the bundle. `path` is relative to its root, with forward slashes."""
+
+    path: str
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class TileChannel:
+    """One (tile, channel) in the bundle.
+
+    lods       for the tileset, finest first; addresses relative to it
+    triangles  by level of detail
+    volume     its entry in volumes.json, or None
+    files      all that was written
+    """
+
+    channel_id: str
+    lods: tuple[TileLod, ...]
+    triangles: tuple[int, ...]
+    volume: dict[str, Any] | None
+    files: tuple[FileRef, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BundleTile:
+    """One tile in the bundle. `low`, `high`: corners (x, y, z) of its box in the world, um."""
+
+    id: str
+    low: Point
+    high: Point
+    channels: tuple[TileChannel, ...]
+
+
+def write_file(root: Path, path: str, content: bytes) -> FileRef:
+    """Write one file of a bundle. Raises OutputError."""
+    write_bytes(root / path, content)
+    return FileRef(path, len(content), hashlib.sha256(content).hexdigest())
+
+
+def export_tile(
+    stage_path: Path, root: Path, tile_id: str, channel_ids: tuple[str, ...], step_m: float
+) -> BundleTile:
+    """Write one tile of a stage below `root`; see gltf.py for the lattice step, in metres.
+
+    Opens the stage anew and loads this tile only, so that it runs in any process and the memory
+    of the others does not grow. Raises StageError and OutputError.
+    """
+    stage = open_stage(stage_path)
+    with loaded(stage, tile_id) as tile:
+        channels, boxes = [], []
+        for channel_id in channel_ids:
+            volume = read_volume(tile, channel_id)
+            if volume is not None:
+                boxes.append(world_box(np.array(volume.low), np.array(volume.high), volume.matrix))
+            channels.append(_export_channel(root, tile, channel_id, volume, step_m))
+        low, high = (
+            np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True)
+        )
+    return BundleTile(tile_id, _point(low.min(axis=0)), _point(high.max(axis=0)), tuple(channels))
+
+
+def _export_channel(
+    root: Path, tile: Usd.Prim, channel_id: str, volume: ComposedVolume | None, step_m: float
+) -> TileChannel:
+    files: list[FileRef] = []
+    lods: list[TileLod] = []
+    triangles: list[int] = []
+    finer = b""
+    for lod in read_lods(tile, channel_id):
+        glb = _encode(tile, channel_id, lod, step_m)
+        triangles.append(len(lod.mesh.triangles))
+        if glb.data == finer:
+            continue  # a channel with fewer levels than others repeats its last
+        finer = glb.data
+        uri = f"{tile.GetName()}/lod{lod.level}.glb"
+        files.append(write_file(root, f"channels/{channel_id}/{uri}", glb.data))
+        lods.append(TileLod(uri, lod.distance_um, glb.min_m, glb.max_m))
+    entry = None
+    if volume is not None:
+        entry, written = _export_volume(root, tile.GetName(), channel_id, volume)
+        files += written
+    return TileChannel(channel_id, tuple(lods), tuple(triangles), entry, tuple(files))
+
+
+def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) -> Glb:
+    prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
+    normal_map = None if lod.normal_map is None else _read_normal_map(lod.normal_map)
+    try:
+        return encode_glb(
+            lod.mesh,
+            step_m,
+            lod.material,
+            f"{channel_id}_{tile.GetName()}",
+            {"tile": tile.GetName(), "channel": channel_id},
+            normal_map,
+        )
+    except ValueError as error:  # what an artist may have done to the mesh
+        raise StageError(f"{prim}: lod{lod.level}: {error}") from error
+
+
+def _read_normal_map(path: Path) -> bytes:
+    try:
+        with Image.open(path) as file:
+            image = file.convert("RGB")
+    except OSError as error:
+        raise StageError(f"{path}: can't be read as an image: {error}") from error
+    width, height = (max(4, 4 * round(n / 4)) for n in image.size)
+    if (width, height) != image.size:
+        image = image.resize((width, height), Image.Resampling.LANCZOS)
+    return encode_normal_map(np.asarray(image))
+
+
+def _export_volume(
+    root: Path, tile_id: str, channel_id: str, volume: ComposedVolume
+) -> tuple[dict[str, Any], list[FileRef]]:
+    voxels = read_atlas(volume.atlas)
+    if voxels.shape != volume.size[::-1]:
+        found = tuple(voxels.shape[::-1])
+        raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
+    texture = encode_3d(mip_levels(voxels))
+    bricks = encode_3d([min_max_bricks(voxels)])
+    path = f"volumes/{tile_id}/{channel_id}"
+    files = [
+        write_file(root, f"{path}.ktx2", texture.data),
+        write_file(root, f"{path}_bricks.ktx2", bricks.data),
+    ]
+    entry = {
+        "tile": tile_id,
+        "file": asdict(files[0]),
+        "bricks": asdict(files[1]),
+        "size": list(volume.size),
+        "apron": volume.apron,
+        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
+        # row by row for row vectors is column by column for column vectors
+        "matrix": [float(n) for n in volume.matrix.ravel()],
+        "levels": [
+            {"size": list(level.size), "offset": level.offset, "length": level.length}
+            for level in texture.levels
+        ],
+    }
+    return entry, files
+
+
+def _point(values: Any) -> Point:
+    x, y, z = (float(n) for n in values)
+    return x, y, z

@@ -1,0 +1,195 @@
+"""Read the tiles of a composed stage, whatever layers an artist put over it.
+
+Everything comes through pxr's composition: colours, visibility, moved tiles, chosen variants. The
+levels of detail are variants; they are looked through one by one by selections in the session
+layer.
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Tf, Usd, UsdGeom, UsdUtils
+
+from stereocell.errors import StageError
+from stereocell.mesh import Mesh
+from stereocell.write.composed_look import material_of, normal_map_of, surface_of
+from stereocell.write.composed_mesh import read_mesh
+from stereocell.write.composed_values import (
+    Point,
+    file_of,
+    one_line,
+    point_of,
+    select_variant,
+    shortest,
+    value_of,
+)
+from stereocell.write.gltf import Material
+from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES
+
+_LOD = re.compile(r"lod(\d+)")
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedLod:
+    """One level of detail, in world um. `level` counts from the finest, 0."""
+
+    level: int
+    mesh: Mesh
+    distance_um: float
+    material: Material
+    normal_map: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedVolume:
+    """One volume: the file with its voxels, and where they are.
+
+    size        voxels (x, y, z) with the apron
+    low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
+    matrix      (4, 4) for row vectors, to world um
+    """
+
+    atlas: Path
+    size: tuple[int, int, int]
+    apron: int
+    low: Point
+    high: Point
+    matrix: NDArray[np.float64]
+
+
+def open_stage(path: Path) -> Usd.Stage:
+    """Open a stage without its payloads. Raises StageError if it is none, or in other units."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    try:
+        stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+    except Tf.ErrorException as error:
+        raise StageError(f"{path}: can't be opened as a USD stage: {one_line(error)}") from error
+    finally:
+        del quiet
+    _check_composition(stage)
+    if UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        unit = UsdGeom.GetStageMetersPerUnit(stage)
+        if not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
+            raise StageError(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+    for needed in (ROOT, CHANNELS, TILES):
+        if not stage.GetPrimAtPath(needed):
+            raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
+    return stage
+
+
+def specimen_name(stage: Usd.Stage) -> str:
+    root = stage.GetPrimAtPath(ROOT)
+    return str(root.GetDisplayName() or root.GetName())
+
+
+def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:
+    """Return the tiles that are active and visible, loaded or not, in the stage's order."""
+    kept = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
+    prims = stage.GetPrimAtPath(TILES).GetFilteredChildren(kept)
+    return [prim for prim in prims if _is_visible(prim)]
+
+
+def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the box in the world, um, that a tile says it fills, loaded or not: its extentsHint.
+
+    Raises StageError if it has none.
+    """
+    hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
+    if not hint:
+        raise StageError(f"{tile.GetPath()}.extentsHint: no value")
+    return world_box(np.array(hint[0]), np.array(hint[1]), _to_world(tile))
+
+
+@contextmanager
+def loaded(stage: Usd.Stage, tile_id: str) -> Iterator[Usd.Prim]:
+    """Yield a tile's prim with its payload loaded and its meshes and volumes both active."""
+    path = TILES.AppendChild(tile_id)
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    stage.Load(path)
+    del quiet
+    try:
+        _check_composition(stage)
+        prim = stage.GetPrimAtPath(path)
+        if "both" in prim.GetVariantSet("representation").GetVariantNames():
+            select_variant(prim, "representation", "both")
+        yield prim
+    finally:
+        stage.Unload(path)
+
+
+def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
+    """Yield a loaded tile's levels of detail of one channel, finest first; none: no surface.
+
+    Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
+    """
+    path = tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}")
+    variants = tile.GetVariantSet("lod")
+    levels = sorted(
+        int(match[1]) for match in map(_LOD.fullmatch, variants.GetVariantNames()) if match
+    )
+    for level in levels or [0]:  # a flattened stage has one level, and no variants
+        if levels:
+            select_variant(tile, "lod", f"lod{level}")
+        prim = _drawn(tile, path)
+        if prim is None or not prim.IsA(UsdGeom.Mesh):
+            continue
+        matrix = _to_world(prim)
+        mesh = read_mesh(UsdGeom.Mesh(prim), matrix)
+        if mesh is None:
+            continue
+        stretch = float(np.linalg.norm(matrix[:3, :3], 2))
+        distance = shortest(value_of(prim, "stereocell:distance")) * stretch
+        surface = surface_of(prim)
+        yield ComposedLod(level, mesh, distance, material_of(surface), normal_map_of(surface))
+
+
+def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
+    """Return a loaded tile's volume of one channel; None if it is not drawn. Raises StageError."""
+    name = f"{channel_id}_{tile.GetName()}_volume"
+    prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{name}"))
+    if prim is None:
+        return None
+    width, height, depth = value_of(prim, "stereocell:atlasSize")
+    return ComposedVolume(
+        file_of(prim.GetAttribute("stereocell:atlas")),
+        (width, height, depth),
+        value_of(prim, "stereocell:apron"),
+        point_of(value_of(prim, "stereocell:boundsMin")),
+        point_of(value_of(prim, "stereocell:boundsMax")),
+        _to_world(prim),
+    )
+
+
+def world_box(
+    low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the box along the world's axes around a box moved by a matrix for row vectors."""
+    picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
+    corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def _check_composition(stage: Usd.Stage) -> None:
+    """Raise StageError on the first layer, payload or reference that did not come in."""
+    errors = stage.GetCompositionErrors()
+    if errors:
+        raise StageError(f"{stage.GetRootLayer().realPath}: {one_line(errors[0])}")
+
+
+def _drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
+    prim = tile.GetStage().GetPrimAtPath(path)
+    return prim if prim and prim.IsActive() and _is_visible(prim) else None
+
+
+def _is_visible(prim: Usd.Prim) -> bool:
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible)
+
+
+def _to_world(prim: Usd.Prim) -> NDArray[np.float64]:
+    """Return the matrix from a prim's space to the world for row vectors, (4, 4)."""
+    return np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))

@@ -1,0 +1,113 @@
+"""Lay out a .glb's buffers with EXT_meshopt_compression, by the library meshoptimizer."""
+
+from typing import Any
+
+import meshoptimizer
+import numpy as np
+from numpy.typing import NDArray
+
+_UNSIGNED_SHORT, _UNSIGNED_INT = 5123, 5125
+_VERTICES, _INDICES = 34962, 34963  # bufferView.target
+
+
+def reorder(
+    triangles: NDArray[np.uint32], vertex_count: int
+) -> tuple[NDArray[np.uint32], NDArray[np.intp]]:
+    """Return indices (3m,) in the order of the GPU's vertex cache, and the vertices to keep.
+
+    The vertices come in the order of their first use; those of no triangle are left out.
+    """
+    source = np.ascontiguousarray(triangles, dtype=np.uint32).ravel()
+    indices = np.empty_like(source)
+    meshoptimizer.optimize_vertex_cache(indices, source, len(source), vertex_count)
+    used, first = np.unique(indices, return_index=True)
+    order = used[np.argsort(first)].astype(np.intp)
+    new = np.zeros(vertex_count, dtype=np.uint32)
+    new[order] = np.arange(len(order), dtype=np.uint32)
+    return new[indices], order
+
+
+class CompressedBuffers:
+    """The compressed binary chunk (buffer 0) and the layout of what it decodes to (buffer 1).
+
+    Buffer 1 has no data: EXT_meshopt_compression's fallback for readers that know the extension.
+    """
+
+    def __init__(self) -> None:
+        self._data = bytearray()
+        self._decoded = 0
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+
+    def add(self, data: bytes) -> int:
+        """Store bytes as they are; return the bufferView's index."""
+        self._views.append({"buffer": 0, "byteOffset": self._align(), "byteLength": len(data)})
+        self._data += data
+        return len(self._views) - 1
+
+    def add_attribute(self, values: NDArray[Any], accessor: dict[str, Any]) -> int:
+        """Store rows of 4, 8, ... bytes, one a vertex; return the accessor's index."""
+        count, stride = len(values), values.itemsize * values.shape[1]
+        # The extension wants version 0 of the vertex codec; the library's newest is its default,
+        # and a setting of the whole process.
+        meshoptimizer.encode_vertex_version(0)
+        encoded = meshoptimizer.encode_vertex_buffer(values, count, stride)
+        view = self._add_view(encoded, "ATTRIBUTES", count, stride)
+        view["byteStride"] = stride
+        view["target"] = _VERTICES
+        return self._add_accessor({**accessor, "count": count})
+
+    def add_indices(self, indices: NDArray[np.uint32], vertex_count: int) -> int:
+        """Store triangles' indices (3m,); return the accessor's index."""
+        meshoptimizer.encode_index_version(1)
+        encoded = meshoptimizer.encode_index_buffer(indices, len(indices), vertex_count)
+        short = vertex_count <= 0xFFFF  # index 65535 itself would restart a strip
+        view = self._add_view(encoded, "TRIANGLES", len(indices), 2 if short else 4)
+        view["target"] = _INDICES
+        kind = _UNSIGNED_SHORT if short else _UNSIGNED_INT
+        return self._add_accessor(
+            {"componentType": kind, "type": "SCALAR", "count": len(indices)},
+        )
+
+    def finish(self, document: dict[str, Any]) -> bytes:
+        """Put accessors, bufferViews and buffers into the document; return the binary chunk."""
+        self._align()
+        document["accessors"] = self._accessors
+        document["bufferViews"] = self._views
+        document["buffers"] = [
+            {"byteLength": len(self._data)},
+            {
+                "byteLength": self._decoded,
+                "extensions": {"EXT_meshopt_compression": {"fallback": True}},
+            },
+        ]
+        return bytes(self._data)
+
+    def _add_view(self, encoded: bytes, mode: str, count: int, stride: int) -> dict[str, Any]:
+        view: dict[str, Any] = {
+            "buffer": 1,
+            "byteOffset": self._decoded,
+            "byteLength": count * stride,
+            "extensions": {
+                "EXT_meshopt_compression": {
+                    "buffer": 0,
+                    "byteOffset": self._align(),
+                    "byteLength": len(encoded),
+                    "byteStride": stride,
+                    "count": count,
+                    "mode": mode,
+                }
+            },
+        }
+        self._views.append(view)
+        self._data += encoded
+        self._decoded += -(-count * stride // 4) * 4
+        return view
+
+    def _add_accessor(self, accessor: dict[str, Any]) -> int:
+        self._accessors.append({"bufferView": len(self._views) - 1, **accessor})
+        return len(self._accessors) - 1
+
+    def _align(self) -> int:
+        self._data += bytes(-len(self._data) % 4)
+        return len(self._data)

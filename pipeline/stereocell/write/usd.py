@@ -1,0 +1,104 @@
+"""Write the stage of a specimen: stage.usda, which only composes, and its looks.
+
+stage.usda                    /Specimen: tiles by payload, cameras; sublayers the two looks/ layers
+looks/channels.usda           /Specimen/Channels, see usd_looks.py
+looks/lights.usda             a copy of usd_assets/lights.usda
+tiles/<tile>/tile.usdc        see usd_tile.py
+
+stage.usda says nothing about what the tiles and looks hold, so that a layer of an artist's, over it
+or among its sublayers, is stronger than all of them.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Kind, Usd, UsdGeom
+
+from stereocell.assets import find_asset
+from stereocell.specimen import Look, Provenance, TileContent
+from stereocell.write.atomic import write_bytes
+from stereocell.write.usd_cameras import define_cameras
+from stereocell.write.usd_layer import ROOT, TILES, export, new_stage, vec3f, world_box
+from stereocell.write.usd_looks import write_looks
+from stereocell.write.usd_tile import LAYER_NAME, write_tile
+
+__all__ = ["TileExtent", "write_stage", "write_tile"]
+
+STAGE_NAME = "stage.usda"
+
+_NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
+Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class TileExtent:
+    """Where a tile lies: see TileContent. All (z, y, x) in um."""
+
+    id: str
+    first_um: tuple[float, float, float]
+    last_um: tuple[float, float, float]
+    spacing_um: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, tile: TileContent) -> "TileExtent":
+        return cls(tile.id, tile.first_um, tile.last_um, tile.spacing_um)
+
+    @property
+    def drawn_box(self) -> NDArray[np.float64]:
+        """Lower and upper corner (x, y, z) of all that it draws, half a voxel wider; (2, 3)."""
+        half = np.asarray(self.spacing_um) / 2
+        return np.array(world_box(self.first_um - half, self.last_um + half))
+
+
+def write_stage(
+    stage_dir: Path,
+    name: str,
+    looks: Sequence[Look],
+    tiles: Sequence[TileExtent],
+    provenance: Provenance,
+) -> None:
+    """Write stage.usda and looks/ over tiles that `write_tile` writes, before or after.
+
+    name        the specimen's, kept as the display name of /Specimen
+    provenance  settings and versions, kept in the layer's customLayerData; numbers, text and
+                dictionaries as they are, anything else as JSON text
+
+    Raises OutputError.
+    """
+    write_looks(stage_dir / "looks", looks)
+    lights = find_asset("usd_assets/lights.usda").read_bytes()
+    write_bytes(stage_dir / "looks" / "lights.usda", lights)
+
+    stage = new_stage(".usda", ROOT.name)
+    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+    root.SetDisplayName(name)
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
+    group = UsdGeom.Xform.Define(stage, TILES).GetPrim()
+    Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
+    for tile in tiles:
+        prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
+        Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
+        prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
+        # what an unloaded tile is known by
+        UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(tile.drawn_box))
+    boxes = np.array([tile.drawn_box for tile in tiles])
+    define_cameras(stage, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
+
+    layer = stage.GetRootLayer()
+    layer.documentation = _NOTE
+    layer.customLayerData = {"stereocell": {k: _plain(v) for k, v in provenance.items()}}
+    del stage  # the sublayers' paths only resolve beside the file
+    layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
+    export(layer, stage_dir / STAGE_NAME)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, bool | int | float | str):
+        return value
+    return json.dumps(value, sort_keys=True)

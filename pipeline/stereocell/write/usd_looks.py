@@ -1,0 +1,86 @@
+"""Write the looks of a stage: looks/channels.usda, the one place where a channel's look lives.
+
+Each channel is a material below /Specimen/Channels that the materials of all tiles inherit. The
+colour is an input of the material: the surface shader is connected to it, volume renderers and the
+bundle read it. The opacity points are the transfer function; the LUT is baked from them.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+
+from stereocell.specimen import Look, OpacityPoints
+from stereocell.write.exr import write_lut
+from stereocell.write.usd_layer import (
+    CHANNEL_API,
+    CHANNELS,
+    ROOT,
+    export,
+    new_stage,
+    set_attribute,
+)
+
+DEFAULT_FUNCTION = "default"
+
+_Types = Sdf.ValueTypeNames
+
+
+def write_looks(folder: Path, looks: Sequence[Look]) -> None:
+    """Write channels.usda and <channel>_<function>.exr into `folder`. Raises OutputError."""
+    stage = new_stage(".usda", ROOT.name)
+    stage.OverridePrim(ROOT)
+    UsdGeom.Scope.Define(stage, CHANNELS)
+    for look in looks:
+        material = UsdShade.Material.Define(stage, CHANNELS.AppendChild(look.id))
+        _author_look(material, look)
+        _author_surface(material)
+        _author_functions(material.GetPrim(), look)
+        for name, points in look.transfer_functions.items():
+            write_lut(folder / _lut_name(look, name), points)
+    export(stage.GetRootLayer(), folder / "channels.usda")
+
+
+def _lut_name(look: Look, function: str) -> str:
+    return f"{look.id}_{function}.exr"
+
+
+def _author_look(material: UsdShade.Material, look: Look) -> None:
+    prim = material.GetPrim()
+    prim.SetDisplayName(look.name)
+    prim.AddAppliedSchema(CHANNEL_API)
+    material.CreateInput("color", _Types.Color3f).Set(Gf.Vec3f(*look.color))
+    set_attribute(prim, "stereocell:displayName", _Types.String, look.name)
+    set_attribute(prim, "stereocell:window", _Types.Float2, Gf.Vec2f(*look.window))
+    set_attribute(prim, "stereocell:isoConfidence", _Types.Float, look.iso_confidence)
+    if look.iso_value is not None:
+        set_attribute(prim, "stereocell:isoValue", _Types.Float, look.iso_value)
+        set_attribute(prim, "stereocell:isoValueNormalized", _Types.Float, look.iso_normalized)
+
+
+def _author_surface(material: UsdShade.Material) -> None:
+    stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface")
+    surface = UsdShade.Shader.Define(stage, path)
+    surface.CreateIdAttr("UsdPreviewSurface")
+    color = surface.CreateInput("diffuseColor", _Types.Color3f)
+    color.ConnectToSource(material.GetInput("color"))
+    surface.CreateInput("metallic", _Types.Float).Set(0.0)
+    surface.CreateInput("roughness", _Types.Float).Set(0.5)
+    output = surface.CreateOutput("surface", _Types.Token)
+    material.CreateSurfaceOutput().ConnectToSource(output)
+
+
+def _author_functions(prim: Usd.Prim, look: Look) -> None:
+    variants = prim.GetVariantSets().AddVariantSet("transferFunction")
+    for name, points in look.transfer_functions.items():
+        variants.AddVariant(name)
+        variants.SetVariantSelection(name)
+        with variants.GetVariantEditContext():
+            pairs = _pairs(points)
+            set_attribute(prim, "stereocell:opacityPoints", _Types.Float2Array, pairs)
+            set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(look, name)}")
+    variants.SetVariantSelection(DEFAULT_FUNCTION)
+
+
+def _pairs(points: OpacityPoints) -> Vt.Vec2fArray:
+    return Vt.Vec2fArray([Gf.Vec2f(*point) for point in points])

@@ -1,0 +1,227 @@
+"""Write one tile of a stage: tile.usdc, and beside it the volumes and normal maps that it names.
+
+A tile names no look but its channel's: its materials inherit the prim /Specimen/Channels/<channel>,
+which lies outside this file. USD resolves such an inherit in the stage that holds the payload, so
+the one prim there gives the look to all tiles, and an opinion about it in any layer over the stage
+reaches them all.
+
+`lod1` is selected unless someone asks otherwise: an artist arranges and lights all tiles at once,
+for which the finest level is millions of triangles too heavy, and picks `lod0` for the final frame.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
+
+from stereocell.mesh import Lod
+from stereocell.names import from_identifier
+from stereocell.specimen import ChannelContent, TileContent
+from stereocell.write.atomic import replacing
+from stereocell.write.exr import APRON, write_atlas
+from stereocell.write.usd_layer import (
+    CHANNELS,
+    export,
+    new_stage,
+    set_attribute,
+    vec3d,
+    vec3f,
+    world_box,
+)
+from stereocell.write.vdb import GRID_NAME, write_vdb
+
+DEFAULT_LOD = 1
+LAYER_NAME = "tile.usdc"
+
+_Types = Sdf.ValueTypeNames
+
+
+def write_tile(stage_dir: Path, tile: TileContent) -> None:
+    """Write `stage_dir`/tiles/<tile>/. Tiles are independent; tile.usdc comes last.
+
+    Raises OutputError. A volume whose shape does not fit its tile is a bug: ValueError.
+    """
+    folder = stage_dir / "tiles" / tile.id
+    for channel in tile.channels:
+        _check_shape(tile, channel)
+        _write_files(folder, tile, channel)
+    stage = new_stage(".usdc", tile.id)
+    root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    for channel in tile.channels:
+        branch = UsdGeom.Xform.Define(stage, root.GetPath().AppendChild(channel.channel_id))
+        branch.GetPrim().SetDisplayName(from_identifier(channel.channel_id))
+        _define_look(branch, tile, channel)
+        if channel.lods:
+            _define_mesh(branch, tile, channel)
+        _define_volume(branch, tile, channel)
+    _author_lods(root, tile)
+    _author_representations(root, tile)
+    export(stage.GetRootLayer(), folder / LAYER_NAME)
+
+
+def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
+    box = np.subtract(tile.last_um, tile.first_um) / tile.spacing_um
+    expected = tuple(int(n) for n in np.rint(box).astype(int) + 1 + 2 * APRON)
+    if channel.volume.shape != expected or channel.volume.dtype != np.uint8:
+        found = f"{channel.volume.dtype} {channel.volume.shape}"
+        raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected uint8 {expected}")
+
+
+def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> None:
+    own = channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)]
+    write_vdb(folder / f"{channel.channel_id}.vdb", own, tile.first_um, tile.spacing_um)
+    write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
+    for level, lod in enumerate(channel.lods):
+        if lod.normal_map is not None:
+            with replacing(folder / _normal_map_name(channel, level)) as temporary:
+                Image.fromarray(lod.normal_map).save(temporary, format="PNG")
+
+
+def _normal_map_name(channel: ChannelContent, level: int) -> str:
+    return f"{channel.channel_id}_lod{level}_normal.png"
+
+
+def _leaf(tile: TileContent, channel: ChannelContent, suffix: str = "") -> str:
+    """Return a name that is unique in the whole stage: some clients flatten the tree."""
+    return f"{channel.channel_id}_{tile.id}{suffix}"
+
+
+def _define_look(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+    stage, path = branch.GetPrim().GetStage(), branch.GetPath()
+    look = UsdShade.Material.Define(stage, path.AppendChild(_leaf(tile, channel, "_look")))
+    look.GetPrim().GetInherits().AddInherit(CHANNELS.AppendChild(channel.channel_id))
+
+
+def _bind(gprim: UsdGeom.Gprim, branch: UsdGeom.Xform, look: str) -> None:
+    binding = UsdShade.MaterialBindingAPI.Apply(gprim.GetPrim())
+    path = branch.GetPath().AppendChild(look)
+    binding.Bind(UsdShade.Material.Get(gprim.GetPrim().GetStage(), path))
+
+
+def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+    """Define what the levels of detail have in common."""
+    stage = branch.GetPrim().GetStage()
+    mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(True)  # a surface is cut open where its tile ends
+    _bind(mesh, branch, _leaf(tile, channel, "_look"))
+
+
+def _define_volume(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+    """Define the volume and its one field, nested below: clients read one file a volume."""
+    stage = branch.GetPrim().GetStage()
+    path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
+    volume = UsdVol.Volume.Define(stage, path)
+    field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(GRID_NAME))
+    field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
+    field.CreateFieldNameAttr(GRID_NAME)
+    field.CreateFieldClassAttr(UsdVol.Tokens.fogVolume)
+    field.CreateFieldDataTypeAttr(UsdVol.Tokens.half)
+    volume.CreateFieldRelationship(GRID_NAME, field.GetPath())
+    _bind(volume, branch, _leaf(tile, channel, "_look"))
+
+    first, spacing = np.asarray(tile.first_um), np.asarray(tile.spacing_um)
+    low, high = world_box(first - spacing / 2, first + (np.asarray(tile.own_shape) - 0.5) * spacing)
+    volume.CreateExtentAttr(vec3f([low, high]))
+    depth, height, width = channel.volume.shape
+    low, high = world_box(tile.first_um, tile.last_um)
+    prim = volume.GetPrim()
+    set_attribute(
+        prim, "stereocell:atlas", _Types.Asset, f"./{channel.channel_id}.exr", custom=True
+    )
+    size = Gf.Vec3i(width, height, depth)
+    set_attribute(prim, "stereocell:atlasSize", _Types.Int3, size, custom=True)
+    set_attribute(prim, "stereocell:apron", _Types.Int, APRON, custom=True)
+    set_attribute(prim, "stereocell:boundsMin", _Types.Double3, vec3d(low), custom=True)
+    set_attribute(prim, "stereocell:boundsMax", _Types.Double3, vec3d(high), custom=True)
+
+
+def _author_lods(root: Usd.Prim, tile: TileContent) -> None:
+    """Put each level's geometry into its variant; a channel with fewer levels repeats its last."""
+    count = max((len(channel.lods) for channel in tile.channels), default=0)
+    if count == 0:
+        return
+    variants = root.GetVariantSets().AddVariantSet("lod")
+    for level in range(count):
+        variants.AddVariant(f"lod{level}")
+        variants.SetVariantSelection(f"lod{level}")
+        with variants.GetVariantEditContext():
+            for channel in tile.channels:
+                if channel.lods:
+                    own = min(level, len(channel.lods) - 1)
+                    _author_lod(root, tile, channel, own)
+    variants.SetVariantSelection(f"lod{min(DEFAULT_LOD, count - 1)}")
+
+
+def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, level: int) -> None:
+    lod = channel.lods[level]
+    branch = root.GetPath().AppendChild(channel.channel_id)
+    mesh = UsdGeom.Mesh.Get(root.GetStage(), branch.AppendChild(_leaf(tile, channel)))
+    points = vec3f(lod.mesh.positions)
+    triangles = lod.mesh.triangles.astype(np.int32)
+    mesh.CreatePointsAttr(points)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
+    mesh.CreateNormalsAttr(vec3f(lod.mesh.normals))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    if len(points):
+        mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    set_attribute(mesh.GetPrim(), "stereocell:distance", _Types.Float, lod.distance_um, custom=True)
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    vertex = UsdGeom.Tokens.vertex
+    if lod.mesh.uvs is not None:
+        st = primvars.CreatePrimvar("st", _Types.TexCoord2fArray, vertex)
+        st.Set(Vt.Vec2fArray.FromNumpy(_float32(lod.mesh.uvs)))
+    if lod.mesh.tangents is not None:
+        tangents = primvars.CreatePrimvar("tangents", _Types.Float4Array, vertex)
+        tangents.Set(Vt.Vec4fArray.FromNumpy(_float32(lod.mesh.tangents)))
+    if lod.normal_map is not None:
+        look = branch.AppendChild(_leaf(tile, channel, "_look"))
+        _author_normal_map(root.GetStage(), look, _normal_map_name(channel, level), lod)
+
+
+def _author_normal_map(stage: Usd.Stage, look: Sdf.Path, file: str, lod: Lod) -> None:
+    """Feed the normal map to the surface shader that the look inherits."""
+    if lod.mesh.uvs is None:
+        raise ValueError(f"{file}: a normal map on a mesh without UVs")
+    reader = UsdShade.Shader.Define(stage, look.AppendChild("st"))
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", _Types.String).Set("st")
+    st = reader.CreateOutput("result", _Types.Float2)
+
+    texture = UsdShade.Shader.Define(stage, look.AppendChild("normal_map"))
+    texture.CreateIdAttr("UsdUVTexture")
+    texture.CreateInput("file", _Types.Asset).Set(f"./{file}")
+    texture.CreateInput("sourceColorSpace", _Types.Token).Set("raw")
+    texture.CreateInput("wrapS", _Types.Token).Set("clamp")
+    texture.CreateInput("wrapT", _Types.Token).Set("clamp")
+    texture.CreateInput("scale", _Types.Float4).Set(Gf.Vec4f(2, 2, 2, 1))  # 0..1 -> -1..1
+    texture.CreateInput("bias", _Types.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
+    texture.CreateInput("st", _Types.Float2).ConnectToSource(st)
+    normal = texture.CreateOutput("rgb", _Types.Float3)
+
+    surface = UsdShade.Shader(stage.OverridePrim(look.AppendChild("surface")))
+    surface.CreateInput("normal", _Types.Normal3f).ConnectToSource(normal)
+
+
+def _author_representations(root: Usd.Prim, tile: TileContent) -> None:
+    variants = root.GetVariantSets().AddVariantSet("representation")
+    hidden = {"mesh": ("_volume",), "volume": ("",), "both": ()}
+    for name, suffixes in hidden.items():
+        variants.AddVariant(name)
+        variants.SetVariantSelection(name)
+        with variants.GetVariantEditContext():
+            for channel in tile.channels:
+                branch = root.GetPath().AppendChild(channel.channel_id)
+                for suffix in suffixes:
+                    if suffix or channel.lods:
+                        path = branch.AppendChild(_leaf(tile, channel, suffix))
+                        root.GetStage().OverridePrim(path).SetActive(False)
+    variants.SetVariantSelection("mesh")
+
+
+def _float32(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(values, dtype=np.float32)

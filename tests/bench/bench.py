@@ -1,0 +1,111 @@
+"""What `make bench` prints: ratios of two things timed in one run, medians of several rounds.
+
+Machines are noisy: a ratio within one run says more than seconds. Nothing here is a test.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+from skimage import measure
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from phantoms import blurred_ball, write_ome_tiff
+from stereocell import build, config, lod, repair, surface
+from stereocell.engine import Engine
+from stereocell.tiling import Box
+from stereocell.volume import Volume
+
+SPACING = (0.28, 0.14, 0.14)
+ROUNDS = 5
+
+
+def nuclei(shape: tuple[int, int, int], count: int, seed: int = 0) -> np.ndarray:
+    """Return blurred balls on noise, float32 (z, y, x)."""
+    rng = np.random.default_rng(seed)
+    field = np.zeros(shape, np.float32)
+    small = (24, 48, 48)
+    ball = 1000 * blurred_ball(small, SPACING, (3.3, 3.3, 3.3), 2.4, 0.2)
+    for corner in rng.integers(0, np.array(shape) - small, (count, 3)):
+        part = tuple(slice(c, c + n) for c, n in zip(corner, small, strict=True))
+        field[part] = np.maximum(field[part], ball)
+    return (field + rng.normal(200, 30, shape)).astype(np.float32)
+
+
+def compare(name: str, ours: Callable[[], object], peer: Callable[[], object], what: str) -> None:
+    """Time two calls in turns and print the ratio of their medians."""
+    seconds: dict[str, list[float]] = {"ours": [], "peer": []}
+    for _ in range(ROUNDS):
+        for label, call in (("ours", ours), ("peer", peer)):
+            start = time.perf_counter()
+            call()
+            seconds[label].append(time.perf_counter() - start)
+    a, b = (statistics.median(seconds[label]) for label in ("ours", "peer"))
+    print(f"{name:<34} {a:8.3f} s   {b / a:6.2f} x as fast as {what} ({b:.3f} s)")
+
+
+def main() -> None:
+    """Run all comparisons."""
+    shape = (97, 256, 256)
+    voxels = nuclei(shape, 150)
+    volume = Volume(voxels, SPACING)
+    region = Box((0, 0, 0), shape)
+    field = surface.smooth(volume, 0.14)
+    distance = surface.signed_distance(field, np.float32(700), SPACING, 1000.0)
+    print(f"phantom {shape}, {voxels.size / 1e6:.1f} M voxels; medians of {ROUNDS}")
+    compare(
+        "extract_surface",
+        lambda: surface.extract_surface(distance, region, region, region, SPACING, (0, 0, 0)),
+        lambda: measure.marching_cubes(distance, 0.0, spacing=SPACING),
+        "scikit-image's marching cubes",
+    )
+    options = repair.RepairOptions(0.56, 0.84, 1.1)
+    solid = distance > 0
+
+    def close_by_morphology() -> None:
+        z, y, x = np.ogrid[-2:3, -4:5, -4:5]
+        element = (z * 0.28) ** 2 + (y * 0.14) ** 2 + (x * 0.14) ** 2 <= 0.56**2
+        ndimage.binary_closing(solid, element)
+
+    compare(
+        "repair (all of it)",
+        lambda: repair.repair(distance, SPACING, options),
+        close_by_morphology,
+        "a binary closing alone",
+    )
+    fine = surface.extract_surface(distance, region, region, region, SPACING, (0, 0, 0))
+
+    def chain() -> None:
+        mesh = fine
+        for error in (0.05, 0.3, 1.0, 2.5):
+            mesh = lod.simplify(mesh, error * 0.28)
+
+    compare(
+        "four LODs, one from the other",
+        chain,
+        lambda: [lod.simplify(fine, error * 0.28) for error in (0.05, 0.3, 1.0, 2.5)],
+        "each from the finest",
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "nuclei.ome.tif"
+        write_ome_tiff(source, np.clip(voxels, 0, 65535).astype(np.uint16), spacing=SPACING)
+        seconds = {}
+        for workers in (1, 2):
+            out = Path(folder) / str(workers)
+            build.make(str(source), out, config.load("cycif", None, {"plan": {"grid": "4x2"}}))
+            engine = Engine(workers)
+            engine.run("warm-up", abs, [("a", -1), ("b", -2)])
+            start = time.perf_counter()
+            build.run_units(out, engine)
+            seconds[workers] = time.perf_counter() - start
+            engine.close()
+        print(f"units with 2 workers: {seconds[1] / seconds[2]:.2f} x as fast as with 1")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""Take a .glb apart, by the tables of glTF 2.0 and EXT_meshopt_compression."""
+
+import json
+import struct
+
+import meshoptimizer
+import numpy as np
+
+
+def read(data):
+    """Return the document and the decoded accessors."""
+    magic, version, length = struct.unpack_from("<4sII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    json_length, kind = struct.unpack_from("<I4s", data, 12)
+    assert kind == b"JSON"
+    document = json.loads(data[20 : 20 + json_length])
+    binary_length, kind = struct.unpack_from("<I4s", data, 20 + json_length)
+    assert kind == b"BIN\0"
+    binary = data[28 + json_length :]
+    assert binary_length == len(binary) == document["buffers"][0]["byteLength"]
+    types = {5120: np.int8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+    arrays = []
+    for accessor in document["accessors"]:
+        view = document["bufferViews"][accessor["bufferView"]]["extensions"][
+            "EXT_meshopt_compression"
+        ]
+        stored = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+        dtype = types[accessor["componentType"]]
+        if view["mode"] == "TRIANGLES":
+            assert stored[0] == 0xE1
+            # the package decodes into 32-bit indices whatever they are meant to become
+            arrays.append(meshoptimizer.decode_index_buffer(view["count"], 4, stored))
+        else:
+            assert stored[0] == 0xA0  # version 0 of the vertex codec: all that the extension knows
+            row = np.dtype([("row", dtype, view["byteStride"] // np.dtype(dtype).itemsize)])
+            rows = meshoptimizer.decode_vertex_buffer(
+                view["count"], view["byteStride"], stored, dtype=row
+            )
+            arrays.append(rows["row"][:, : {"VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]])
+    return document, arrays
+
+
+def decoded_positions_m(data):
+    """World positions as a viewer gets them: in float32."""
+    document, arrays = read(data)
+    node = document["nodes"][0]
+    offsets = arrays[document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
+    scale, translation = np.float32(node["scale"]), np.float32(node["translation"])
+    return offsets.astype(np.float32) * scale + translation

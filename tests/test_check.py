@@ -1,0 +1,147 @@
+import shutil
+import subprocess
+
+import pytest
+
+import spheres
+from stereocell.assets import find_asset
+from stereocell.check import check
+from stereocell.write.bundle import write_bundle
+from stereocell.write.usd import TileExtent, write_stage, write_tile
+
+GLB = "channels/CD31/r0_c0/lod0.glb"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    tile = spheres.tile(0)
+    write_tile(out / "stage", tile)
+    looks = (spheres.RED, spheres.BLUE)
+    write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
+    write_bundle(out / "stage" / "stage.usda", out / "bundle", None)
+    return out
+
+
+@pytest.fixture
+def out(made, tmp_path):
+    """A copy to be spoilt."""
+    return shutil.copytree(made, tmp_path / "out")
+
+
+def lines(out):
+    return {line.name: line for line in check(out)}
+
+
+def failed(out):
+    """Names of the lines that fail, but for the plan, which these folders don't have."""
+    return {name for name, line in lines(out).items() if not line.ok} - {"plan"}
+
+
+@pytest.fixture(scope="module")
+def node():
+    """Skip where node or its packages are missing; `make test` installs them."""
+    packages = find_asset("viewer_gltf/tools").parent / "node_modules"
+    if shutil.which("node") is None or not (packages / "gltf-validator").is_dir():
+        pytest.skip("needs Node 20 and its packages: `make setup`")
+
+
+@pytest.mark.usefixtures("node")
+def test_what_the_pipeline_writes_passes_all_checks(made):
+    assert failed(made) == set()
+    assert lines(made)["glTF validator"].detail == "3 files"
+
+
+def test_what_needs_no_node_passes(made):
+    assert failed(made) <= {"glTF validator", "KTX2 textures"}
+
+
+def test_a_folder_without_a_build_fails_in_every_line(tmp_path):
+    found = lines(tmp_path)
+    assert not any(line.ok for line in found.values())
+    assert "No such file" in found["manifest"].detail
+    assert all("\n" not in line.detail for line in found.values())
+
+
+def test_changed_byte_is_found(out):
+    path = out / "bundle" / GLB
+    data = bytearray(path.read_bytes())
+    data[-40] ^= 1
+    path.write_bytes(data)
+    assert "hashes" in failed(out)
+    assert f"{GLB}: not the bytes" in lines(out)["hashes"].detail
+
+
+def test_missing_and_unlisted_files_are_found(out):
+    (out / "bundle" / GLB).rename(out / "bundle" / "lost.glb")
+    assert {"hashes", "tilesets"} <= failed(out)
+    assert f"{GLB}: missing" in lines(out)["hashes"].detail
+    assert "lost.glb: not in files.json" in lines(out)["hashes"].detail
+    assert "no file at r0_c0/lod0.glb" in lines(out)["tilesets"].detail
+
+
+def test_reference_to_other_bytes_is_found(out):
+    manifest = out / "bundle" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"sha256": "', '"sha256": "00000000', 1))
+    assert "hashes" in failed(out)
+
+
+def test_unknown_version_is_found(out):
+    manifest = out / "bundle" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
+    assert lines(out)["manifest"].detail.endswith("$.version: 1 was expected")
+
+
+def test_broken_json_is_found(out):
+    (out / "bundle" / "files.json").write_text("{")
+    assert "no JSON" in lines(out)["file list"].detail
+
+
+def test_level_that_lies_elsewhere_is_found(out):
+    path = out / "bundle" / "channels/CD31/volumes.json"
+    text = path.read_text()
+    offset = text.split('"offset": ')[1].split(",")[0]
+    path.write_text(text.replace(f'"offset": {offset}', f'"offset": {int(offset) + 1}', 1))
+    assert "lie elsewhere" in lines(out)["volume lists"].detail
+
+
+def test_tileset_whose_errors_grow_is_found(out):
+    path = out / "bundle" / "channels/CD31/tileset.json"
+    path.write_text(path.read_text().replace('"geometricError": 0.0', '"geometricError": 9.0'))
+    assert "larger geometricError" in lines(out)["tilesets"].detail
+
+
+def test_stage_with_a_lost_file_is_found(out):
+    (out / "stage" / "tiles" / "r0_c0" / "CD31.vdb").unlink()
+    assert "CD31.vdb" in lines(out)["stage"].detail
+
+
+@pytest.mark.usefixtures("node")
+def test_positions_that_leave_their_bounds_are_found_inside_the_compression(out):
+    path = out / "bundle" / GLB
+    data = path.read_bytes()
+    at = data.index(b'"max":[') + len(b'"max":[')
+    digit = b"1" if data[at : at + 1] != b"1" else b"2"
+    path.write_bytes(data[:at] + digit + data[at + 1 :])
+    detail = lines(out)["glTF validator"].detail
+    assert "decompressed: ACCESSOR_MAX_MISMATCH" in detail
+
+
+@pytest.mark.usefixtures("node")
+def test_cut_texture_is_found(out):
+    path = out / "bundle" / "volumes/r0_c0/CD31.ktx2"
+    path.write_bytes(path.read_bytes()[:-100])
+    assert "CD31.ktx2" in lines(out)["KTX2 textures"].detail
+
+
+def test_missing_node_is_named(made, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    found = lines(made)["glTF validator"]
+    assert not found.ok
+    assert "install Node 20 or newer" in found.detail
+
+
+def test_missing_packages_are_named(made, monkeypatch):
+    answer = subprocess.CompletedProcess([], 1, "", "Error [ERR_MODULE_NOT_FOUND]: no package")
+    monkeypatch.setattr(subprocess, "run", lambda *args, **options: answer)
+    assert "run `make setup`" in lines(made)["glTF validator"].detail

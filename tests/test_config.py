@@ -1,0 +1,83 @@
+"""Settings: presets, files, flags; and what is wrong with them."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from stereocell import config
+from stereocell.errors import UsageError
+
+
+def test_printed_settings_are_the_defaults_again() -> None:
+    text = config.to_toml(config.Settings())
+    assert config.apply(config.Settings(), tomllib.loads(text), "here") == config.Settings()
+    keys = [line for line in text.splitlines() if " = " in line and not line.startswith("#")]
+    assert keys
+    assert all("  # " in line for line in keys)
+
+
+@pytest.mark.parametrize("preset", ["cycif", "lightsheet", "mri"])
+def test_presets_load(preset: str) -> None:
+    settings = config.load(preset, None, {})
+    assert settings != config.Settings()
+    assert config.from_dict(config.to_dict(settings)) == settings
+
+
+def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[window]\nlow_percentile = 3\n[surface]\nalpha_um = 2.5\n[plan]\nlevel = 1\n")
+    settings = config.load("cycif", file, {"plan": {"level": 2}})
+    assert settings.plan.level == 2
+    assert settings.window.low_percentile == 3.0
+    assert settings.surface.alpha_um == 2.5
+    assert settings.surface.min_diagonal_um == 1.5  # from the preset
+
+
+def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
+    file = tmp_path / "ours.toml"
+    file.write_text('[isovalue]\ncriterion = "mean"\n[iso_values]\n"Hoechst 33342" = 800\n')
+    settings = config.load(str(file), None, {})
+    assert settings.isovalue.criterion == "mean"
+    assert settings.iso_values == {"Hoechst 33342": 800.0}
+    assert config.from_dict(tomllib.loads(config.to_toml(settings))) == settings
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[plan]\nlevle = 1\n", "unknown key 'levle'; did you mean 'level'"),
+        ("[surfaces]\n", "unknown section 'surfaces'; did you mean 'surface'"),
+        ("[plan]\nlevel = 1.5\n", "plan.level is 1.5, expected a whole number or 'auto'"),
+        ("[window]\nlow_percentile = true\n", "low_percentile is True, expected a number"),
+        ("[window]\nlow_percentile = 100\n", "expected 0 <= low < high <= 100"),
+        ("[isovalue]\nbins = 3\n", "bins is 3, expected at least 16"),
+        ("[plan]\nchannels = 3\n", "channels is 3, expected a list"),
+        ("plan = 3\n", "plan is 3, expected a table"),
+        ("[plan\n", "not TOML"),
+    ],
+)
+def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(UsageError) as raised:
+        config.load(None, file, {})
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_unknown_preset_lists_the_known() -> None:
+    with pytest.raises(UsageError, match=r"expected one of cycif, lightsheet, mri or a \.toml file"):
+        config.load("confocal", None, {})
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none\.toml: No such file"):
+        config.load(None, tmp_path / "none.toml", {})
+
+
+def test_auto_lengths_follow_the_spacing() -> None:
+    resolved = config.SurfaceOptions().resolved((5.0, 2.0, 2.0))
+    assert (resolved.smoothing_um, resolved.alpha_um) == (2.0, 10.0)
+    with pytest.raises(UsageError, match="alpha_um is -1"):
+        config.SurfaceOptions(alpha_um=-1.0).resolved((1.0, 1.0, 1.0))

@@ -1,0 +1,110 @@
+"""Levels of detail: error, borders, measured distance; what is unwrapped and baked on them."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from stereocell.errors import UsageError
+from stereocell.lod import LodOptions, measure_distance, simplify
+from stereocell.mesh import Mesh
+from stereocell.unwrap import bake_normals, unwrap
+
+
+def _sphere(radius: float = 5.0, sides: int = 96) -> Mesh:
+    sphere = pv.Sphere(radius=radius, theta_resolution=sides, phi_resolution=sides)
+    positions = np.asarray(sphere.points, np.float32)
+    triangles = sphere.regular_faces.astype(np.uint32)
+    return Mesh(positions, triangles, (positions / radius).astype(np.float32))
+
+
+def _open_half() -> Mesh:
+    sphere = _sphere()
+    keep = (sphere.positions[sphere.triangles][:, :, 0] >= 0).all(axis=1)
+    used = np.unique(sphere.triangles[keep])
+    renumber = np.zeros(len(sphere.positions), np.uint32)
+    renumber[used] = np.arange(len(used))
+    return Mesh(sphere.positions[used], renumber[sphere.triangles[keep]], sphere.normals[used])
+
+
+def _border(mesh: Mesh) -> set[bytes]:
+    edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    once, count = np.unique(edges, axis=0, return_counts=True)
+    return {p.tobytes() for p in mesh.positions[np.unique(once[count == 1])]}
+
+
+@pytest.mark.parametrize("error", [0.02, 0.1, 0.5])
+def test_coarser_level_has_fewer_triangles_and_stays_near(error: float) -> None:
+    fine = _sphere()
+    coarse = simplify(fine, error)
+    assert len(coarse.triangles) < 0.6 * len(fine.triangles)
+    assert measure_distance(fine, coarse, 4000) < 3 * error
+
+
+def test_cut_edges_are_locked() -> None:
+    half = _open_half()
+    coarse = simplify(half, 1.0)
+    assert len(coarse.triangles) < len(half.triangles)
+    assert _border(half) == _border(coarse)
+
+
+def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> None:
+    measured = measure_distance(_sphere(5.0), _sphere(4.0), 4000)
+    assert measured == pytest.approx(1.0, abs=0.02)
+
+
+def test_errors_must_rise() -> None:
+    with pytest.raises(UsageError, match="expected rising positive numbers"):
+        LodOptions(errors=(0.5, 0.1))
+
+
+def test_unwrapped_charts_do_not_overlap_and_fill_the_square() -> None:
+    mesh, size = unwrap(simplify(_sphere(), 0.2), 256, 0.1)
+    assert mesh.uvs is not None
+    assert mesh.uvs.min() >= 0
+    assert mesh.uvs.max() <= 1
+    count = np.zeros((size, size), int)
+    for triangle in mesh.uvs[mesh.triangles] * size:  # a second, plain rasteriser
+        low, high = np.floor(triangle.min(axis=0)).astype(int), np.ceil(triangle.max(axis=0))
+        u, v = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
+        a, b, c = triangle
+        signs = [
+            (q[0] - p[0]) * (v - p[1]) - (q[1] - p[1]) * (u - p[0])
+            for p, q in ((a, b), (b, c), (c, a))
+        ]
+        inside = np.all([s > 1e-3 for s in signs], axis=0) | np.all(
+            [s < -1e-3 for s in signs], axis=0
+        )
+        count[v[inside].astype(int), u[inside].astype(int)] += 1
+    assert count.max() == 1
+    assert (count > 0).mean() > 0.3
+
+
+def test_tangents_are_unit_and_across_the_normals() -> None:
+    mesh, _ = unwrap(simplify(_sphere(), 0.2), 256, 0.1)
+    assert mesh.tangents is not None
+    np.testing.assert_allclose(np.linalg.norm(mesh.tangents[:, :3], axis=1), 1, atol=1e-4)
+    assert np.abs((mesh.tangents[:, :3] * mesh.normals).sum(axis=1)).max() < 1e-3
+
+
+def test_baked_map_gives_back_the_sphere_s_normals() -> None:
+    """Shade a very coarse sphere by its map: the normals must be those of the true sphere."""
+    fine = _sphere()
+    coarse, size = unwrap(simplify(fine, 0.8), 256, 0.1)
+    image = bake_normals(coarse, fine, size)
+    assert coarse.uvs is not None
+    assert coarse.tangents is not None
+    corners = coarse.triangles
+    at = coarse.uvs[corners].mean(axis=1) * size  # triangle centres
+    texel = image[size - 1 - at[:, 1].astype(int), at[:, 0].astype(int)] / 127.5 - 1
+    normal = coarse.normals[corners].mean(axis=1)
+    tangent = coarse.tangents[corners, :3].mean(axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    bitangent = np.cross(normal, tangent) * coarse.tangents[corners[:, 0], 3:]
+    shaded = texel[:, :1] * tangent + texel[:, 1:2] * bitangent + texel[:, 2:] * normal
+    shaded /= np.linalg.norm(shaded, axis=1, keepdims=True)
+    truth = coarse.positions[corners].mean(axis=1)
+    truth = truth / np.linalg.norm(truth, axis=1, keepdims=True)
+    cosine = (shaded * truth).sum(axis=1)
+    assert np.median(cosine) > 0.995
+    assert np.percentile(cosine, 5) > 0.97

@@ -1,0 +1,10 @@
+/** Write the tests' synthetic bundle, to look at it: `npm run fixture -- FOLDER`. */
+import { writeFixture } from "../test/fixture/bundle";
+
+const [folder] = process.argv.slice(2);
+if (folder === undefined) {
+  process.stderr.write("usage: npm run fixture -- FOLDER\n");
+  process.exit(2);
+}
+const { channels } = await writeFixture(folder);
+process.stdout.write(`${folder}: ${channels.map(({ name }) => name).join(", ")}\n`);

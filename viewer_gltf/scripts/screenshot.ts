@@ -1,0 +1,83 @@
+/**
+ * A picture of a bundle, drawn by headless Chromium.
+ *
+ *   npm run build && npm run screenshot -- BUNDLE OUT.png [options]
+ *     --size 1280x720        CSS pixels
+ *     --volume one|all       draw the channels of --volumes as volumes, in one tile or in all
+ *     --volumes A,B          channel ids (default: all shown ones, at most four)
+ *     --tile r0_c0           the tile of --volume one
+ *     --only A,B             show these channels only
+ *     --transfer NAME        transfer function of the volumes
+ *     --stereo               what an emulated headset shows, both eyes
+ *     --phone                portrait, with touch
+ *     --page                 the bundle's own index.html instead of dist/
+ */
+import { parseArgs } from "node:util";
+import { addHeadset, launch } from "../test/driver/chromium";
+import { Host } from "../test/driver/host";
+import { ViewerPage } from "../test/driver/page";
+
+const { values, positionals } = parseArgs({
+  allowPositionals: true,
+  options: {
+    size: { type: "string", default: "1280x720" },
+    volume: { type: "string" },
+    volumes: { type: "string" },
+    tile: { type: "string" },
+    only: { type: "string" },
+    transfer: { type: "string" },
+    stereo: { type: "boolean", default: false },
+    phone: { type: "boolean", default: false },
+    page: { type: "boolean", default: false },
+  },
+});
+const [bundle, out] = positionals;
+if (bundle === undefined || out === undefined) {
+  process.stderr.write("usage: npm run screenshot -- BUNDLE OUT.png [options]\n");
+  process.exit(2);
+}
+
+const [width, height] = values.phone ? [390, 780] : values.size.split("x").map(Number);
+const dist = new URL("../dist/", import.meta.url).pathname;
+const host = await Host.start({ "/": values.page ? bundle : dist, "/bundle/": bundle });
+const browser = await launch({ width, height });
+try {
+  const page = await browser.context.newPage();
+  page.on("pageerror", (error) => process.stderr.write(`page: ${error.message}\n`));
+  page.on("console", (message) => {
+    if (message.type() === "error") process.stderr.write(`console: ${message.text()}\n`);
+  });
+  if (values.stereo) await addHeadset(page);
+  const viewer = new ViewerPage(page);
+  const started = performance.now();
+  await viewer.open(`${host.address}/${values.page ? "" : "?bundle=bundle/"}`);
+  const overview_s = (performance.now() - started) / 1000;
+  const { state } = await viewer.snapshot();
+  const only = values.only?.split(",");
+  const shown = state.channels.filter(({ id, shown }) => only?.includes(id) ?? shown);
+  for (const channel of state.channels) {
+    const isShown = shown.includes(channel);
+    if (isShown !== channel.shown) await viewer.show(channel.id, isShown);
+  }
+  if (values.volume !== undefined) {
+    const ids = values.volumes?.split(",") ?? shown.map(({ id }) => id).slice(0, 4);
+    for (const id of ids) {
+      await viewer.drawVolume(id, true);
+      if (values.transfer !== undefined) await viewer.chooseTransferFunction(id, values.transfer);
+    }
+    if (values.volume === "all") await viewer.chooseScope("all");
+    if (values.tile !== undefined) await viewer.chooseTile(values.tile);
+  }
+  if (values.stereo) await viewer.enterStereo();
+  else await viewer.settled();
+  const { triangles, volumes } = await viewer.snapshot();
+  await page.screenshot({ path: out });
+  process.stdout.write(
+    `${out}: overview after ${overview_s.toFixed(1)} s, settled after ` +
+      `${((performance.now() - started) / 1000).toFixed(1)} s; ${triangles} triangles; ` +
+      `${volumes.length} volumes\n`,
+  );
+} finally {
+  await browser.close();
+  await host.stop();
+}

@@ -1,0 +1,70 @@
+/** Fetch files of a bundle. Every fault becomes a BundleError that names the file. */
+import { BundleError } from "./errors";
+import type { FileRef } from "./generated/bundle";
+
+/** The address of a path that a manifest names; the bundle's query, if any, goes with it. */
+export function fileAddress(base: string, path: string): string {
+  const url = new URL(base);
+  return new URL(path + url.search, base).href;
+}
+
+/** The response of `url`, if its status says success. `path` is the file's name in messages. */
+export async function request(
+  url: string,
+  path: string,
+  options: RequestInit = {},
+): Promise<Response> {
+  let response: Response;
+  try {
+    response = await fetch(url, options);
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    throw new BundleError(`${path}: the host of ${url} can't be reached, or forbids this page`, {
+      cause: error,
+    });
+  }
+  if (response.status === 404) throw new BundleError(`${path}: not found (404) at ${url}`);
+  if (!response.ok) {
+    throw new BundleError(`${path}: the host answered ${response.status} for ${url}`);
+  }
+  return response;
+}
+
+/** The file's bytes, after their number and hash were checked against the reference. */
+export async function fetchFile(
+  base: string,
+  file: FileRef,
+  signal?: AbortSignal,
+): Promise<Uint8Array<ArrayBuffer>> {
+  const response = await request(fileAddress(base, file.path), file.path, { signal });
+  const bytes = new Uint8Array(await response.arrayBuffer());
+  await checkFile(file, bytes);
+  return bytes;
+}
+
+/** Throws BundleError unless the bytes are the ones that the reference describes. */
+export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
+  if (bytes.length !== file.bytes) {
+    throw new BundleError(
+      `${file.path}: expected ${file.bytes} bytes, found ${bytes.length} (a broken upload?)`,
+    );
+  }
+  // The hash needs a secure context (https or localhost); elsewhere the size has to do.
+  if (!globalThis.isSecureContext) return;
+  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
+  const hash = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  if (hash !== file.sha256) {
+    throw new BundleError(`${file.path}: expected SHA-256 ${file.sha256}, found ${hash}`);
+  }
+}
+
+/** The parsed text. Throws BundleError if it is no JSON, as a host's own error page is. */
+export function parseJson(text: string, path: string): unknown {
+  try {
+    return JSON.parse(text);
+  } catch (error) {
+    if (!(error instanceof SyntaxError)) throw error;
+    const start = text.trim().slice(0, 40).replace(/\s+/g, " ");
+    throw new BundleError(`${path}: expected JSON, found "${start}"`, { cause: error });
+  }
+}

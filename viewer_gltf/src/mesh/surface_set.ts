@@ -1,0 +1,103 @@
+/** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
+import { type Camera, Group } from "three";
+import type { Bundle } from "../bundle/load";
+import { surfaceColor } from "../color";
+import { isSurfaceShown, type ViewerState } from "../state";
+import type { SurfaceLoader } from "./loader";
+import { overview, type Progress } from "./progress";
+import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
+
+/** Screen-space error, in pixels, down to which LODs are refined; a headset draws every eye. */
+export const ERROR_TARGET_PX = 2;
+export const ERROR_TARGET_XR_PX = 4;
+
+export class SurfaceSet {
+  /** In um, world. */
+  readonly group = new Group();
+  private readonly tilesets = new Map<string, SurfaceTileset>();
+  private state: ViewerState | null = null;
+  private errorTarget_px = ERROR_TARGET_PX;
+
+  constructor(
+    private readonly bundle: Bundle,
+    private readonly loader: SurfaceLoader,
+    private readonly hasVolume: (tile: string, channel: string) => boolean,
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {}
+
+  get overview(): Progress {
+    return overview(this.shown().map(([, tileset]) => tileset.progress));
+  }
+
+  get isLoading(): boolean {
+    return this.shown().some(([, tileset]) => tileset.isLoading);
+  }
+
+  get triangles(): number {
+    return this.shown().reduce((sum, [, tileset]) => sum + tileset.triangles, 0);
+  }
+
+  setErrorTarget(pixels: number): void {
+    this.errorTarget_px = pixels;
+  }
+
+  follow(state: ViewerState): void {
+    this.state = state;
+    for (const channel of state.channels) {
+      if (channel.shown && channel.hasSurface && !this.tilesets.has(channel.id)) {
+        this.add(channel.id);
+      }
+      const tileset = this.tilesets.get(channel.id);
+      if (tileset === undefined) continue;
+      tileset.group.visible = channel.shown;
+      for (const surface of tileset.surfaces.values()) this.dress(channel.id, surface);
+    }
+  }
+
+  update(camera: Camera, width_px: number, height_px: number): void {
+    const isComplete = this.overview.isComplete;
+    for (const [, tileset] of this.shown()) {
+      if (isComplete) tileset.refine(this.errorTarget_px);
+      tileset.update(camera, width_px, height_px);
+    }
+  }
+
+  private shown(): [string, SurfaceTileset][] {
+    return [...this.tilesets].filter(([, tileset]) => tileset.group.visible);
+  }
+
+  private add(id: string): void {
+    const channel = this.bundle.manifest.channels.find((c) => c.id === id);
+    if (channel === undefined) throw new Error(`the bundle has no channel ${id}`);
+    const tileset = new SurfaceTileset(
+      this.bundle.base,
+      channel,
+      this.loader,
+      (surface) => this.dress(id, surface),
+      this.onChange,
+      this.onError,
+    );
+    this.tilesets.set(id, tileset);
+    this.group.add(tileset.group);
+  }
+
+  /** Colour and visibility of one loaded surface, by the state. */
+  private dress(id: string, surface: Surface): void {
+    const { state } = this;
+    const channel = state?.channels.find((c) => c.id === id);
+    if (state === null || channel === undefined) return;
+    surface.scene.visible = isSurfaceShown(
+      state,
+      id,
+      surface.tile,
+      this.hasVolume(surface.tile, id),
+    );
+    paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
+  }
+
+  dispose(): void {
+    for (const tileset of this.tilesets.values()) tileset.dispose();
+    this.tilesets.clear();
+  }
+}

@@ -1,0 +1,45 @@
+/** Where the specimen and the eye are. Lengths of the room are metres. Pure. */
+import type { Manifest } from "../bundle/generated/bundle";
+
+type Bounds = Manifest["specimen"]["bounds_um"];
+type Vec3 = readonly [number, number, number];
+
+/** The specimen's longest edge in the room. */
+export const LONGEST_EDGE_M = 1.2;
+/** In a headset the specimen's centre is this far in front of the eyes, at their height. */
+export const XR_DISTANCE_M = 1.5;
+/** Share of the picture that the specimen may fill at the start. */
+const FILL = 0.88;
+
+export type Placement = Readonly<{
+  /** Metres of the room per um of the specimen. */
+  scale: number;
+  /** The specimen's centre, um, world. */
+  center: Vec3;
+  /** The specimen's edges in the room. */
+  size: Vec3;
+}>;
+
+/** How large the room shows the specimen. */
+export function place(bounds: Bounds): Placement {
+  const edge = (i: number) => bounds.max[i] - bounds.min[i];
+  const longest = Math.max(edge(0), edge(1), edge(2));
+  const scale = LONGEST_EDGE_M / (longest > 0 ? longest : 1);
+  const middle = (i: number) => (bounds.min[i] + bounds.max[i]) / 2;
+  return {
+    scale,
+    center: [middle(0), middle(1), middle(2)],
+    size: [edge(0) * scale, edge(1) * scale, edge(2) * scale],
+  };
+}
+
+/**
+ * Distance from the specimen's centre to a camera in front of it (towards +z) that sees its whole
+ * front face.
+ *
+ * @param fov_rad vertical field of view
+ */
+export function framingDistance(size: Vec3, fov_rad: number, aspect: number): number {
+  const half = Math.tan(fov_rad / 2);
+  return size[2] / 2 + Math.max(size[1], size[0] / aspect) / (2 * FILL * half);
+}

@@ -1,0 +1,33 @@
+/** Which mip levels of a volume to fetch, coarse first. Pure. */
+import type { MipLevel } from "../bundle/generated/volumes";
+
+/** The first picture comes from the finest level that is not larger than this. */
+export const FIRST_LEVEL_BYTES = 64 * 1024;
+/** GPU memory for all volumes on screen together. */
+export const VOLUME_BUDGET_BYTES = 256 * 1024 * 1024;
+
+export function texels(level: MipLevel): number {
+  const [x, y, z] = level.size;
+  return x * y * z;
+}
+
+/**
+ * Indices into `levels` (which go from fine to coarse), in the order in which they are fetched:
+ * first a small one, then each finer one up to the finest that fits into `budget_bytes` (one byte
+ * a texel) and whose sides the GPU takes. The coarsest is always allowed.
+ */
+export function levelsToFetch(
+  levels: readonly MipLevel[],
+  budget_bytes: number,
+  maxSide: number,
+): readonly number[] {
+  const coarsest = levels.length - 1;
+  const fits = (level: MipLevel) =>
+    texels(level) <= budget_bytes && Math.max(...level.size) <= maxSide;
+  const found = levels.findIndex(fits);
+  const finest = found === -1 ? coarsest : found;
+  let first = levels.findIndex((level) => texels(level) <= FIRST_LEVEL_BYTES);
+  if (first === -1) first = coarsest;
+  first = Math.max(first, finest);
+  return Array.from({ length: first - finest + 1 }, (_, i) => first - i);
+}

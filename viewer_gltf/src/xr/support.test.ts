@@ -1,0 +1,29 @@
+import { describe, expect, it } from "vitest";
+import { findXrSupport } from "./support";
+
+const system = (answer: () => Promise<boolean>) => ({ isSessionSupported: answer });
+
+describe("stereo", () => {
+  it("is there with a headset", async () => {
+    const found = await findXrSupport(
+      system(async () => true),
+      true,
+    );
+    expect(found).toEqual({ isAvailable: true, reason: "" });
+  });
+
+  it("tells why it is not there", async () => {
+    const reasonOf = async (...args: Parameters<typeof findXrSupport>) =>
+      (await findXrSupport(...args)).reason;
+    expect(await reasonOf(undefined, false)).toContain("https");
+    expect(await reasonOf(undefined, true)).toContain("no WebXR");
+    expect(
+      await reasonOf(
+        system(async () => false),
+        true,
+      ),
+    ).toContain("No headset");
+    const refuse = () => Promise.reject(new DOMException("policy", "SecurityError"));
+    expect(await reasonOf(system(refuse), true)).toContain("refuses WebXR here: policy");
+  });
+});

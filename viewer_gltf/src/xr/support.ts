@@ -1,0 +1,22 @@
+/** Whether a headset can be used, and if not, why, in words. */
+export type XrSupport = Readonly<{ isAvailable: boolean; reason: string }>;
+
+/** @param xr `navigator.xr`, absent in browsers without WebXR or outside a secure context */
+export async function findXrSupport(
+  xr: Pick<XRSystem, "isSessionSupported"> | undefined,
+  isSecure: boolean,
+): Promise<XrSupport> {
+  if (!isSecure) {
+    return { isAvailable: false, reason: "Stereo needs a secure address: https, or localhost." };
+  }
+  if (xr === undefined) {
+    return { isAvailable: false, reason: "This browser has no WebXR, which stereo needs." };
+  }
+  try {
+    if (await xr.isSessionSupported("immersive-vr")) return { isAvailable: true, reason: "" };
+  } catch (error) {
+    if (!(error instanceof DOMException)) throw error;
+    return { isAvailable: false, reason: `The browser refuses WebXR here: ${error.message}` };
+  }
+  return { isAvailable: false, reason: "No headset or phone viewer was found." };
+}

@@ -1,0 +1,24 @@
+/** Where the start view shows a point, from the viewer's own rules of placement. */
+import type { Manifest } from "../../src/bundle/generated/bundle";
+import { framingDistance, place } from "../../src/view/placement";
+
+const FIELD_OF_VIEW_RAD = (40 * Math.PI) / 180;
+
+/** Pixel of a point (um, world) in a stage of that size, and the cosine of its ray to the z axis. */
+export function project(
+  point: readonly [number, number, number],
+  bounds: Manifest["specimen"]["bounds_um"],
+  width: number,
+  height: number,
+): { x: number; y: number; cosine: number } {
+  const { scale, center, size } = place(bounds);
+  const distance = framingDistance(size, FIELD_OF_VIEW_RAD, width / height);
+  const [x, y, z] = point.map((v, i) => (v - center[i]) * scale);
+  const depth = distance - z;
+  const pixels = height / 2 / Math.tan(FIELD_OF_VIEW_RAD / 2) / depth;
+  return {
+    x: width / 2 + x * pixels,
+    y: height / 2 - y * pixels,
+    cosine: depth / Math.hypot(x, y, depth),
+  };
+}

@@ -1,0 +1,69 @@
+/** Headless Chromium with software WebGL, in a profile of its own that goes when it closes. */
+import { existsSync } from "node:fs";
+import { mkdtemp, readFile, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { type BrowserContext, chromium, type Page } from "playwright-core";
+
+export const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
+export const HOW_TO_GET = `no Chromium at ${CHROMIUM}: apt-get install chromium, or set CHROMIUM to its path`;
+
+const FLAGS = [
+  "--no-sandbox",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+  "--use-angle=swiftshader",
+  "--enable-unsafe-swiftshader",
+  "--ignore-gpu-blocklist",
+];
+
+export function hasChromium(): boolean {
+  return existsSync(CHROMIUM);
+}
+
+export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<void> }>;
+
+/** @param viewport CSS pixels; small ones, since software draws them */
+export async function launch(
+  viewport: { width: number; height: number },
+  flags: readonly string[] = [],
+): Promise<Browser> {
+  if (!hasChromium()) throw new Error(HOW_TO_GET);
+  const profile = await mkdtemp(join(tmpdir(), "stereocell-chromium-"));
+  const context = await chromium.launchPersistentContext(profile, {
+    executablePath: CHROMIUM,
+    headless: false, // playwright's own switch is the old mode; the flag below is the new one
+    args: ["--headless=new", ...FLAGS, ...flags],
+    viewport,
+    deviceScaleFactor: 1,
+  });
+  return {
+    context,
+    close: async () => {
+      await context.close();
+      await rm(profile, { recursive: true, force: true });
+    },
+  };
+}
+
+/** Give the page an emulated headset (iwer), before its own scripts run. */
+export async function addHeadset(page: Page): Promise<void> {
+  const script = new URL(import.meta.resolve("iwer/build/iwer.min.js"));
+  await page.addInitScript(await readFile(script, "utf8"));
+  await page.addInitScript(() => {
+    const { XRDevice, metaQuest3 } = (window as unknown as { IWER: typeof import("iwer") }).IWER;
+    const device = new XRDevice(metaQuest3, { stereoEnabled: true });
+    device.installRuntime({ forceInstall: true }); // Chromium has a runtime, but no headset
+    device.position.set(0, 1.6, 0);
+    // The emulator gives the canvas the window's size; the page's own style would squash it.
+    document.addEventListener("DOMContentLoaded", () => {
+      const style = document.createElement("style");
+      style.textContent =
+        "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }";
+      document.head.append(style);
+    });
+  });
+}

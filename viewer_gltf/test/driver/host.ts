@@ -1,0 +1,82 @@
+/** A static host on localhost for tests, with or without HTTP ranges, that remembers requests. */
+import { readFile } from "node:fs/promises";
+import { createServer, type Server } from "node:http";
+import type { AddressInfo } from "node:net";
+import { extname, join, normalize } from "node:path";
+
+const TYPES: Readonly<Record<string, string>> = {
+  ".html": "text/html; charset=utf-8",
+  ".js": "text/javascript",
+  ".css": "text/css",
+  ".json": "application/json",
+  ".wasm": "application/wasm",
+  ".glb": "model/gltf-binary",
+  ".ktx2": "image/ktx2",
+};
+
+export type Request = Readonly<{ path: string; range: string | null }>;
+
+export class Host {
+  readonly requests: Request[] = [];
+  /** Paths that are answered instead of the folder's file. */
+  readonly overrides = new Map<string, { status: number; body: string | Uint8Array }>();
+  hasRanges = true;
+
+  private constructor(
+    private readonly server: Server,
+    readonly address: string,
+  ) {}
+
+  /** Serve folders under their prefixes, such as `{"/": dist, "/bundle/": bundle}`. */
+  static async start(mounts: Readonly<Record<string, string>>): Promise<Host> {
+    const prefixes = Object.keys(mounts).sort((a, b) => b.length - a.length);
+    const server = createServer((request, response) => {
+      const path = decodeURIComponent(new URL(request.url ?? "/", "http://host").pathname);
+      const range = request.headers.range ?? null;
+      host.requests.push({ path, range });
+      const prefix = prefixes.find((each) => path.startsWith(each));
+      const inside = prefix === undefined ? "" : normalize(path.slice(prefix.length));
+      const file =
+        prefix === undefined || inside.startsWith("..")
+          ? null
+          : join(mounts[prefix], inside.endsWith("/") || inside === "." ? "index.html" : inside);
+      const answer = host.overrides.get(path);
+      const content =
+        answer !== undefined
+          ? Promise.resolve(Buffer.from(answer.body))
+          : file === null
+            ? Promise.reject(new Error("outside"))
+            : readFile(file);
+      content.then(
+        (bytes) => {
+          const headers = { "Content-Type": TYPES[extname(path)] ?? "text/html" };
+          const asked =
+            host.hasRanges && answer === undefined ? /^bytes=(\d+)-(\d+)$/.exec(range ?? "") : null;
+          if (asked === null) {
+            response.writeHead(answer?.status ?? 200, headers).end(bytes);
+            return;
+          }
+          const part = bytes.subarray(Number(asked[1]), Number(asked[2]) + 1);
+          const last = Number(asked[1]) + part.length - 1;
+          response
+            .writeHead(206, {
+              ...headers,
+              "Content-Range": `bytes ${asked[1]}-${last}/${bytes.length}`,
+            })
+            .end(part);
+        },
+        () => response.writeHead(404).end("not found"),
+      );
+    });
+    await new Promise<void>((resolve) => server.listen(0, "127.0.0.1", resolve));
+    const host = new Host(server, `http://127.0.0.1:${(server.address() as AddressInfo).port}`);
+    return host;
+  }
+
+  stop(): Promise<void> {
+    this.server.closeAllConnections();
+    return new Promise((resolve) => {
+      this.server.close(() => resolve());
+    });
+  }
+}

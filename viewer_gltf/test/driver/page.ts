@@ -1,0 +1,69 @@
+/** Drive the viewer's page as a person does: by its controls. */
+import type { Page } from "playwright-core";
+import type { Snapshot } from "../../src/api";
+
+export class ViewerPage {
+  constructor(readonly page: Page) {}
+
+  /** Open an address and wait until the overview is on screen. */
+  async open(address: string): Promise<void> {
+    await this.page.goto(address);
+    await this.page.waitForFunction(() => window.stereocell !== undefined);
+    await this.page.evaluate(() => window.stereocell?.ready);
+  }
+
+  /** Wait until nothing loads and the picture shows all of it. */
+  async settled(): Promise<void> {
+    await this.page.evaluate(() => window.stereocell?.settled());
+  }
+
+  async snapshot(): Promise<Snapshot> {
+    const snapshot = await this.page.evaluate(() => window.stereocell?.snapshot());
+    if (snapshot === undefined) throw new Error("the page has no window.stereocell");
+    return snapshot;
+  }
+
+  private part(channel: string, name: string) {
+    return this.page.locator(`[data-channel="${channel}"] [data-part="${name}"]`);
+  }
+
+  async show(channel: string, isShown: boolean): Promise<void> {
+    await this.part(channel, "shown").setChecked(isShown);
+    await this.settled();
+  }
+
+  async drawVolume(channel: string, isVolume: boolean): Promise<void> {
+    // The checkbox lies invisible under its label's text, which is what a person clicks.
+    await this.part(channel, "volume").setChecked(isVolume, { force: true });
+    await this.settled();
+  }
+
+  async recolor(channel: string, hex: string): Promise<void> {
+    await this.part(channel, "color").fill(hex);
+    await this.settled();
+  }
+
+  async chooseTransferFunction(channel: string, name: string): Promise<void> {
+    await this.part(channel, "transfer-function").selectOption(name);
+    await this.settled();
+  }
+
+  async chooseTile(tile: string): Promise<void> {
+    await this.page.locator("[data-tile-choice]").selectOption(tile);
+    await this.settled();
+  }
+
+  async chooseScope(scope: "one" | "all"): Promise<void> {
+    await this.page.locator(`[data-scope="${scope}"]`).setChecked(true, { force: true });
+    await this.settled();
+  }
+
+  async enterStereo(): Promise<void> {
+    await this.page.locator('[data-action="stereo"]').click();
+    await this.page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
+    await this.settled();
+    // Two more frames, so that both eyes have been drawn at the pose that holds.
+    const frames = await this.page.evaluate(() => window.stereocell?.frames ?? 0);
+    await this.page.waitForFunction((n) => (window.stereocell?.frames ?? 0) > n + 1, frames);
+  }
+}

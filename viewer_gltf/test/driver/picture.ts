@@ -1,0 +1,83 @@
+/** Pixels of what the page shows, decoded by the page itself. */
+import type { Page } from "playwright-core";
+
+export type Pixel = readonly [number, number, number];
+export type Area = Readonly<{ x: number; y: number; width: number; height: number }>;
+
+export class Picture {
+  constructor(
+    readonly width: number,
+    readonly height: number,
+    private readonly rgba: Uint8Array,
+  ) {}
+
+  at(x: number, y: number): Pixel {
+    const i = 4 * (Math.round(y) * this.width + Math.round(x));
+    return [this.rgba[i], this.rgba[i + 1], this.rgba[i + 2]];
+  }
+
+  count(matches: (pixel: Pixel) => boolean): number {
+    return this.where(matches).length;
+  }
+
+  /** Positions of the matching pixels. */
+  where(matches: (pixel: Pixel) => boolean): [number, number][] {
+    const found: [number, number][] = [];
+    for (let y = 0; y < this.height; y++) {
+      for (let x = 0; x < this.width; x++) {
+        if (matches(this.at(x, y))) found.push([x, y]);
+      }
+    }
+    return found;
+  }
+}
+
+/** What the page shows in the stage (or in `area`), without what lies over it. */
+export async function takePicture(page: Page, area?: Area): Promise<Picture> {
+  const clip = area ?? (await page.locator(".stage").boundingBox()) ?? undefined;
+  const png = await page.screenshot({ clip });
+  const { width, height, data } = await page.evaluate(async (base64) => {
+    const blob = await (await fetch(`data:image/png;base64,${base64}`)).blob();
+    const bitmap = await createImageBitmap(blob);
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    const context = canvas.getContext("2d");
+    if (context === null) throw new Error("no 2D canvas");
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    let text = "";
+    for (let i = 0; i < data.length; i += 8192) {
+      text += String.fromCharCode(...data.subarray(i, i + 8192));
+    }
+    return { width: bitmap.width, height: bitmap.height, data: btoa(text) };
+  }, png.toString("base64"));
+  return new Picture(width, height, Buffer.from(data, "base64"));
+}
+
+/** The room's background. */
+export function isBackground([r, g, b]: Pixel): boolean {
+  return Math.abs(r - 11) + Math.abs(g - 13) + Math.abs(b - 18) < 8;
+}
+
+/**
+ * Whether a pixel shows a colour (linear) in any light: its hue is near, and it is not grey.
+ * Hue and saturation are taken in sRGB, which light from a white lamp leaves about as they are.
+ */
+export function hasColor(linear: Pixel, tolerance_deg = 22): (pixel: Pixel) => boolean {
+  const wanted = hue(linear.map((v) => 255 * v ** (1 / 2.2)) as unknown as Pixel);
+  return (pixel) => {
+    const found = hue(pixel);
+    if (wanted === null || found === null) return false;
+    const apart = Math.abs(found - wanted) % 360;
+    return Math.min(apart, 360 - apart) < tolerance_deg;
+  };
+}
+
+/** Degrees; null where a pixel is too grey or too dark to have one. */
+function hue([r, g, b]: Pixel): number | null {
+  const high = Math.max(r, g, b);
+  const spread = high - Math.min(r, g, b);
+  if (high < 40 || spread < 0.25 * high) return null;
+  if (high === r) return (60 * (g - b)) / spread;
+  if (high === g) return 120 + (60 * (b - r)) / spread;
+  return 240 + (60 * (r - g)) / spread;
+}

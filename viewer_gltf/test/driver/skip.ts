@@ -1,0 +1,9 @@
+/** Browser tests need Chromium: a clear skip without it, a failure in CI. */
+import { describe } from "vitest";
+import { HOW_TO_GET, hasChromium } from "./chromium";
+
+export function describeInChromium(name: string, tests: () => void): void {
+  if (hasChromium()) describe(name, tests);
+  else if (process.env.CI) throw new Error(HOW_TO_GET);
+  else describe.skip(`${name} [${HOW_TO_GET}]`, tests);
+}
