@@ -198,7 +198,10 @@ def run_report(out: Path) -> None:
     with _phase(store, "report") as phase:
         content = [store.index(), store.survey(), provenance(store.plan())]
         phases = [store.phase(name).get("key") for name in ("stage", "bundle")]
-        if phase.is_done(key_of([content, phases], *report.MODULES), store.report_file):
+        if phase.is_done(
+            key_of([content, phases, report.TEMPLATE.read_text()], *report.MODULES),
+            store.report_file,
+        ):
             return
         report.write_report(out)
 

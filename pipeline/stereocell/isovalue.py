@@ -29,7 +29,7 @@ class IsoValueOptions:
     bins: int = setting(256, "levels tried over the range of a tile's voxels")
     clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
     min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
-    min_sharpness: float = setting(1.6, "gradient at the level over the tile's median gradient")
+    min_sharpness: float = setting(2.0, "gradient at the level over the tile's median gradient")
 
     def __post_init__(self) -> None:
         if self.criterion not in CRITERIA:
@@ -47,7 +47,8 @@ class IsoValue:
     value       in the units of the voxels
     sharpness   mean gradient at the level over the median gradient of the tile. In noise without
                 structure all levels are alike and it is near 1 (1.0 to 1.2 on the synthetic
-                block's empty tiles); tiles packed with membranes gave 2.6, sparse ones 30 to 130
+                block's empty tiles, 1.6 in the autofluorescence of a real brain); tiles packed with
+                membranes gave 2.6, sparse ones 30 to 130
     is_clear    whether the sharpness reaches `min_sharpness`
     levels, score  the criterion's curve, float64 (bins,); score is scaled to a maximum of 1
     """

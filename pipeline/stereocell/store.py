@@ -173,7 +173,7 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
         temporary.mkdir(parents=True)
         np.save(temporary / "volume.npy", unit.volume)
         for level, lod in enumerate(unit.lods):
-            np.savez(temporary / f"lod{level}.npz", **_arrays(lod))
+            np.savez(lod_file(temporary, level), **_arrays(lod))
         write_json(temporary / "unit.json", record)
         shutil.rmtree(directory, ignore_errors=True)
         os.replace(temporary, directory)
@@ -183,12 +183,17 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
     return record
 
 
+def lod_file(directory: Path, level: int) -> Path:
+    """Return where `save_unit` puts one level of detail."""
+    return directory / f"lod{level}.npz"
+
+
 def load_lods(directory: Path) -> tuple[Lod, ...]:
     """Return the levels of detail that `save_unit` wrote."""
     record = json.loads((directory / "unit.json").read_text())
     lods = []
     for level, stored in enumerate(record["lods"]):
-        with np.load(directory / f"lod{level}.npz") as arrays:
+        with np.load(lod_file(directory, level)) as arrays:
             mesh = Mesh(
                 arrays["positions"],
                 arrays["triangles"],

@@ -30,7 +30,12 @@ describeInChromium("the viewer", () => {
     if (given === undefined) await writeFixture(folder);
     const bundle = given ?? folder;
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
-    host = await Host.start({ "/app/": DIST, "/bundle/": bundle });
+    host = await Host.start({
+      "/app/": DIST,
+      "/bundle/": bundle,
+      "/some/folder/": bundle,
+      "/some/folder/assets/": join(DIST, "assets"),
+    });
     browser = await launch(VIEWPORT);
   });
 
@@ -74,6 +79,16 @@ describeInChromium("the viewer", () => {
       await showOnly(id);
       expect((await picture()).count(hasColor(color)), id).toBeGreaterThan(100);
     }
+  });
+
+  it("opens the bundle beside it, in any folder of a host", async () => {
+    const body = await readFile(join(DIST, "index.html"));
+    host.overrides.set("/some/folder/index.html", { status: 200, body });
+    await viewer.open(`${host.address}/some/folder/index.html`);
+    await viewer.settled();
+    expect((await picture()).count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    const outside = host.requests.filter(({ path }) => !path.startsWith("/some/folder/"));
+    expect(outside).toEqual([]);
   });
 
   it("asks for nothing that lies outside the page and the bundle", async () => {

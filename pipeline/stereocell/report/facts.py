@@ -11,7 +11,7 @@ import numpy as np
 
 from stereocell.errors import OutputError
 from stereocell.plan import Channel, Plan
-from stereocell.store import Store, read_json
+from stereocell.store import Store, lod_file, read_json
 from stereocell.tiling import Tile
 
 PHASES = ("plan", "units", "stage", "bundle")
@@ -146,7 +146,7 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
     lods = []
     for level, lod in enumerate(record["lods"]):
         glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
-        file = glb if glb.is_file() else directory / f"lod{level}.npz"
+        file = glb if glb.is_file() else lod_file(directory, level)
         lods.append(LodFacts(lod["triangles"], lod["distance_um"], file.stat().st_size))
     ktx2 = [bundle / "volumes" / tile.id / f"{channel.id}{end}.ktx2" for end in ("", "_bricks")]
     z, y, x = record["volume"]

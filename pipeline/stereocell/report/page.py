@@ -22,14 +22,14 @@ from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
 from stereocell.report.remarks import find_remarks
 from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
 from stereocell.report.slices import cut_unit, draw_slices
-from stereocell.store import Store, load_lods
+from stereocell.store import Store, load_lods, lod_file
 from stereocell.tiling import Box, Tile
 from stereocell.unit import APRON
 from stereocell.volume import zyx_to_xyz
 from stereocell.write.atomic import write_bytes
 from stereocell.write.generator import GENERATOR
 
-TEMPLATES = Path(__file__).parents[1] / "templates"
+TEMPLATE = Path(__file__).parents[1] / "templates" / "report.html.j2"
 MOST_PICTURED = 60  # units
 MOST_ROWS = 400  # units in a table
 _TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # drawn in one picture
@@ -69,14 +69,14 @@ def render(store: Store, facts: Facts) -> str:
 
     pictured = [_inline(picture) for picture in pictures]
     environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
+        loader=FileSystemLoader(TEMPLATE.parent),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
-    return environment.get_template("report.html.j2").render(
+    return environment.get_template(TEMPLATE.name).render(
         facts=facts,
         plan=plan,
         generator=GENERATOR,
@@ -193,7 +193,7 @@ def _scene(facts: Facts, tile: Tile | None) -> Scene:
     return Scene(
         surfaces=tuple(
             Surface(
-                str((u.directory / f"lod{min(level, len(u.lods) - 1)}.npz").absolute()),
+                str(lod_file(u.directory, min(level, len(u.lods) - 1)).absolute()),
                 srgb(u.channel.color),
             )
             for u in (units[i] for i in thin_out(len(units), every))

@@ -179,9 +179,6 @@ export class Panel {
       { channel: id },
       color,
       element("span", { className: "name", textContent: name, title: name }),
-      ...(channel.hasSurface
-        ? []
-        : [element("span", { className: "tag", textContent: "no surface" })]),
       shown,
       element(
         "div",
@@ -195,6 +192,9 @@ export class Panel {
           element("span", { textContent: "Volume" }),
         ),
         transferFunction,
+        ...(channel.hasSurface
+          ? []
+          : [element("span", { className: "tag", textContent: "no surface" })]),
       ),
     );
     return { root, shown, color, volume, transferFunction };

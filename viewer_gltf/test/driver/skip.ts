@@ -5,5 +5,8 @@ import { HOW_TO_GET, hasChromium } from "./chromium";
 export function describeInChromium(name: string, tests: () => void): void {
   if (hasChromium()) describe(name, tests);
   else if (process.env.CI) throw new Error(HOW_TO_GET);
-  else describe.skip(`${name} [${HOW_TO_GET}]`, tests);
+  else {
+    process.stderr.write(`skipped: ${name}: ${HOW_TO_GET}\n`);
+    describe.skip(name, tests);
+  }
 }

@@ -1,0 +1,70 @@
+"""A disk that fills up in the middle of a build, in each phase; then room is made."""
+
+import hashlib
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import phantoms
+from stereocell.cli import main
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], capture_output=True
+    )
+    if mounted.returncode:
+        pytest.skip("mounting a small tmpfs is not allowed here (it takes root)")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def _resize(disk: Path, size: str) -> None:
+    subprocess.run(["mount", "-o", f"remount,size={size}", str(disk)], check=True)
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    return {
+        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file()
+    }
+
+
+@pytest.mark.slow
+def test_full_disk_is_one_line_leaves_no_half_file_and_the_build_goes_on_later(
+    tmp_path: Path, small_disk: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    body = np.stack([phantoms.f_phantom(2)] * 2)
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body, "CZYX", names=["a", "b"])
+
+    def build(out: Path) -> int:
+        return main(["build", str(source), "-o", str(out), "--workers", "0", "--grid", "2x1"])
+
+    assert build(tmp_path / "undisturbed") == 0
+    used = sum(f.stat().st_size for f in (tmp_path / "undisturbed").rglob("*") if f.is_file())
+    capfd.readouterr()
+
+    out = small_disk / "out"
+    failures = 0
+    for percent in range(2, 100, 7):
+        _resize(small_disk, f"{used * percent // 100 // 1024 + 8}k")
+        code = build(out)
+        printed = capfd.readouterr().err
+        assert "Traceback" not in printed
+        assert not [f for f in out.rglob(".*") if f.is_file() or f.is_dir()], percent
+        if code:
+            failures += 1
+            assert code == 1
+            assert "No space left on device" in printed
+    assert failures > 5
+    _resize(small_disk, "512m")
+    assert build(out) == 0
+    for part in ("stage", "bundle"):
+        assert _digests(out / part) == _digests(tmp_path / "undisturbed" / part)
