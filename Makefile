@@ -114,6 +114,8 @@ test-fast: setup ## Unit tests only
 test: setup browser ## All tests, in headless Chromium too
 	$(BIN)/pytest
 	cd $(VIEWER) && npm run --silent test
+	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
+	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) npm run --silent test:browser
 
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py

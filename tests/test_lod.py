@@ -52,6 +52,19 @@ def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> Non
     assert measured == pytest.approx(1.0, abs=0.02)
 
 
+def test_small_body_does_not_vanish_beside_a_large_one() -> None:
+    large, small = _sphere(), _sphere(0.4, 24)
+    moved = small.positions + np.float32([9, 0, 0])
+    both = Mesh(
+        np.concatenate([large.positions, moved]),
+        np.concatenate([large.triangles, small.triangles + np.uint32(len(large.positions))]),
+        np.concatenate([large.normals, small.normals]),
+    )
+    coarse = simplify(both, 1.0)
+    assert (coarse.positions[:, 0] > 8).any()
+    assert len(coarse.triangles) < 0.2 * len(both.triangles)
+
+
 def test_errors_must_rise() -> None:
     with pytest.raises(UsageError, match="expected rising positive numbers"):
         LodOptions(errors=(0.5, 0.1))
@@ -84,6 +97,20 @@ def test_tangents_are_unit_and_across_the_normals() -> None:
     assert mesh.tangents is not None
     np.testing.assert_allclose(np.linalg.norm(mesh.tangents[:, :3], axis=1), 1, atol=1e-4)
     assert np.abs((mesh.tangents[:, :3] * mesh.normals).sum(axis=1)).max() < 1e-3
+
+
+def test_baked_map_of_a_thin_shell_shows_no_other_wall() -> None:
+    """The inner wall's vertices are nearer than the outer wall's to a chord of a coarse mesh."""
+    outer, inner = _sphere(5.0, 24), _sphere(4.8, 96)
+    turned = inner.triangles[:, ::-1] + np.uint32(len(outer.positions))
+    shell = Mesh(
+        np.concatenate([outer.positions, inner.positions]),
+        np.concatenate([outer.triangles, turned]),
+        np.concatenate([outer.normals, -inner.normals]),
+    )
+    coarse, size = unwrap(simplify(_sphere(), 0.5), 128, 0.1)
+    image = bake_normals(coarse, shell, size)
+    assert image[..., 2].min() > 128 + 50  # no normal is turned away
 
 
 def test_baked_map_gives_back_the_sphere_s_normals() -> None:

@@ -20,8 +20,6 @@ from stereocell.unwrap import bake_normals, unwrap
 from stereocell.volume import Volume
 
 APRON = 1
-STRAY = 3.0  # distance over error above which bodies have vanished; whole ones measured 1.2 to 2
-TRIES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +114,12 @@ def _make_lods(
     lods: list[Lod] = []
     mesh = fine
     for level, error in enumerate(options.errors):
-        mesh, distance = _coarser(mesh, fine, error * min(spacing), options.samples, clock)
-        # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
-        distance = max(distance, lods[-1].distance_um if lods else 0.0)
+        with clock("simplify"):
+            mesh = simplify(mesh, error * min(spacing))
+        with clock("measure"):
+            distance = measure_distance(fine, mesh, options.samples)
+            # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
+            distance = max(distance, lods[-1].distance_um if lods else 0.0)
         if level >= len(options.errors) - settings.unwrap.coarse_lods and len(mesh.triangles):
             with clock("unwrap"):
                 unwrapped, size = unwrap(mesh, settings.unwrap.max_texture, max(spacing))
@@ -127,26 +128,6 @@ def _make_lods(
         else:
             lods.append(Lod(mesh, distance))
     return tuple(lods)
-
-
-def _coarser(
-    mesh: Mesh, fine: Mesh, error_um: float, samples: int, clock: "_Clock"
-) -> tuple[Mesh, float]:
-    """Return the mesh simplified, and its measured distance to the fine one.
-
-    The simplifier's error is a mean over planes: at a bound near a body's radius it removes the
-    whole body. What strays too far is done again with half the error; the last try is taken.
-    """
-    bound = STRAY * error_um
-    for _ in range(TRIES):
-        with clock("simplify"):
-            simpler = simplify(mesh, error_um)
-        with clock("measure"):
-            distance = measure_distance(fine, simpler, samples)
-        if distance <= bound:
-            break
-        error_um /= 2
-    return simpler, distance
 
 
 class _Clock:

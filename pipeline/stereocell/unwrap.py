@@ -15,6 +15,8 @@ from scipy.spatial import cKDTree
 from stereocell.mesh import Mesh
 from stereocell.options import setting
 
+NEIGHBOURS = 6  # fine vertices that a texel looks at
+
 
 @dataclass(frozen=True, slots=True)
 class UnwrapOptions:
@@ -80,8 +82,9 @@ def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
 def bake_normals(coarse: Mesh, fine: Mesh, size: int) -> NDArray[np.uint8]:
     """Return the tangent-space normal map (size, size, 3), row 0 at v = 1, of the fine surface.
 
-    Each texel's place on the coarse mesh takes the normal of the nearest fine vertices (inverse
-    distance of three). Texels outside the charts repeat the nearest inside: mip levels stay clean.
+    Each texel's place on the coarse mesh takes the normals of the nearest fine vertices, weighted
+    by inverse distance, of those on the same side: the other wall of a thin shell may be nearer.
+    Texels outside the charts repeat the nearest inside, so that mip levels stay clean.
     """
     assert coarse.uvs is not None
     assert coarse.tangents is not None
@@ -92,11 +95,15 @@ def bake_normals(coarse: Mesh, fine: Mesh, size: int) -> NDArray[np.uint8]:
         return np.einsum("nk,nkd->nd", weights, values[corners].astype(np.float64))
 
     tree = cKDTree(fine.positions, balanced_tree=False, compact_nodes=False)
-    distance, nearest = tree.query(interpolate(coarse.positions), k=3)
-    weight = 1.0 / np.maximum(distance, 1e-6)
-    wanted = _unit(np.einsum("nk,nkd->nd", weight, fine.normals[nearest].astype(np.float64)))
-
+    # a list of k asks for k columns, even for one
+    neighbours = list(range(1, min(NEIGHBOURS, tree.n) + 1))
+    distance, nearest = tree.query(interpolate(coarse.positions), k=neighbours)
     normal = _unit(interpolate(coarse.normals))
+    candidates = fine.normals[nearest].astype(np.float64)
+    weight = 1.0 / np.maximum(distance, 1e-6)
+    weight *= np.einsum("nkd,nd->nk", candidates, normal) > 0
+    wanted = np.einsum("nk,nkd->nd", weight, candidates)
+    wanted = np.where(weight.sum(axis=1, keepdims=True) > 0, _unit(wanted), normal)
     tangent = _unit(interpolate(coarse.tangents[:, :3]))
     handed = coarse.tangents[corners[:, 0], 3:]
     bitangent = np.cross(normal, tangent) * handed
