@@ -1,6 +1,5 @@
 """Readers against files written by zarr and tifffile directly."""
 
-import pickle
 import shutil
 from collections.abc import Callable
 from itertools import permutations
@@ -214,15 +213,6 @@ def test_equal_names_are_told_apart(tmp_path: Path) -> None:
     path = write_ome_zarr(tmp_path / "c.zarr", [stack], axes="czyx", channels=channels)
     names = [channel.name for channel in read.open(path).channels]
     assert names == ["DNA (channel 0)", "CD8", "DNA (channel 2)"]
-
-
-@pytest.mark.parametrize("fixture", FORMATS)
-def test_workers_open_the_same_dataset(fixture: str, request: pytest.FixtureRequest) -> None:
-    dataset = read.open(request.getfixturevalue(fixture), spacing_um=(2.0, 1.0, 1.0))
-    copy = pickle.loads(pickle.dumps(dataset))
-    assert copy.levels == dataset.levels
-    assert copy.fingerprint == dataset.fingerprint
-    np.testing.assert_array_equal(copy.read(1, BOX).voxels, dataset.read(1, BOX).voxels)
 
 
 @pytest.mark.parametrize("fixture", FORMATS)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stereocell.errors import SourceError
 from stereocell.read.faults import one_line
 from stereocell.read.fingerprint import fingerprint_of
-from stereocell.read.spacing import Level, Triple
+from stereocell.read.spacing import Level
 from stereocell.tiling import Box
 from stereocell.volume import Volume
 
@@ -88,7 +88,6 @@ class Dataset:
     time_points: int
     time: int
     images: int
-    spacing_um: Triple | None = field(repr=False)  # as given to `open`
     arrays: tuple[VoxelArray, ...] = field(repr=False)
     shown: str = field(repr=False)  # the source without secrets, for messages
     on_close: Callable[[], None] | None = field(repr=False, default=None)
@@ -96,12 +95,6 @@ class Dataset:
     def __post_init__(self) -> None:
         if self.on_close is not None:
             weakref.finalize(self, self.on_close)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Workers open the source anew: open files and event loops don't travel."""
-        from stereocell.read.opening import reopen  # opening imports this module
-
-        return reopen, (self.source, self.time, self.spacing_um)
 
     @cached_property
     def fingerprint(self) -> str:

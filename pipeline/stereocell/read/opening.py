@@ -56,11 +56,6 @@ def open(source: str | Path, *, time: int = 0, spacing_um: Triple | None = None)
         raise
 
 
-def reopen(source: str, time: int, spacing_um: Triple | None) -> Dataset:
-    """`open` with positional arguments, for pickle."""
-    return open(source, time=time, spacing_um=spacing_um)
-
-
 def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | None) -> Dataset:
     where = location.shown
     finest = image.arrays[0]
@@ -82,7 +77,6 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         time_points=finest.size("t"),
         time=time,
         images=image.images,
-        spacing_um=spacing_um,
         arrays=image.arrays,
         shown=where,
         on_close=image.close,
