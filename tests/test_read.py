@@ -1,5 +1,6 @@
 """Readers against files written by zarr and tifffile directly."""
 
+import re
 import shutil
 from collections.abc import Callable
 from itertools import permutations
@@ -260,7 +261,10 @@ def test_only_the_tiles_that_a_box_touches_are_decoded(
     dataset = read.open(tiny_tiff)
     assert decoded == []
     dataset.read(1, Box((2, 16, 0), (4, 32, 17)))
-    assert sorted(decoded) == ["0.1.2.1.0.0", "0.1.2.1.1.0", "0.1.3.1.0.0", "0.1.3.1.1.0"]
+    # c, z, y, x of the tiles; the key's spelling is the store's own (Zarr v2 or v3)
+    tiles = {tuple(int(n) for n in re.findall(r"\d+", key))[:4] for key in decoded}
+    assert tiles == {(1, 2, 1, 0), (1, 2, 1, 1), (1, 3, 1, 0), (1, 3, 1, 1)}
+    assert len(decoded) == 4
 
 
 # Addresses

@@ -49,7 +49,8 @@ class VoxelArray:
     @property
     def chunk(self) -> tuple[int, int, int]:
         """The block (z, y, x) that the file reads and decodes at once."""
-        z, y, x = (self.array.chunks[self.axes.index(axis)] for axis in "zyx")
+        chunk = dict(zip(self.axes, self.array.chunks, strict=True))
+        z, y, x = (int(chunk.get(axis, 1)) for axis in "zyx")
         return z, y, x
 
     def size(self, axis: str) -> int:
@@ -60,9 +61,11 @@ class VoxelArray:
         """Return the voxels of a box, (z, y, x), in this machine's byte order."""
         wanted: dict[str, int | slice] = dict(zip("zyx", box.slices, strict=True))
         wanted |= {"t": time, "c": channel}
-        stored = self.array[tuple(wanted.get(axis, 0) for axis in self.axes)]
+        stored = np.asarray(self.array[tuple(wanted.get(axis, 0) for axis in self.axes)])
         order = [axis for axis in self.axes if axis in "zyx"]
-        voxels = np.asarray(stored).transpose([order.index(axis) for axis in "zyx"])
+        lacking = [axis for axis in "zyx" if axis not in order]
+        stored = stored.reshape(stored.shape + (1,) * len(lacking))
+        voxels = stored.transpose([(order + lacking).index(axis) for axis in "zyx"])
         return np.ascontiguousarray(voxels, dtype=voxels.dtype.newbyteorder("="))
 
 

@@ -88,10 +88,12 @@ def _open(location: Location, stack: ExitStack) -> TiffFile:
 
 
 def _array(series: TiffPageSeries, level: int) -> VoxelArray:
-    # squeeze=False: axes of length 1 stay, so that a single plane is seen as one
-    axes = tuple(axis.lower() for axis in series.levels[level].get_axes(squeeze=False))
-    store = series.aszarr(level=level, squeeze=False)
-    return VoxelArray(zarr.open_array(store, mode="r", zarr_format=2), axes)
+    """Return a level's voxels. Axes of length 1 are squeezed out: tifffile 2026.5 does no other."""
+    array = zarr.open_array(series.aszarr(level=level), mode="r")
+    # tifffile's store is Zarr v3 from 2026.5 on, v2 before; each names the axes in its own way
+    names: Any = getattr(array.metadata, "dimension_names", None)
+    names = names or array.attrs["_ARRAY_DIMENSIONS"]
+    return VoxelArray(array, tuple(str(name).lower() for name in names))
 
 
 def _check_whole(where: str, tiff: TiffFile, pages: Sequence[TiffPage | TiffFrame | None]) -> None:
