@@ -251,3 +251,13 @@ def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[st
             main([name, "--help"])
         assert stop.value.code == 0
         assert f"example: stereocell {name}" in capsys.readouterr().out
+
+
+def test_fewer_channels_leave_no_stale_file_in_the_stage(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    source = str(_source(tmp_path))
+    assert main(["build", source, "-o", str(out), *BUILD, "--channels", "F body"]) == 0
+    assert list(out.rglob("empty*")) != []  # the units stay: they may be wanted again
+    for part in ("stage", "bundle"):
+        assert not list((out / part).rglob("*empty*"))

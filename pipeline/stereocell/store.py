@@ -21,7 +21,7 @@ from stereocell.errors import OutputError
 from stereocell.mesh import Lod, Mesh
 from stereocell.plan import Plan, from_json, to_json
 from stereocell.unit import Unit
-from stereocell.write.atomic import write_bytes
+from stereocell.write.atomic import replacing_folder, write_bytes
 
 
 def key_of(content: Any, *modules: ModuleType) -> str:
@@ -150,8 +150,6 @@ class Store:
 
 def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
     """Write a unit as a folder under its final name, and return its record."""
-    temporary = directory.with_name(f".{directory.name}.{os.getpid()}")
-    shutil.rmtree(temporary, ignore_errors=True)
     lods = [
         {
             "triangles": len(lod.mesh.triangles),
@@ -169,17 +167,11 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
         "cavities_filled": unit.cavities_filled,
         "seconds": {step: round(s, 3) for step, s in unit.seconds.items()},
     }
-    try:
-        temporary.mkdir(parents=True)
-        np.save(temporary / "volume.npy", unit.volume)
+    with replacing_folder(directory) as folder:
+        np.save(folder / "volume.npy", unit.volume)
         for level, lod in enumerate(unit.lods):
-            np.savez(lod_file(temporary, level), **_arrays(lod))
-        write_json(temporary / "unit.json", record)
-        shutil.rmtree(directory, ignore_errors=True)
-        os.replace(temporary, directory)
-    except OSError as error:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise OutputError(f"{directory}: can't be written: {error.strerror or error}") from error
+            np.savez(lod_file(folder, level), **_arrays(lod))
+        write_json(folder / "unit.json", record)
     return record
 
 

@@ -2,8 +2,6 @@
 
 import json
 import math
-import os
-import shutil
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ from stereocell.samples import fluorescence
 from stereocell.samples.fluorescence import BLUR_UM, SPACING_UM, STAINS
 from stereocell.samples.tissue import Tissue, grow_tissue
 from stereocell.tiling import Box
+from stereocell.write.atomic import replacing_folder, write_bytes
 
 SUFFIX = ".ome.zarr"
 _CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
@@ -57,18 +56,9 @@ def write_cycif(
         truth = json.dumps(_truth(tissue, shape, settings), indent=1) + "\n"
         path.parent.mkdir(parents=True, exist_ok=True)
         if not is_there:
-            temporary = path.with_name(f".{path.name}.{os.getpid()}")
-            try:
-                _write_zarr(temporary, tissue, shape, tile_size, attributes, seed)
-                os.rename(temporary, path)
-            finally:
-                shutil.rmtree(temporary, ignore_errors=True)
-        temporary = truth_path.with_name(f".{truth_path.name}.{os.getpid()}")
-        try:
-            temporary.write_text(truth, encoding="utf-8")
-            os.replace(temporary, truth_path)
-        finally:
-            temporary.unlink(missing_ok=True)
+            with replacing_folder(path) as folder:
+                _write_zarr(folder, tissue, shape, tile_size, attributes, seed)
+        write_bytes(truth_path, truth.encode())
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
 

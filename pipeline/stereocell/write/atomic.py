@@ -1,6 +1,7 @@
 """Write a file under a temporary name beside it, flush it, rename it: the whole file or none."""
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,3 +35,27 @@ def write_bytes(path: Path, content: bytes) -> None:
     """Put a file of these bytes at `path`, whole or not at all. Raises OutputError."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)
+
+
+@contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """Yield an empty folder beside `path`; on leaving, it takes the place of `path`.
+
+    If the body raises, `path` stays as it was. What a killed run left is cleared away first.
+    Raises OutputError where the system refuses (rights, space).
+    """
+    new, old = (path.with_name(f".{path.name}.{word}") for word in ("partial", "old"))
+    try:
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir(parents=True)
+        try:
+            yield new
+            shutil.rmtree(old, ignore_errors=True)
+            if path.exists():  # a folder that isn't empty can't be renamed over
+                os.replace(path, old)
+            os.replace(new, path)
+        finally:
+            shutil.rmtree(new, ignore_errors=True)
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error

@@ -10,8 +10,6 @@ The stage is the only source. It is written beside its place and put there as a 
 """
 
 import json
-import os
-import shutil
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
@@ -24,6 +22,7 @@ import numpy as np
 
 from stereocell.errors import OutputError, StageError
 from stereocell.specimen import evaluate
+from stereocell.write.atomic import replacing_folder
 from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
 from stereocell.write.composed import hinted_box, open_stage, specimen_name, tile_prims
 from stereocell.write.composed_look import ComposedLook, read_looks
@@ -51,16 +50,8 @@ def write_bundle(
         raise OutputError(f"{bundle_dir}: exists and is no bundle: no {MANIFEST} in it")
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
-    partial_dir = bundle_dir.with_name(f".{bundle_dir.name}.partial")
-    try:
-        shutil.rmtree(partial_dir, ignore_errors=True)  # of a killed run
-        partial_dir.mkdir(parents=True)
-        _fill(stage_path, partial_dir, viewer_dist, workers)
-        _swap(partial_dir, bundle_dir)
-    except OSError as error:
-        raise OutputError(f"{bundle_dir}: can't be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(partial_dir, ignore_errors=True)
+    with replacing_folder(bundle_dir) as folder:
+        _fill(stage_path, folder, viewer_dist, workers)
 
 
 def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, workers: int) -> None:
@@ -181,13 +172,3 @@ def _json(content: object) -> bytes:
 
 def _holds(folder: Path) -> bool:
     return not folder.is_dir() or any(folder.iterdir())
-
-
-def _swap(made: Path, place: Path) -> None:
-    """Put one folder in the place of another; a folder that isn't empty can't be renamed over."""
-    old = place.with_name(f".{place.name}.old")
-    shutil.rmtree(old, ignore_errors=True)
-    if place.exists():
-        os.replace(place, old)
-    os.replace(made, place)
-    shutil.rmtree(old, ignore_errors=True)

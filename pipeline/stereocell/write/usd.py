@@ -10,6 +10,7 @@ or among its sublayers, is stronger than all of them.
 """
 
 import json
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from pxr import Kind, Usd, UsdGeom
 
 from stereocell.assets import find_asset
 from stereocell.specimen import Look, Provenance, TileContent
-from stereocell.write.atomic import write_bytes
+from stereocell.write.atomic import replacing_folder
 from stereocell.write.usd_cameras import define_cameras
 from stereocell.write.usd_layer import ROOT, TILES, export, new_stage, vec3f, world_box
 from stereocell.write.usd_looks import write_looks
@@ -69,9 +70,9 @@ def write_stage(
 
     Raises OutputError.
     """
-    write_looks(stage_dir / "looks", looks)
-    lights = find_asset("usd_assets/lights.usda").read_bytes()
-    write_bytes(stage_dir / "looks" / "lights.usda", lights)
+    with replacing_folder(stage_dir / "looks") as folder:
+        write_looks(folder, looks)
+        shutil.copyfile(find_asset("usd_assets/lights.usda"), folder / "lights.usda")
 
     stage = new_stage(".usda", ROOT.name)
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()

@@ -19,7 +19,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
 from stereocell.mesh import Lod
 from stereocell.names import from_identifier
 from stereocell.specimen import ChannelContent, TileContent
-from stereocell.write.atomic import replacing
+from stereocell.write.atomic import replacing_folder
 from stereocell.write.exr import APRON, write_atlas
 from stereocell.write.usd_layer import (
     CHANNELS,
@@ -39,14 +39,20 @@ _Types = Sdf.ValueTypeNames
 
 
 def write_tile(stage_dir: Path, tile: TileContent) -> None:
-    """Write `stage_dir`/tiles/<tile>/. Tiles are independent; tile.usdc comes last.
+    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one. Tiles are independent.
 
     Raises OutputError. A volume whose shape does not fit its tile is a bug: ValueError.
     """
-    folder = stage_dir / "tiles" / tile.id
     for channel in tile.channels:
         _check_shape(tile, channel)
-        _write_files(folder, tile, channel)
+    with replacing_folder(stage_dir / "tiles" / tile.id) as folder:
+        for channel in tile.channels:
+            _write_files(folder, tile, channel)
+        export(_compose(tile), folder / LAYER_NAME)
+
+
+def _compose(tile: TileContent) -> Sdf.Layer:
+    """Return the layer tile.usdc."""
     stage = new_stage(".usdc", tile.id)
     root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
@@ -59,7 +65,7 @@ def write_tile(stage_dir: Path, tile: TileContent) -> None:
         _define_volume(branch, tile, channel)
     _author_lods(root, tile)
     _author_representations(root, tile)
-    export(stage.GetRootLayer(), folder / LAYER_NAME)
+    return stage.GetRootLayer()
 
 
 def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
@@ -76,8 +82,8 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> No
     write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
     for level, lod in enumerate(channel.lods):
         if lod.normal_map is not None:
-            with replacing(folder / _normal_map_name(channel, level)) as temporary:
-                Image.fromarray(lod.normal_map).save(temporary, format="PNG")
+            picture = Image.fromarray(lod.normal_map)
+            picture.save(folder / _normal_map_name(channel, level), format="PNG")
 
 
 def _normal_map_name(channel: ChannelContent, level: int) -> str:
