@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from stereocell import unwrap as unwrap_module
 from stereocell.errors import UsageError
 from stereocell.lod import LodOptions, measure_distance, simplify
 from stereocell.mesh import Mesh
@@ -90,6 +91,14 @@ def test_unwrapped_charts_do_not_overlap_and_fill_the_square() -> None:
         count[v[inside].astype(int), u[inside].astype(int)] += 1
     assert count.max() == 1
     assert (count > 0).mean() > 0.3
+
+
+def test_an_atlas_outlives_its_unwrap_and_a_few_after() -> None:
+    """Destroying one whose worker thread is just falling asleep can hang for ever."""
+    mesh = simplify(_sphere(sides=24), 0.2)
+    for _ in range(unwrap_module.ATLASES_KEPT + 3):
+        unwrap(mesh, 64, 1.0)
+    assert len(unwrap_module._past_atlases) == unwrap_module.ATLASES_KEPT
 
 
 def test_tangents_are_unit_and_across_the_normals() -> None:

@@ -4,6 +4,9 @@ Charts and packing are xatlas's. The map is in tangent space, as UsdPreviewSurfa
 and stores where the fine surface's normal lies relative to the coarse mesh's interpolated frame.
 """
 
+import atexit
+import ctypes
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +17,13 @@ from scipy.spatial import cKDTree
 
 from stereocell.mesh import Mesh
 from stereocell.options import setting
+
+# xatlas 0.0.11 tells its worker threads to end without holding the lock that they sleep under: an
+# atlas destroyed at the very moment when a worker lies down waits for it for ever (seen once, its
+# stack in ~TaskScheduler). So an atlas is destroyed some unwraps later, its workers long asleep,
+# and the last ones never: the process takes them along.
+ATLASES_KEPT = 4
+_past_atlases: deque[xatlas.Atlas] = deque()
 
 NEIGHBOURS = 6  # fine vertices that a texel looks at
 
@@ -44,6 +54,7 @@ def unwrap(mesh: Mesh, max_texture: int, texel_um: float) -> tuple[Mesh, int]:
     pack.resolution, pack.padding = size, 2
     atlas.generate(charts, pack)
     vertices, triangles, uvs = atlas.get_mesh(0)
+    _retire(atlas)
     # a full atlas page can come out larger than asked for; xatlas scales UVs by that page
     split = Mesh(
         mesh.positions[vertices],
@@ -52,6 +63,18 @@ def unwrap(mesh: Mesh, max_texture: int, texel_um: float) -> tuple[Mesh, int]:
         uvs.astype(np.float32),
     )
     return replace(split, tangents=make_tangents(split)), size
+
+
+def _retire(atlas: xatlas.Atlas) -> None:
+    _past_atlases.append(atlas)
+    if len(_past_atlases) > ATLASES_KEPT:
+        _past_atlases.popleft()
+
+
+@atexit.register
+def _never_destroy_the_last() -> None:
+    for atlas in _past_atlases:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))
 
 
 def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
