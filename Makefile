@@ -115,7 +115,10 @@ test: setup browser ## All tests, in headless Chromium too
 	$(BIN)/pytest
 	cd $(VIEWER) && npm run --silent test
 	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
-	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) npm run --silent test:browser
+	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
+	for kind in tif zarr; do $(RUN) build out/f/f.ome.$$kind -o out/f/$$kind --workers 0 || exit 1; done
+	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) \
+	  STEREOCELL_F_BUNDLES=$(abspath out/f/tif/bundle):$(abspath out/f/zarr/bundle) npm run --silent test:browser
 
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py

@@ -3,6 +3,7 @@
 None of this uses stereocell: it is what the readers are tested against.
 """
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -152,3 +153,16 @@ def write_ome_zarr(
     else:
         group.attrs["ome"] = {"version": version, **ome}
     return path
+
+
+def write_f_everywhere(folder: Path) -> None:
+    """Write the F as f.ome.tif and f.ome.zarr: what the viewer's orientation tests are built of."""
+    folder.mkdir(parents=True, exist_ok=True)
+    spacing = (0.5, 0.2, 0.2)
+    write_ome_tiff(folder / "f.ome.tif", f_phantom(), spacing=spacing, names=["F"])
+    scale = dict(zip("zyx", spacing, strict=True))
+    write_ome_zarr(folder / "f.ome.zarr", [f_phantom()], scales=[scale], channels=[{"label": "F"}])
+
+
+if __name__ == "__main__":
+    write_f_everywhere(Path(sys.argv[1]))

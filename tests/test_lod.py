@@ -6,7 +6,7 @@ import pyvista as pv
 
 from stereocell import unwrap as unwrap_module
 from stereocell.errors import UsageError
-from stereocell.lod import LodOptions, measure_distance, simplify
+from stereocell.lod import LodOptions, Nearest, measure_distance, simplify
 from stereocell.mesh import Mesh
 from stereocell.unwrap import bake_normals, unwrap
 
@@ -38,7 +38,7 @@ def test_coarser_level_has_fewer_triangles_and_stays_near(error: float) -> None:
     fine = _sphere()
     coarse = simplify(fine, error)
     assert len(coarse.triangles) < 0.6 * len(fine.triangles)
-    assert measure_distance(fine, coarse, 4000) < 3 * error
+    assert measure_distance(Nearest(fine), Nearest(coarse), 4000) < 3 * error
 
 
 def test_cut_edges_are_locked() -> None:
@@ -49,7 +49,7 @@ def test_cut_edges_are_locked() -> None:
 
 
 def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> None:
-    measured = measure_distance(_sphere(5.0), _sphere(4.0), 4000)
+    measured = measure_distance(Nearest(_sphere(5.0)), Nearest(_sphere(4.0)), 4000)
     assert measured == pytest.approx(1.0, abs=0.02)
 
 

@@ -172,7 +172,8 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
     with _phase(store, "bundle") as phase:
         path = stage if stage is not None else store.stage_file
         if not path.is_file():
-            raise OutputError(f"{path} is missing: run `stereocell stage OUT` first")
+            remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
+            raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
         key = key_of([str(path.absolute()), _state(path.parent), _state(store.stage_dir),
                       _state(viewer) if viewer else None], bundle_writer)  # fmt: skip

@@ -16,6 +16,7 @@ from rich.progress import (
 )
 
 from stereocell.errors import StereoCellError
+from stereocell.interrupts import children_ignore_interrupts
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -84,15 +85,16 @@ class Engine:
         if self._client is None:
             from distributed import Client
 
-            # units hold arrays of known size; distributed's own spilling and pausing is in the way
-            self._client = Client(
-                n_workers=self.workers,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=":0",
-                memory_limit=0,
-                silence_logs=logging.CRITICAL,
-            )
+            with children_ignore_interrupts():
+                # units hold arrays of known size; distributed's spilling and pausing is in the way
+                self._client = Client(
+                    n_workers=self.workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=":0",
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
         return self._client
 
     def close(self) -> None:

@@ -83,12 +83,37 @@ def compact(mesh: Mesh, triangles: NDArray[np.uint32]) -> Mesh:
 PERCENTILE = 99.0  # a sliver that vanishes, less than 1 % of the area, does not count
 
 
-def measure_distance(a: Mesh, b: Mesh, samples: int) -> float:
+class Nearest:
+    """Distances to the nearest point of a mesh; its search tree is built once."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._locator = vtkStaticCellLocator()
+        self._locator.SetDataSet(to_polydata(mesh))
+        self._locator.BuildLocator()
+
+    def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distance in um from each of the points (n, 3)."""
+        nearest, cell = [0.0, 0.0, 0.0], vtkGenericCell()
+        # references: VTK writes its answers into them
+        cell_id: Any = reference(0)
+        sub_id: Any = reference(0)
+        square: Any = reference(0.0)
+        squares = []
+        for point in points.tolist():
+            self._locator.FindClosestPoint(point, nearest, cell, cell_id, sub_id, square)
+            squares.append(square.get())
+        return np.sqrt(squares)
+
+
+def measure_distance(a: Nearest, b: Nearest, samples: int) -> float:
     """Return the distance in um between two meshes: the 99th percentile, the larger of both ways.
 
     Points spread evenly over the area of each mesh go to the nearest point of the other.
     """
-    return max(_one_way(a, b, samples), _one_way(b, a, samples))
+    there = b.distances(spread_points(a.mesh, samples))
+    back = a.distances(spread_points(b.mesh, samples))
+    return float(max(np.percentile(there, PERCENTILE), np.percentile(back, PERCENTILE)))
 
 
 def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
@@ -103,22 +128,6 @@ def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     a, b, c = corners[np.minimum(chosen, len(corners) - 1)].transpose(1, 0, 2)
     return a + u[:, None] * (b - a) + v[:, None] * (c - a)
-
-
-def _one_way(a: Mesh, b: Mesh, samples: int) -> float:
-    locator = vtkStaticCellLocator()
-    locator.SetDataSet(to_polydata(b))
-    locator.BuildLocator()
-    nearest, cell = [0.0, 0.0, 0.0], vtkGenericCell()
-    # references: VTK writes its answers into them
-    cell_id: Any = reference(0)
-    sub_id: Any = reference(0)
-    square: Any = reference(0.0)
-    squares = []
-    for point in spread_points(a, samples).tolist():
-        locator.FindClosestPoint(point, nearest, cell, cell_id, sub_id, square)
-        squares.append(square.get())
-    return float(np.percentile(squares, PERCENTILE)) ** 0.5
 
 
 def to_polydata(mesh: Mesh) -> vtkPolyData:

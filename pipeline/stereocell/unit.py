@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stereocell.config import Settings
 from stereocell.isofield import IsoField
-from stereocell.lod import measure_distance, simplify
+from stereocell.lod import Nearest, measure_distance, simplify
 from stereocell.mesh import Lod, Mesh
 from stereocell.repair import RepairOptions, repair
 from stereocell.surface import extract_surface, signed_distance, smooth
@@ -113,11 +113,13 @@ def _make_lods(
     options = settings.lod
     lods: list[Lod] = []
     mesh = fine
+    with clock("measure"):
+        to_fine = Nearest(fine)
     for level, error in enumerate(options.errors):
         with clock("simplify"):
             mesh = simplify(mesh, error * min(spacing))
         with clock("measure"):
-            distance = measure_distance(fine, mesh, options.samples)
+            distance = measure_distance(to_fine, Nearest(mesh), options.samples)
             # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
             distance = max(distance, lods[-1].distance_um if lods else 0.0)
         if level >= len(options.errors) - settings.unwrap.coarse_lods and len(mesh.triangles):
