@@ -35,8 +35,9 @@ def test_neighbours_agree_bit_by_bit_from_their_own_parts() -> None:
     assert field is not None
     whole = field.at(REGION)
     for tile in TILES:
-        window = tile.box.grown((2, 8, 8), REGION)
-        np.testing.assert_array_equal(field.around(tile.box).at(window), whole[window.slices])
+        for halo in ((0, 0, 0), (2, 8, 8), (9, 70, 70)):  # the last: larger than its neighbours
+            window = tile.box.grown(halo, REGION)
+            np.testing.assert_array_equal(field.around(window).at(window), whole[window.slices])
 
 
 def test_tile_without_a_value_takes_the_others_mean() -> None:

@@ -79,7 +79,9 @@ def test_body_at_the_data_s_end_is_capped() -> None:
     assert mesh.normals[cap & ~rim, 2].max() < -0.99  # it faces away from the body
 
 
-@pytest.mark.parametrize(("axis", "tile_size"), [(2, (48, 100, 50)), (1, (48, 50, 100))])
+@pytest.mark.parametrize(
+    ("axis", "tile_size"), [(2, (48, 100, 50)), (1, (48, 50, 100)), (0, (24, 100, 100))]
+)
 def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -> None:
     rng = np.random.default_rng(3)
     voxels = np.zeros((48, 100, 100), np.float32)
@@ -89,8 +91,8 @@ def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -
     region = Box((0, 0, 0), (48, 100, 100))
     reach = OPTIONS.reach_um(SPACING) + SMOOTHING_REACH * 0.14
     halo = tuple(int(np.ceil(reach / step)) + 2 for step in SPACING)
-    plane = np.float32(50 * SPACING[axis])
-    coordinate = {2: 0, 1: 1}[axis]
+    plane = np.float32(tile_size[axis] * SPACING[axis])
+    coordinate = 2 - axis
     rims = []
     for tile in cut(region, tile_size):
         lattice = tile.lattice(region)

@@ -12,10 +12,6 @@ from numpy.typing import NDArray
 
 from stereocell.tiling import Box, Tile
 
-# Tiles on each side whose values can reach a tile's window: one whose halo is larger than half
-# its neighbour also meets the neighbour's neighbour.
-REACH = 2
-
 
 @dataclass(frozen=True, slots=True)
 class IsoField:
@@ -47,13 +43,13 @@ class IsoField:
             field = a + (b - a) * share.reshape([-1 if i == axis else 1 for i in range(3)])
         return field.astype(np.float32)
 
-    def around(self, box: Box) -> "IsoField":
-        """Return the part that can reach this tile's window: what a unit's result depends on."""
+    def around(self, window: Box) -> "IsoField":
+        """Return the part that reaches into a unit's window: what its result depends on."""
         keep = []
         for axis, centres in enumerate(self.centres):
-            middle = (box.start[axis] + box.stop[axis] - 1) / 2
-            nearest = int(np.abs(np.asarray(centres) - middle).argmin())
-            keep.append(slice(max(0, nearest - REACH), nearest + REACH + 1))
+            first = np.searchsorted(centres, window.start[axis], side="right") - 1
+            last = np.searchsorted(centres, window.stop[axis] - 1, side="left")
+            keep.append(slice(max(0, int(first)), int(last) + 1))
         z, y, x = (centres[part] for centres, part in zip(self.centres, keep, strict=True))
         return IsoField((z, y, x), self.values[tuple(keep)])
 

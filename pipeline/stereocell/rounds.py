@@ -253,11 +253,12 @@ def _unit_task(
     iso = make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
     low, high = entry["display"]["window"]
     lattice = tile.lattice(plan.region)
+    window = lattice.grown(plan.halo, plan.region)
     given = UnitInput(
-        window=lattice.grown(plan.halo, plan.region),
+        window=window,
         lattice=lattice,
         region=plan.region,
-        iso=None if iso is None else iso.around(tile.box),
+        iso=None if iso is None else iso.around(window),
         display=(low, high),
         settings=plan.settings,
     )
