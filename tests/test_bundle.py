@@ -183,6 +183,73 @@ def test_color_edited_over_the_stage_reaches_manifest_and_meshes(bundle, edit):
     assert channel(edited, blue) == channel(bundle, blue)
 
 
+def texels(data):
+    """Return level 0 of a texture as one row of bytes."""
+    offset, length, _ = np.frombuffer(data, "<u8", 3, 80)
+    return np.frombuffer(zstandard.decompress(data[offset : offset + length]), np.uint8)
+
+
+def test_window_edited_over_the_stage_reaches_manifest_voxels_and_bricks(bundle, edit):
+    low, high = 490.0, 2050.0  # as source values: an eighth and a half of the old window
+    edited = edit(
+        lambda s: s.GetAttributeAtPath(f"{CD31}.stereocell:window").Set(Gf.Vec2f(low, high))
+    )
+    entry = channel(edited)
+    assert entry["window"] == [low, high]
+    assert entry["iso_value"] == 1200  # the surface stays where it was
+    assert entry["iso_normalized"] == pytest.approx((1200 - low) / (high - low))
+    for key in ("file", "bricks"):
+        old, new = (
+            texels((folder / volumes(folder)[0][key]["path"]).read_bytes()).astype(float)
+            for folder in (bundle, edited)
+        )
+        values = 100 + old / 255 * 3900  # what the voxels were in the source
+        assert np.abs(new - np.clip((values - low) / (high - low), 0, 1) * 255).max() <= 0.5001
+        assert new.max() == 255
+    blue = "Hoechst 33342"
+    assert channel(edited, blue) == channel(bundle, blue)
+
+
+def test_window_edit_survives_flattening(edit, tmp_path):
+    def change(stage):
+        stage.GetAttributeAtPath(f"{CD31}.stereocell:window").Set(Gf.Vec2f(490, 2050))
+        for tile in stage.GetPrimAtPath("/Specimen/Tiles").GetChildren():
+            tile.GetVariantSet("representation").SetVariantSelection("both")
+
+    edited = edit(change)
+    flat = tmp_path / "flat.usda"
+    Usd.Stage.Open(str(tmp_path / "edited.usda")).Export(str(flat))
+    write_bundle(flat, tmp_path / "flat", None)
+    for folder in (edited, tmp_path / "flat"):
+        assert channel(folder)["window"] == [490, 2050]
+    paths = [folder / volumes(folder)[0]["file"]["path"] for folder in (edited, tmp_path / "flat")]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_name_edited_over_the_stage_reaches_the_manifest(edit):
+    edited = edit(lambda s: s.OverridePrim(CD31).SetDisplayName("vessels"))
+    assert channel(edited, "vessels")["id"] == "CD31"
+
+
+def test_points_edited_outside_the_variants_are_named_with_the_remedy(edit):
+    def change(stage):
+        points = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0.points")
+        points.Set([point + Gf.Vec3f(0, 0, 1) for point in points.Get()])
+
+    words = r"CD31_r0_c0: .* at lod0: edit inside the variant lod=lod0, or override points, "
+    with pytest.raises(StageError, match=words):
+        edit(change)
+
+
+def test_cut_volume_is_one_line(tmp_path, capfd):
+    stage = write_tiles(tmp_path / "stage")
+    atlas = tmp_path / "stage/tiles/r0_c1/CD31.exr"
+    atlas.write_bytes(atlas.read_bytes()[:-50])
+    with pytest.raises(StageError, match=r"CD31\.exr: can't be read as OpenEXR: it ends at byte"):
+        write_bundle(stage, tmp_path / "bundle", None)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_color_of_one_tile_stays_in_that_tile(edit):
     look = "/Specimen/Tiles/r0_c1/CD31/CD31_r0_c1_look"
     edited = edit(
@@ -299,6 +366,10 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
                 [(1, 0), (0, 1)]
             ),
             "CD31.stereocell:opacityPoints: intensities fall",
+        ),
+        (
+            lambda s: s.GetAttributeAtPath(f"{CD31}.stereocell:window").Set(Gf.Vec2f(9, 9)),
+            r"CD31.stereocell:window: \(9, 9\), expected them to rise",
         ),
         (
             lambda s: UsdGeom.Imageable(s.GetPrimAtPath("/Specimen/Tiles")).MakeInvisible(),

@@ -6,6 +6,7 @@ import pytest
 import spheres
 from stereocell.assets import find_asset
 from stereocell.check import check
+from stereocell.errors import OutputError
 from stereocell.write.bundle import write_bundle
 from stereocell.write.usd import TileExtent, write_stage, write_tile
 
@@ -56,7 +57,16 @@ def test_what_needs_no_node_passes(made):
     assert failed(made) <= {"glTF validator", "KTX2 textures"}
 
 
-def test_a_folder_without_a_build_fails_in_every_line(tmp_path):
+@pytest.mark.parametrize("name", [".", "missing"])
+def test_a_folder_without_a_build_is_one_error(tmp_path, name):
+    with pytest.raises(
+        OutputError, match=r"holds no build, expected plan\.json, stage/ and bundle/"
+    ):
+        lines(tmp_path / name)
+
+
+def test_a_build_without_anything_in_it_fails_in_every_line(tmp_path):
+    (tmp_path / "bundle").mkdir()
     found = lines(tmp_path)
     assert not any(line.ok for line in found.values())
     assert "No such file" in found["manifest"].detail
@@ -109,6 +119,33 @@ def test_tileset_whose_errors_grow_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
     path.write_text(path.read_text().replace('"geometricError": 0.0', '"geometricError": 9.0'))
     assert "larger geometricError" in lines(out)["tilesets"].detail
+
+
+@pytest.mark.usefixtures("node")
+def test_a_build_without_any_surface_passes(tmp_path):
+    tile = spheres.tile(0, (spheres.BLUE,))
+    write_tile(tmp_path / "stage", tile)
+    write_stage(tmp_path / "stage", "empty", [spheres.BLUE], [TileExtent.of(tile)], {})
+    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None)
+    assert failed(tmp_path) == set()
+    assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"
+
+
+def test_lost_meshes_are_not_taken_for_a_build_without_any_surface(out):
+    for path in (out / "bundle").rglob("*.glb"):
+        path.unlink()
+    assert "glTF validator" in failed(out)
+
+
+@pytest.mark.parametrize(
+    "path", ["tiles/r0_c0/CD31.vdb", "tiles/r0_c0/CD31.exr", "looks/CD31_default.exr"]
+)
+def test_cut_file_of_the_stage_is_found(out, path, capfd):
+    spoilt = out / "stage" / path
+    spoilt.write_bytes(spoilt.read_bytes()[:-20])
+    assert "stage files" in failed(out)
+    assert f"{path}: can't be read as" in lines(out)["stage files"].detail
+    assert capfd.readouterr().err == ""
 
 
 def test_stage_with_a_lost_file_is_found(out):

@@ -6,7 +6,7 @@ import pytest
 
 from stereocell.errors import StageError
 from stereocell.specimen import evaluate
-from stereocell.write.exr import read_atlas, write_atlas, write_lut
+from stereocell.write.exr import check_exr, read_atlas, write_atlas, write_lut
 
 
 @pytest.mark.parametrize("shape", [(1, 5, 9), (7, 3, 30), (5, 5, 5), (26, 66, 51)])
@@ -48,6 +48,42 @@ def test_a_lut_holds_the_opacity_of_every_intensity(tmp_path: Path) -> None:
     expected = np.where(x < 0.2, 0, np.where(x < 0.6, rising, falling))
     assert np.allclose(pixels[0, :, 3], expected, atol=1e-3)
     assert np.allclose(evaluate(points), expected, atol=1e-6)
+
+
+def test_a_file_that_was_cut_short_is_one_line_and_nothing_else_is_printed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.exr"
+    volume = np.random.default_rng(1).integers(0, 256, (9, 60, 90), dtype=np.uint8)
+    write_atlas(path, volume)
+    whole = path.read_bytes()
+    check_exr(path)
+    for size in (0, 3, 100, 400, len(whole) // 2, len(whole) - 200, len(whole) - 1):
+        path.write_bytes(whole[:size])
+        with pytest.raises(StageError, match=r"a\.exr: can't be read as OpenEXR: it") as caught:
+            read_atlas(path)
+        assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")  # OpenEXR would tell on stderr what it can't read
+
+
+@pytest.mark.parametrize("compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "DWAB"])
+def test_whole_files_of_other_programs_pass(tmp_path: Path, compression: str) -> None:
+    path = tmp_path / "a.exr"
+    header = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
+    header["type"] = OpenEXR.scanlineimage
+    pixels = np.random.default_rng(1).random((300, 20)).astype(np.float16)
+    OpenEXR.File(header, {"Y": pixels}).write(str(path))
+    check_exr(path)
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(StageError, match=r"expected \d+ or more"):
+        check_exr(path)
+
+
+def test_tiled_files_pass_by_their_header(tmp_path: Path) -> None:
+    header = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+    pixels = np.zeros((64, 64), dtype=np.float16)
+    OpenEXR.File(header, {"Y": pixels}).write(str(tmp_path / "a.exr"))
+    check_exr(tmp_path / "a.exr")
 
 
 def test_a_damaged_or_missing_or_other_file_is_one_clear_line(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 import hashlib
+import json
 import multiprocessing
 import runpy
 import sys
@@ -6,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol
 
 from phantoms import f_phantom
@@ -226,11 +228,10 @@ def test_a_look_keeps_the_channels_own_name_and_levels(stage_path: Path) -> None
     stage = Usd.Stage.Open(str(stage_path))
     prim = stage.GetPrimAtPath(f"/Specimen/Channels/{F_ID}")
     assert prim.GetDisplayName() == "CD3\N{GREEK SMALL LETTER EPSILON}"
-    assert prim.GetAttribute("stereocell:displayName").Get() == prim.GetDisplayName()
     assert "StereoCellChannelAPI" in prim.GetAppliedSchemas()
     assert tuple(prim.GetAttribute("stereocell:window").Get()) == (100, 1100)
     assert prim.GetAttribute("stereocell:isoValue").Get() == 600
-    assert prim.GetAttribute("stereocell:isoValueNormalized").Get() == 0.5
+    assert prim.GetAttribute("stereocell:volumeWindow").Get() == (100, 1100)
     empty = stage.GetPrimAtPath(f"/Specimen/Channels/{EMPTY_ID}")
     assert empty.GetDisplayName() == "1st"
     assert not empty.GetAttribute("stereocell:isoValue").HasAuthoredValue()
@@ -301,6 +302,39 @@ def test_the_generated_schema_is_what_usd_makes_of_its_source(
     capfd.readouterr()  # it reports what it wrote
     made = (tmp_path / "generatedSchema.usda").read_text()
     assert made == (folder / "generatedSchema.usda").read_text()
+
+
+def test_the_json_twin_of_the_schema_has_the_same_attributes() -> None:
+    twin = json.loads(assets.schema_path("channel.schema.json").read_text())
+    source = Sdf.Layer.FindOrOpen(str(assets.find_asset("schemas/usd/schema.usda")))
+    attributes = source.GetPrimAtPath("/StereoCellChannelAPI").attributes
+    assert twin["title"] == "StereoCellChannelAPI"
+    assert set(twin["properties"]) == {attribute.name for attribute in attributes}
+    json_types = {"color3f": "array", "float2": "array", "float2[]": "array"}
+    json_types |= {"float": "number", "asset": "string"}
+    for attribute in attributes:
+        field = twin["properties"][attribute.name]
+        assert field["usdType"] == str(attribute.typeName)
+        assert field["type"] == json_types[field["usdType"]]
+        assert field["description"] == " ".join(attribute.documentation.split())
+        default = None if attribute.default is None else np.array(attribute.default).tolist()
+        assert default == pytest.approx(field.get("default"))
+
+
+def test_a_channel_as_json_fits_the_twin_of_its_schema(stage_path: Path) -> None:
+    twin = json.loads(assets.schema_path("channel.schema.json").read_text())
+    stage = Usd.Stage.Open(str(stage_path))
+    for channel in (F_ID, EMPTY_ID):
+        prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")
+        content = {}
+        for name in twin["properties"]:
+            value = prim.GetAttribute(name).Get()
+            if isinstance(value, Sdf.AssetPath):
+                content[name] = value.path
+            elif value is not None:
+                content[name] = np.array(value).tolist()
+        Draft202012Validator(twin).validate(content)
+        assert ("stereocell:isoValue" in content) == (channel == F_ID)
 
 
 def test_shipped_files_are_found_in_a_checkout_and_in_a_wheel(

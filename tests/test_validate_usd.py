@@ -45,6 +45,16 @@ def test_an_unknown_variant_is_found(stage_path: Path, tmp_path: Path) -> None:
     assert any("variant set lod selects 'lod9'" in text for text in findings)
 
 
+def test_a_window_that_falls_is_found(stage_path: Path, tmp_path: Path) -> None:
+    path = tmp_path / "edit.usda"
+    window = f'over "{F_ID}"\n{{\nfloat2 stereocell:window = (9, 2)\n}}'
+    body = f'over "Specimen"\n{{\nover "Channels"\n{{\n{window}\n}}\n}}\n'
+    path.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n{body}")
+    findings = [str(finding) for finding in validate_stage(path)]
+    expected = f"/Specimen/Channels/{F_ID}: window is (9, 2), expected it to rise (look)"
+    assert expected in findings
+
+
 def test_bounds_that_do_not_hold_the_tile_are_found(stage_path: Path, tmp_path: Path) -> None:
     hint = "float3[] extentsHint = [(0, 0, 0), (1, 1, 1)]"
     findings = validate_edit(stage_path, tmp_path, f'over "r0_c1"\n{{\n{hint}\n}}')

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stereocell.errors import OutputError
-from stereocell.write.vdb import write_vdb
+from stereocell.errors import OutputError, StageError
+from stereocell.write.vdb import check_vdb, write_vdb
 
 SPACING_UM = (0.28, 0.14, 0.15)
 
@@ -168,6 +168,24 @@ def test_same_voxels_same_bytes_and_other_voxels_another_uuid(tmp_path: Path) ->
     write_vdb(tmp_path / "c.vdb", density, (0, 0, 0), SPACING_UM)
     assert (tmp_path / "a.vdb").read_bytes() == (tmp_path / "b.vdb").read_bytes()
     assert read_vdb(tmp_path / "a.vdb").uuid != read_vdb(tmp_path / "c.vdb").uuid
+
+
+def test_a_file_that_was_cut_short_or_is_another_is_one_clear_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.vdb"
+    density = np.random.default_rng(1).integers(0, 256, (9, 12, 30), dtype=np.uint8)
+    write_vdb(path, density, (0.0, 0.0, 0.0), SPACING_UM)
+    whole = path.read_bytes()
+    check_vdb(path)
+    for size in (0, 7, 40, 80, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:size])
+        with pytest.raises(StageError, match=r"a\.vdb: can't be read as OpenVDB: it"):
+            check_vdb(path)
+    path.write_bytes(b"\x76" + whole)
+    with pytest.raises(StageError, match="its first bytes are not OpenVDB's"):
+        check_vdb(path)
+    path.unlink()
+    with pytest.raises(StageError, match=r"a\.vdb: can't be read: No such file"):
+        check_vdb(path)
 
 
 def test_a_folder_that_is_a_file_is_one_clear_line(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from urllib.parse import urlparse
 
 import numpy as np
 
-from stereocell import report, specimen, transfer
+from stereocell import bricks, report, specimen, transfer, write
 from stereocell.assets import viewer_dist
 from stereocell.config import Settings, to_dict, to_toml
 from stereocell.engine import Engine, console
@@ -23,8 +23,9 @@ from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
 from stereocell.specimen import ChannelContent, Look, TileContent
 from stereocell.store import Store, key_of, load_lods, write_json
-from stereocell.write import bundle as bundle_writer
 from stereocell.write import usd
+from stereocell.write.bundle import write_bundle
+from stereocell.write.composed import dependencies
 from stereocell.write.generator import GENERATOR
 
 
@@ -113,7 +114,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         tiles = [_tile_task(store, plan, index, tile.id) for tile in plan.tiles]
         about = provenance(plan)
         depends = [index, [asdict(look) for look in looks], about, plan.name]
-        key = key_of(depends, usd, specimen, transfer)
+        key = key_of(depends, write, specimen, transfer)
         if phase.is_done(key, store.stage_file):
             return
         engine.run("stage", run_tile, tiles)
@@ -175,22 +176,21 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
             remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
             raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
-        key = key_of([str(path.absolute()), _state(path.parent), _state(store.stage_dir),
-                      _state(viewer) if viewer else None], bundle_writer)  # fmt: skip
+        files = dependencies(path) + ([] if viewer is None else sorted(viewer.rglob("*")))
+        key = key_of([str(path.absolute()), [_state(file) for file in files]], write, bricks)
         if phase.is_done(key, store.bundle_dir / "manifest.json"):
             return
-        bundle_writer.write_bundle(path, store.bundle_dir, viewer, workers=engine.workers)
+        write_bundle(path, store.bundle_dir, viewer, workers=engine.workers)
     if viewer is None:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
 
 
-def _state(folder: Path) -> list[tuple[str, int, int]]:
-    """Return names, sizes and times of change of all files below: what an edit alters."""
-    files = sorted(file for file in folder.rglob("*") if file.is_file())
-    stats = [(file, file.stat()) for file in files]
-    return [(str(f.relative_to(folder)), s.st_size, s.st_mtime_ns) for f, s in stats]
+def _state(file: Path) -> tuple[str, int, int]:
+    """Return name, size and time of change: what an edit alters."""
+    status = file.stat()
+    return str(file), status.st_size, status.st_mtime_ns
 
 
 def run_report(out: Path) -> None:
@@ -200,7 +200,7 @@ def run_report(out: Path) -> None:
         content = [store.index(), store.survey(), provenance(store.plan())]
         phases = [store.phase(name).get("key") for name in ("stage", "bundle")]
         if phase.is_done(
-            key_of([content, phases, report.TEMPLATE.read_text()], *report.MODULES),
+            key_of([content, phases, report.TEMPLATE.read_text()], report),
             store.report_file,
         ):
             return

@@ -19,10 +19,13 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 from stereocell.assets import find_asset, schema_path
-from stereocell.errors import CheckError, StereoCellError
+from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.validate_usd import validate_stage
 from stereocell.write.bundle import FILES, MANIFEST
+from stereocell.write.exr import check_exr
+from stereocell.write.vdb import check_vdb
 
+_WHOLE = {".exr": check_exr, ".vdb": check_vdb}
 _MOST_SHOWN = 3  # problems in one line
 _NODE_TIMEOUT_S = 1200.0
 _GET_NODE = "install Node 20 or newer, then run `make setup`"
@@ -38,17 +41,23 @@ class CheckLine:
 
 
 def check(out: Path) -> Iterator[CheckLine]:
-    """Yield a line for each check of a build's folder: plan, stage and bundle."""
+    """Yield a line for each check of a build's folder: plan, stage and bundle.
+
+    Raises OutputError, before any line, where there is no build at all.
+    """
+    if not any((out / part).exists() for part in ("plan.json", "stage", "bundle")):
+        raise OutputError(f"{out}: holds no build, expected plan.json, stage/ and bundle/")
     bundle = out / "bundle"
     checks: list[tuple[str, Callable[[], str]]] = [
         ("plan", lambda: _check_json(out / "plan.json", "plan.schema.json")),
         ("stage", lambda: _check_stage(out / "stage" / "stage.usda")),
+        ("stage files", lambda: _check_stage_files(out / "stage")),
         ("manifest", lambda: _check_json(bundle / MANIFEST, "bundle.schema.json")),
         ("file list", lambda: _check_json(bundle / FILES, "bundle.schema.json", "FileIndex")),
         ("volume lists", lambda: _check_volume_lists(bundle)),
         ("tilesets", lambda: _check_tilesets(bundle)),
         ("hashes", lambda: _check_hashes(bundle)),
-        ("glTF validator", lambda: _run_node("check_glb.mjs", sorted(bundle.rglob("*.glb")))),
+        ("glTF validator", lambda: _check_meshes(bundle)),
         ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
     ]
     for name, run in checks:
@@ -85,6 +94,21 @@ def _check_stage(path: Path) -> str:
     findings = validate_stage(path)
     _raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"
+
+
+def _check_stage_files(folder: Path) -> str:
+    """Check that the volumes and lookup tables are whole: USD only sees that they exist."""
+    paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
+    if not paths:
+        raise CheckError(f"{folder}: no .exr and no .vdb file, expected those of its volumes")
+    problems = []
+    for path in paths:
+        try:
+            _WHOLE[path.suffix](path)
+        except StereoCellError as error:
+            problems.append(str(error))
+    _raise_on(problems)
+    return f"{len(paths)} volumes and lookup tables are whole"
 
 
 def _check_volume_lists(bundle: Path) -> str:
@@ -198,6 +222,13 @@ def _references(content: Any) -> Iterator[dict[str, Any]]:
             yield content
         for item in content.values():
             yield from _references(item)
+
+
+def _check_meshes(bundle: Path) -> str:
+    paths = sorted(bundle.rglob("*.glb"))
+    if not paths and all(channel["tileset"] is None for channel in _channels(bundle)):
+        return "0 files: no channel has a surface"
+    return _run_node("check_glb.mjs", paths)
 
 
 def _textures(bundle: Path) -> list[Path]:

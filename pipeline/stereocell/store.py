@@ -25,11 +25,17 @@ from stereocell.write.atomic import replacing_folder, write_bytes
 
 
 def key_of(content: Any, *modules: ModuleType) -> str:
-    """Return the name of a result: a hash of what it depends on and of the modules that make it."""
+    """Return the name of a result: a hash of what it depends on and of the code that makes it.
+
+    A package counts with all the modules that lie in its folder.
+    """
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
     for module in modules:
         assert module.__file__ is not None
-        digest.update(Path(module.__file__).read_bytes())
+        file = Path(module.__file__)
+        files = sorted(file.parent.glob("*.py")) if file.name == "__init__.py" else [file]
+        for part in files:
+            digest.update(part.read_bytes())
     return digest.hexdigest()[:20]
 
 

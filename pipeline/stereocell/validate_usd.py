@@ -65,6 +65,7 @@ def _check_all(stage: Usd.Stage) -> Iterator[Finding]:
         elif prim.HasAPI(UsdGeom.ModelAPI):
             yield from _check_extents_hint(UsdGeom.ModelAPI(prim), boxes)
         elif CHANNEL_API in prim.GetAppliedSchemas():
+            yield from _check_windows(prim)
             yield from _check_opacity(prim)
 
 
@@ -239,6 +240,13 @@ def _check_extents_hint(model: UsdGeom.ModelAPI, boxes: UsdGeom.BBoxCache) -> It
     if (shown[0] < box[0] - tolerance).any() or (shown[1] > box[1] + tolerance).any():
         message = f"extentsHint {box.round(4).tolist()} does not hold {shown.round(4).tolist()}"
         yield Finding("extent", _place(prim), message)
+
+
+def _check_windows(prim: Usd.Prim) -> Iterator[Finding]:
+    for name in ("window", "volumeWindow"):
+        window = prim.GetAttribute(f"stereocell:{name}").Get()
+        if window is not None and not window[0] < window[1]:
+            yield Finding("look", _place(prim), f"{name} is {window}, expected it to rise")
 
 
 def _check_opacity(prim: Usd.Prim) -> Iterator[Finding]:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from stereocell.errors import OutputError, StageError
+from stereocell.interrupts import children_ignore_interrupts
 from stereocell.specimen import evaluate
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
@@ -66,7 +67,7 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, workers: int) 
         export_tile,
         stage_path,
         root,
-        channel_ids=tuple(look.id for look in looks),
+        looks=tuple(looks),
         step_m=step_m,
     )
     tiles = _run(export, [str(prim.GetName()) for prim in prims], workers)
@@ -99,7 +100,9 @@ def _run(export: "partial[BundleTile]", tile_ids: list[str], workers: int) -> li
         return [export(tile_id) for tile_id in tile_ids]
     # not forked: USD's threads would be lost halfway through what they do
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        return list(pool.map(export, tile_ids))
+        with children_ignore_interrupts():
+            futures = [pool.submit(export, tile_id) for tile_id in tile_ids]
+        return [future.result() for future in futures]
 
 
 def _write_channel(

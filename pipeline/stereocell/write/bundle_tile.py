@@ -22,6 +22,7 @@ from stereocell.write.composed import (
     read_volume,
     world_box,
 )
+from stereocell.write.composed_look import ComposedLook
 from stereocell.write.composed_values import Point
 from stereocell.write.exr import read_atlas
 from stereocell.write.gltf import Glb, encode_glb
@@ -72,7 +73,7 @@ def write_file(root: Path, path: str, content: bytes) -> FileRef:
 
 
 def export_tile(
-    stage_path: Path, root: Path, tile_id: str, channel_ids: tuple[str, ...], step_m: float
+    stage_path: Path, root: Path, tile_id: str, looks: tuple[ComposedLook, ...], step_m: float
 ) -> BundleTile:
     """Write one tile of a stage below `root`; see gltf.py for the lattice step, in metres.
 
@@ -82,11 +83,11 @@ def export_tile(
     stage = open_stage(stage_path)
     with loaded(stage, tile_id) as tile:
         channels, boxes = [], []
-        for channel_id in channel_ids:
-            volume = read_volume(tile, channel_id)
+        for look in looks:
+            volume = read_volume(tile, look.id)
             if volume is not None:
                 boxes.append(world_box(np.array(volume.low), np.array(volume.high), volume.matrix))
-            channels.append(_export_channel(root, tile, channel_id, volume, step_m))
+            channels.append(_export_channel(root, tile, look, volume, step_m))
         low, high = (
             np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True)
         )
@@ -94,8 +95,9 @@ def export_tile(
 
 
 def _export_channel(
-    root: Path, tile: Usd.Prim, channel_id: str, volume: ComposedVolume | None, step_m: float
+    root: Path, tile: Usd.Prim, look: ComposedLook, volume: ComposedVolume | None, step_m: float
 ) -> TileChannel:
+    channel_id = look.id
     files: list[FileRef] = []
     lods: list[TileLod] = []
     triangles: list[int] = []
@@ -111,7 +113,7 @@ def _export_channel(
         lods.append(TileLod(uri, lod.distance_um, glb.min_m, glb.max_m))
     entry = None
     if volume is not None:
-        entry, written = _export_volume(root, tile.GetName(), channel_id, volume)
+        entry, written = _export_volume(root, tile.GetName(), look, volume)
         files += written
     return TileChannel(channel_id, tuple(lods), tuple(triangles), entry, tuple(files))
 
@@ -145,15 +147,16 @@ def _read_normal_map(path: Path) -> bytes:
 
 
 def _export_volume(
-    root: Path, tile_id: str, channel_id: str, volume: ComposedVolume
+    root: Path, tile_id: str, look: ComposedLook, volume: ComposedVolume
 ) -> tuple[dict[str, Any], list[FileRef]]:
     voxels = read_atlas(volume.atlas)
     if voxels.shape != volume.size[::-1]:
         found = tuple(voxels.shape[::-1])
         raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
+    voxels = look.window_voxels(voxels)
     texture = encode_3d(mip_levels(voxels))
     bricks = encode_3d([min_max_bricks(voxels)])
-    path = f"volumes/{tile_id}/{channel_id}"
+    path = f"volumes/{tile_id}/{look.id}"
     files = [
         write_file(root, f"{path}.ktx2", texture.data),
         write_file(root, f"{path}_bricks.ktx2", bricks.data),

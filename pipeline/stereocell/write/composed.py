@@ -82,6 +82,22 @@ def open_stage(path: Path) -> Usd.Stage:
     return stage
 
 
+def dependencies(path: Path) -> list[Path]:
+    """Return every file that the stage is made of: layers, also unselected ones, and assets.
+
+    A stage that can't be opened depends on itself; `open_stage` says what is wrong with it.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        layers, assets, _ = UsdUtils.ComputeAllDependencies(str(path))
+    except Tf.ErrorException:
+        return [path]
+    finally:
+        del quiet
+    files = {path, *(Path(layer.realPath) for layer in layers), *(Path(str(a)) for a in assets)}
+    return sorted(file for file in files if file.is_file())
+
+
 def specimen_name(stage: Usd.Stage) -> str:
     root = stage.GetPrimAtPath(ROOT)
     return str(root.GetDisplayName() or root.GetName())
@@ -139,13 +155,24 @@ def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
         if prim is None or not prim.IsA(UsdGeom.Mesh):
             continue
         matrix = _to_world(prim)
-        mesh = read_mesh(UsdGeom.Mesh(prim), matrix)
+        try:
+            mesh = read_mesh(UsdGeom.Mesh(prim), matrix)
+        except StageError as error:
+            raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
         if mesh is None:
             continue
         stretch = float(np.linalg.norm(matrix[:3, :3], 2))
         distance = shortest(value_of(prim, "stereocell:distance")) * stretch
         surface = surface_of(prim)
         yield ComposedLod(level, mesh, distance, material_of(surface), normal_map_of(surface))
+
+
+def _edit_advice(level: int) -> str:
+    """An edit outside the variants lies over every level of detail, and fits one at most."""
+    return (
+        f" at lod{level}: edit inside the variant lod=lod{level}, or override points, "
+        "faceVertexCounts, faceVertexIndices and normals together"
+    )
 
 
 def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:

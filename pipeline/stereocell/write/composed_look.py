@@ -4,6 +4,8 @@ import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd, UsdShade
 
 from stereocell.errors import StageError
@@ -19,19 +21,42 @@ from stereocell.write.gltf import Material
 from stereocell.write.usd_layer import CHANNELS
 from stereocell.write.usd_looks import DEFAULT_FUNCTION
 
+_VOLUME_WINDOW = "stereocell:volumeWindow"
+
 
 @dataclass(frozen=True, slots=True)
 class ComposedLook:
-    """One channel as the stage draws it; see specimen.Look. `chosen`: a transfer function."""
+    """One channel as the stage draws it; see specimen.Look.
+
+    window         the voxel values to be shown as 0 and 1
+    volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
+    chosen         a transfer function
+    """
 
     id: str
     name: str
     color: tuple[float, float, float]
     window: tuple[float, float]
+    volume_window: tuple[float, float]
     iso_value: float | None
-    iso_normalized: float | None
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
+
+    @property
+    def iso_normalized(self) -> float | None:
+        """The iso-value on the window's scale; outside 0..1 where the window leaves it out."""
+        low, high = self.window
+        return None if self.iso_value is None else (self.iso_value - low) / (high - low)
+
+    def window_voxels(self, voxels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a volume of the stage, uint8 by `volume_window`, as uint8 by `window`."""
+        if self.window == self.volume_window:
+            return voxels
+        first, last = self.volume_window
+        low, high = self.window
+        values = first + np.arange(256) / 255 * (last - first)
+        table = np.rint(np.clip((values - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+        return table[voxels]
 
 
 def read_looks(stage: Usd.Stage) -> list[ComposedLook]:
@@ -86,17 +111,25 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
         functions[chosen] = _opacity_points(prim)
     if chosen not in functions:
         raise StageError(f"{prim.GetPath()}: no transferFunction variant {chosen!r}")
-    low, high = value_of(prim, "stereocell:window")
+    window = _window(prim, "stereocell:window")
     return ComposedLook(
         prim.GetName(),
-        value_of(prim, "stereocell:displayName") or prim.GetName(),
+        prim.GetDisplayName() or prim.GetName(),
         color_of(prim.GetAttribute("inputs:color")),
-        (shortest(low), shortest(high)),
+        window,
+        # only stages of other programs lack it
+        _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
         _number(prim, "stereocell:isoValue"),
-        _number(prim, "stereocell:isoValueNormalized"),
         chosen,
         functions,
     )
+
+
+def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:
+    low, high = (shortest(number) for number in value_of(prim, name))
+    if not low < high:
+        raise StageError(f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected them to rise")
+    return low, high
 
 
 def _number(prim: Usd.Prim, name: str) -> float | None:

@@ -3,6 +3,12 @@
 Each channel is a material below /Specimen/Channels that the materials of all tiles inherit. The
 colour is an input of the material: the surface shader is connected to it, volume renderers and the
 bundle read it. The opacity points are the transfer function; the LUT is baked from them.
+
+The material has no volume output: USD ships no volume shader that renderers agree on, only
+UsdPreviewSurface. So the binding of a Volume prim to its look hands over the channel's values
+(colour, opacity points, LUT), and does NOT make a renderer draw the volume by them: an artist
+connects `outputs:volume` to the renderer's own shader, in a layer over the stage, and feeds its
+colour from `inputs:color`. The bundle's viewer has its own ray caster.
 """
 
 from collections.abc import Sequence
@@ -50,12 +56,11 @@ def _author_look(material: UsdShade.Material, look: Look) -> None:
     prim.SetDisplayName(look.name)
     prim.AddAppliedSchema(CHANNEL_API)
     material.CreateInput("color", _Types.Color3f).Set(Gf.Vec3f(*look.color))
-    set_attribute(prim, "stereocell:displayName", _Types.String, look.name)
-    set_attribute(prim, "stereocell:window", _Types.Float2, Gf.Vec2f(*look.window))
+    for name in ("window", "volumeWindow"):
+        set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*look.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, look.iso_confidence)
     if look.iso_value is not None:
         set_attribute(prim, "stereocell:isoValue", _Types.Float, look.iso_value)
-        set_attribute(prim, "stereocell:isoValueNormalized", _Types.Float, look.iso_normalized)
 
 
 def _author_surface(material: UsdShade.Material) -> None:

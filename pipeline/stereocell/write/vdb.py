@@ -23,10 +23,12 @@ import zlib
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.errors import StageError
 from stereocell.volume import zyx_to_xyz
 from stereocell.write.atomic import write_bytes
 
@@ -34,6 +36,7 @@ GRID_NAME = "density"
 
 _MAGIC = 0x56444220
 _FORMAT, _LIBRARY = 224, (12, 0)
+_OLDEST_FORMAT = 222  # whose head is laid out as it is now
 _ZIP, _ACTIVE_MASK = 1, 2
 _ONLY_ACTIVE_VALUES = b"\x00"
 _ZLIB_LEVEL = 1
@@ -70,6 +73,52 @@ def write_vdb(
     uuid = "-".join(digest[a:b] for a, b in pairwise(cuts))
     header = struct.pack("<qIII?", _MAGIC, _FORMAT, *_LIBRARY, True) + uuid.encode()
     write_bytes(path, header + struct.pack("<Ii", 0, 1) + body)
+
+
+def check_vdb(path: Path) -> None:
+    """Raise StageError if a file is missing, is no OpenVDB, or ends before its grids do.
+
+    Reads what says where the grids end, not the grids. A file without these offsets, or of a
+    format before 222, passes by its first bytes: other programs may have written it.
+    """
+    try:
+        with path.open("rb") as file:
+            damage = _find_damage(file, path.stat().st_size)
+    except OSError as error:
+        raise StageError(f"{path}: can't be read: {error.strerror or error}") from error
+    except struct.error:
+        damage = "its head was cut short"
+    if damage is not None:
+        raise StageError(f"{path}: can't be read as OpenVDB: {damage}")
+
+
+def _find_damage(file: BinaryIO, size: int) -> str | None:
+    (magic,) = struct.unpack("<q", file.read(8))
+    if magic != _MAGIC:
+        return "its first bytes are not OpenVDB's"
+    version, _, _, has_offsets = struct.unpack("<III?", file.read(13))
+    if version < _OLDEST_FORMAT or not has_offsets:
+        return None
+    file.read(36)  # UUID
+    (entries,) = struct.unpack("<I", file.read(4))
+    for _ in range(3 * entries):  # name, type and value, each behind its length
+        _skip_text(file)
+    (grids,) = struct.unpack("<i", file.read(4))
+    if grids < 1:
+        return "it holds no grid"
+    for _ in range(grids):
+        for _ in range(3):  # name, tree type, instance parent
+            _skip_text(file)
+        _, _, end = struct.unpack("<3q", file.read(24))
+        if end > size:
+            return f"it ends at byte {size}, expected {end} or more"
+        file.seek(end)
+    return None
+
+
+def _skip_text(file: BinaryIO) -> None:
+    (length,) = struct.unpack("<I", file.read(4))
+    file.seek(length, 1)
 
 
 def _grid(voxels: NDArray[np.uint8], transform: bytes) -> bytes:
