@@ -40,7 +40,7 @@ if (bundle === undefined || out === undefined) {
 const [width, height] = values.phone ? [390, 780] : values.size.split("x").map(Number);
 const dist = new URL("../dist/", import.meta.url).pathname;
 const host = await Host.start({ "/": values.page ? bundle : dist, "/bundle/": bundle });
-const browser = await launch({ width, height });
+const browser = await launch({ width, height }, { hasTouch: values.phone });
 try {
   const page = await browser.context.newPage();
   page.on("pageerror", (error) => process.stderr.write(`page: ${error.message}\n`));

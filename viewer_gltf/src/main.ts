@@ -1,5 +1,8 @@
 /** Start: find the bundle, show it, or say on the page why not. */
-import "./ui/style.css";
+import "./ui/page.css";
+import "./ui/panel.css";
+import "./ui/controls.css";
+import "./ui/overlays.css";
 import type { StereoCellApi } from "./api";
 import { bundleAddress } from "./bundle/address";
 import { BundleError } from "./bundle/errors";
@@ -109,6 +112,14 @@ void opened.then(
   () => undefined, // told above
 );
 ready.catch(() => undefined); // told above; whoever awaits `ready` still sees it
+
+/** Bugs: the console has the details, the page says that something is amiss. */
+function tellBug(error: unknown): void {
+  if (!(error instanceof Error)) return; // such as a ResizeObserver's harmless message
+  viewer?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });
+}
+addEventListener("error", (event) => tellBug(event.error));
+addEventListener("unhandledrejection", (event) => tellBug(event.reason));
 
 const api: StereoCellApi = {
   apiVersion: 1,

@@ -11,7 +11,11 @@ import {
 } from "./state";
 
 const FILE = { path: "x", bytes: 0, sha256: "0".repeat(64) };
-const BOUNDS: Manifest["specimen"]["bounds_um"] = { min: [0, 0, 0], max: [1, 1, 1] };
+const BOUNDS: Manifest["specimen"]["bounds_um"] = { min: [0, 0, 0], max: [3, 1, 1] };
+const tile = (id: string, x: number): Manifest["tiles"][number] => ({
+  id,
+  bounds_um: { min: [x, 0, 0], max: [x + 1, 1, 1] },
+});
 
 function manifest(channels: number): Manifest {
   return {
@@ -19,11 +23,7 @@ function manifest(channels: number): Manifest {
     version: 1,
     generator: "test",
     specimen: { name: "test", bounds_um: BOUNDS },
-    tiles: [
-      { id: "r0_c0", bounds_um: BOUNDS },
-      { id: "r0_c1", bounds_um: BOUNDS },
-      { id: "r0_c2", bounds_um: BOUNDS },
-    ],
+    tiles: [tile("r0_c1", 1), tile("r0_c0", 0), tile("r0_c2", 2)],
     channels: Array.from({ length: channels }, (_, i) => ({
       id: `c${i}`,
       name: `channel ${i}`,

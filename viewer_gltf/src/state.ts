@@ -44,6 +44,16 @@ export type Action =
   | Readonly<{ type: "notify"; text: string }>
   | Readonly<{ type: "dismiss"; text: string }>;
 
+/** The tile whose centre is nearest to the specimen's. */
+function middleTile({ specimen, tiles }: Manifest): string {
+  const centerOf = ({ min, max }: Manifest["specimen"]["bounds_um"]) =>
+    min.map((v, i) => (v + max[i]) / 2);
+  const center = centerOf(specimen.bounds_um);
+  const distance = (tile: Manifest["tiles"][number]) =>
+    Math.hypot(...centerOf(tile.bounds_um).map((v, i) => v - center[i]));
+  return tiles.reduce((a, b) => (distance(b) < distance(a) ? b : a)).id;
+}
+
 /** The state in which a bundle opens: surfaces; volumes are off, ready in the middle tile. */
 export function initialState(manifest: Manifest): ViewerState {
   const tiles = manifest.tiles.map((tile) => tile.id);
@@ -61,7 +71,7 @@ export function initialState(manifest: Manifest): ViewerState {
     })),
     tiles,
     scope: "one",
-    tile: tiles[Math.floor((tiles.length - 1) / 2)],
+    tile: middleTile(manifest),
     notices: [],
   };
 }

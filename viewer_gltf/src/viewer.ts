@@ -32,6 +32,7 @@ export class Viewer {
   private readonly surfaces: SurfaceSet;
   private readonly volumes: VolumeSet;
   private readonly resize: ResizeObserver;
+  private readonly disposed = new AbortController();
   private readonly size = new Vector2();
   private readonly point = new Vector3();
   private readonly toSpecimen = new Matrix4();
@@ -53,7 +54,6 @@ export class Viewer {
     const { manifest } = bundle;
     this.state = initialState(manifest);
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.info.autoReset = false;
     stage.append(this.renderer.domElement);
 
@@ -108,6 +108,7 @@ export class Viewer {
     });
     this.resize = new ResizeObserver(() => this.fit());
     this.resize.observe(stage);
+    this.followPixelRatio();
     this.fit();
     this.follow();
     this.renderer.setAnimationLoop(() => this.frame());
@@ -233,11 +234,27 @@ export class Viewer {
     if (this.renderer.xr.isPresenting) return;
     const { clientWidth, clientHeight } = this.stage;
     if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setSize(clientWidth, clientHeight);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
     if (this.isHome) this.resetView();
     this.isStale = true;
+  }
+
+  /** A window may go to another screen, or be zoomed, at the same size. */
+  private followPixelRatio(): void {
+    const { signal } = this.disposed;
+    const listen = () =>
+      matchMedia(`(resolution: ${devicePixelRatio}dppx)`).addEventListener("change", follow, {
+        once: true,
+        signal,
+      });
+    const follow = () => {
+      this.fit();
+      listen();
+    };
+    listen();
   }
 
   private enterStereo(): void {
@@ -264,6 +281,7 @@ export class Viewer {
   dispose(): void {
     this.renderer.setAnimationLoop(null);
     this.resize.disconnect();
+    this.disposed.abort();
     this.controls.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();

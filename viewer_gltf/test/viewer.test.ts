@@ -232,11 +232,11 @@ describeInChromium("the viewer", () => {
 
   it("names a broken or missing file in a notice and shows the rest", async () => {
     const { id } = manifest.channels[0];
-    const tile = manifest.tiles[Math.floor((manifest.tiles.length - 1) / 2)].id;
+    await open();
+    const { tile } = (await viewer.snapshot()).state;
     host.overrides.set(`/bundle/volumes/${tile}/${id}.ktx2`, { status: 404, body: "" });
     const lut = manifest.channels[1].lut.path;
     host.overrides.set(`/bundle/${lut}`, { status: 200, body: "not the file" });
-    await open();
     await viewer.drawVolume(id, true);
     await viewer.drawVolume(manifest.channels[1].id, true);
     const notices = viewer.page.locator("[data-notices]");
@@ -246,28 +246,6 @@ describeInChromium("the viewer", () => {
     expect((await viewer.snapshot()).triangles).toBeGreaterThan(0);
     await notices.locator("p", { hasText: "(404)" }).getByRole("button").click();
     expect(await notices.textContent()).not.toContain("not found (404)");
-  });
-
-  it("chooses the tile that is clicked", async () => {
-    await open();
-    await viewer.drawVolume(manifest.channels[0].id, true);
-    const box = await viewer.page.locator(".stage").boundingBox();
-    if (box === null) throw new Error("no stage");
-    const { bounds_um } = manifest.specimen;
-    const x = box.x + box.width / 2;
-    const y = box.y + box.height / 2;
-    // The tile under a point right of the middle holds that part of the specimen's front.
-    await viewer.page.mouse.click(x + box.width / 4, y + box.height / 8);
-    const { tile } = (await viewer.snapshot()).state;
-    const chosen = manifest.tiles.find(({ id }) => id === tile);
-    const middle = (bounds_um.min[0] + bounds_um.max[0]) / 2;
-    expect(chosen?.bounds_um.max[0]).toBeGreaterThan(middle);
-    // A drag turns the specimen and chooses nothing.
-    await viewer.page.mouse.move(x - box.width / 4, y);
-    await viewer.page.mouse.down();
-    await viewer.page.mouse.move(x, y, { steps: 4 });
-    await viewer.page.mouse.up();
-    expect((await viewer.snapshot()).state.tile).toBe(tile);
   });
 
   it("draws no frames while nothing changes", async () => {

@@ -13,6 +13,13 @@ describe("the bundle's address", () => {
     expect(bundleAddress("https://host/?bundle=https://other/x/")).toBe("https://other/x/");
   });
 
+  it("is an address of the web", () => {
+    for (const wrong of ["http://", "https://a b/", "ftp://host/x/", "mailto:x"]) {
+      const page = `https://host/?bundle=${encodeURIComponent(wrong)}`;
+      expect(() => bundleAddress(page)).toThrow(`expected a folder's address on the web`);
+    }
+  });
+
   it("keeps a query that the host needs", () => {
     expect(bundleAddress("https://host/?bundle=%2Fdemo%3Ftoken%3D1")).toBe(
       "https://host/demo/?token=1",

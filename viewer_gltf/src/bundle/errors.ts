@@ -1,4 +1,9 @@
 /** What is wrong with a bundle or with this browser, in words for the page. Other errors are bugs. */
 export class BundleError extends Error {
-  override readonly name = "BundleError";
+  override readonly name: string = "BundleError";
+}
+
+/** A fault that may be gone a second later: no connection, or a host that is busy. */
+export class TemporaryError extends BundleError {
+  override readonly name = "TemporaryError";
 }

@@ -1,6 +1,7 @@
 /** Fetch files of a bundle. Every fault becomes a BundleError that names the file. */
-import { BundleError } from "./errors";
+import { BundleError, TemporaryError } from "./errors";
 import type { FileRef } from "./generated/bundle";
+import { withRetries } from "./retry";
 
 /** The address of a path that a manifest names; the bundle's query, if any, goes with it. */
 export function fileAddress(base: string, path: string): string {
@@ -8,26 +9,45 @@ export function fileAddress(base: string, path: string): string {
   return new URL(path + url.search, base).href;
 }
 
-/** The response of `url`, if its status says success. `path` is the file's name in messages. */
-export async function request(
-  url: string,
-  path: string,
-  options: RequestInit = {},
-): Promise<Response> {
+/** Answers of a host that may be better a moment later. */
+const BUSY = 429;
+const FIRST_SERVER_FAULT = 500;
+
+/**
+ * The response of `url`, if its status says success. `path` is the file's name in messages. Faults
+ * of the network and of the host are tried again before they are thrown.
+ */
+export function request(url: string, path: string, options: RequestInit = {}): Promise<Response> {
+  return withRetries(() => requestOnce(url, path, options), options.signal);
+}
+
+async function requestOnce(url: string, path: string, options: RequestInit): Promise<Response> {
   let response: Response;
   try {
     response = await fetch(url, options);
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new BundleError(`${path}: the host of ${url} can't be reached, or forbids this page`, {
+    throw new TemporaryError(`${path}: the host of ${url} can't be reached, or forbids this page`, {
       cause: error,
     });
   }
   if (response.status === 404) throw new BundleError(`${path}: not found (404) at ${url}`);
   if (!response.ok) {
-    throw new BundleError(`${path}: the host answered ${response.status} for ${url}`);
+    const isTemporary = response.status === BUSY || response.status >= FIRST_SERVER_FAULT;
+    const Fault = isTemporary ? TemporaryError : BundleError;
+    throw new Fault(`${path}: the host answered ${response.status} for ${url}`);
   }
   return response;
+}
+
+/** The response's bytes. Throws BundleError if the connection breaks before the last one. */
+export async function readBody(response: Response, path: string): Promise<Uint8Array<ArrayBuffer>> {
+  try {
+    return new Uint8Array(await response.arrayBuffer());
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    throw new BundleError(`${path}: the connection broke before the file's end`, { cause: error });
+  }
 }
 
 /** The file's bytes, after their number and hash were checked against the reference. */
@@ -37,7 +57,7 @@ export async function fetchFile(
   signal?: AbortSignal,
 ): Promise<Uint8Array<ArrayBuffer>> {
   const response = await request(fileAddress(base, file.path), file.path, { signal });
-  const bytes = new Uint8Array(await response.arrayBuffer());
+  const bytes = await readBody(response, file.path);
   await checkFile(file, bytes);
   return bytes;
 }

@@ -1,6 +1,6 @@
 /** Load the small files of a bundle: the manifest, and a channel's list of volumes. */
 import { checkManifest, checkVolumes } from "./check";
-import { fetchFile, fileAddress, parseJson, request } from "./fetch";
+import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";
 import type { FileRef, Manifest } from "./generated/bundle";
 import type { TileVolume } from "./generated/volumes";
 
@@ -10,7 +10,8 @@ export type Bundle = Readonly<{ base: string; manifest: Manifest }>;
 export async function loadBundle(base: string): Promise<Bundle> {
   const path = "manifest.json";
   const response = await request(fileAddress(base, path), path, { cache: "no-cache" });
-  return { base, manifest: checkManifest(parseJson(await response.text(), path)) };
+  const text = new TextDecoder().decode(await readBody(response, path));
+  return { base, manifest: checkManifest(parseJson(text, path)) };
 }
 
 /** The volumes of one channel, by tile. Throws BundleError. */

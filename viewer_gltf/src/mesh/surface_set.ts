@@ -50,7 +50,7 @@ export class SurfaceSet {
       }
       const tileset = this.tilesets.get(channel.id);
       if (tileset === undefined) continue;
-      tileset.group.visible = channel.shown;
+      tileset.show(channel.shown);
       for (const surface of tileset.surfaces.values()) this.dress(channel.id, surface);
     }
   }
@@ -64,7 +64,7 @@ export class SurfaceSet {
   }
 
   private shown(): [string, SurfaceTileset][] {
-    return [...this.tilesets].filter(([, tileset]) => tileset.group.visible);
+    return [...this.tilesets].filter(([, tileset]) => tileset.isShown);
   }
 
   private add(id: string): void {

@@ -18,15 +18,19 @@ import {
   type Object3D,
 } from "three";
 import { BundleError } from "../bundle/errors";
-import { fileAddress, request } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Rgb } from "../color";
+import { fetchGlb, fetchTileset } from "./content";
 import type { SurfaceLoader } from "./loader";
 import type { TileProgress } from "./progress";
 
 const UM_PER_METRE = 1e6;
 /** The root holds no content; below it lie the tiles' coarsest LODs. */
 const DEPTH_OF_COARSEST = 1;
+/** GPU memory for the surfaces of all channels, which share one cache; hidden ones go first. */
+const SURFACE_BUDGET_BYTES = 384 * 1024 * 1024;
+/** What is left of a full cache after hidden surfaces were dropped. */
+const KEPT_SHARE = 0.75;
 
 export type Surface = Readonly<{
   scene: Object3D;
@@ -44,6 +48,7 @@ export class SurfaceTileset {
   private total: number | null = null;
   /** Coarsest tiles that have been loaded or given up. */
   private readonly done = new Set<Tile>();
+  private readonly failed = new Set<Tile>();
 
   constructor(
     base: string,
@@ -54,15 +59,20 @@ export class SurfaceTileset {
     onError: (error: unknown) => void,
   ) {
     if (channel.tileset === null) throw new Error(`channel ${channel.id} has no surface`);
-    const { path } = channel.tileset;
-    this.tiles = new TilesRenderer(fileAddress(base, path));
+    const file = channel.tileset;
+    // Addresses without the bundle's query, which goes with every request: see fileAddress.
+    const folder = new URL(".", base).href.split("?")[0];
+    const root = new URL(file.path, folder).href;
+    this.tiles = new TilesRenderer(root);
+    this.tiles.lruCache.maxBytesSize = SURFACE_BUDGET_BYTES;
+    this.tiles.lruCache.minBytesSize = KEPT_SHARE * SURFACE_BUDGET_BYTES;
     this.tiles.maxDepth = DEPTH_OF_COARSEST + 1;
     this.tiles.manager.addHandler(/\.(gltf|glb)$/, loader.gltf);
-    const folder = new URL(".", base).href;
+    const nameOf = (url: string) => decodeURIComponent(url.replace(folder, ""));
     this.tiles.registerPlugin({
       name: "STEREOCELL_BUNDLE",
-      fetchData: (url: string, options: RequestInit) =>
-        request(url, decodeURIComponent(url.replace(folder, "")), options),
+      fetchData: (url: string, { signal }: RequestInit) =>
+        url === root ? fetchTileset(base, file) : fetchGlb(base, nameOf(url), signal),
       // Before the renderer puts its own `tile` into every userData.
       processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
     });
@@ -74,12 +84,13 @@ export class SurfaceTileset {
     this.tiles.addEventListener("load-model", ({ tile }) => this.count(tile));
     this.tiles.addEventListener("load-error", ({ tile, error, url }) => {
       if (tile === null) this.total = 0;
-      else this.count(tile);
-      const name = decodeURIComponent(String(url).replace(folder, ""));
+      else this.giveUp(tile);
       onError(
         error instanceof BundleError
           ? error
-          : new BundleError(`${name}: ${error.message}`, { cause: error }),
+          : new BundleError(`${nameOf(String(url))}: the surface can't be read: ${error.message}`, {
+              cause: error,
+            }),
       );
     });
     this.tiles.addEventListener("dispose-model", ({ scene }) => this.surfaces.delete(scene));
@@ -90,6 +101,27 @@ export class SurfaceTileset {
     this.tiles.group.scale.setScalar(UM_PER_METRE);
     this.group.name = `surfaces of ${channel.id}`;
     this.group.add(this.tiles.group);
+  }
+
+  get isShown(): boolean {
+    return this.group.visible;
+  }
+
+  /** A hidden tileset gives its memory up where another needs it; a shown one tries all again. */
+  show(isShown: boolean): void {
+    if (isShown === this.group.visible) return;
+    this.group.visible = isShown;
+    if (isShown) {
+      this.retryFailed();
+      return;
+    }
+    const { lruCache } = this.tiles;
+    const release = (tile: object) => {
+      lruCache.markUnused(tile);
+      return false;
+    };
+    this.tiles.traverse(release, null);
+    lruCache.scheduleUnload();
   }
 
   get progress(): TileProgress {
@@ -125,6 +157,30 @@ export class SurfaceTileset {
     this.tiles.setCamera(camera);
     this.tiles.setResolution(camera, width_px, height_px);
     this.tiles.update();
+  }
+
+  /**
+   * The renderer draws a failed tile as a hole in place of its parent: without the failed child the
+   * parent stays. The coarsest have no parent to show; their finer LODs may still come.
+   */
+  private giveUp(tile: Tile): void {
+    this.failed.add(tile);
+    const { parent } = tile;
+    if (parent?.children !== undefined && tile.internal.depth > DEPTH_OF_COARSEST) {
+      parent.children = parent.children.filter((child) => child !== tile);
+    }
+    this.count(tile);
+  }
+
+  private retryFailed(): void {
+    if (this.tiles.root === null) this.total = null;
+    for (const tile of this.failed) {
+      const siblings = tile.parent?.children;
+      if (siblings !== undefined && !siblings.includes(tile)) siblings.push(tile);
+      this.tiles.lruCache.remove(tile); // makes it a tile that was never loaded
+    }
+    this.failed.clear();
+    this.tiles.resetFailedTiles(); // the root
   }
 
   private count(tile: Tile): void {

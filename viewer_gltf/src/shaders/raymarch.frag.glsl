@@ -43,15 +43,19 @@ void main() {
   vec3 dir = ray / back;
   vec3 invDir = 1.0 / (dir + 1e-6 * vec3(equal(dir, vec3(0.0))));
   vec2 span = intersectBox(vEye, invDir, uSize);
-  float end = min(span.y, sceneDistance(back));
+  vec3 scene = sceneDistances(back);
+  float edge = min(span.y, scene.x);
+  float end = min(span.y, scene.y);
   float t = max(span.x, 0.0);
 
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
   vec3 texEye = uTexLow + vEye * texPerUm;
   vec3 texDir = dir * texPerUm;
   vec4 sum = vec4(0.0);
+  vec4 veil = vec4(0.0);  // the sum in front of the edge
   float shift = jitter(gl_FragCoord.xy);
-  for (int i = 0; i < MAX_STEPS && t < end && sum.a < OPAQUE; i++) {
+  int i = 0;
+  for (; i < MAX_STEPS && t < end && sum.a < OPAQUE; i++) {
     // What remains of the ray over what remains of the budget: it always reaches the end.
     float dt = max(uMinStep, (end - t) / float(MAX_STEPS - i));
     float leap = leapLength(texEye + t * texDir, texDir);
@@ -59,15 +63,22 @@ void main() {
       t += leap;
       continue;
     }
-    float here = min(dt, end - t);  // the last step may be shorter
+    bool isInFront = t < edge;
+    float here = min(dt, (isInFront ? edge : end) - t);  // the last step may be shorter
     vec3 p = texEye + (t + shift * here) * texDir;
     vec4 s = classify(sampleIntensities(p), here / uVoxel);
     if (s.a > 0.0) {
       s.rgb *= shade(p, texPerUm, dir);
       sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
     }
+    if (isInFront) veil = sum;
     t += here;
   }
+#ifdef COUNT_STEPS  // for tests: the number of steps, and the share of the ray that they covered
+  oColor = vec4(float(i % 256) / 255.0, float(i / 256) / 255.0, clamp(t / end, 0.0, 1.0), 1.0);
+  return;
+#endif
+  sum = mix(veil, sum, scene.z);
   if (sum.a <= 0.0) discard;
   // Blending happens on encoded colours, as for every other surface of the page.
   oColor = vec4(linearToOutputTexel(vec4(sum.rgb / sum.a, 1.0)).rgb * sum.a, sum.a);

@@ -1,5 +1,5 @@
-// The volume's box, a unit cube around the origin that modelViewMatrix brings to the eye's space. Its back faces are
-// drawn, so that the ray is there also when the eye is inside.
+// The volume's box, a unit cube around the origin that modelViewMatrix brings to the eye's space.
+// Its back faces are drawn, so that the ray is there also when the eye is inside.
 uniform vec3 uSize;  // um, edges of the box
 
 centroid out vec3 vPosition;  // um, from the box's low corner

@@ -3,7 +3,7 @@
  * request with the whole file, which then serves every level.
  */
 import { BundleError } from "../bundle/errors";
-import { checkFile, fileAddress, request } from "../bundle/fetch";
+import { checkFile, fileAddress, readBody, request } from "../bundle/fetch";
 import type { TileVolume } from "../bundle/generated/volumes";
 import { readLevel, readTexture } from "./ktx2";
 import { texels } from "./levels";
@@ -41,7 +41,7 @@ export class VolumeSource {
       signal,
       headers: { Range: `bytes=${level.offset}-${last}` },
     });
-    const bytes = new Uint8Array(await response.arrayBuffer());
+    const bytes = await readBody(response, file.path);
     if (response.status !== 206) {
       await checkFile(file, bytes);
       this.whole = bytes;

@@ -34,7 +34,7 @@ const STEP_VOXELS = 0.7;
 
 export type Part = Readonly<{
   channel: string;
-  volume: VolumeTexture;
+  volume: Pick<VolumeTexture, "texture" | "level" | "bricks" | "brickCount">;
   transferFunction: TransferFunction;
   color: Rgb;
 }>;

@@ -1,5 +1,6 @@
 /** All volumes on screen: follows the state, loads what is missing, drops what is gone. */
 import { type DepthTexture, Group, type Vector3 } from "three";
+import type { TileVolume } from "../bundle/generated/volumes";
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
 import { type ViewerState, volumeChannels, volumeTiles } from "../state";
@@ -148,12 +149,14 @@ export class VolumeSet {
 
   private updateMarch(state: ViewerState, tile: string): void {
     const parts: Part[] = [];
+    let box: TileVolume | null = null; // the same for all channels of a tile
     for (const channel of volumeChannels(state)) {
       const volumes = this.channels.get(channel.id);
       const volume = this.textures.get(`${tile}/${channel.id}`);
       if (volumes === undefined || typeof volumes === "string") continue;
       const transferFunction = volumes.transferFunctions.get(channel.transferFunction);
       if (volume?.texture == null || transferFunction === undefined) continue;
+      box ??= volume.source.volume;
       parts.push({ channel: channel.id, volume, transferFunction, color: channel.color });
     }
     const looks = parts.map((part) => part.channel).join(" ");
@@ -163,9 +166,9 @@ export class VolumeSet {
       this.marches.delete(tile);
       found = undefined;
     }
-    if (parts.length === 0) return;
+    if (box === null) return;
     if (found === undefined) {
-      const march = new TileMarch(parts[0].volume.source.volume, parts.length, this.depth);
+      const march = new TileMarch(box, parts.length, this.depth);
       found = { looks, march };
       this.marches.set(tile, found);
       this.group.add(march.mesh);

@@ -33,7 +33,13 @@ export class XrSession {
       this.session = null;
       this.onEnd();
     });
-    await this.renderer.xr.setSession(session);
+    try {
+      await this.renderer.xr.setSession(session);
+    } catch (error) {
+      this.session = null; // so that it can be tried again
+      void session.end().catch(() => undefined); // it may have ended by itself: that was the fault
+      throw error;
+    }
     this.onStart();
   }
 

@@ -4,16 +4,21 @@ import { framingDistance, place } from "../../src/view/placement";
 
 const FIELD_OF_VIEW_RAD = (40 * Math.PI) / 180;
 
-/** Pixel of a point (um, world) in a stage of that size, and the cosine of its ray to the z axis. */
+/** Where the eye is: at the start (towards +z), or after a quarter turn (towards -x). */
+export type Side = "front" | "left";
+
+/** Pixel of a point (um, world) in a stage of that size, and the cosine of its ray to the axis. */
 export function project(
   point: readonly [number, number, number],
   bounds: Manifest["specimen"]["bounds_um"],
   width: number,
   height: number,
+  side: Side = "front",
 ): { x: number; y: number; cosine: number } {
   const { scale, center, size } = place(bounds);
   const distance = framingDistance(size, FIELD_OF_VIEW_RAD, width / height);
-  const [x, y, z] = point.map((v, i) => (v - center[i]) * scale);
+  const p = point.map((v, i) => (v - center[i]) * scale);
+  const [x, y, z] = side === "front" ? p : [p[2], p[1], -p[0]];
   const depth = distance - z;
   const pixels = height / 2 / Math.tan(FIELD_OF_VIEW_RAD / 2) / depth;
   return {

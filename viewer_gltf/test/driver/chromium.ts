@@ -29,7 +29,7 @@ export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<v
 /** @param viewport CSS pixels; small ones, since software draws them */
 export async function launch(
   viewport: { width: number; height: number },
-  flags: readonly string[] = [],
+  { hasTouch = false, flags = [] as readonly string[] } = {},
 ): Promise<Browser> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
   const profile = await mkdtemp(join(tmpdir(), "stereocell-chromium-"));
@@ -39,6 +39,7 @@ export async function launch(
     args: ["--headless=new", ...FLAGS, ...flags],
     viewport,
     deviceScaleFactor: 1,
+    hasTouch,
   });
   return {
     context,

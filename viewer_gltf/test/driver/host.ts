@@ -14,13 +14,17 @@ const TYPES: Readonly<Record<string, string>> = {
   ".ktx2": "image/ktx2",
 };
 
-export type Request = Readonly<{ path: string; range: string | null }>;
+export type Request = Readonly<{ path: string; query: string; range: string | null }>;
+/** `times`: answered so only that often, then by the folder's file. */
+export type Answer = { status: number; body: string | Uint8Array; times?: number };
 
 export class Host {
   readonly requests: Request[] = [];
   /** Paths that are answered instead of the folder's file. */
-  readonly overrides = new Map<string, { status: number; body: string | Uint8Array }>();
+  readonly overrides = new Map<string, Answer>();
   hasRanges = true;
+  /** Before every answer. */
+  delay_ms = 0;
 
   private constructor(
     private readonly server: Server,
@@ -31,9 +35,10 @@ export class Host {
   static async start(mounts: Readonly<Record<string, string>>): Promise<Host> {
     const prefixes = Object.keys(mounts).sort((a, b) => b.length - a.length);
     const server = createServer((request, response) => {
-      const path = decodeURIComponent(new URL(request.url ?? "/", "http://host").pathname);
+      const { pathname, search } = new URL(request.url ?? "/", "http://host");
+      const path = decodeURIComponent(pathname);
       const range = request.headers.range ?? null;
-      host.requests.push({ path, range });
+      host.requests.push({ path, query: search, range });
       const prefix = prefixes.find((each) => path.startsWith(each));
       const inside = prefix === undefined ? "" : normalize(path.slice(prefix.length));
       const file =
@@ -41,6 +46,7 @@ export class Host {
           ? null
           : join(mounts[prefix], inside.endsWith("/") || inside === "." ? "index.html" : inside);
       const answer = host.overrides.get(path);
+      if (answer?.times !== undefined && --answer.times === 0) host.overrides.delete(path);
       const content =
         answer !== undefined
           ? Promise.resolve(Buffer.from(answer.body))
@@ -48,7 +54,8 @@ export class Host {
             ? Promise.reject(new Error("outside"))
             : readFile(file);
       content.then(
-        (bytes) => {
+        async (bytes) => {
+          if (host.delay_ms > 0) await new Promise((done) => setTimeout(done, host.delay_ms));
           const headers = { "Content-Type": TYPES[extname(path)] ?? "text/html" };
           const asked =
             host.hasRanges && answer === undefined ? /^bytes=(\d+)-(\d+)$/.exec(range ?? "") : null;

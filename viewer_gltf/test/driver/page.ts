@@ -38,6 +38,13 @@ export class ViewerPage {
     await this.settled();
   }
 
+  /** Show a channel as its surface, or as its volume in all tiles. */
+  async showAs(channel: string, as: "surface" | "volume"): Promise<void> {
+    await this.show(channel, true);
+    await this.drawVolume(channel, as === "volume");
+    if (as === "volume") await this.chooseScope("all");
+  }
+
   async recolor(channel: string, hex: string): Promise<void> {
     await this.part(channel, "color").fill(hex);
     await this.settled();
@@ -56,6 +63,37 @@ export class ViewerPage {
   async chooseScope(scope: "one" | "all"): Promise<void> {
     await this.page.locator(`[data-scope="${scope}"]`).setChecked(true, { force: true });
     await this.settled();
+  }
+
+  /** Drag from one point of the page to another, and wait until the turn has come to rest. */
+  async drag(from: readonly [number, number], to: readonly [number, number]): Promise<void> {
+    await this.page.mouse.move(...from);
+    await this.page.mouse.down();
+    await this.page.mouse.move(...to, { steps: 4 });
+    await this.page.mouse.up();
+    await this.still();
+  }
+
+  /** Turn the specimen by a quarter, so that what was on the left faces the viewer. */
+  async turnLeftSideToFront(): Promise<void> {
+    const box = await this.page.locator(".stage").boundingBox();
+    if (box === null) throw new Error("no stage");
+    const y = box.y + box.height / 2;
+    const x = box.x + box.width / 4;
+    await this.drag([x, y], [x + box.height / 4, y]); // the stage's height is a whole turn
+  }
+
+  /** Wait until some of the page's turns pass without a frame: a drag goes on for a while. */
+  async still(): Promise<void> {
+    await this.settled();
+    await this.page.evaluate(async () => {
+      const frames = () => window.stereocell?.frames ?? 0;
+      for (let idle = 0; idle < 5; ) {
+        const before = frames();
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+        idle = frames() === before ? idle + 1 : 0;
+      }
+    });
   }
 
   async enterStereo(): Promise<void> {

@@ -32,6 +32,18 @@ export class Picture {
   }
 }
 
+/** Share of the pixels that differ by more than a little. */
+export function difference(a: Picture, b: Picture): number {
+  let differing = 0;
+  for (let y = 0; y < a.height; y++) {
+    for (let x = 0; x < a.width; x++) {
+      const other = b.at(x, y);
+      if (a.at(x, y).some((v, i) => Math.abs(v - other[i]) > 8)) differing++;
+    }
+  }
+  return differing / (a.width * a.height);
+}
+
 /** What the page shows in the stage (or in `area`), without what lies over it. */
 export async function takePicture(page: Page, area?: Area): Promise<Picture> {
   const clip = area ?? (await page.locator(".stage").boundingBox()) ?? undefined;

@@ -3,7 +3,9 @@
 float leapLength(vec3 p, vec3 texDir) {
   vec3 q = p * uTexels / 8.0;  // in bricks
   vec3 brick = floor(q);
-  float d = floor(texelFetch(uOccupancy, clamp(ivec3(brick), ivec3(0), textureSize(uOccupancy, 0) - 1), 0).r * 255.0 + 0.5);
+  ivec3 last = textureSize(uOccupancy, 0) - 1;
+  float stored = texelFetch(uOccupancy, clamp(ivec3(brick), ivec3(0), last), 0).r;
+  float d = floor(stored * 255.0 + 0.5);
   d -= uBrickSlack;
   if (d < 1.0) return 0.0;
   vec3 dq = texDir * uTexels / 8.0;  // bricks per unit of the ray

@@ -1,7 +1,29 @@
-// Distance along this fragment's ray to the opaque surface behind this pixel, in the ray's own
-// units: view z grows linearly along the ray and is vViewZ at distance `back`.
-float sceneDistance(float back) {
-  float depth = texelFetch(uSceneDepth, ivec2(gl_FragCoord.xy), 0).r;
+// A jump of depth between pixels, in voxels; less is the slope of one surface.
+const float JUMP_VOXELS = 4.0;
+
+// Distance along this fragment's ray to what has a depth, in the ray's own units: view z grows
+// linearly along the ray and is vViewZ at distance `back`.
+float distanceOf(float depth, float back) {
   float viewZ = -vDepth.y / (2.0 * depth - 1.0 + vDepth.x);
   return back * viewZ / vViewZ;
+}
+
+// Where the opaque scene ends the ray: x at the pixel's centre, y beyond a silhouette that runs
+// through the pixel, z the share of the pixel that sees past it. The picture is multisampled and
+// its depth is not, so a pixel at a silhouette would else show the room between mesh and volume.
+vec3 sceneDistances(float back) {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 last = textureSize(uSceneDepth, 0) - 1;
+  float near = distanceOf(texelFetch(uSceneDepth, pixel, 0).r, back);
+  float far = near;
+  float farther = 0.0;
+  for (int i = 0; i < 4; i++) {
+    ivec2 aside = i < 2 ? ivec2(2 * i - 1, 0) : ivec2(0, 2 * i - 5);
+    float depth = texelFetch(uSceneDepth, clamp(pixel + aside, ivec2(0), last), 0).r;
+    float there = distanceOf(depth, back);
+    if (there < near + JUMP_VOXELS * uVoxel) continue;
+    far = max(far, there);
+    farther += 1.0;
+  }
+  return vec3(near, far, min(1.0, farther / 2.0));  // a slanted edge leaves two of the four free
 }

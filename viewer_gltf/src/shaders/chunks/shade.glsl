@@ -1,3 +1,11 @@
+const float AMBIENT = 0.4;  // what faces away keeps its colour: channels are told by it
+const float DIFFUSE = 0.7;  // a little above 1 in all, as the surfaces' lamp is
+// Steps of intensity over two voxels: below the first they are the noise of 8 bits and of the
+// detector, above the second a boundary of its own; between, light fades in.
+const float NOISE_STEP = 0.03;
+const float BOUNDARY_STEP = 0.18;
+const float FLAT_STEP = 1e-4;  // less than one of 8 bits: no direction at all
+
 // Diffuse light by the gradient of the summed intensities (Levoy 1988), central differences one
 // voxel to either side. 1 where there is no gradient to tell a direction, or only noise.
 float shade(vec3 p, vec3 texPerUm, vec3 dir) {
@@ -10,9 +18,9 @@ float shade(vec3 p, vec3 texPerUm, vec3 dir) {
   }
   gradient *= sign(texPerUm);
   float steepness = length(gradient);
-  if (steepness < 1e-4) return 1.0;
+  if (steepness < FLAT_STEP) return 1.0;
   vec3 normal = -gradient / steepness;
   if (dot(normal, dir) > 0.0) normal = -normal;
-  float lit = 0.4 + 0.7 * max(dot(normal, vLight), 0.0);
-  return mix(1.0, lit, smoothstep(0.03, 0.18, steepness));
+  float lit = AMBIENT + DIFFUSE * max(dot(normal, vLight), 0.0);
+  return mix(1.0, lit, smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness));
 }

@@ -1,0 +1,128 @@
+/** Numbers out of the ray-march: how many steps a ray takes, and what its chunks compute. */
+import type { Page } from "playwright-core";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { MAX_STEPS } from "../src/volume/tile_march";
+import { type Browser, launch } from "./driver/chromium";
+import { describeInChromium } from "./driver/skip";
+import { bundled } from "./march/bundled";
+import { readChunks, runProgram } from "./march/chunk";
+import type { Counts, Run } from "./march/harness";
+
+describeInChromium("the ray-march", () => {
+  let browser: Browser;
+  let page: Page;
+
+  beforeAll(async () => {
+    browser = await launch({ width: 64, height: 64 });
+    page = await browser.context.newPage();
+    await page.addScriptTag({
+      content: await bundled(new URL("./march/harness.ts", import.meta.url)),
+    });
+  });
+
+  afterAll(() => browser?.close());
+
+  async function count(run: Run): Promise<Counts> {
+    const counts = await page.evaluate((each) => window.countSteps?.(each), run);
+    if (counts === undefined) throw new Error("the page has no harness");
+    expect(counts.pixels).toBeGreaterThan(300);
+    return counts;
+  }
+
+  it("takes at most 100 steps, and reaches the end with them", async () => {
+    expect(MAX_STEPS).toBe(100);
+    // The space diagonal is 337 voxels: 481 steps of the shortest length.
+    const { most, covered } = await count({ side: 198, opacity: 1, bricks: "all" });
+    expect(most).toBeLessThanOrEqual(100);
+    expect(most).toBeGreaterThan(90);
+    expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("keeps to the limit where leaps and samples alternate", async () => {
+    const { most, covered } = await count({ side: 198, opacity: 1, bricks: "checkerboard" });
+    expect(most).toBeLessThanOrEqual(100);
+    expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("stops behind an opaque entry", async () => {
+    const { most } = await count({ side: 198, opacity: 255, bricks: "all" });
+    expect(most).toBeLessThanOrEqual(2);
+  });
+
+  it("leaps through what is empty", async () => {
+    const { most, covered } = await count({ side: 198, opacity: 255, bricks: "none" });
+    expect(most).toBeLessThanOrEqual(5);
+    expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("finds where a ray enters and leaves a box", async () => {
+    const chunks = await readChunks("intersect_box");
+    const intersect = async (eye: string, dir: string) => {
+      const call = `intersectBox(vec3(${eye}), 1.0 / vec3(${dir}), vec3(4.0, 2.0, 8.0))`;
+      const head = "#include <chunks/intersect_box>";
+      return (await runProgram(page, chunks, head, `oColor = ${call}.xyxy;`)).slice(0, 2);
+    };
+    // Along z, a hair off the axes, since the reciprocal of 0 is not defined in GLSL.
+    const [near, far] = await intersect("1.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
+    expect(near).toBeCloseTo(5, 4);
+    expect(far).toBeCloseTo(13, 4);
+    // Along the diagonal (1, 1, 1): in by y = 0, out by y = 2.
+    expect(await intersect("0.0, -1.0, 0.0", "1.0, 1.0, 1.0")).toEqual([1, 3]);
+    const [enters, leaves] = await intersect("9.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
+    expect(enters).toBeGreaterThan(leaves); // a miss
+  });
+
+  it("leaps to the wall of the empty block, and not from a visible brick", async () => {
+    const chunks = await readChunks("leap");
+    const head = `uniform sampler3D uOccupancy;
+      const vec3 uTexels = vec3(64.0, 8.0, 8.0);  // 8 bricks in a row, the last one visible
+      const float uVoxel = 1.0;
+      const float uBrickSlack = 0.0;
+      #include <chunks/leap>`;
+    const uOccupancy = { size: [8, 1, 1], channels: 1, texels: [7, 6, 5, 4, 3, 2, 1, 0] } as const;
+    const leap = async (x: number, dir: string) =>
+      (
+        await runProgram(
+          page,
+          chunks,
+          head,
+          `oColor = vec4(leapLength(vec3(${x / 64}, 0.5, 0.5), vec3(${dir}) / 64.0));`,
+          { uOccupancy: { ...uOccupancy, texels: [...uOccupancy.texels] } },
+        )
+      )[0];
+    expect(await leap(4, "1.0, 0.0, 0.0")).toBeCloseTo(52 + 1e-3, 3); // from voxel 4 to 56
+    expect(await leap(20, "1.0, 0.0, 0.0")).toBeCloseTo(36 + 1e-3, 3); // from voxel 20 to 56
+    expect(await leap(60, "1.0, 0.0, 0.0")).toBe(0);
+    // Back from brick 6, whose block is that brick alone: from voxel 52 to 48.
+    expect(await leap(52, "-1.0, 0.0, 0.0")).toBeCloseTo(4 + 1e-3, 3);
+  });
+
+  it("classifies by the table, with the opacity of the step's length", async () => {
+    const chunks = await readChunks("classify");
+    const head = `uniform sampler2D uLut;
+      #define CHANNELS 2
+      const vec3 uColor[CHANNELS] = vec3[CHANNELS](vec3(1.0, 0.0, 0.0), vec3(0.0, 0.0, 1.0));
+      #include <chunks/classify>`;
+    const row = (top: number) =>
+      Array.from({ length: 256 }, (_, i) => [255, 255, 255, i === 200 ? top : 0]).flat();
+    const uLut = { size: [256, 2], channels: 4, texels: [...row(51), ...row(102)] } as const;
+    const classify = (intensity: string, voxels: string) =>
+      runProgram(
+        page,
+        chunks,
+        head,
+        `oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, ${voxels});`,
+        { uLut: { ...uLut, texels: [...uLut.texels] } },
+      );
+    const one = await classify("200.0, 0.0", "3.0");
+    [1, 0, 0, 1 - 0.8 ** 3].forEach((v, i) => {
+      expect(one[i]).toBeCloseTo(v, 5);
+    });
+    // Both: absorbed together, the colour shared 0.2 to 0.4.
+    const both = await classify("200.0, 200.0", "1.0");
+    [1 / 3, 0, 2 / 3, 1 - 0.8 * 0.6].forEach((v, i) => {
+      expect(both[i]).toBeCloseTo(v, 5);
+    });
+    expect((await classify("10.0, 0.0", "1.0"))[3]).toBe(0);
+  });
+});
