@@ -16,6 +16,10 @@ DEMO_INPUT := out/samples/cycif.ome.zarr
 DEMO_ARGS := --preset cycif --grid 5x2
 endif
 
+ifeq ($(filter $(SAMPLE),cycif brain-cells),)
+$(error SAMPLE is $(SAMPLE), expected cycif or brain-cells)
+endif
+
 VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(BIN)/stereocell
@@ -83,6 +87,7 @@ report: need-input $(OUT)/report/index.html ## ... then the page with pictures
 
 $(OUT)/plan.json: $(wildcard $(INPUT)) | setup
 	$(RUN) plan $(INPUT) -o $(OUT) $(ARGS)
+	@touch $@
 $(OUT)/units/done.json: $(OUT)/plan.json
 	$(RUN) units $(OUT) --workers $(WORKERS)
 	@touch $@

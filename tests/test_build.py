@@ -118,12 +118,13 @@ def test_same_build_again_does_nothing(
 ) -> None:
     source, out = _source(tmp_path), tmp_path / "out"
     shutil.copytree(built, out)
-    before = {f: f.stat().st_mtime_ns for f in out.rglob("*.glb")}
+    units = {f: f.stat().st_mtime_ns for f in out.rglob("unit.json")}
+    assert units
     for phase in ("units", "stage"):
         assert main([phase, str(out), "--workers", "0"]) == 0
         assert f"{phase}: up to date" in capsys.readouterr().err
     assert main(["build", str(source), "-o", str(out), *BUILD]) == 0  # a copy of the same input
-    assert {f: f.stat().st_mtime_ns for f in out.rglob("*.glb")}.keys() == before.keys()
+    assert {f: f.stat().st_mtime_ns for f in out.rglob("unit.json")} == units
 
 
 def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
@@ -261,3 +262,38 @@ def test_fewer_channels_leave_no_stale_file_in_the_stage(built: Path, tmp_path: 
     assert list(out.rglob("empty*")) != []  # the units stay: they may be wanted again
     for part in ("stage", "bundle"):
         assert not list((out / part).rglob("*empty*"))
+
+
+@pytest.mark.parametrize("change", [["--grid", "1x1"], ["--iso-value", "F body=400"]])
+def test_stage_of_another_plan_than_the_units_is_refused(
+    built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: list[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    assert main(["plan", str(_source(tmp_path)), "-o", str(out), *change]) == 0
+    for phase in ("stage", "report"):
+        capsys.readouterr()
+        assert main([phase, str(out)]) == 1
+        assert "run `stereocell units OUT`" in _one_line(capsys)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_iso_value_must_be_finite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], value: str
+) -> None:
+    arguments = ["plan", str(_source(tmp_path)), "-o", str(tmp_path / "out")]
+    assert main([*arguments, "--iso-value", f"F body={value}"]) == 2
+    assert "expected a number" in _one_line(capsys)
+
+
+def test_readme_s_edit_layer_recolours_the_bundle(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    layer = readme.split("```usda\n")[1].split("```")[0]
+    layer = layer.replace("out/mine", str(out)).replace("CD31", "F_x20_body")
+    (tmp_path / "edited.usda").write_text(layer)
+    edited = ["--stage", str(tmp_path / "edited.usda")]
+    assert main(["bundle", str(out), "--workers", "0", *edited]) == 0
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+    assert manifest["channels"][0]["color"] == pytest.approx([1, 0.1, 0.1])

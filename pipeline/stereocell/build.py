@@ -86,6 +86,7 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     plan = store.plan()
     with _phase(store, "units") as phase:
         phase.is_up_to_date = not run_rounds(store, plan, engine, only)
+        store.sign_units(plan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +110,7 @@ def run_stage(out: Path, engine: Engine) -> None:
     store = Store(out)
     plan = store.plan()
     with _phase(store, "stage") as phase:
+        store.require_units_of(plan)
         index, content = store.index(), store.survey()
         looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
         tiles = [_tile_task(store, plan, index, tile.id) for tile in plan.tiles]
@@ -197,7 +199,9 @@ def run_report(out: Path) -> None:
     """Write OUT/report/index.html: pictures, sizes, times."""
     store = Store(out)
     with _phase(store, "report") as phase:
-        content = [store.index(), store.survey(), provenance(store.plan())]
+        plan = store.plan()
+        store.require_units_of(plan)
+        content = [store.index(), store.survey(), provenance(plan)]
         phases = [store.phase(name).get("key") for name in ("stage", "bundle")]
         if phase.is_done(
             key_of([content, phases, report.TEMPLATE.read_text()], report),

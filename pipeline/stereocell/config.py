@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,9 @@ class SurfaceOptions:
     """Lengths in um; auto follows the voxel spacing."""
 
     smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
-    alpha_um: float | str = setting(AUTO, "gaps up to twice this close; auto: 2 coarsest spacings")
+    alpha_um: float | str = setting(
+        AUTO, "radius of the ball that closes gaps; auto: 2 coarsest spacings"
+    )
     min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
     max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
 
@@ -194,7 +197,7 @@ def _known(key: str, known: list[str], where: str, what: str) -> None:
 
 def _typed(where: str, value: Any, expected: str) -> Any:
     """Return the value as the field's type (its annotation as text), or raise UsageError."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
+    number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
     whole = isinstance(value, int) and not isinstance(value, bool)
     if expected.startswith("tuple["):
         inner = expected.removeprefix("tuple[").split(",")[0]

@@ -63,6 +63,7 @@ class Store:
         self.settings_file = out / "stereocell.toml"
         self.survey_file = out / "units" / "survey.json"
         self.index_file = out / "units" / "done.json"
+        self.units_plan_file = out / "units" / "plan.key"
         self.phases_file = out / "phases.json"
         self.stage_dir = out / "stage"
         self.stage_file = self.stage_dir / "stage.usda"
@@ -123,6 +124,19 @@ class Store:
         """Return the key of each finished unit, by `<tile>/<channel>`."""
         content = read_json(self.index_file, "run `stereocell units OUT` first")
         return dict(content)
+
+    def sign_units(self, plan: Plan) -> None:
+        """Keep which plan the units were built for."""
+        self.write_text(self.units_plan_file, key_of(to_json(plan)))
+
+    def require_units_of(self, plan: Plan) -> None:
+        """Raise OutputError if the units are of another plan, or of none."""
+        there = self.units_plan_file.read_text() if self.units_plan_file.is_file() else ""
+        if there != key_of(to_json(plan)):
+            raise OutputError(
+                f"{self.out / 'units'}: not built for the plan in {self.plan_file.name}: "
+                "run `stereocell units OUT` first"
+            )
 
     def record(self, tile_id: str, channel_id: str, key: str) -> dict[str, Any]:
         """Return a unit's record: triangles, distances, seconds, reason."""

@@ -19,12 +19,12 @@ def make_transfer_functions(
     """Return the opacity points of every name in NAMES.
 
     `histogram`: voxel counts over 0..1 in equal bins. Background is what most voxels are: opacity
-    starts above its 90th percentile, and half-way to the iso-value where that lies higher. A
-    channel without a surface gets its 99th percentile as the level.
+    starts half-way between the median and the level, which is the iso-value, or the 99th
+    percentile in a channel without a surface.
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
-    percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.9, 0.99)}
+    percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.99)}
     level = percentile[0.99] if iso_normalized is None else iso_normalized
     level = float(np.clip(level, 0.02, 0.96))
     floor = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
@@ -40,6 +40,6 @@ def make_transfer_functions(
 
 
 def _points(*points: tuple[float, float]) -> OpacityPoints:
-    """Return the points with both ends of the range, rounded so that text files repeat."""
+    """Return the points after the origin, rounded so that text files repeat."""
     inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]
     return ((0.0, 0.0), *inner)
