@@ -297,3 +297,18 @@ def test_readme_s_edit_layer_recolours_the_bundle(built: Path, tmp_path: Path) -
     assert main(["bundle", str(out), "--workers", "0", *edited]) == 0
     manifest = json.loads((out / "bundle" / "manifest.json").read_text())
     assert manifest["channels"][0]["color"] == pytest.approx([1, 0.1, 0.1])
+
+
+def test_one_unit_alone_does_not_pass_for_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = _source(tmp_path), tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), "--grid", "2x1"]) == 0
+    assert main(["units", str(out), "--workers", "0", "--only", "r0_c1/F body"]) == 0
+    assert len(list(out.rglob("unit.json"))) == 1
+    assert not Store(out).index_file.exists()
+    capsys.readouterr()
+    assert main(["stage", str(out)]) == 1
+    assert "run `stereocell units OUT`" in _one_line(capsys)
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    assert main(["stage", str(out), "--workers", "0"]) == 0

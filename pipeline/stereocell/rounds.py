@@ -35,20 +35,24 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> in
 
     Raises TasksFailedError once all others are finished.
     """
-    wanted = _select(plan, only)
+    wanted = {(tile_id, channel.id) for tile_id, channel in _select(plan, only)}
     content = _survey(store, plan, engine)
-    tasks, keys = [], {}
-    for tile_id, channel in wanted:
+    tasks, keys, others = [], {}, 0
+    for tile_id, channel in _select(plan, None):
         task, key = _unit_task(store, plan, content, tile_id, channel)
         keys[f"{tile_id}/{channel.id}"] = key
-        if not (task.directory / "unit.json").is_file():
+        if (task.directory / "unit.json").is_file():
+            continue
+        if (tile_id, channel.id) in wanted:
             tasks.append((f"{tile_id}/{channel.name}", task))
+        else:
+            others += 1
     if tasks:
         engine.run("units", run_unit, tasks)
-    if only is not None and store.index_file.exists():
-        keys = {**store.index(), **keys}
-    if not store.index_file.exists() or store.index() != keys:
-        write_json(store.index_file, keys)
+    if not others:  # all there: the stage may be made of them
+        if not store.index_file.exists() or store.index() != keys:
+            write_json(store.index_file, keys)
+        store.sign_units(plan)
     return len(tasks)
 
 
