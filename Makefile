@@ -35,7 +35,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view report check lint test test-fast bench lock clean browser need-input
+.PHONY: help setup demo plan units stage bundle view report check lint test test-fast bench lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -85,7 +85,11 @@ stage: need-input $(OUT)/stage/stage.usda ## ... then the USD stage
 bundle: need-input $(OUT)/bundle/manifest.json ## ... then the web bundle
 report: need-input $(OUT)/report/index.html ## ... then the page with pictures
 
-$(OUT)/plan.json: $(wildcard $(INPUT)) | setup
+# what was asked for: another INPUT or other ARGS make the plan anew
+$(OUT)/.request: FORCE
+	@mkdir -p $(OUT)
+	@echo '$(INPUT) $(ARGS)' | cmp -s - $@ || echo '$(INPUT) $(ARGS)' > $@
+$(OUT)/plan.json: $(OUT)/.request $(wildcard $(INPUT)) | setup
 	$(RUN) plan $(INPUT) -o $(OUT) $(ARGS)
 	@touch $@
 $(OUT)/units/done.json: $(OUT)/plan.json
