@@ -312,3 +312,17 @@ def test_one_unit_alone_does_not_pass_for_all(
     assert "run `stereocell units OUT`" in _one_line(capsys)
     assert main(["units", str(out), "--workers", "0"]) == 0
     assert main(["stage", str(out), "--workers", "0"]) == 0
+
+
+def test_lost_files_are_made_again(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    store = Store(out)
+    lost = store.unit_dir("r0_c0", "F_x20_body", store.index()["r0_c0/F_x20_body"]) / "lod1.npz"
+    lost.unlink()
+    (out / "stage" / "tiles" / "r0_c1" / "tile.usdc").unlink()
+    shutil.rmtree(out / "bundle" / "volumes")
+    assert main(["build", str(_source(tmp_path)), "-o", str(out), *BUILD]) == 0
+    assert lost.is_file()
+    for part in ("stage", "bundle"):
+        assert _files(out / part) == _files(built / part)

@@ -3,6 +3,7 @@
 Every phase skips what is done already: results are named by what they depend on.
 """
 
+import json
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -116,7 +117,8 @@ def run_stage(out: Path, engine: Engine) -> None:
         about = provenance(plan)
         depends = [index, [asdict(look) for look in looks], about, plan.name]
         key = key_of(depends, write, specimen, transfer)
-        if phase.is_done(key, store.stage_file):
+        layers = [store.stage_dir / "tiles" / tile.id / usd.LAYER_NAME for tile in plan.tiles]
+        if phase.is_done(key, store.stage_file, *layers):
             return
         engine.run("stage", run_tile, tiles)
         extents = [
@@ -179,13 +181,22 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         viewer = viewer_dist()
         files = dependencies(path) + ([] if viewer is None else sorted(viewer.rglob("*")))
         key = key_of([str(path.absolute()), [_state(file) for file in files]], write, bricks)
-        if phase.is_done(key, store.bundle_dir / "manifest.json"):
+        if phase.is_done(key, store.bundle_dir / "manifest.json", *_listed(store.bundle_dir)):
             return
         write_bundle(path, store.bundle_dir, viewer, workers=engine.workers)
     if viewer is None:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
+
+
+def _listed(bundle_dir: Path) -> list[Path]:
+    """Return the files that the bundle says it has."""
+    try:
+        names = json.loads((bundle_dir / "files.json").read_text())
+    except (OSError, ValueError):
+        return [bundle_dir / "files.json"]
+    return [bundle_dir / name for name in names]
 
 
 def _state(file: Path) -> tuple[str, int, int]:
@@ -218,10 +229,11 @@ class _Phase:
         self.key = ""
         self.is_up_to_date = False
 
-    def is_done(self, key: str, result: Path) -> bool:
-        """Return whether the result stands and was made from the same things."""
+    def is_done(self, key: str, *results: Path) -> bool:
+        """Return whether the results stand and were made from the same things."""
         self.key = key
-        self.is_up_to_date = result.is_file() and self.store.phase(self.name).get("key") == key
+        stands = all(result.is_file() for result in results)
+        self.is_up_to_date = stands and self.store.phase(self.name).get("key") == key
         if not self.is_up_to_date:
             self.store.save_phase(self.name, "", 0.0)  # killed half-way, it is not done
         return self.is_up_to_date

@@ -21,7 +21,7 @@ from stereocell.isovalue import find_iso_value
 from stereocell.plan import Channel, Plan
 from stereocell.read import Dataset
 from stereocell.sources import SourceRef, open_source, source_of
-from stereocell.store import Store, key_of, read_json, save_unit, write_json
+from stereocell.store import Store, is_whole, key_of, read_json, save_unit, write_json
 from stereocell.surface import smooth
 from stereocell.survey import Display, find_display, make_look
 from stereocell.tiling import Box
@@ -41,7 +41,7 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> in
     for tile_id, channel in _select(plan, None):
         task, key = _unit_task(store, plan, content, tile_id, channel)
         keys[f"{tile_id}/{channel.id}"] = key
-        if (task.directory / "unit.json").is_file():
+        if is_whole(task.directory):
             continue
         if (tile_id, channel.id) in wanted:
             tasks.append((f"{tile_id}/{channel.name}", task))

@@ -195,6 +195,17 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
     return record
 
 
+def is_whole(directory: Path) -> bool:
+    """Return whether a unit's folder holds all that its record names."""
+    try:
+        record = json.loads((directory / "unit.json").read_text())
+        files = [directory / "volume.npy"]
+        files += [lod_file(directory, level) for level in range(len(record["lods"]))]
+    except (OSError, ValueError, LookupError):
+        return False
+    return all(file.is_file() for file in files)
+
+
 def lod_file(directory: Path, level: int) -> Path:
     """Return where `save_unit` puts one level of detail."""
     return directory / f"lod{level}.npz"

@@ -27,7 +27,7 @@ from stereocell.write.usd_layer import ROOT, TILES, export, new_stage, vec3f, wo
 from stereocell.write.usd_looks import write_looks
 from stereocell.write.usd_tile import LAYER_NAME, write_tile
 
-__all__ = ["TileExtent", "write_stage", "write_tile"]
+__all__ = ["LAYER_NAME", "TileExtent", "write_stage", "write_tile"]
 
 STAGE_NAME = "stage.usda"
 
