@@ -154,7 +154,10 @@ class Store:
 
     def phases(self) -> dict[str, dict[str, Any]]:
         """Return what is known of each phase: `key` of what it was made from, `seconds`."""
-        return dict(json.loads(self.phases_file.read_text())) if self.phases_file.exists() else {}
+        try:
+            return dict(json.loads(self.phases_file.read_text()))
+        except (FileNotFoundError, ValueError):  # none yet, or damaged: nothing counts as done
+            return {}
 
     def times(self) -> dict[str, float]:
         """Return the seconds of each finished phase."""
