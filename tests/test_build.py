@@ -326,3 +326,21 @@ def test_lost_files_are_made_again(built: Path, tmp_path: Path) -> None:
     assert lost.is_file()
     for part in ("stage", "bundle"):
         assert _files(out / part) == _files(built / part)
+
+
+@pytest.mark.parametrize("phase", ["stage", "report"])
+def test_cut_unit_file_is_named_with_the_remedy(
+    built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], phase: str
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    store = Store(out)
+    folder = store.unit_dir("r0_c0", "F_x20_body", store.index()["r0_c0/F_x20_body"])
+    cut = folder / "lod0.npz"
+    cut.write_bytes(cut.read_bytes()[:100])
+    (out / "phases.json").unlink()
+    capsys.readouterr()
+    assert main([phase, str(out), *(["--workers", "0"] if phase == "stage" else [])]) == 1
+    line = _one_line(capsys)
+    assert "damaged" in line
+    assert "run `stereocell units OUT`" in line

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from zipfile import BadZipFile
 
 import jsonschema
 import numpy as np
@@ -215,20 +216,30 @@ def lod_file(directory: Path, level: int) -> Path:
 
 
 def load_lods(directory: Path) -> tuple[Lod, ...]:
-    """Return the levels of detail that `save_unit` wrote."""
-    record = json.loads((directory / "unit.json").read_text())
-    lods = []
-    for level, stored in enumerate(record["lods"]):
-        with np.load(lod_file(directory, level)) as arrays:
-            mesh = Mesh(
-                arrays["positions"],
-                arrays["triangles"],
-                arrays["normals"],
-                arrays.get("uvs"),
-                arrays.get("tangents"),
-            )
-            lods.append(Lod(mesh, stored["distance_um"], arrays.get("normal_map")))
-    return tuple(lods)
+    """Return the levels of detail that `save_unit` wrote.
+
+    Raises OutputError for a damaged file, naming the folder to remove.
+    """
+    try:
+        record = json.loads((directory / "unit.json").read_text())
+        return tuple(_load_lod(directory, k, lod) for k, lod in enumerate(record["lods"]))
+    except (OSError, ValueError, LookupError, BadZipFile) as error:
+        raise OutputError(
+            f"{directory}: damaged ({error}): remove it and run `stereocell units OUT`"
+        ) from error
+
+
+def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
+    # opened here: numpy leaves a damaged file open
+    with lod_file(directory, level).open("rb") as file, np.load(file) as arrays:
+        mesh = Mesh(
+            arrays["positions"],
+            arrays["triangles"],
+            arrays["normals"],
+            arrays.get("uvs"),
+            arrays.get("tangents"),
+        )
+        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"))
 
 
 def _arrays(lod: Lod) -> dict[str, Any]:
