@@ -1,5 +1,6 @@
 """Fixtures that several test modules share: tiny sources on disk, and servers on loopback."""
 
+import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -16,6 +17,18 @@ from numpy.typing import NDArray
 import phantoms
 
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """An empty file system of 400 kB; it takes root."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    options = ["-t", "tmpfs", "-o", "size=400k"]
+    if subprocess.run(["mount", *options, "tmpfs", str(disk)], capture_output=True).returncode:
+        pytest.skip("mounting a small tmpfs is not allowed here (it takes root)")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import numpy as np
 import tifffile
 import zarr
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.special import erf
 
 F_BACKGROUND, F_BODY = 100, 1000
@@ -57,6 +58,45 @@ def blurred_ball(
     shells = sigma_um / (r * np.sqrt(2.0 * np.pi)) * (np.exp(-(u**2)) - np.exp(-(v**2)))
     ball: NDArray[np.float32] = (0.5 * (erf(u) + erf(v)) - shells).astype(np.float32)
     return ball
+
+
+SEAM_TILE = 40  # voxels; the scene is two such tiles each way
+
+
+def seam_scene() -> NDArray[np.uint16]:
+    """Return bodies on the planes where 2 x 2 x 2 tiles meet, uint16 (z, y, x) = (80, 80, 80).
+
+    Each of the 12 faces between two tiles is crossed by a ball with a cavity (8 x 7 x 7 voxels) or
+    by two slabs with a gap (5 voxels) between them, and by a fragment (7 x 3 x 3). All three reach
+    past the plane by at most 2 voxels on one side and by 4 or 5 on the other. A ball lies where all
+    tiles meet. From tile to tile, bodies and background grow brighter along each axis, by 0.8.
+    """
+    size, plane = 2 * SEAM_TILE, SEAM_TILE
+    grid = np.indices((size,) * 3)
+    solid = np.zeros((size,) * 3, bool)
+    for axis in range(3):
+        for quadrant in range(4):
+            low, right = divmod(quadrant, 2)
+            n, u, v = (grid[(axis + k) % 3] for k in range(3))
+            # each face in its own quadrant, every second one seen from the other side
+            n = 2 * plane - n if low else n
+            u = size - 1 - u if low else u
+            v = size - 1 - v if right else v
+            past = (n >= plane - 2) & (n <= plane + 5)
+            if low == right:
+                ball = (n - plane - 1) ** 2 + (u - 13) ** 2 + (v - 13) ** 2 <= 11**2
+                cavity = past & (abs(u - 13) <= 3) & (abs(v - 13) <= 3)
+                solid |= ball & ~cavity
+            else:
+                slabs = (abs(u - 13) <= 9) & (abs(v - 13) <= 9) & (abs(n - plane) <= 12)
+                solid |= slabs & ~((n >= plane) & (n <= plane + 4))
+            solid |= past & (n >= plane - 1) & (abs(u - 31) <= 1) & (abs(v - 13) <= 1)
+    center = sum((along - plane) ** 2 for along in grid) <= 6**2
+    counts = 200 + 1000 * ndimage.gaussian_filter((solid | center).astype(np.float64), 0.7)
+    for along in grid:
+        counts *= 1.4 + 0.4 * np.tanh((along - plane) / 2)
+    counts += np.random.default_rng(0).normal(0.0, 10.0, counts.shape)
+    return np.rint(counts).astype(np.uint16)
 
 
 def as_counts(

@@ -12,7 +12,8 @@ from stereocell import build, config
 from stereocell.engine import Engine
 from stereocell.mesh import Mesh
 from stereocell.samples import write_cycif
-from stereocell.store import Store, load_lods
+from stereocell.store import Store
+from stereocell.unit_files import load_lods
 from test_surface import enclosed_volume, open_edges
 
 VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
@@ -90,13 +91,22 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
         assert found == pytest.approx(expected, rel=0.15)
 
 
-def test_blurred_ball_keeps_its_volume_from_file_to_mesh(tmp_path: Path) -> None:
-    radius, spacing = 3.0, (0.28, 0.14, 0.14)
-    ball = phantoms.blurred_ball((40, 80, 80), spacing, (5.6, 5.6, 5.6), radius, 0.15)
-    counts = phantoms.as_counts(ball, 200, 1200, noise=10.0)
+@pytest.mark.parametrize(
+    ("radius", "sigma", "noise"), [(3.0, 0.15, 10.0), (5.0, 0.3, 10.0), (1.5, 0.3, 50.0)]
+)
+def test_blurred_ball_keeps_its_volume_from_file_to_mesh(
+    tmp_path: Path, radius: float, sigma: float, noise: float
+) -> None:
+    """Within 2 %; within 6 % at a radius of 5 x 11 x 11 voxels: see the test of the iso-value."""
+    spacing, side = (0.28, 0.14, 0.14), 2 * (radius + 2.6)
+    z, y, x = (round(side / step) for step in spacing)
+    ball = phantoms.blurred_ball((z, y, x), spacing, (side / 2,) * 3, radius, sigma)
+    counts = phantoms.as_counts(ball, 200, 1200, noise=noise)
     source = phantoms.write_ome_tiff(
         tmp_path / "ball.ome.tif", counts, spacing=spacing, names=["ball"]
     )
     _, (mesh,) = _units(source, tmp_path / "out", "ball")
     assert open_edges(mesh) == 0
-    assert enclosed_volume(mesh) == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.02)
+    assert enclosed_volume(mesh) == pytest.approx(
+        4 / 3 * np.pi * radius**3, rel=0.02 if radius >= 3 else 0.06
+    )

@@ -16,7 +16,7 @@ from zarr.codecs import BloscCodec, GzipCodec, ZstdCodec
 from conftest import Server
 from phantoms import f_phantom, write_ome_tiff, write_ome_zarr
 from stereocell import read
-from stereocell.errors import SourceError
+from stereocell.errors import SourceError, UsageError
 from stereocell.tiling import Box
 
 Maker = Callable[[Path], Path]
@@ -242,7 +242,8 @@ def test_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("time", [-1, 3])
 def test_time_out_of_range(tmp_path: Path, time: int) -> None:
     path = write_ome_zarr(tmp_path / "t.zarr", [np.stack([SMALL] * 3)], axes="tzyx")
-    assert f"time: found {time}, expected 0 to 2" in refusal(path, time=time)
+    with pytest.raises(UsageError, match=f"--time: found {time}, expected 0 to 2"):
+        read.open(path, time=time)
 
 
 def early_xml_tiff(path: Path, **options: Any) -> Path:

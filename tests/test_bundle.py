@@ -10,7 +10,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 import spheres
 from glbs import decoded_positions_m, read
 from stereocell.assets import schema_path
-from stereocell.errors import OutputError, StageError
+from stereocell.engine import Engine
+from stereocell.errors import OutputError, StageError, StereoCellError
 from stereocell.write.bundle import write_bundle
 from stereocell.write.usd import TileExtent, write_stage, write_tile
 
@@ -28,7 +29,7 @@ def stage(tmp_path_factory):
 def bundle(stage, tmp_path_factory):
     """Its bundle, to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None)
+    write_bundle(stage, out, None, Engine(0))
     return out
 
 
@@ -53,7 +54,7 @@ def edit(stage, tmp_path):
         change(over)
         layer.Save()
         del over
-        write_bundle(path, tmp_path / "bundle", None)
+        write_bundle(path, tmp_path / "bundle", None, Engine(0))
         return tmp_path / "bundle"
 
     return export
@@ -169,7 +170,7 @@ def test_coarsest_lod_has_the_baked_normal_map(bundle):
 
 
 def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):
-    write_bundle(stage, tmp_path / "again", None, workers=2)
+    write_bundle(stage, tmp_path / "again", None, Engine(2))
     assert files(tmp_path / "again") == files(bundle)
 
 
@@ -219,7 +220,7 @@ def test_window_edit_survives_flattening(edit, tmp_path):
     edited = edit(change)
     flat = tmp_path / "flat.usda"
     Usd.Stage.Open(str(tmp_path / "edited.usda")).Export(str(flat))
-    write_bundle(flat, tmp_path / "flat", None)
+    write_bundle(flat, tmp_path / "flat", None, Engine(0))
     for folder in (edited, tmp_path / "flat"):
         assert channel(folder)["window"] == [490, 2050]
     paths = [folder / volumes(folder)[0]["file"]["path"] for folder in (edited, tmp_path / "flat")]
@@ -237,7 +238,7 @@ def test_points_edited_outside_the_variants_are_named_with_the_remedy(edit):
         points.Set([point + Gf.Vec3f(0, 0, 1) for point in points.Get()])
 
     words = r"CD31_r0_c0: .* at lod0: edit inside the variant lod=lod0, or override points, "
-    with pytest.raises(StageError, match=words):
+    with pytest.raises(StereoCellError, match=words):
         edit(change)
 
 
@@ -245,9 +246,12 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
     stage = write_tiles(tmp_path / "stage")
     atlas = tmp_path / "stage/tiles/r0_c1/CD31.exr"
     atlas.write_bytes(atlas.read_bytes()[:-50])
-    with pytest.raises(StageError, match=r"CD31\.exr: can't be read as OpenEXR: it ends at byte"):
-        write_bundle(stage, tmp_path / "bundle", None)
-    assert capfd.readouterr() == ("", "")
+    with pytest.raises(
+        StereoCellError, match=r"CD31\.exr: can't be read as OpenEXR: it ends at byte"
+    ):
+        write_bundle(stage, tmp_path / "bundle", None, Engine(0))
+    for line in capfd.readouterr().err.splitlines():  # OpenEXR's own words would come on top
+        assert line.startswith("bundle ")
 
 
 def test_color_of_one_tile_stays_in_that_tile(edit):
@@ -346,10 +350,11 @@ def test_edited_points_are_taken(edit):
 def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
     stage = write_tiles(tmp_path / "stage")
     (tmp_path / "stage" / lost).unlink()
-    with pytest.raises(StageError, match=words) as caught:
-        write_bundle(stage, tmp_path / "bundle", None)
+    with pytest.raises(StereoCellError, match=words) as caught:
+        write_bundle(stage, tmp_path / "bundle", None, Engine(0))
     assert "\n" not in str(caught.value)
-    assert capfd.readouterr().err == ""  # USD's own warnings would come on top
+    for line in capfd.readouterr().err.splitlines():  # USD's own warnings would come on top
+        assert line.startswith("bundle ")
     assert [p.name for p in tmp_path.iterdir()] == ["stage"]
 
 
@@ -378,18 +383,18 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
     ],
 )
 def test_faulty_edits_are_named(edit, change, words):
-    with pytest.raises(StageError, match=words):
+    with pytest.raises(StereoCellError, match=words):
         edit(change)
 
 
 def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, bundle, tmp_path):
     place = tmp_path / "bundle"
-    write_bundle(stage, place, None)
+    write_bundle(stage, place, None, Engine(0))
     (place / "left over").write_text("from an older build")
     with pytest.raises(StageError):
-        write_bundle(tmp_path / "none.usda", place, None)
+        write_bundle(tmp_path / "none.usda", place, None, Engine(0))
     assert (place / "left over").exists()
-    write_bundle(stage, place, None)
+    write_bundle(stage, place, None, Engine(0))
     assert files(place) == files(bundle)
     assert [p.name for p in tmp_path.iterdir()] == ["bundle"]
 
@@ -397,7 +402,7 @@ def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, 
 def test_folder_that_is_no_bundle_is_left_alone(stage, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(OutputError, match=r"is no bundle: no manifest\.json in it"):
-        write_bundle(stage, tmp_path, None)
+        write_bundle(stage, tmp_path, None, Engine(0))
     assert (tmp_path / "thesis.tex").exists()
 
 
@@ -405,14 +410,14 @@ def test_viewer_is_copied_and_listed(stage, tmp_path):
     (tmp_path / "dist" / "assets").mkdir(parents=True)
     (tmp_path / "dist" / "index.html").write_text("<!doctype html>")
     (tmp_path / "dist" / "assets" / "main.js").write_text("start()")
-    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist")
+    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0))
     assert (tmp_path / "bundle" / "assets" / "main.js").read_text() == "start()"
     assert {"index.html", "assets/main.js"} <= load(tmp_path / "bundle" / "files.json").keys()
 
 
 def test_viewer_that_is_not_built_is_named(stage, tmp_path):
     with pytest.raises(OutputError, match=r"dist: no index\.html, expected the built viewer"):
-        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist")
+        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0))
 
 
 def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
@@ -420,5 +425,5 @@ def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
     for name in ("index.html", "manifest.json"):
         (tmp_path / "dist" / name).write_text("")
     with pytest.raises(OutputError, match=r"the bundle has a manifest\.json of its own"):
-        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist")
+        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0))
     assert not (tmp_path / "bundle").exists()

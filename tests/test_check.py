@@ -6,6 +6,7 @@ import pytest
 import spheres
 from stereocell.assets import find_asset
 from stereocell.check import check
+from stereocell.engine import Engine
 from stereocell.errors import OutputError
 from stereocell.write.bundle import write_bundle
 from stereocell.write.usd import TileExtent, write_stage, write_tile
@@ -20,7 +21,7 @@ def made(tmp_path_factory):
     write_tile(out / "stage", tile)
     looks = (spheres.RED, spheres.BLUE)
     write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
-    write_bundle(out / "stage" / "stage.usda", out / "bundle", None)
+    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0))
     return out
 
 
@@ -69,7 +70,7 @@ def test_a_build_without_anything_in_it_fails_in_every_line(tmp_path):
     (tmp_path / "bundle").mkdir()
     found = lines(tmp_path)
     assert not any(line.ok for line in found.values())
-    assert "No such file" in found["manifest"].detail
+    assert "is missing" in found["manifest"].detail
     assert all("\n" not in line.detail for line in found.values())
 
 
@@ -99,7 +100,7 @@ def test_reference_to_other_bytes_is_found(out):
 def test_unknown_version_is_found(out):
     manifest = out / "bundle" / "manifest.json"
     manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
-    assert lines(out)["manifest"].detail.endswith("$.version: 1 was expected")
+    assert lines(out)["manifest"].detail.count("$.version: 1 was expected") == 1
 
 
 def test_broken_json_is_found(out):
@@ -126,7 +127,7 @@ def test_a_build_without_any_surface_passes(tmp_path):
     tile = spheres.tile(0, (spheres.BLUE,))
     write_tile(tmp_path / "stage", tile)
     write_stage(tmp_path / "stage", "empty", [spheres.BLUE], [TileExtent.of(tile)], {})
-    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None)
+    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, Engine(0))
     assert failed(tmp_path) == set()
     assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"
 

@@ -17,6 +17,29 @@ def test_printed_settings_are_the_defaults_again() -> None:
     assert all("  # " in line for line in keys)
 
 
+def test_the_header_says_whether_the_file_is_to_be_edited() -> None:
+    template = config.to_toml(config.Settings(), config.TEMPLATE)
+    assert template.startswith("# StereoCell settings. Every key may be left out")
+    record = config.to_toml(config.Settings())
+    assert record.startswith("# The settings that this build used")
+    assert "copy this file and pass the copy with --config" in record
+    assert tomllib.loads(record) == tomllib.loads(template)
+
+
+def test_any_channel_name_survives_the_file() -> None:
+    odd = 'a"b\\c\n\t\x00\x7f\u6f22'
+    settings = config.apply(config.Settings(), {"iso_values": {odd: 1.5}}, "here")
+    assert config.from_dict(tomllib.loads(config.to_toml(settings))) == settings
+
+
+def test_a_later_tile_size_replaces_an_earlier_grid(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('[plan]\ngrid = "5x2"\ntile_size = [64, 100, 100]\n')
+    assert config.load("mri", file, {}).plan.grid == "5x2"
+    plan = config.load(None, file, {"plan": {"tile_size": [8, 9, 9]}}).plan
+    assert (plan.grid, plan.tile_size) == ("", (8, 9, 9))
+
+
 @pytest.mark.parametrize("preset", ["cycif", "lightsheet", "mri"])
 def test_presets_load(preset: str) -> None:
     settings = config.load(preset, None, {})
@@ -53,6 +76,10 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[window]\nlow_percentile = 100\n", "expected 0 <= low < high <= 100"),
         ("[isovalue]\nbins = 3\n", "bins is 3, expected at least 16"),
         ("[plan]\nchannels = 3\n", "channels is 3, expected a list"),
+        ("[plan]\nmax_voxels = 0\n", "plan.max_voxels is 0, expected at least 1"),
+        ("[plan]\ntime = -1\n", "plan.time is -1, expected 0 or more"),
+        ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um: found 1,0,1, expected z,y,x in um"),
+        ("[plan]\nspacing_um = [1, 2]\n", "spacing_um: found 1,2, expected z,y,x in um"),
         ("plan = 3\n", "plan is 3, expected a table"),
         ("[plan\n", "not TOML"),
     ],

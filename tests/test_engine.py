@@ -1,5 +1,7 @@
 """The engine runs everything, in order of the tasks, whatever fails."""
 
+import os
+
 import pytest
 
 from stereocell.engine import Engine, TasksFailedError
@@ -7,8 +9,8 @@ from stereocell.errors import SourceError
 
 
 def double(value: int) -> int:
-    if value == 3:
-        raise SourceError("three is\nbroken")
+    if value in (3, 6):
+        raise SourceError("it is\nbroken")
     if value == 4:
         raise ValueError("four is a bug")
     return 2 * value
@@ -21,11 +23,30 @@ def test_results_come_in_the_tasks_order_and_failures_at_the_end(workers: int) -
         tasks = [(f"t{n}", n) for n in (9, 8, 1)]
         assert engine.run("good", double, tasks) == [18, 16, 2]
         with pytest.raises(TasksFailedError) as raised:
-            engine.run("bad", double, [(f"t{n}", n) for n in (1, 3, 4, 5)])
+            engine.run("bad", double, [(f"t{n}", n) for n in (1, 3, 4, 5, 6)])
     finally:
         engine.close()
     assert str(raised.value).splitlines() == [
-        "t3: three is broken",
+        "t3, t6: it is broken",
         "t4: ValueError: four is a bug",
-        "bad: 2 of 4 failed",
+        "bad: 3 of 5 failed",
     ]
+
+
+def die(value: int) -> int:
+    if value == 1:
+        os._exit(9)  # as when the system takes a process's memory back
+    return value
+
+
+@pytest.mark.slow
+def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
+    engine = Engine(2)
+    try:
+        with pytest.raises(TasksFailedError) as raised:
+            engine.run("bad", die, [(f"t{n}", n) for n in range(4)])
+    finally:
+        engine.close()
+    (line,) = str(raised.value).splitlines()
+    assert line.startswith("t1: its worker process was killed each time")
+    assert "fewer --workers" in line

@@ -2,7 +2,6 @@
 
 import hashlib
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +9,6 @@ import pytest
 
 import phantoms
 from stereocell.cli import main
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], capture_output=True
-    )
-    if mounted.returncode:
-        pytest.skip("mounting a small tmpfs is not allowed here (it takes root)")
-    yield disk
-    subprocess.run(["umount", str(disk)], check=True)
 
 
 def _resize(disk: Path, size: str) -> None:

@@ -37,7 +37,32 @@ def test_neighbours_agree_bit_by_bit_from_their_own_parts() -> None:
     for tile in TILES:
         for halo in ((0, 0, 0), (2, 8, 8), (9, 70, 70)):  # the last: larger than its neighbours
             window = tile.box.grown(halo, REGION)
-            np.testing.assert_array_equal(field.around(window).at(window), whole[window.slices])
+            values = np.broadcast_to(whole, REGION.shape)[window.slices]
+            seen = np.broadcast_to(field.at(window), window.shape)
+            near = np.broadcast_to(field.around(window).at(window), window.shape)
+            np.testing.assert_array_equal(seen, values)
+            np.testing.assert_array_equal(near, values)
+
+
+def test_field_has_one_voxel_along_axes_where_one_centre_reaches_in() -> None:
+    field = make_iso_field(TILES, _found())
+    assert field is not None
+    assert field.at(REGION).shape == (1, 40, 100)
+    assert field.at(Box((2, 0, 0), (5, 9, 9))).shape == (1, 1, 1)  # before the first centres
+    lone = make_iso_field(TILES[:1], {TILES[0].id: 7.0})
+    assert lone is not None
+    np.testing.assert_array_equal(lone.at(REGION), [[[7]]])
+
+
+def test_tiles_of_all_three_axes_are_blended_linearly() -> None:
+    region = Box((0, 0, 0), (12, 20, 30))
+    tiles = cut(region, (6, 10, 10))
+    centre = {t.id: (np.array(t.box.start) + np.array(t.box.stop) - 1) / 2 for t in tiles}
+    field = make_iso_field(tiles, {tile: float(c @ (100, 10, 1)) for tile, c in centre.items()})
+    assert field is not None
+    inner = Box((3, 5, 5), (9, 15, 25))  # between the outermost centres
+    z, y, x = np.meshgrid(*map(np.arange, inner.start, inner.stop), indexing="ij")
+    np.testing.assert_allclose(field.at(inner), 100 * z + 10 * y + x, rtol=1e-6)
 
 
 def test_tile_without_a_value_takes_the_others_mean() -> None:

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from stereocell import unwrap as unwrap_module
 from stereocell.errors import UsageError
-from stereocell.lod import LodOptions, Nearest, measure_distance, simplify
+from stereocell.lod import FEWEST, LodOptions, Nearest, drop_doubles, measure_distance, simplify
 from stereocell.mesh import Mesh
 from stereocell.unwrap import bake_normals, unwrap
+from test_surface import open_edges
 
 
 def _sphere(radius: float = 5.0, sides: int = 96) -> Mesh:
@@ -54,7 +55,7 @@ def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> Non
     assert measured == pytest.approx(1.0, abs=0.02)
 
 
-def test_small_body_does_not_vanish_beside_a_large_one() -> None:
+def test_small_body_shrinks_to_its_simplest_beside_a_large_one() -> None:
     large, small = _sphere(), _sphere(0.4, 24)
     moved = small.positions + np.float32([9, 0, 0])
     both = Mesh(
@@ -63,13 +64,57 @@ def test_small_body_does_not_vanish_beside_a_large_one() -> None:
         np.concatenate([large.normals, small.normals]),
     )
     coarse = simplify(both, 1.0)
-    assert (coarse.positions[:, 0] > 8).any()
-    assert len(coarse.triangles) < 0.2 * len(both.triangles)
+    far = coarse.positions[:, 0] > 8
+    assert 4 <= far[coarse.triangles].all(axis=1).sum() <= FEWEST
+    assert np.ptp(coarse.positions[far], axis=0).min() > 0.1  # it doesn't lie flat
+    assert open_edges(coarse) == 0
+    again = simplify(coarse, 2.0)  # the next level has it too
+    assert (again.positions[:, 0] > 8).sum() >= 4
+
+
+def test_body_with_a_border_keeps_it_whatever_the_error() -> None:
+    half = _open_half()
+    coarse = simplify(half, 50.0)
+    assert _border(half) == _border(coarse)
+    edges = np.sort(coarse.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert (count == 1).sum() == len(_border(half))
+
+
+def test_sheets_without_thickness_and_repeated_triangles_go() -> None:
+    tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    sheet = [[4, 5, 6], [5, 4, 6]]
+    leaf = [[0, 1, 4], [4, 1, 0]]  # hangs on an edge of the tetrahedron
+    repeated = [[3, 0, 1]]
+    collapsed = [[7, 7, 0], [7, 8, 7]]
+    triangles = np.array(leaf + tetrahedron + sheet + repeated + collapsed, np.uint32)
+    np.testing.assert_array_equal(drop_doubles(triangles), tetrahedron)
+    # two one way and one the other: as many as they are worth stay, as the first of them has it
+    odd = np.array([[5, 4, 6], [4, 5, 6], [6, 4, 5]], np.uint32)
+    np.testing.assert_array_equal(drop_doubles(odd), [[4, 5, 6]])
+    assert len(drop_doubles(np.zeros((0, 3), np.uint32))) == 0
+
+
+def test_simplified_levels_of_a_thin_plate_stay_closed_and_without_sheets() -> None:
+    """A plate far thinner than the error is what simplification folds onto itself."""
+    sphere = _sphere(sides=48)
+    plate = Mesh(sphere.positions * np.float32([1, 1, 0.01]), sphere.triangles, sphere.normals)
+    mesh = plate
+    for error in (0.1, 0.5, 2.0, 4.0):
+        mesh = simplify(mesh, error)
+        assert len(mesh.triangles) >= 4
+        assert open_edges(mesh) == 0
+        assert len(drop_doubles(mesh.triangles)) == len(mesh.triangles)
 
 
 def test_errors_must_rise() -> None:
     with pytest.raises(UsageError, match="expected rising positive numbers"):
         LodOptions(errors=(0.5, 0.1))
+
+
+def test_no_samples_is_wrong_usage() -> None:
+    with pytest.raises(UsageError, match=r"lod\.samples is 0, expected 1 or more"):
+        LodOptions(samples=0)
 
 
 def test_unwrapped_charts_do_not_overlap_and_fill_the_square() -> None:

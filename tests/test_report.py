@@ -359,23 +359,20 @@ def test_report_before_units_names_the_command(tmp_path: Path) -> None:
     assert not (tmp_path / "report").exists()
 
 
-def test_unbuilt_units_and_doubtful_ones_are_remarked(built: Path) -> None:
+def test_doubtful_units_are_remarked(built: Path) -> None:
     facts = gather(Store(built))
-    assert facts.missing == ()
     assert [step.name for step in facts.steps][:2] == ["read", "volume"]
     assert all(isinstance(step, StepFacts) for step in facts.steps)
     units = (
         _unit(confidence=0.1),
-        _unit(confidence=0.1, channel=Channel(1, "given by hand", (1.0, 1.0, 1.0))),
         _unit(iso_value=None, iso_reason="every voxel is 3"),
         _unit(reason="no voxel crosses the iso-value", iso_reason="every voxel is 4"),
         _unit(reason="dark", channel=Channel(2, "dim", (0.0, 0.0, 1.0))),
         _unit(fragments_dropped=1200, cavities_filled=3),
     )
-    doubtful = replace(facts, units=units, missing=("r9_c9/CD31",))
-    titles = {r.title: r.lines for r in find_remarks(doubtful, {"given by hand": 5.0})}
+    doubtful = replace(facts, units=units)
+    titles = {r.title: r.lines for r in find_remarks(doubtful)}
     assert titles == {
-        "1 unit not built yet": ("r9_c9/CD31",),
         "1 channel without a surface in any tile": ("dim: dark",),
         "1 unit without a surface, in channels that have some": (
             "r0_c0/CD31: no voxel crosses the iso-value (every voxel is 4)",

@@ -13,14 +13,20 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell import read
+from stereocell.cli import main
 from stereocell.errors import OutputError, UsageError
-from stereocell.samples import SAMPLES, fluorescence, write_brain_cells, write_cycif
+from stereocell.samples import fluorescence, write_brain_cells, write_cycif
 from stereocell.samples.bodies import Nucleus, Tube, rotation_of
 from stereocell.samples.fluorescence import BLUR_UM, SPACING_UM, STAINS
 from stereocell.samples.tissue import NUCLEUS_GAP_UM, Tissue, grow_tissue
 from stereocell.tiling import Box
 
-SMALL: dict[str, Any] = {"grid": (2, 1), "tile_size": (24, 96, 96), "seed": 3}
+SMALL: dict[str, Any] = {
+    "grid": (2, 1),
+    "tile_size": (24, 96, 96),
+    "seed": 3,
+    "brightness_spread": 1.0,
+}
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +98,36 @@ def test_cycif_interrupted_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(OutputError, match=r"block\.ome\.zarr: can't be written: No space left"):
         write_cycif(tmp_path / "block.ome.zarr", **SMALL)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_cycif_stopped_between_two_files_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    write, written = Path.write_bytes, []
+
+    def stopping(path: Path, content: bytes) -> int:
+        written.append(path)
+        if len(written) > 9:
+            raise error
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", stopping)
+    with pytest.raises((OutputError, KeyboardInterrupt)):
+        write_cycif(tmp_path / "block.ome.zarr", **SMALL)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_cycif_on_a_full_disk_is_one_line_and_leaves_nothing(
+    small_disk: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    size = ["--grid", "2x1", "--tile-size", "24,96,96"]
+    assert main(["sample", "cycif", str(small_disk / "block.ome.zarr"), *size]) == 1
+    assert main(["sample", "brain-cells", str(small_disk / "brain.ome.tif")]) == 1
+    lines = capfd.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert all("can't be written: No space left on device" in line for line in lines)
+    assert list(small_disk.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -286,6 +322,17 @@ def test_brain_cells_overwrites_nothing(tmp_path: Path) -> None:
         write_brain_cells(tmp_path / "brain.ome.zarr")
 
 
-def test_samples_are_listed() -> None:
-    assert set(SAMPLES) == {"cycif", "brain-cells"}
-    assert [sample.suffix for sample in SAMPLES.values()] == [".ome.zarr", ".ome.tif"]
+def test_brain_cells_leaves_no_licence_without_its_stack(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = Path.write_bytes
+
+    def full(path: Path, content: bytes) -> int:
+        if len(content) > 100_000:
+            raise OSError(28, "No space left on device")
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OutputError, match=r"brain\.ome\.tif: can't be written: No space left"):
+        write_brain_cells(tmp_path / "brain.ome.tif")
+    assert list(tmp_path.iterdir()) == []

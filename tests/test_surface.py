@@ -7,7 +7,13 @@ from numpy.typing import NDArray
 from phantoms import blurred_ball, f_phantom
 from stereocell.mesh import Mesh
 from stereocell.repair import RepairOptions, repair
-from stereocell.surface import SMOOTHING_REACH, extract_surface, signed_distance, smooth
+from stereocell.surface import (
+    SMOOTHING_REACH,
+    extract_surface,
+    gradient_magnitude,
+    signed_distance,
+    smooth,
+)
 from stereocell.tiling import Box, cut
 from stereocell.volume import Volume, zyx_to_xyz
 
@@ -101,6 +107,22 @@ def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -
         rims.append({row.tobytes() for row in mesh.positions[on_plane]})
     assert len(rims[0]) > 50
     assert rims[0] == rims[1]
+
+
+def test_gradient_of_a_ramp_is_its_slope_in_um() -> None:
+    z, _, x = np.indices((5, 6, 7), dtype=np.float32)
+    ramp = (3 * z * 0.28 + 4 * x * 0.14).astype(np.float32)
+    np.testing.assert_allclose(gradient_magnitude(ramp, SPACING), 5, rtol=1e-4)
+
+
+@pytest.mark.parametrize("exponent", [-110, -70, 70, 110])
+def test_gradient_of_huge_and_tiny_voxels_has_the_same_digits(exponent: int) -> None:
+    field = np.random.default_rng(0).normal(0, 1, (6, 7, 8)).astype(np.float32)
+    scale = np.float32(2.0**exponent)
+    plain = gradient_magnitude(field, SPACING)
+    np.testing.assert_array_equal(gradient_magnitude(field * scale, SPACING), plain * scale)
+    distance = signed_distance(field * scale, scale, SPACING, float(scale))
+    np.testing.assert_array_equal(distance, signed_distance(field, np.float32(1), SPACING, 1.0))
 
 
 def test_f_stays_an_f() -> None:

@@ -1,10 +1,16 @@
 """Windows, histograms and transfer functions."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import phantoms
+from stereocell import tasks
+from stereocell.cli import main
 from stereocell.config import WindowOptions
 from stereocell.specimen import evaluate
+from stereocell.store import Store
 from stereocell.survey import find_display, make_look
 from stereocell.transfer import NAMES, make_transfer_functions
 
@@ -24,6 +30,43 @@ def test_sparse_channel_keeps_its_few_bright_voxels() -> None:
     voxels = np.zeros(100_000, np.uint16)
     voxels[:5] = 900
     assert find_display(voxels, WindowOptions(1, 99)).window == (0, 900)
+
+
+@pytest.mark.parametrize(
+    ("limit", "levels", "seen"),
+    [
+        (16_000_000, 2, (0, np.s_[2:14, 4:32, 8:32])),
+        (5000, 2, (1, np.s_[1:7, 2:16, 4:16])),  # too many voxels: the coarser level's
+        (5000, 1, (0, np.s_[2:14:2, 4:32, 8:32])),  # and where there is none, some planes
+    ],
+)
+def test_window_is_that_of_the_region_alone(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    limit: int,
+    levels: int,
+    seen: tuple[int, tuple[slice, slice, slice]],
+) -> None:
+    """The data are dim to the left and bright to the right; a part of the left is built."""
+    monkeypatch.setattr(tasks, "SURVEY_VOXELS", limit)
+    fine = np.random.default_rng(0).integers(100, 200, (16, 40, 80)).astype(np.uint16)
+    fine[:, :, 36:] *= 10
+    coarse = fine.reshape(8, 2, 20, 2, 40, 2).mean(axis=(1, 3, 5)).astype(np.uint16)
+    pyramid = [fine, coarse][:levels]
+    scales = [dict.fromkeys("zyx", 1.0), dict.fromkeys("zyx", 2.0)]
+    source = phantoms.write_ome_zarr(tmp_path / "halves.ome.zarr", pyramid, scales=scales)
+    out = tmp_path / "out"
+    flags = ["--level", "0", "--region", "2:14,4:32,8:32"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = Store(out).survey().values()
+    level, part = seen
+    options = WindowOptions()
+    expected = np.percentile(
+        pyramid[level][part], (options.low_percentile, options.high_percentile)
+    )
+    assert channel["display"]["window"] == pytest.approx(expected)
+    assert sum(channel["display"]["histogram"]) == pyramid[level][part].size
 
 
 @pytest.mark.parametrize("iso", [None, 0.0, 0.02, 0.3, 0.97, 1.0, 1.7])

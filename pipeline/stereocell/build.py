@@ -3,44 +3,47 @@
 Every phase skips what is done already: results are named by what they depend on.
 """
 
-import json
+import hashlib
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlparse
 
-import numpy as np
-
-from stereocell import bricks, report, specimen, transfer, write
+from stereocell import report, tasks
 from stereocell.assets import viewer_dist
 from stereocell.config import Settings, to_dict, to_toml
+from stereocell.documents import write_json
 from stereocell.engine import Engine, console
 from stereocell.errors import OutputError
+from stereocell.lineage import key_of, libraries_of
 from stereocell.plan import PALETTE, Channel, Plan, choose_level, make_plan
+from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
 from stereocell.specimen import ChannelContent, Look, TileContent
-from stereocell.store import Store, key_of, load_lods, write_json
-from stereocell.write import usd
-from stereocell.write.bundle import write_bundle
+from stereocell.store import Store
+from stereocell.unit_files import load_lods, load_volume
+from stereocell.write import bundle, usd
+from stereocell.write.atomic import write_bytes
 from stereocell.write.composed import dependencies
 from stereocell.write.generator import GENERATOR
 
 
 def make(source: str, out: Path, settings: Settings) -> Plan:
-    """Write OUT/plan.json (and the settings used, as TOML). The same plan again changes nothing."""
+    """Write OUT/plan.json (and the settings used, as TOML). The same plan again changes nothing.
+
+    Raises StereoCellError; OUT is left as it was.
+    """
+    require_apart(source, out)
     store = Store(out)
     with _phase(store, "plan") as phase:
-        location = source if urlparse(source).scheme else str(Path(source).absolute())
+        location = Location.of(source).source
         options = settings.plan
         dataset = open_source(SourceRef(location, options.time, options.spacing_um))
-        if dataset.time_points > 1:
-            console.print(
-                f"plan: {dataset.time_points} points in time; building --time {options.time}"
-            )
+        for note in dataset.notes:
+            console.print(f"plan: {note}", markup=False)
         indices = dataset.find_channels(options.channels) if options.channels else None
         chosen = range(len(dataset.channels)) if indices is None else indices
         channels = [
@@ -59,7 +62,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
         )  # fmt: skip
         store.require_writable()
         phase.is_up_to_date = not store.save_plan(plan)
-        store.write_text(store.settings_file, to_toml(plan.settings))
+        write_bytes(store.settings_file, to_toml(plan.settings).encode())
         write_json(out / "provenance.json", provenance(plan))
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
@@ -78,6 +81,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
+        "libraries": {**libraries_of(tasks), **libraries_of(usd)},
     }
 
 
@@ -86,7 +90,10 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     store = Store(out)
     plan = store.plan()
     with _phase(store, "units") as phase:
-        phase.is_up_to_date = not run_rounds(store, plan, engine, only)
+        built = run_rounds(store, plan, engine, only)
+        phase.is_up_to_date = not built
+        units = len(plan.tiles) * len(plan.channels)
+        phase.about = "" if built == units else f"{built} of {units} units"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +106,7 @@ class TileTask:
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units."""
     channels = tuple(
-        ChannelContent(channel_id, load_lods(folder), np.load(folder / "volume.npy"))
+        ChannelContent(channel_id, load_lods(folder), load_volume(folder))
         for channel_id, folder in task.units
     )
     usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
@@ -116,9 +123,10 @@ def run_stage(out: Path, engine: Engine) -> None:
         tiles = [_tile_task(store, plan, index, tile.id) for tile in plan.tiles]
         about = provenance(plan)
         depends = [index, [asdict(look) for look in looks], about, plan.name]
-        key = key_of(depends, write, specimen, transfer)
-        layers = [store.stage_dir / "tiles" / tile.id / usd.LAYER_NAME for tile in plan.tiles]
-        if phase.is_done(key, store.stage_file, *layers):
+        folders = [store.stage_dir / "tiles" / tile.id for tile in plan.tiles]
+        if phase.is_done(
+            key_of(depends, usd), store.stage_file, store.stage_dir / "looks", *folders
+        ):
             return
         engine.run("stage", run_tile, tiles)
         extents = [
@@ -136,13 +144,8 @@ def _tile_task(
     lattice = tile.lattice(plan.region)
     units = []
     for channel in plan.channels:
-        name = f"{tile_id}/{channel.id}"
-        if name not in index:
-            raise OutputError(
-                f"{store.index_file}: unit {tile_id}/{channel.name} is missing: "
-                "run `stereocell units OUT`"
-            )
-        units.append((channel.id, store.unit_dir(tile_id, channel.id, index[name])))
+        key = index[f"{tile_id}/{channel.id}"]
+        units.append((channel.id, store.unit_dir(tile_id, channel.id, key)))
     content = TileContent(
         id=tile_id,
         spacing_um=plan.spacing_um,
@@ -180,23 +183,14 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
             raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
         files = dependencies(path) + ([] if viewer is None else sorted(viewer.rglob("*")))
-        key = key_of([str(path.absolute()), [_state(file) for file in files]], write, bricks)
-        if phase.is_done(key, store.bundle_dir / "manifest.json", *_listed(store.bundle_dir)):
+        key = key_of([str(path.absolute()), [_state(file) for file in files]], bundle)
+        if phase.is_done(key, store.bundle_dir):
             return
-        write_bundle(path, store.bundle_dir, viewer, workers=engine.workers)
+        bundle.write_bundle(path, store.bundle_dir, viewer, engine)
     if viewer is None:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
-
-
-def _listed(bundle_dir: Path) -> list[Path]:
-    """Return the files that the bundle says it has."""
-    try:
-        names = json.loads((bundle_dir / "files.json").read_text())
-    except (OSError, ValueError):
-        return [bundle_dir / "files.json"]
-    return [bundle_dir / name for name in names]
 
 
 def _state(file: Path) -> tuple[str, int, int]:
@@ -211,12 +205,10 @@ def run_report(out: Path) -> None:
     with _phase(store, "report") as phase:
         plan = store.plan()
         store.require_units_of(plan)
-        content = [store.index(), store.survey(), provenance(plan)]
-        phases = [store.phase(name).get("key") for name in ("stage", "bundle")]
-        if phase.is_done(
-            key_of([content, phases, report.TEMPLATE.read_text()], report),
-            store.report_file,
-        ):
+        others = {name: entry for name, entry in store.phases().items() if name != "report"}
+        content = [store.index(), store.survey(), provenance(plan), others]
+        key = key_of([content, report.TEMPLATE.read_text()], report)
+        if phase.is_done(key, store.report_file):
             return
         report.write_report(out)
 
@@ -226,17 +218,34 @@ class _Phase:
 
     def __init__(self, store: Store, name: str) -> None:
         self.store, self.name = store, name
-        self.key = ""
+        self.key, self.about = "done", ""
+        self.results: tuple[Path, ...] = ()
         self.is_up_to_date = False
 
     def is_done(self, key: str, *results: Path) -> bool:
-        """Return whether the results stand and were made from the same things."""
-        self.key = key
-        stands = all(result.is_file() for result in results)
-        self.is_up_to_date = stands and self.store.phase(self.name).get("key") == key
+        """Return whether `results` (files, folders) stand whole and come from the same things."""
+        self.key, self.results = key, results
+        entry = self.store.phases().get(self.name, {})
+        self.is_up_to_date = entry.get("key") == key and entry["results"] == _digest(results)
         if not self.is_up_to_date:
-            self.store.save_phase(self.name, "", 0.0)  # killed half-way, it is not done
+            self.store.save_phase(self.name, "", "", 0.0, "")  # killed half-way, it is not done
         return self.is_up_to_date
+
+
+def _digest(results: Iterable[Path]) -> str:
+    """Return a digest of all files' names and sizes: what a damage alters.
+
+    Of a USD layer only whether it can be opened: a size that an artist's edit changed is no damage.
+    """
+    digest = hashlib.sha256()
+    for result in results:
+        for file in sorted(result.rglob("*")) if result.is_dir() else [result]:
+            if file.suffix in usd.LAYER_SUFFIXES:
+                state = int(usd.is_layer(file))
+            else:
+                state = file.stat().st_size if file.is_file() else -1
+            digest.update(f"{file.relative_to(result.parent)} {state}\n".encode())
+    return digest.hexdigest()[:20]
 
 
 @contextmanager
@@ -249,5 +258,5 @@ def _phase(store: Store, name: str) -> Iterator[_Phase]:
     if phase.is_up_to_date:
         console.print(f"{name}: up to date")
     else:
-        store.save_phase(name, phase.key or "done", seconds)
+        store.save_phase(name, phase.key, _digest(phase.results), seconds, phase.about)
         console.print(f"{name}: {seconds:.1f} s")

@@ -15,10 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
-
-from stereocell.assets import find_asset, schema_path
+from stereocell.assets import find_asset
+from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.validate_usd import validate_stage
 from stereocell.write.bundle import FILES, MANIFEST
@@ -28,6 +26,9 @@ from stereocell.write.vdb import check_vdb
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb}
 _MOST_SHOWN = 3  # problems in one line
 _NODE_TIMEOUT_S = 1200.0
+_PLAN = "plan.schema.json"
+_BUNDLE = "bundle.schema.json"
+_RUN_BUNDLE = "run `stereocell bundle OUT`"
 _GET_NODE = "install Node 20 or newer, then run `make setup`"
 
 
@@ -49,11 +50,11 @@ def check(out: Path) -> Iterator[CheckLine]:
         raise OutputError(f"{out}: holds no build, expected plan.json, stage/ and bundle/")
     bundle = out / "bundle"
     checks: list[tuple[str, Callable[[], str]]] = [
-        ("plan", lambda: _check_json(out / "plan.json", "plan.schema.json")),
+        ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
         ("stage", lambda: _check_stage(out / "stage" / "stage.usda")),
         ("stage files", lambda: _check_stage_files(out / "stage")),
-        ("manifest", lambda: _check_json(bundle / MANIFEST, "bundle.schema.json")),
-        ("file list", lambda: _check_json(bundle / FILES, "bundle.schema.json", "FileIndex")),
+        ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
+        ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
         ("tilesets", lambda: _check_tilesets(bundle)),
         ("hashes", lambda: _check_hashes(bundle)),
@@ -67,27 +68,9 @@ def check(out: Path) -> Iterator[CheckLine]:
             yield CheckLine(name, False, str(error))
 
 
-def _check_json(path: Path, schema_name: str, definition: str | None = None) -> str:
-    _validate(path, _read_json(path), schema_name, definition)
-    return f"{path.name} fits {schema_name}"
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_bytes())
-    except OSError as error:
-        raise CheckError(f"{path}: {error.strerror or error}") from error
-    except ValueError as error:
-        raise CheckError(f"{path}: no JSON: {error}") from error
-
-
-def _validate(path: Path, content: Any, schema_name: str, definition: str | None = None) -> None:
-    schema = json.loads(schema_path(schema_name).read_bytes())
-    if definition is not None:
-        schema = {"$defs": schema["$defs"], "$ref": f"#/$defs/{definition}"}
-    error = best_match(Draft202012Validator(schema).iter_errors(content))
-    if error is not None:
-        raise CheckError(f"{path}: {error.json_path}: {error.message}")
+def _check_json(path: Path, schema: str, remedy: str) -> str:
+    read_json(path, schema, remedy)
+    return f"{path.name} fits {schema}"
 
 
 def _check_stage(path: Path) -> str:
@@ -117,8 +100,7 @@ def _check_volume_lists(bundle: Path) -> str:
     volumes = 0
     for channel in _channels(bundle):
         path = bundle / channel["volumes"]["path"]
-        content = _read_json(path)
-        _validate(path, content, "volumes.schema.json")
+        content = read_json(path, "volumes.schema.json", _RUN_BUNDLE)
         for volume in content["volumes"]:
             volumes += 1
             listed = [(level["offset"], level["length"]) for level in volume["levels"]]
@@ -141,9 +123,7 @@ def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
 
 
 def _channels(bundle: Path) -> list[dict[str, Any]]:
-    path = bundle / MANIFEST
-    manifest = _read_json(path)
-    _validate(path, manifest, "bundle.schema.json")
+    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
     channels: list[dict[str, Any]] = manifest["channels"]
     return channels
 
@@ -155,7 +135,7 @@ def _check_tilesets(bundle: Path) -> str:
         if channel["tileset"] is None:
             continue
         path = bundle / channel["tileset"]["path"]
-        tileset = _read_json(path)
+        tileset = read_json(path, None, _RUN_BUNDLE)
         try:
             for uri, error, limit in _walk(tileset["root"], tileset["geometricError"]):
                 contents += 1
@@ -180,9 +160,8 @@ def _walk(tile: dict[str, Any], limit: float) -> Iterator[tuple[str, float, floa
 
 def _check_hashes(bundle: Path) -> str:
     """Check every file against files.json, every reference too, and that no file is unlisted."""
-    manifest = _read_json(bundle / MANIFEST)
-    listed = _read_json(bundle / FILES)
-    _validate(bundle / FILES, listed, "bundle.schema.json", "FileIndex")
+    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    listed = read_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)
     problems = []
     found = {p.relative_to(bundle).as_posix(): p for p in bundle.rglob("*") if p.is_file()}
     for path, entry in listed.items():
@@ -195,7 +174,8 @@ def _check_hashes(bundle: Path) -> str:
     ]
     references = list(_references(manifest))
     for channel in _channels(bundle):
-        references += _references(_read_json(bundle / channel["volumes"]["path"]))
+        path = bundle / channel["volumes"]["path"]
+        references += _references(read_json(path, "volumes.schema.json", _RUN_BUNDLE))
     for reference in references:
         entry = {"bytes": reference["bytes"], "sha256": reference["sha256"]}
         expected = listed.get(reference["path"])

@@ -61,16 +61,20 @@ def _input(parser: argparse.ArgumentParser) -> None:
     plan = parser.add_argument_group("what to build")
     plan.add_argument("--level", type=int, help="resolution level, 0 is the finest")
     plan.add_argument("--channels", help="names or indices, as CD31,MART1")
-    plan.add_argument("--region", help="z0:z1,y0:y1,x0:x1 in voxels of the level")
+    plan.add_argument(
+        "--region",
+        help="z0:z1,y0:y1,x0:x1 in voxels of the level that is built: without --level the finest "
+        "whose region stays within plan.max_voxels",
+    )
     plan.add_argument("--tile-size", help="z,y,x in voxels")
-    plan.add_argument("--grid", help="columns x rows, as 5x2, instead of --tile-size")
+    plan.add_argument("--grid", help="columns x rows of equal tiles, as 5x2; not with --tile-size")
     plan.add_argument("--time", type=int, help="index into a time series")
     plan.add_argument("--spacing-um", help="z,y,x voxel spacing in um, instead of the file's")
     plan.add_argument(
         "--iso-value",
         action="append",
         metavar="CHANNEL=VALUE",
-        help="use this iso-value (voxel values) for a channel; may be repeated",
+        help="use this iso-value (voxel values) for a channel, by name or index; may be repeated",
     )
 
 
@@ -78,9 +82,15 @@ def _workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",
         type=_count,
-        default=os.cpu_count() or 1,
-        help="worker processes; 0 runs inline (default: this machine's cores)",
+        default=_cores(),
+        help="worker processes; 0 runs inline (default: the cores that it may run on)",
     )
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _out(parser: argparse.ArgumentParser) -> None:
@@ -109,12 +119,18 @@ def _flags(options: argparse.Namespace) -> dict[str, Any]:
     """Return the flags as the TOML's sections and keys."""
     from stereocell.errors import UsageError
 
+    if options.grid is not None and options.tile_size is not None:
+        raise UsageError("--grid and --tile-size both say how to cut, expected one of them")
     plan: dict[str, Any] = {}
     for key in ("level", "region", "grid", "time"):
         if getattr(options, key) is not None:
             plan[key] = getattr(options, key)
     if options.channels is not None:
         plan["channels"] = [name.strip() for name in options.channels.split(",")]
+        if not all(plan["channels"]):
+            raise UsageError(
+                f"--channels is {options.channels!r}, expected names or indices, as CD31,MART1"
+            )
     if options.tile_size is not None:
         plan["tile_size"] = _numbers(options.tile_size, int, "--tile-size")
     if options.spacing_um is not None:
@@ -137,7 +153,8 @@ def _flags(options: argparse.Namespace) -> dict[str, Any]:
 def _settings(options: argparse.Namespace) -> int:
     from stereocell import config
 
-    sys.stdout.write(config.to_toml(config.load(options.preset, options.config, {})))
+    settings = config.load(options.preset, options.config, {})
+    sys.stdout.write(config.to_toml(settings, config.TEMPLATE))
     return 0
 
 
@@ -250,9 +267,11 @@ def _declare_sample(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", choices=["cycif", "brain-cells"])
     parser.add_argument("out", type=Path, metavar="OUT", help="file or folder to write")
     cycif = parser.add_argument_group("cycif")
-    cycif.add_argument("--grid", default="5x2", help="columns x rows of tiles (default 5x2)")
-    cycif.add_argument("--tile-size", default="64,128,128", help="z,y,x (default 64,128,128)")
-    cycif.add_argument("--seed", type=int, default=0)
+    cycif.add_argument(
+        "--grid", default="5x2", help="columns x rows of tiles (default %(default)s)"
+    )
+    cycif.add_argument("--tile-size", default="64,128,128", help="z,y,x (default %(default)s)")
+    cycif.add_argument("--seed", type=int, default=0, help="another seed, another block")
     cycif.add_argument(
         "--brightness-spread", type=float, default=1.0, help="cells are up to 1 + this as bright"
     )

@@ -3,6 +3,7 @@
 Order of precedence: defaults < preset < configuration file < flags. Unknown keys are errors.
 """
 
+import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -19,6 +20,12 @@ from stereocell.unwrap import UnwrapOptions
 
 PRESETS = Path(__file__).parent / "presets"
 AUTO = "auto"
+# What the first lines of a file of settings say about it.
+TEMPLATE = "StereoCell settings. Every key may be left out; unknown keys are errors."
+RECORD = (
+    "The settings that this build used; each build writes them anew.\n"
+    "To change them, copy this file and pass the copy with --config."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +34,25 @@ class PlanOptions:
 
     level: int | str = setting(AUTO, "resolution level, 0 is the finest; auto: see max_voxels")
     max_voxels: int = setting(
-        2_000_000_000, "auto takes the finest level within this, all channels"
+        2_000_000_000, "auto takes the finest level within this: the region, all channels"
     )
     channels: tuple[str, ...] = setting((), "names or indices; empty: all")
-    region: str = setting("", "z0:z1,y0:y1,x0:x1 in voxels of the level; empty: all")
+    region: str = setting("", "z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all")
     tile_size: tuple[int, ...] = setting((194, 512, 512), "voxels z, y, x, clipped to the data")
-    grid: str = setting("", "columns x rows, as 5x2; instead of tile_size")
+    grid: str = setting("", "columns x rows of equal tiles, as 5x2; instead of tile_size")
     time: int = setting(0, "index into a time series")
     spacing_um: tuple[float, ...] = setting((), "voxel spacing z, y, x, instead of the file's")
+
+    def __post_init__(self) -> None:
+        if self.max_voxels < 1:
+            raise UsageError(f"plan.max_voxels is {self.max_voxels}, expected at least 1")
+        if self.time < 0:
+            raise UsageError(f"plan.time is {self.time}, expected 0 or more (--time)")
+        if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
+            found = ",".join(f"{value:g}" for value in self.spacing_um)
+            raise UsageError(
+                f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0 (--spacing-um)"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +148,8 @@ def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings
         for key in content:
             _known(key, list(types), f"{where}: {section}", "key")
         typed = {k: _typed(f"{where}: {section}.{k}", v, types[k]) for k, v in content.items()}
+        if section == "plan" and "tile_size" in typed:
+            typed = {"grid": "", **typed}  # later settings win over an earlier grid
         settings = replace(settings, **{section: replace(current, **typed)})
     return settings
 
@@ -149,9 +169,9 @@ def from_dict(values: Mapping[str, Any]) -> Settings:
     return apply(Settings(), values, "plan.json: settings")
 
 
-def to_toml(settings: Settings) -> str:
-    """Return every setting as TOML, each with its comment."""
-    lines = ["# StereoCell settings. Every key may be left out; unknown keys are errors."]
+def to_toml(settings: Settings, header: str = RECORD) -> str:
+    """Return every setting as TOML, each with its comment, below the header's lines."""
+    lines = [f"# {line}" for line in header.splitlines()]
     for section in fields(settings):
         value = getattr(settings, section.name)
         lines += ["", f"[{section.name}]"]
@@ -171,7 +191,8 @@ def _plain(value: Any) -> dict[str, Any]:
 
 def _toml(value: Any) -> str:
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        # a TOML string is a JSON string, but for DEL
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
     return repr(value)

@@ -25,7 +25,7 @@ console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 class TasksFailedError(StereoCellError):
-    """Some tasks failed; all others are finished. The message has a line for each failure."""
+    """Some tasks failed; all others are finished. A line for each reason."""
 
 
 class Engine:
@@ -49,13 +49,16 @@ class Engine:
                 if error is None:
                     results[place] = result
                 else:
-                    failures[place] = f"{tasks[place][0]}: {_in_words(error)}"
+                    failures[place] = _in_words(error)
                 advance(error is not None)
         if failures:
-            lines = [failures[place] for place in sorted(failures)]
-            raise TasksFailedError(
-                "\n".join([*lines, f"{label}: {len(failures)} of {len(tasks)} failed"])
-            )
+            named: dict[str, list[str]] = {}  # one line for all that failed alike
+            for place in sorted(failures):
+                named.setdefault(failures[place], []).append(tasks[place][0])
+            lines = [f"{', '.join(names)}: {reason}" for reason, names in named.items()]
+            if len(lines) > 1:
+                lines.append(f"{label}: {len(failures)} of {len(tasks)} failed")
+            raise TasksFailedError("\n".join(lines))
         return [results[place] for place in range(len(tasks))]
 
     def _outcomes(
@@ -76,10 +79,14 @@ class Engine:
         futures = {
             client.submit(function, task, pure=False): place for place, task in enumerate(tasks)
         }
-        for future in as_completed(futures):
-            failure = future.exception()
-            yield futures[future], None if failure else future.result(), failure
-            future.release()
+        try:
+            for future in as_completed(futures):
+                failure = future.exception()
+                yield futures[future], None if failure else future.result(), failure
+                future.release()
+        except KeyboardInterrupt:
+            self.close()  # now: workers would go on writing into folders that are being removed
+            raise
 
     def _start(self) -> Any:
         if self._client is None:
@@ -106,7 +113,16 @@ class Engine:
 
 def _in_words(error: BaseException) -> str:
     words = " ".join(str(error).split())
-    return words if isinstance(error, StereoCellError) else f"{type(error).__name__}: {words}"
+    if isinstance(error, StereoCellError):
+        return words
+    if type(error).__name__ == "KilledWorker":  # distributed tries a task four times
+        return (
+            "its worker process was killed each time, most likely for want of memory: try fewer "
+            "--workers or a smaller --tile-size"
+        )
+    if isinstance(error, MemoryError):
+        return f"out of memory ({words}): try fewer --workers or a smaller --tile-size"
+    return f"{type(error).__name__}: {words}"
 
 
 @contextmanager

@@ -25,23 +25,22 @@ class IsoField:
     values: NDArray[np.float64]
 
     def at(self, box: Box) -> NDArray[np.float32]:
-        """Return iso(x) at the voxels of the box, float32 (z, y, x).
+        """Return iso(x) at the voxels of the box, float32; it broadcasts over (z, y, x).
 
-        A voxel's value depends on nothing but its place, bit by bit: linear steps axis by axis,
-        weights from the voxel's index alone.
+        An axis along which only one centre reaches into the box is 1 long. A voxel's value depends
+        on nothing but its place, bit by bit: linear steps axis by axis, weights from the voxel's
+        index alone.
         """
-        field = self.values
-        for axis, centres in enumerate(self.centres):
-            voxels = np.arange(box.start[axis], box.stop[axis], dtype=np.float64)
-            below = np.searchsorted(np.asarray(centres), voxels, side="right") - 1
-            low = np.clip(below, 0, len(centres) - 1)
-            high = np.clip(below + 1, 0, len(centres) - 1)
-            span = np.asarray(centres)[high] - np.asarray(centres)[low]
-            share = (voxels - np.asarray(centres)[low]) / np.where(span > 0, span, 1.0)
-            share = np.where(span > 0, share, 0.0)
-            a, b = np.take(field, low, axis=axis), np.take(field, high, axis=axis)
-            field = a + (b - a) * share.reshape([-1 if i == axis else 1 for i in range(3)])
-        return field.astype(np.float32)
+        near = self.around(box)
+        weights = [
+            _weights(np.asarray(centres), start, stop)
+            for centres, start, stop in zip(near.centres, box.start, box.stop, strict=True)
+        ]
+        columns = _blend(_blend(near.values, 0, weights[0]), 1, weights[1])
+        field = np.empty((*columns.shape[:2], len(weights[2].share)), np.float32)
+        for plane, column in zip(field, columns, strict=True):  # all in float64 would be GBs
+            plane[...] = _blend(column, 1, weights[2])
+        return field
 
     def around(self, window: Box) -> "IsoField":
         """Return the part that reaches into a unit's window: what its result depends on."""
@@ -52,6 +51,34 @@ class IsoField:
             keep.append(slice(max(0, int(first)), int(last) + 1))
         z, y, x = (centres[part] for centres, part in zip(self.centres, keep, strict=True))
         return IsoField((z, y, x), self.values[tuple(keep)])
+
+
+@dataclass(frozen=True, slots=True)
+class _Weights:
+    """Each voxel lies at `share` of the way from centre number `low` to `high`; arrays (n,)."""
+
+    low: NDArray[np.intp]
+    high: NDArray[np.intp]
+    share: NDArray[np.float64]
+
+
+def _weights(centres: NDArray[np.float64], start: int, stop: int) -> _Weights:
+    """Return the weights of the voxels start..stop; of one that stands for all with one centre."""
+    voxels = np.arange(start, stop if len(centres) > 1 else start + 1, dtype=np.float64)
+    below = np.searchsorted(centres, voxels, side="right") - 1
+    low = np.clip(below, 0, len(centres) - 1)
+    high = np.clip(below + 1, 0, len(centres) - 1)
+    span = centres[high] - centres[low]
+    inside = span > 0
+    share = np.where(inside, (voxels - centres[low]) / np.where(inside, span, 1.0), 0.0)
+    return _Weights(low, high, share)
+
+
+def _blend(values: NDArray[np.float64], axis: int, weights: _Weights) -> NDArray[np.float64]:
+    a, b = np.take(values, weights.low, axis=axis), np.take(values, weights.high, axis=axis)
+    share = weights.share.reshape([-1 if i == axis else 1 for i in range(values.ndim)])
+    blended: NDArray[np.float64] = a + (b - a) * share
+    return blended
 
 
 def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> IsoField | None:

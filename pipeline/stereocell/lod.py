@@ -39,28 +39,81 @@ class LodOptions:
     def __post_init__(self) -> None:
         if not self.errors or list(self.errors) != sorted(self.errors) or self.errors[0] <= 0:
             raise UsageError(f"lod.errors is {list(self.errors)}, expected rising positive numbers")
+        if self.samples < 1:
+            raise UsageError(f"lod.samples is {self.samples}, expected 1 or more")
+
+
+FEWEST = 8  # triangles of a body that would vanish: an octahedron
 
 
 def simplify(mesh: Mesh, max_error_um: float) -> Mesh:
     """Return the mesh with as few triangles as the error allows, border vertices untouched.
 
     The simplifier's error is a mean over planes: at a bound near a body's radius the whole body
-    vanishes. A body of which nothing is left stays as it was.
+    vanishes, or lies flat. Such a body is simplified by itself, down to FEWEST triangles.
     """
-    source = np.ascontiguousarray(mesh.triangles).ravel()
+    kept = drop_doubles(_simplify(mesh.positions, mesh.triangles, max_error_um, 0))
+    bodies = _bodies(mesh)
+    body = bodies[mesh.triangles[:, 0]]
+    vanished = np.flatnonzero(~np.isin(body, bodies[kept[:, 0]]))
+    vanished = vanished[np.argsort(body[vanished], kind="stable")]
+    ends = np.flatnonzero(np.diff(body[vanished])) + 1
+    small = [
+        _shrink(mesh, mesh.triangles[part], max_error_um)
+        for part in np.split(vanished, ends)
+        if len(part)
+    ]
+    return compact(mesh, np.concatenate([kept, *small]))
+
+
+def _shrink(mesh: Mesh, triangles: NDArray[np.uint32], max_error_um: float) -> NDArray[np.uint32]:
+    """Return FEWEST triangles, or as many as the error needs, in place of those of one body."""
+    used, corners = np.unique(triangles, return_inverse=True)
+    own = corners.reshape(-1, 3).astype(np.uint32)
+    shrunk = drop_doubles(_simplify(mesh.positions[used], own, max_error_um, FEWEST))
+    return used[shrunk] if len(shrunk) else triangles
+
+
+def _simplify(
+    positions: NDArray[np.float32], triangles: NDArray[np.uint32], max_error_um: float, fewest: int
+) -> NDArray[np.uint32]:
+    source = np.ascontiguousarray(triangles).ravel()
     result = np.empty_like(source)
     count = meshoptimizer.simplify(
         result,
         source,
-        np.ascontiguousarray(mesh.positions),
-        target_index_count=0,
+        np.ascontiguousarray(positions),
+        target_index_count=3 * fewest,
         target_error=max_error_um,
         options=meshoptimizer.SIMPLIFY_LOCK_BORDER | meshoptimizer.SIMPLIFY_ERROR_ABSOLUTE,
     )
-    kept = result[:count].reshape(-1, 3)
-    body = _bodies(mesh)
-    vanished = ~np.isin(body[mesh.triangles[:, 0]], body[kept[:, 0]])
-    return compact(mesh, np.concatenate([kept, mesh.triangles[vanished]]))
+    return result[:count].reshape(-1, 3)
+
+
+def drop_doubles(triangles: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Return the triangles without collapsed and repeated ones, in the same order.
+
+    Two triangles of the same corners, wound against each other, are a sheet without thickness:
+    both go. Each edge loses one in either direction, so that a closed mesh stays closed, and a
+    border where it is. Of triangles wound alike the first stays.
+    """
+    a, b, c = np.sort(triangles, axis=1).T
+    order = np.lexsort((c, b, a))
+    a, b, c = a[order], b[order], c[order]
+    new = np.ones(len(order), bool)
+    new[1:] = (a[1:] != a[:-1]) | (b[1:] != b[:-1]) | (c[1:] != c[:-1])
+    collapsed = (a == b) | (b == c)
+    if new.all() and not collapsed.any():
+        return triangles
+    first, middle, last = triangles[order].T
+    rising = (first < middle).astype(int) + (middle < last) + (last < first)
+    winding = np.where(rising == 2, 1, -1)  # a cyclic turn of (a, b, c), or of (c, b, a)
+    group = np.cumsum(new) - 1
+    balance = np.bincount(group, winding)[group]
+    stays = (winding * balance > 0) & ~collapsed
+    # the first of its group that is wound as most are
+    _, firsts = np.unique(group[stays], return_index=True)
+    return triangles[np.sort(order[stays][firsts])]
 
 
 def _bodies(mesh: Mesh) -> NDArray[np.int32]:

@@ -3,11 +3,19 @@
 ASCII letters and digits stay; each other character becomes `_x<hex>_`, as do a leading digit and
 an underscore that stands before an `x` (so that no name can imitate an escape). `Hoechst 33342`
 becomes `Hoechst_x20_33342`, `CD3e` with a Greek epsilon `CD3_x3b5_`, `1st` becomes `_x31_st`.
+
+File names are limited to 255 bytes. Where the identifier would be longer than `MAX_LENGTH`, its end
+gives way to a digest of the whole name, as `_xh<hex>_`, which no other name can imitate.
 """
 
+import hashlib
 import re
+from bisect import bisect_right
+from itertools import accumulate
 
-_ESCAPE = re.compile(r"_x([0-9a-f]+)_")
+MAX_LENGTH = 180  # leaves room for tile ids, keys and suffixes round it in a file's name
+
+_ESCAPE = re.compile(r"_x([0-9a-f]+)_|_xh[0-9a-f]{20}_$")
 _KEPT = re.compile(r"[A-Za-z0-9]|_(?!x)")
 
 
@@ -19,9 +27,15 @@ def to_identifier(name: str) -> str:
         bool(_KEPT.match(name, i)) and not (i == 0 and char.isdigit())
         for i, char in enumerate(name)
     ]
-    return "".join(c if keep else f"_x{ord(c):x}_" for c, keep in zip(name, kept, strict=True))
+    parts = [c if keep else f"_x{ord(c):x}_" for c, keep in zip(name, kept, strict=True)]
+    ends = list(accumulate(len(part) for part in parts))
+    if ends[-1] <= MAX_LENGTH:
+        return "".join(parts)
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:20]
+    shortened = f"_xh{digest}_"
+    return "".join(parts[: bisect_right(ends, MAX_LENGTH - len(shortened))]) + shortened
 
 
 def from_identifier(identifier: str) -> str:
-    """Return the name that `to_identifier` was given."""
-    return _ESCAPE.sub(lambda match: chr(int(match[1], 16)), identifier)
+    """Return the name that `to_identifier` was given; one cut short ends in `\u2026`."""
+    return _ESCAPE.sub(lambda match: chr(int(match[1], 16)) if match[1] else "\u2026", identifier)

@@ -4,22 +4,25 @@ Everything later phases need is in it, with every `auto` resolved; plan.json is 
 (schemas/plan.schema.json).
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Protocol
-
-import numpy as np
 
 from stereocell.config import AUTO, Settings, from_dict, to_dict
 from stereocell.errors import SourceError, UsageError
 from stereocell.names import to_identifier
 from stereocell.repair import RepairOptions
 from stereocell.surface import SMOOTHING_REACH
-from stereocell.tiling import Box, Tile, cut, size_of_grid
+from stereocell.tiling import Box, Tile, cut, cut_evenly
 
 FORMAT = "stereocell-plan"
 VERSION = 1
+
+# What a unit may work on, about 30 bytes a voxel: so many voxels, or so many times its tile.
+UNIT_VOXELS = 1 << 27
+UNIT_TILES = 8
 
 # Colours for channels whose file names none (linear RGB), told apart on a dark ground; the first
 # ones are the usual blue, magenta and green of microscopy.
@@ -94,7 +97,11 @@ class Plan:
 
 
 def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings) -> tuple[int, str]:
-    """Return the level to build and why. Raises UsageError if it doesn't exist."""
+    """Return the level to build and why: the one asked for, else the finest within the limit.
+
+    The region counts voxels of the level that is built; a level too small to hold it is none to
+    build. Raises UsageError if there is no such level.
+    """
     wanted = settings.plan.level
     if wanted != AUTO:
         if not isinstance(wanted, int) or not 0 <= wanted < len(levels):
@@ -102,15 +109,24 @@ def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings)
                 f"--level is {wanted}, expected 0 to {len(levels) - 1} (the source's levels)"
             )
         return wanted, "asked for"
-    limit = settings.plan.max_voxels
-    voxels = [channels * int(np.prod(level.shape, dtype=np.int64)) for level in levels]
-    for index, count in enumerate(voxels):
-        if count <= limit:
+    region, limit = settings.plan.region, settings.plan.max_voxels
+    for index, level in enumerate(levels):
+        whole = Box((0, 0, 0), level.shape)
+        try:
+            box = parse_region(region, whole)
+        except UsageError:
+            if index == 0:
+                raise
+            break
+        voxels = channels * math.prod(box.shape)
+        if voxels <= limit:
             what = "the finest" if index == 0 else "the finest within the limit"
-            return index, f"{what}: {count:,} of at most {limit:,} voxels (plan.max_voxels)"
+            return index, f"{what}: {voxels:,} of at most {limit:,} voxels (plan.max_voxels)"
+    what = f"--region {region}" if region else "the coarsest level"
+    remedy = "a smaller --region" if region else "a --level"
     raise UsageError(
-        f"the coarsest level holds {voxels[-1]:,} voxels, more than plan.max_voxels = {limit:,}: "
-        "name a --level, or fewer --channels"
+        f"{what} holds {voxels:,} voxels, more than plan.max_voxels = {limit:,}: "
+        f"name {remedy}, or fewer --channels"
     )
 
 
@@ -135,22 +151,13 @@ def make_plan(
         raise SourceError(
             f"{source}: {_by(region.shape)} voxels (z, y, x) to build, expected at least 2 each way"
         )
-    tile_size = _tile_size(settings, region)
-    unknown = set(settings.iso_values) - {channel.name for channel in channels}
-    if unknown:
-        raise UsageError(
-            f"--iso-value names channel {min(unknown)!r}, "
-            f"expected one of {', '.join(channel.name for channel in channels)}"
-        )
+    tile_size, tiles = _tiles(settings, region)
     settings = replace(
         settings,
         surface=settings.surface.resolved(chosen.spacing_um),
-        plan=replace(settings.plan, level=level[0], tile_size=tile_size, grid=""),
+        plan=replace(settings.plan, level=level[0], tile_size=tile_size),
+        iso_values=_by_name(settings.iso_values, channels),
     )
-    reach = _repair_options(settings).reach_um(chosen.spacing_um)
-    reach += SMOOTHING_REACH * float(settings.surface.smoothing_um)
-    # two more: one voxel for the gradient, one because the tile's last plane is its neighbour's
-    z, y, x = (int(np.ceil(reach / step)) + 2 for step in chosen.spacing_um)
     return Plan(
         source=source,
         name=name,
@@ -160,8 +167,8 @@ def make_plan(
         spacing_um=chosen.spacing_um,
         origin_um=origin_um,
         region=region,
-        halo=(z, y, x),
-        tiles=cut(region, tile_size),
+        halo=_halo(settings, chosen.spacing_um, region),
+        tiles=tiles,
         channels=tuple(channels),
         settings=settings,
     )
@@ -184,26 +191,86 @@ def parse_region(text: str, whole: Box) -> Box:
     return box
 
 
-def _tile_size(settings: Settings, region: Box) -> tuple[int, int, int]:
+def _tiles(settings: Settings, region: Box) -> tuple[tuple[int, int, int], tuple[Tile, ...]]:
+    """Return the tiles and their size, that of the largest where a grid is asked for."""
     options = settings.plan
     if options.grid:
-        match = re.fullmatch(r"(\d+)x(\d+)", options.grid)
-        if not match or "0" in match.groups():
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", options.grid)
+        if not match:
             raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
         columns, rows = int(match[1]), int(match[2])
-        _, height, width = region.shape
+        depth, height, width = region.shape
         if height < 2 * rows or width < 2 * columns:
             raise UsageError(
                 f"--grid {options.grid} makes more tiles than {_by((height, width))} voxels (y, x) "
                 "can fill, expected at least 2 voxels a tile each way"
             )
-        return size_of_grid(region, columns, rows)
+        size = (depth, -(-height // rows), -(-width // columns))
+        return size, cut_evenly(region, columns, rows)
     if len(options.tile_size) != 3 or min(options.tile_size) < 2:
         raise UsageError(
             f"--tile-size is {list(options.tile_size)}, expected three numbers z,y,x of at least 2"
         )
     z, y, x = (min(a, b) for a, b in zip(options.tile_size, region.shape, strict=True))
-    return z, y, x
+    return (z, y, x), cut(region, (z, y, x))
+
+
+def _halo(
+    settings: Settings,
+    spacing_um: tuple[float, float, float],
+    region: Box,
+) -> tuple[int, int, int]:
+    """Return the voxels (z, y, x) that a unit reads around its tile, at most the region's.
+
+    Raises UsageError where that, and what closing and smoothing add at the ends of what is read,
+    is out of proportion to the tile: such lengths are meant for other voxels.
+    """
+    surface = settings.surface
+    smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
+    reach = _repair_options(settings).reach_um(spacing_um) + smoothing
+    padding = max(float(surface.alpha_um), smoothing)
+    tile_size = settings.plan.tile_size
+    limit = max(UNIT_VOXELS, UNIT_TILES * math.prod(tile_size))
+    z, y, x = (
+        min(size + 2 * (reach / step + 3), n) + 2 * padding / step
+        for size, n, step in zip(tile_size, region.shape, spacing_um, strict=True)
+    )
+    if z * y * x > limit:
+        found = ", ".join(
+            f"{f.name} = {getattr(surface, f.name):g} um "
+            f"({getattr(surface, f.name) / min(spacing_um):,.0f} voxels)"
+            for f in fields(surface)
+        )
+        raise UsageError(
+            f"the surface's lengths don't suit voxels of {_by(spacing_um)} um (z, y, x): {found} "
+            f"make a unit work on {z * y * x:.3g} voxels for a tile of "
+            f"{_by(tile_size)}, expected at most {limit:,}: "
+            "choose another --preset, smaller lengths or larger tiles"
+        )
+    # two more: one voxel for the gradient, one because the tile's last plane is its neighbour's
+    lengths = zip(region.shape, spacing_um, strict=True)
+    depth, height, width = (math.ceil(min(reach / step, n)) + 2 for n, step in lengths)
+    return depth, height, width
+
+
+def _by_name(iso_values: Mapping[str, float], channels: Sequence[Channel]) -> dict[str, float]:
+    """Return iso-values by the channels' names; an index stands for a channel without that name."""
+    by_index = {str(channel.index): channel.name for channel in channels}
+    names = {channel.name for channel in channels}
+    found: dict[str, float] = {}
+    for key, value in iso_values.items():
+        name = key if key in names else by_index.get(key)
+        if name is None:
+            raise UsageError(
+                f"--iso-value names channel {key!r}, expected one of "
+                f"{', '.join(c.name for c in channels)}, or an index of {', '.join(by_index)}"
+            )
+        if name in found:
+            raise UsageError(
+                f"--iso-value names channel {name!r} by name and by index, expected one"
+            )
+        found[name] = value
+    return found
 
 
 def _repair_options(settings: Settings) -> RepairOptions:
@@ -213,8 +280,8 @@ def _repair_options(settings: Settings) -> RepairOptions:
     )
 
 
-def _by(numbers: Sequence[int]) -> str:
-    return " x ".join(str(n) for n in numbers)
+def _by(numbers: Sequence[float]) -> str:
+    return " x ".join(f"{n:.15g}" for n in numbers)
 
 
 def to_json(plan: Plan) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from stereocell import read
-from stereocell.errors import UsageError
 from stereocell.plan import Plan
 
 
@@ -22,10 +21,6 @@ def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
     if not ref.spacing_um:
         return read.open(ref.source, time=ref.time)
-    if len(ref.spacing_um) != 3:
-        raise UsageError(
-            f"--spacing-um is {list(ref.spacing_um)}, expected three numbers z,y,x in um"
-        )
     z, y, x = ref.spacing_um
     return read.open(ref.source, time=ref.time, spacing_um=(z, y, x))
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from stereocell.mesh import Lod
 from stereocell.names import to_identifier
 
+APRON = 1  # voxels around the lattice's on every side of a volume: what trilinear filtering reads
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 
 
@@ -46,7 +47,7 @@ class ChannelContent:
     """One (tile, channel): what a unit of work leaves.
 
     lods    finest first; empty: no surface
-    volume  uint8 (z, y, x), window applied, with an apron of 1 voxel on every side
+    volume  uint8 (z, y, x), window applied, with an apron of APRON voxels on every side
     """
 
     channel_id: str

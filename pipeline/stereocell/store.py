@@ -1,58 +1,25 @@
-"""OUT: where everything lies, and how results are written and found again.
+"""OUT: where everything lies, and how it is found again.
 
 Results are named by a hash of all that they depend on (input, settings of the step, its code), are
 written under a temporary name and renamed: a killed run resumes, a finished one is a no-op.
 """
 
-import hashlib
-import json
 import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import Any
-from zipfile import BadZipFile
 
-import jsonschema
-import numpy as np
-
-from stereocell.assets import find_asset
+from stereocell import plan as plan_module
+from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
-from stereocell.mesh import Lod, Mesh
+from stereocell.lineage import key_of
 from stereocell.plan import Plan, from_json, to_json
-from stereocell.unit import Unit
-from stereocell.write.atomic import replacing_folder, write_bytes
+from stereocell.write.atomic import write_bytes
 
-
-def key_of(content: Any, *modules: ModuleType) -> str:
-    """Return the name of a result: a hash of what it depends on and of the code that makes it.
-
-    A package counts with all the modules that lie in its folder.
-    """
-    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
-    for module in modules:
-        assert module.__file__ is not None
-        file = Path(module.__file__)
-        files = sorted(file.parent.glob("*.py")) if file.name == "__init__.py" else [file]
-        for part in files:
-            digest.update(part.read_bytes())
-    return digest.hexdigest()[:20]
-
-
-def write_json(path: Path, content: Any) -> None:
-    """Put `content` at `path` as JSON, whole or not at all."""
-    write_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
-
-
-def read_json(path: Path, remedy: str) -> Any:
-    """Return the JSON at `path`. Raises OutputError that names the remedy if it isn't there."""
-    try:
-        return json.loads(path.read_text())
-    except FileNotFoundError:
-        raise OutputError(f"{path} is missing: {remedy}") from None
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{path}: not readable as JSON ({error}): {remedy}") from None
+_PLAN = "plan.schema.json"
+_PHASES = "units.schema.json#Phases"
+_RUN_UNITS = "run `stereocell units OUT` first"
 
 
 class Store:
@@ -83,33 +50,35 @@ class Store:
                 f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
             ) from None
 
+    # --- the plan
+
     def save_plan(self, plan: Plan) -> bool:
         """Write plan.json; return whether it changed.
 
         Raises OutputError if OUT holds a build of another input.
         """
-        if self.plan_file.exists():
-            there = self.plan()
-            if there.fingerprint != plan.fingerprint:
-                raise OutputError(
-                    f"{self.out} holds a build of {there.name!r} (fingerprint "
-                    f"{there.fingerprint[:12]}), not of {plan.name!r} ({plan.fingerprint[:12]}): "
-                    "choose another OUT or remove that folder"
-                )
-            if there == plan:
-                return False
-        content = to_json(plan)
-        _validate(content, self.plan_file)
-        write_json(self.plan_file, content)
+        there = self.plan() if self.plan_file.exists() else None
+        if there == plan:
+            return False
+        if there is not None and there.fingerprint != plan.fingerprint:
+            raise OutputError(
+                f"{self.out} holds a build of {_what_differs(there, plan)}: "
+                "choose another OUT or remove that folder"
+            )
+        write_json(self.plan_file, to_json(plan))
         return True
 
     def plan(self) -> Plan:
         """Return the plan. Raises OutputError if there is none or it breaks its schema."""
-        content = read_json(self.plan_file, "run `stereocell plan INPUT -o OUT` first")
-        _validate(content, self.plan_file)
-        return from_json(content)
+        remedy = "run `stereocell plan INPUT -o OUT` first"
+        if self.plan_file.exists():
+            remedy = f"remove it and {remedy}"
+        return from_json(read_json(self.plan_file, _PLAN, remedy))
 
     # --- results of the units' two rounds
+
+    def display_file(self, channel_id: str, key: str) -> Path:
+        return self.out / "units" / f"window-{channel_id}-{key}.json"
 
     def iso_file(self, tile_id: str, channel_id: str, key: str) -> Path:
         return self.out / "units" / tile_id / channel_id / f"iso-{key}.json"
@@ -118,34 +87,34 @@ class Store:
         return self.out / "units" / tile_id / channel_id / key
 
     def survey(self) -> dict[str, Any]:
-        content = read_json(self.survey_file, "run `stereocell units OUT` first")
-        return dict(content)
+        """Return each channel's display, iso-values by tile, and look, by channel id."""
+        return dict(read_json(self.survey_file, "units.schema.json#Survey", _RUN_UNITS))
 
     def index(self) -> dict[str, str]:
         """Return the key of each finished unit, by `<tile>/<channel>`."""
-        content = read_json(self.index_file, "run `stereocell units OUT` first")
-        return dict(content)
+        return dict(read_json(self.index_file, "units.schema.json#Index", _RUN_UNITS))
 
-    def sign_units(self, plan: Plan) -> None:
-        """Keep which plan the units were built for."""
-        self.write_text(self.units_plan_file, key_of(to_json(plan)))
+    def save_units(self, plan: Plan, keys: Mapping[str, str]) -> None:
+        """Keep the units' keys, and which plan they were built for."""
+        write_json(self.index_file, dict(keys))
+        write_bytes(self.units_plan_file, _key(plan).encode())
 
     def require_units_of(self, plan: Plan) -> None:
-        """Raise OutputError if the units are of another plan, or of none."""
-        there = self.units_plan_file.read_text() if self.units_plan_file.is_file() else ""
-        if there != key_of(to_json(plan)):
+        """Raise OutputError unless all units of the plan are known to be there."""
+        signed = self.units_plan_file
+        if not signed.is_file() or signed.read_bytes() != _key(plan).encode():
             raise OutputError(
                 f"{self.out / 'units'}: not built for the plan in {self.plan_file.name}: "
-                "run `stereocell units OUT` first"
+                f"{_RUN_UNITS}"
             )
-
-    def record(self, tile_id: str, channel_id: str, key: str) -> dict[str, Any]:
-        """Return a unit's record: triangles, distances, seconds, reason."""
-        path = self.unit_dir(tile_id, channel_id, key) / "unit.json"
-        return dict(read_json(path, "run `stereocell units OUT` again"))
-
-    def write_text(self, path: Path, text: str) -> None:
-        write_bytes(path, text.encode())
+        survey, index = self.survey(), self.index()
+        for tile in plan.tiles:
+            for channel in plan.channels:
+                name = f"{tile.id}/{channel.id}"
+                if tile.id not in survey.get(channel.id, {"iso": {}})["iso"]:
+                    raise OutputError(f"{self.survey_file}: {name} is not in it: {_RUN_UNITS}")
+                if name not in index:
+                    raise OutputError(f"{self.index_file}: {name} is not in it: {_RUN_UNITS}")
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
         """Remove the folders in `parent` that an earlier plan left."""
@@ -153,112 +122,36 @@ class Store:
             if folder.is_dir() and folder.name not in keep:
                 shutil.rmtree(folder)
 
+    # --- the phases
+
     def phases(self) -> dict[str, dict[str, Any]]:
-        """Return what is known of each phase: `key` of what it was made from, `seconds`."""
-        try:
-            return dict(json.loads(self.phases_file.read_text()))
-        except (FileNotFoundError, ValueError):  # none yet, or damaged: nothing counts as done
-            return {}
+        """Return what is known of each phase; damaged, nothing counts as done."""
+        return dict(find_json(self.phases_file, _PHASES) or {})
 
-    def times(self) -> dict[str, float]:
-        """Return the seconds of each finished phase."""
-        return {name: entry["seconds"] for name, entry in self.phases().items() if entry["key"]}
-
-    def phase(self, name: str) -> dict[str, Any]:
-        return self.phases().get(name, {})
-
-    def save_phase(self, name: str, key: str, seconds: float) -> None:
-        entry = {"key": key, "seconds": round(seconds, 2)}
+    def save_phase(self, name: str, key: str, results: str, seconds: float, about: str) -> None:
+        """Keep what a phase was made from and left; an empty key: it isn't finished."""
+        entry = {"key": key, "results": results, "seconds": round(seconds, 2), "about": about}
         write_json(self.phases_file, {**self.phases(), name: entry})
 
 
-def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
-    """Write a unit as a folder under its final name, and return its record."""
-    lods = [
-        {
-            "triangles": len(lod.mesh.triangles),
-            "vertices": len(lod.mesh.positions),
-            "distance_um": lod.distance_um,
-            "normal_map": 0 if lod.normal_map is None else len(lod.normal_map),
-        }
-        for lod in unit.lods
-    ]
-    record = {
-        "reason": unit.reason,
-        "lods": lods,
-        "volume": list(unit.volume.shape),
-        "fragments_dropped": unit.fragments_dropped,
-        "cavities_filled": unit.cavities_filled,
-        "seconds": {step: round(s, 3) for step, s in unit.seconds.items()},
-    }
-    with replacing_folder(directory) as folder:
-        np.save(folder / "volume.npy", unit.volume)
-        for level, lod in enumerate(unit.lods):
-            np.savez(lod_file(folder, level), **_arrays(lod))
-        write_json(folder / "unit.json", record)
-    return record
+def _key(plan: Plan) -> str:
+    return key_of(to_json(plan), plan_module)
 
 
-def is_whole(directory: Path) -> bool:
-    """Return whether a unit's folder holds all that its record names."""
-    try:
-        record = json.loads((directory / "unit.json").read_text())
-        files = [directory / "volume.npy"]
-        files += [lod_file(directory, level) for level in range(len(record["lods"]))]
-    except (OSError, ValueError, LookupError):
-        return False
-    return all(file.is_file() for file in files)
-
-
-def lod_file(directory: Path, level: int) -> Path:
-    """Return where `save_unit` puts one level of detail."""
-    return directory / f"lod{level}.npz"
-
-
-def load_lods(directory: Path) -> tuple[Lod, ...]:
-    """Return the levels of detail that `save_unit` wrote.
-
-    Raises OutputError for a damaged file, naming the folder to remove.
-    """
-    try:
-        record = json.loads((directory / "unit.json").read_text())
-        return tuple(_load_lod(directory, k, lod) for k, lod in enumerate(record["lods"]))
-    except (OSError, ValueError, LookupError, BadZipFile) as error:
-        raise OutputError(
-            f"{directory}: damaged ({error}): remove it and run `stereocell units OUT`"
-        ) from error
-
-
-def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
-    # opened here: numpy leaves a damaged file open
-    with lod_file(directory, level).open("rb") as file, np.load(file) as arrays:
-        mesh = Mesh(
-            arrays["positions"],
-            arrays["triangles"],
-            arrays["normals"],
-            arrays.get("uvs"),
-            arrays.get("tangents"),
-        )
-        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"))
-
-
-def _arrays(lod: Lod) -> dict[str, Any]:
-    arrays = {
-        "positions": lod.mesh.positions,
-        "triangles": lod.mesh.triangles,
-        "normals": lod.mesh.normals,
-        "uvs": lod.mesh.uvs,
-        "tangents": lod.mesh.tangents,
-        "normal_map": lod.normal_map,
-    }
-    return {name: array for name, array in arrays.items() if array is not None}
-
-
-def _validate(content: Mapping[str, Any], path: Path) -> None:
-    schema = json.loads(find_asset("schemas/plan.schema.json").read_text())
-    error = jsonschema.exceptions.best_match(
-        jsonschema.Draft202012Validator(schema).iter_errors(content)
+def _what_differs(there: Plan, plan: Plan) -> str:
+    """Return what OUT holds, not what was asked for: what tells the two inputs apart."""
+    old, new = there.settings.plan, plan.settings.plan
+    if there.source == plan.source and old.time != new.time:
+        return f"{there.name!r} with --time {old.time}, not {new.time}"
+    if there.source == plan.source and old.spacing_um != new.spacing_um:
+        return f"{there.name!r} with {_spacing(old.spacing_um)}, not {_spacing(new.spacing_um)}"
+    return (
+        f"{there.name!r} (fingerprint {there.fingerprint[:12]}), "
+        f"not of {plan.name!r} ({plan.fingerprint[:12]})"
     )
-    if error is not None:
-        field = ".".join(str(part) for part in error.absolute_path) or "the file"
-        raise OutputError(f"{path}: {field}: {error.message}")
+
+
+def _spacing(spacing_um: tuple[float, ...]) -> str:
+    if not spacing_um:
+        return "the file's own voxel spacing"
+    return "--spacing-um " + ",".join(f"{length:g}" for length in spacing_um)

@@ -34,6 +34,30 @@ def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
     return field
 
 
+def gradient_magnitude(
+    field: NDArray[np.float32], spacing_um: tuple[float, float, float]
+) -> NDArray[np.float32]:
+    """Return |grad f| per um (central differences, one-sided at the ends), float32 (z, y, x).
+
+    A voxel's result depends on nothing but its neighbours, bit by bit: fields whose squares leave
+    float32 are scaled by a power of two, which changes no digit. In these a slope below 1e-18 of
+    the field's largest value is lost, and a slope itself has to fit into float32.
+    """
+    peak = max(abs(float(field.max())), abs(float(field.min())))
+    usual = peak == 0 or 1e-9 < peak < 1e12
+    exponent = 0 if usual else int(np.clip(-np.frexp(peak)[1], -126, 126))
+    scale = np.float32(2.0**exponent)
+    if not usual:
+        field = field * scale
+    squares = np.zeros_like(field)
+    for axis, step in enumerate(spacing_um):
+        if field.shape[axis] > 1:
+            slope = np.gradient(field, np.float32(step), axis=axis)
+            squares += np.square(slope, out=slope)
+    magnitude = np.sqrt(squares, out=squares)
+    return magnitude if usual else np.divide(magnitude, scale, out=magnitude)
+
+
 def signed_distance(
     field: NDArray[np.float32],
     iso_value: NDArray[np.float32],
@@ -46,10 +70,7 @@ def signed_distance(
     of the coarsest spacings, beyond which it means nothing. `iso_value` broadcasts over the field;
     `value_range` (dataset-wide, voxel values) bounds the division where the field is flat.
     """
-    squares = np.zeros_like(field)
-    for axis, step in enumerate(spacing_um):
-        squares += np.gradient(field, np.float32(step), axis=axis) ** 2
-    slope = np.sqrt(squares, out=squares)
+    slope = gradient_magnitude(field, spacing_um)
     slope += np.float32(1e-6 * value_range)
     distance = np.subtract(field, iso_value, dtype=np.float32)
     distance /= slope

@@ -5,7 +5,7 @@ level. Iso-values are found per tile; transfer functions need their mean.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,6 @@ def make_look(
     known = {tile: value for tile, value in iso_values.items() if value is not None}
     iso_value = float(np.mean(list(known.values()))) if known else None
     confidence = float(np.mean([confidences[tile] for tile in known])) if known else 0.0
-    low, high = display.window
-    normalized = None if iso_value is None else (iso_value - low) / (high - low)
-    functions = make_transfer_functions(np.asarray(display.histogram), normalized)
-    return Look(name, color, display.window, iso_value, confidence, functions)
+    look = Look(name, color, display.window, iso_value, confidence, {})
+    functions = make_transfer_functions(np.asarray(display.histogram), look.iso_normalized)
+    return replace(look, transfer_functions=functions)

@@ -5,8 +5,9 @@ inclusive where another tile follows, so that each cell belongs to exactly one t
 meet without cracks and without clipping.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +62,27 @@ def cut(region: Box, tile_size: tuple[int, int, int]) -> tuple[Tile, ...]:
         edges = list(range(low, high, size))
         if len(edges) > 1 and high - edges[-1] < 2:
             edges.pop()
-        axes.append(list(zip(edges, [*edges[1:], high], strict=True)))
-    deep = len(axes[0]) > 1
+        axes.append([*edges, high])
+    return _between(axes)
+
+
+def cut_evenly(region: Box, columns: int, rows: int) -> tuple[Tile, ...]:
+    """Return columns x rows tiles, row by row; their sizes differ by one voxel at most.
+
+    The region needs at least two voxels a tile each way.
+    """
+    axes = [
+        [low + i * (high - low) // count for i in range(count + 1)]
+        for low, high, count in zip(region.start, region.stop, (1, rows, columns), strict=True)
+    ]
+    return _between(axes)
+
+
+def _between(edges: Sequence[Sequence[int]]) -> tuple[Tile, ...]:
+    """Return the tiles between the edges of each axis (z, y, x)."""
+    depths, rows, columns = (list(enumerate(pairwise(axis))) for axis in edges)
     tiles = []
-    for (r, ys), (c, xs), (k, zs) in product(*(list(enumerate(axes[i])) for i in (1, 2, 0))):
+    for (r, ys), (c, xs), (k, zs) in product(rows, columns, depths):
         box = Box((zs[0], ys[0], xs[0]), (zs[1], ys[1], xs[1]))
-        tiles.append(Tile(f"r{r}_c{c}" + (f"_z{k}" if deep else ""), box))
+        tiles.append(Tile(f"r{r}_c{c}" + (f"_z{k}" if len(depths) > 1 else ""), box))
     return tuple(tiles)
-
-
-def size_of_grid(region: Box, columns: int, rows: int) -> tuple[int, int, int]:
-    """Return the tile size that cuts `region` into columns x rows (ceiling division)."""
-    depth, height, width = region.shape
-    return depth, -(-height // rows), -(-width // columns)

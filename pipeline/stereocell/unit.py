@@ -14,12 +14,11 @@ from stereocell.isofield import IsoField
 from stereocell.lod import Nearest, measure_distance, simplify
 from stereocell.mesh import Lod, Mesh
 from stereocell.repair import RepairOptions, repair
+from stereocell.specimen import APRON
 from stereocell.surface import extract_surface, signed_distance, smooth
 from stereocell.tiling import Box
 from stereocell.unwrap import bake_normals, unwrap
 from stereocell.volume import Volume
-
-APRON = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +26,7 @@ class UnitInput:
     """What a unit depends on, besides its voxels.
 
     window, lattice, region  what was read, the tile's lattice points, all that is built (voxels)
+    origin_um                where voxel (0, 0, 0) lies; the plan's, as every tile must use the same
     iso                      the iso-value field near the tile; None: no surface
     display                  voxel values that become 0 and 255
     """
@@ -34,6 +34,7 @@ class UnitInput:
     window: Box
     lattice: Box
     region: Box
+    origin_um: tuple[float, float, float]
     iso: IsoField | None
     display: tuple[float, float]
     settings: Settings
@@ -43,7 +44,7 @@ class UnitInput:
 class Unit:
     """What a unit leaves.
 
-    volume   uint8 (z, y, x): the lattice's voxels, window applied, 1 voxel of apron on every side
+    volume   uint8 (z, y, x): the lattice's voxels, window applied, APRON voxels more on every side
     reason   why there is no surface; empty if there is one
     seconds  by step
     """
@@ -57,7 +58,7 @@ class Unit:
 
 
 def build_unit(volume: Volume, given: UnitInput) -> Unit:
-    """Return meshes and volume of one unit. `volume` covers `given.window`; origin of voxel 0 0 0.
+    """Return meshes and volume of one unit. `volume` covers `given.window`.
 
     A unit whose part of the field never crosses the iso-value has no surface, and says so.
     """
@@ -77,10 +78,8 @@ def build_unit(volume: Volume, given: UnitInput) -> Unit:
         lengths = (surface.alpha_um, surface.min_diagonal_um, surface.max_cavity_um)
         repaired = repair(distance, spacing, RepairOptions(*(float(um) for um in lengths)))
     with clock("extract"):
-        origin = np.asarray(volume.origin_um) - np.asarray(given.window.start) * spacing
-        z, y, x = (float(o) for o in origin)
         fine = extract_surface(
-            repaired.distance, given.window, given.lattice, given.region, spacing, (z, y, x)
+            repaired.distance, given.window, given.lattice, given.region, spacing, given.origin_um
         )
     counts = repaired.fragments_dropped, repaired.cavities_filled
     if not len(fine.triangles):

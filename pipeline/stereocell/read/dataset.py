@@ -11,7 +11,7 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from stereocell.errors import SourceError
+from stereocell.errors import SourceError, UsageError
 from stereocell.read.faults import one_line
 from stereocell.read.fingerprint import fingerprint_of
 from stereocell.read.spacing import Level
@@ -23,10 +23,14 @@ __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
-    """One channel. `color` is linear RGB, 0..1, or None where the source states none."""
+    """One channel. `color` is linear RGB, 0..1, or None where the source states none.
+
+    is_named  False: the source names it not, and the name is made up (`Channel0`)
+    """
 
     name: str
     color: tuple[float, float, float] | None
+    is_named: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,6 @@ class Dataset:
     dtype        uint8, uint16 or float32
     levels       finest first
     channels     in the source's order
-    has_channel_names  False: at least one name is made up (`Channel0`)
     time_points  how many the source holds; `time` is the one that is read
     images       how many the source holds; the first is the one that is read
     """
@@ -87,7 +90,6 @@ class Dataset:
     dtype: np.dtype[Any]
     levels: tuple[Level, ...]
     channels: tuple[ChannelInfo, ...]
-    has_channel_names: bool
     time_points: int
     time: int
     images: int
@@ -98,6 +100,16 @@ class Dataset:
     def __post_init__(self) -> None:
         if self.on_close is not None:
             weakref.finalize(self, self.on_close)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the source is left out, a sentence each, for the user."""
+        notes = []
+        if self.images > 1:
+            notes.append(f"{self.images} images in the source; building the first alone")
+        if self.time_points > 1:
+            notes.append(f"{self.time_points} points in time; building --time {self.time}")
+        return tuple(notes)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -141,30 +153,31 @@ class Dataset:
     def find_channels(self, selection: Sequence[str]) -> tuple[int, ...]:
         """Return the indices of channels given by name or index, in that order, each once.
 
-        A name goes before an index. Raises SourceError for what isn't there, with the names.
+        A name goes before an index; a name that is made up is none. Raises UsageError for what
+        isn't there, with what is.
         """
-        names = [channel.name for channel in self.channels]
+        indices = {c.name: index for index, c in enumerate(self.channels) if c.is_named}
         found = []
         for wanted in selection:
-            if wanted in names and self.has_channel_names:
-                found.append(names.index(wanted))
-            elif wanted.isdecimal() and int(wanted) < len(names):
+            if wanted in indices:
+                found.append(indices[wanted])
+            elif wanted.isdecimal() and int(wanted) < len(self.channels):
                 found.append(int(wanted))
             else:
-                raise SourceError(f"{self.shown}: channel {wanted!r}: {self._remedy(wanted)}")
+                raise UsageError(f"{self.shown}: channel {wanted!r}: {self._remedy(wanted)}")
         return tuple(dict.fromkeys(found))
 
     def _remedy(self, wanted: str) -> str:
-        names = [channel.name for channel in self.channels]
-        last = len(names) - 1
+        names = [channel.name for channel in self.channels if channel.is_named]
+        range_ = f"an index from 0 to {len(self.channels) - 1}"
         if wanted.isdecimal():
-            return f"not found, expected an index from 0 to {last}"
-        if not self.has_channel_names:
-            return f"the source holds no channel names, expected an index from 0 to {last}"
+            return f"not found, expected {range_}"
+        if not names:
+            return f"the source holds no channel names, expected {range_}"
         lower = {name.lower(): name for name in reversed(names)}
         near = difflib.get_close_matches(wanted.lower(), list(lower), n=1, cutoff=0.5)
         hint = f" (did you mean {lower[near[0]]!r}?)" if near else ""
-        return f"not found{hint}, expected one of {', '.join(names)} or an index"
+        return f"not found{hint}, expected one of {', '.join(names)} or {range_}"
 
 
 def _range(box: Box) -> str:

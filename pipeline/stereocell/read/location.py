@@ -1,6 +1,7 @@
 """Where a source lies: a local path or an address that fsspec opens."""
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,9 @@ from urllib.parse import unquote, urlsplit
 
 import fsspec
 
+from stereocell.errors import UsageError
+
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
 _TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
@@ -35,7 +39,7 @@ class Location:
     def of(cls, source: str | Path) -> "Location":
         """Return the location of a path or of an address such as `https://...` or `s3://...`."""
         text = str(source)
-        if "://" not in text:
+        if not _ADDRESS.match(text):
             return cls(os.path.abspath(os.path.expanduser(text)), True)
         parts = urlsplit(text)
         if parts.scheme == "file":
@@ -96,6 +100,20 @@ class Location:
             os.path.exists(os.path.expanduser(file)) for file in files
         )
         return {"anon": not signed}
+
+
+def require_apart(source: str | Path, out: Path) -> None:
+    """Raise UsageError if OUT is a local source, or lies inside one (or inside its .zarr)."""
+    location = Location.of(source)
+    if not location.is_local:
+        return
+    path = Path(location.source)
+    outermost = next((p for p in [*reversed(path.parents), path] if p.suffix == ".zarr"), path)
+    if out.resolve().is_relative_to(outermost.resolve()):
+        raise UsageError(
+            f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
+            "it would write into the data"
+        )
 
 
 def _stem(name: str) -> str:

@@ -1,12 +1,12 @@
 """Open a source: find its format, read its metadata, check that it is a volume we can build."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from stereocell.errors import SourceError
+from stereocell.errors import SourceError, UsageError
 from stereocell.read.dataset import ChannelInfo, Dataset
 from stereocell.read.image import Image
 from stereocell.read.location import Location
@@ -37,7 +37,8 @@ def open(source: str | Path, *, time: int = 0, spacing_um: Triple | None = None)
     `source` is a local path or an address (`http://`, `https://`, `s3://`, or another one that
     fsspec knows). `time` is the time point, from 0. `spacing_um` (z, y, x) replaces the voxel
     spacing that the source states. Raises SourceError for a source that can't be read as a volume
-    (one line: what, where, what was expected), UsageError for a spacing that is no length.
+    (one line: what, where, what was expected), UsageError for a time point that it doesn't hold
+    or a spacing that is no length.
     """
     location = Location.of(source)
     if location.is_local and not Path(location.source).exists():
@@ -61,19 +62,18 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     finest = image.arrays[0]
     _check_arrays(where, image)
     if not 0 <= time < finest.size("t"):
-        raise SourceError(
-            f"{where}: time: found {time}, expected 0 to {finest.size('t') - 1} "
+        raise UsageError(
+            f"{where}: --time: found {time}, expected 0 to {finest.size('t') - 1} "
             f"(the source holds {finest.size('t')} time points)"
         )
-    names = _unique(image.names)
-    channels = map(ChannelInfo, names, image.colors)
+    given = [_shown(name or "") for name in image.names]
+    channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
         source=location.source,
         name=location.name,
         dtype=np.dtype(finest.array.dtype).newbyteorder("="),
         levels=levels_of(image.grids, spacing_um, where),
         channels=tuple(channels),
-        has_channel_names=all(name for name in image.names),
         time_points=finest.size("t"),
         time=time,
         images=image.images,
@@ -115,11 +115,24 @@ def _check_arrays(where: str, image: Image) -> None:
         )
 
 
-def _unique(names: tuple[str | None, ...]) -> list[str]:
+def _shown(name: str) -> str:
+    """Return a name without the characters that nothing shows (controls, NUL, line ends)."""
+    if name.isprintable():
+        return name
+    return " ".join("".join(c if c.isprintable() else " " for c in name).split())
+
+
+def _unique(names: Sequence[str]) -> list[str]:
     """Fill in missing names, and tell equal ones apart (a marker imaged in every cycle)."""
-    filled = [name or f"Channel{index}" for index, name in enumerate(names)]
-    count = Counter(filled)
-    return [
-        f"{name} (channel {index})" if count[name] > 1 else name
-        for index, name in enumerate(filled)
-    ]
+    filled = list(names)
+    for index in (i for i, name in enumerate(names) if not name):
+        filled[index] = f"Channel{index}"
+        while filled[index] in names:
+            filled[index] += "_"
+    while len(set(filled)) < len(filled):
+        count = Counter(filled)
+        filled = [
+            f"{name} (channel {index})" if count[name] > 1 else name
+            for index, name in enumerate(filled)
+        ]
+    return filled

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.errors import OutputError
+from stereocell.documents import read_json
 from stereocell.plan import Channel, Plan
-from stereocell.store import Store, lod_file, read_json
+from stereocell.store import Store
 from stereocell.tiling import Tile
+from stereocell.unit_files import load_record, lod_file
 
 PHASES = ("plan", "units", "stage", "bundle")
 
@@ -85,13 +86,12 @@ class FileFacts:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """All of a build. `missing`: units that the plan names and nobody has built."""
+    """All of a build. `phases`: seconds of each, and on what where not on all."""
 
     plan: Plan
     survey: dict[str, Any]
     units: tuple[UnitFacts, ...]
-    missing: tuple[str, ...]
-    phases: dict[str, float]
+    phases: dict[str, tuple[float, str]]
     steps: tuple[StepFacts, ...]
     files: tuple[FileFacts, ...]
 
@@ -110,30 +110,31 @@ class Total:
 
 
 def gather(store: Store) -> Facts:
-    """Return the facts of OUT. Raises OutputError where plan or units are missing."""
+    """Return the facts of OUT. Raises OutputError where plan or a unit is missing."""
     plan = store.plan()
+    store.require_units_of(plan)
     content, index = store.survey(), store.index()
-    units, missing = [], []
-    for tile in plan.tiles:
-        for channel in plan.channels:
-            if tile.id not in content.get(channel.id, {}).get("iso", {}):
-                raise OutputError(
-                    f"{store.survey_file}: {tile.id}/{channel.name} of plan.json is not in it: "
-                    "run `stereocell units OUT` again"
-                )
-            key = index.get(f"{tile.id}/{channel.id}")
-            if key is None:
-                missing.append(f"{tile.id}/{channel.name}")
-            else:
-                found = content[channel.id]["iso"][tile.id]
-                units.append(_unit(store, tile, channel, key, found))
-    times = store.times()
+    units = [
+        _unit(
+            store,
+            tile,
+            channel,
+            index[f"{tile.id}/{channel.id}"],
+            content[channel.id]["iso"][tile.id],
+        )
+        for tile in plan.tiles
+        for channel in plan.channels
+    ]
+    phases = store.phases()
     return Facts(
         plan=plan,
         survey=content,
         units=tuple(units),
-        missing=tuple(missing),
-        phases={phase: times[phase] for phase in PHASES if phase in times},
+        phases={
+            name: (phases[name]["seconds"], phases[name]["about"])
+            for name in PHASES
+            if name in phases and phases[name]["key"]
+        },
         steps=_steps(units),
         files=_files(store),
     )
@@ -141,7 +142,7 @@ def gather(store: Store) -> Facts:
 
 def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str, Any]) -> UnitFacts:
     directory = store.unit_dir(tile.id, channel.id, key)
-    record = store.record(tile.id, channel.id, key)
+    record = load_record(directory)
     bundle = store.bundle_dir
     lods = []
     for level, lod in enumerate(record["lods"]):
@@ -171,7 +172,11 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
 
 def read_curve(out: Path, unit: UnitFacts) -> dict[str, Any]:
     """Return what the first round wrote of a unit: levels, score, found (none if constant)."""
-    return dict(read_json(out / unit.iso_file, "run `stereocell units OUT` again"))
+    return dict(
+        read_json(
+            out / unit.iso_file, "units.schema.json#IsoValue", "run `stereocell units OUT` again"
+        )
+    )
 
 
 def sum_up(units: Iterable[UnitFacts]) -> Total:

@@ -22,9 +22,10 @@ from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
 from stereocell.report.remarks import find_remarks
 from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
 from stereocell.report.slices import cut_unit, draw_slices
-from stereocell.store import Store, load_lods, lod_file
+from stereocell.specimen import APRON
+from stereocell.store import Store
 from stereocell.tiling import Box, Tile
-from stereocell.unit import APRON
+from stereocell.unit_files import load_lods, load_volume, lod_file
 from stereocell.volume import zyx_to_xyz
 from stereocell.write.atomic import write_bytes
 from stereocell.write.generator import GENERATOR
@@ -84,7 +85,7 @@ def render(store: Store, facts: Facts) -> str:
         refusal=refusal,
         whole=pictured[0] if pictured else None,
         whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES),
-        remarks=find_remarks(facts, plan.settings.iso_values),
+        remarks=find_remarks(facts),
         channels=_channels(facts),
         tiles=[
             {
@@ -142,7 +143,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: IsoField | None) -> 
     plan = facts.plan
     lattice = unit.tile.lattice(plan.region)
     inner = slice(APRON, -APRON)
-    volume = np.load(unit.directory / "volume.npy")[inner, inner, inner]
+    volume = load_volume(unit.directory)[inner, inner, inner]
     low, high = facts.survey[unit.channel.id]["look"]["window"]
     slices = cut_unit(
         volume,

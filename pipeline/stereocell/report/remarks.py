@@ -1,6 +1,6 @@
 """What a reader of the report should look at: said in words, unit by unit."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from stereocell.report.facts import Facts, UnitFacts
@@ -18,8 +18,8 @@ class Remark:
     is_note: bool = False
 
 
-def find_remarks(facts: Facts, given: Mapping[str, float]) -> list[Remark]:
-    """Return the remarks, gravest first. `given`: iso-values by the user's hand, by channel."""
+def find_remarks(facts: Facts) -> list[Remark]:
+    """Return the remarks, gravest first."""
     units = facts.units
     with_surface = {u.channel.name for u in units if not u.reason}
     empty = [u for u in units if u.channel.name not in with_surface]
@@ -38,17 +38,10 @@ def find_remarks(facts: Facts, given: Mapping[str, float]) -> list[Remark]:
         if u.iso_reason and not u.reason
     ]
     unsure = sorted(
-        (
-            u
-            for u in units
-            if u.iso_value is not None
-            and u.confidence < LOW_CONFIDENCE
-            and u.channel.name not in given
-        ),
+        (u for u in units if u.iso_value is not None and u.confidence < LOW_CONFIDENCE),
         key=lambda u: u.confidence,
     )
     found = [
-        _remark("not built yet", facts.missing),
         _remark("without a surface in any tile", whole, "channel"),
         _remark("without an iso-value of their own", own),
         _remark(

@@ -1,11 +1,11 @@
 """The sample `brain-cells`: a crop of a light-sheet stack of a mouse brain (see its README.md)."""
 
-import os
-import shutil
-from importlib.resources import as_file, files
+from contextlib import ExitStack
+from importlib.resources import files
 from pathlib import Path
 
 from stereocell.errors import OutputError, UsageError
+from stereocell.write.atomic import replacing
 
 SUFFIX = ".ome.tif"
 _FOLDER = files("stereocell.samples") / "brain-cells"
@@ -20,26 +20,19 @@ def write_brain_cells(path: Path) -> None:
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
         raise UsageError(f"{path}: the sample is an OME-TIFF, expected a name like NAME{SUFFIX}")
     licence = path.with_name(path.name.removesuffix(SUFFIX) + ".LICENSE")
-    for name, target in (("LICENSE", licence), ("brain_cells.ome.tif", path)):
-        with as_file(_FOLDER / name) as source:
-            _copy(source, target)
+    with ExitStack() as stack:
+        for name, target in (("LICENSE", licence), ("brain_cells.ome.tif", path)):
+            content = (_FOLDER / name).read_bytes()
+            if not _is_there(target, content):
+                stack.enter_context(replacing(target)).write_bytes(content)
 
 
-def _copy(source: Path, target: Path) -> None:
-    try:
-        if target.exists():
-            if target.is_file() and target.read_bytes() == source.read_bytes():
-                return
-            raise OutputError(
-                f"{target}: holds something else, expected nothing or this very sample: "
-                "remove it or choose another name"
-            )
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.name}.{os.getpid()}")
-        try:
-            shutil.copyfile(source, temporary)
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"{target}: can't be written: {error.strerror or error}") from error
+def _is_there(target: Path, content: bytes) -> bool:
+    if not target.exists():
+        return False
+    if target.is_file() and target.read_bytes() == content:
+        return True
+    raise OutputError(
+        f"{target}: holds something else, expected nothing or this very sample: "
+        "remove it or choose another name"
+    )

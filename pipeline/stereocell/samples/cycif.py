@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 import zarr
+from zarr.abc.buffer import Buffer
 from zarr.codecs import ZstdCodec
+from zarr.storage import MemoryStore
 
 from stereocell.errors import OutputError, UsageError
 from stereocell.samples import fluorescence
 from stereocell.samples.fluorescence import BLUR_UM, SPACING_UM, STAINS
 from stereocell.samples.tissue import Tissue, grow_tissue
 from stereocell.tiling import Box
-from stereocell.write.atomic import replacing_folder, write_bytes
+from stereocell.write.atomic import replacing, replacing_folder
 
 SUFFIX = ".ome.zarr"
 _CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
@@ -24,10 +26,10 @@ _COARSEST = 64  # voxels: the pyramid ends when the longer side in the plane is 
 
 def write_cycif(
     path: Path,
-    grid: tuple[int, int] = (5, 2),
-    tile_size: tuple[int, int, int] = (64, 160, 160),
-    seed: int = 0,
-    brightness_spread: float = 1.0,
+    grid: tuple[int, int],
+    tile_size: tuple[int, int, int],
+    seed: int,
+    brightness_spread: float,
 ) -> None:
     """Write the sample to `path` (NAME.ome.zarr) and its truth to NAME.truth.json beside it.
 
@@ -54,11 +56,11 @@ def write_cycif(
             return
         tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed, brightness_spread)
         truth = json.dumps(_truth(tissue, shape, settings), indent=1) + "\n"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if not is_there:
-            with replacing_folder(path) as folder:
-                _write_zarr(folder, tissue, shape, tile_size, attributes, seed)
-        write_bytes(truth_path, truth.encode())
+        with replacing(truth_path) as file:
+            file.write_text(truth, encoding="utf-8")
+            if not is_there:
+                with replacing_folder(path) as folder:
+                    _write_zarr(folder, tissue, shape, tile_size, attributes, seed)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
 
@@ -148,7 +150,12 @@ def _write_zarr(
     attributes: dict[str, Any],
     seed: int,
 ) -> None:
-    group = zarr.open_group(path, mode="w", zarr_format=3, attributes=attributes)
+    """Write the voxels, by way of memory, compressed.
+
+    zarr writes from threads of its own, which would go on beside an exception of ours.
+    """
+    files: dict[str, Buffer] = {}
+    group = zarr.open_group(MemoryStore(files), mode="w", zarr_format=3, attributes=attributes)
     shapes = _level_shapes(shape)
     arrays = [
         group.create_array(
@@ -176,6 +183,9 @@ def _write_zarr(
             arrays[0][stain, :, y : y + height, :] = row
     for finer, coarser in pairwise(arrays):
         _halve(finer, coarser)
+    for key, content in files.items():
+        (path / key).parent.mkdir(parents=True, exist_ok=True)
+        (path / key).write_bytes(content.to_bytes())
 
 
 def _halve(finer: zarr.Array[Any], coarser: zarr.Array[Any]) -> None:

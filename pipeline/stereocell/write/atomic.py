@@ -50,12 +50,26 @@ def replacing_folder(path: Path) -> Iterator[Path]:
         new.mkdir(parents=True)
         try:
             yield new
-            shutil.rmtree(old, ignore_errors=True)
-            if path.exists():  # a folder that isn't empty can't be renamed over
-                os.replace(path, old)
-            os.replace(new, path)
+            for file in new.rglob("*"):
+                if file.is_file():
+                    with file.open("rb+") as opened:
+                        os.fsync(opened.fileno())
+            _swap(new, path, old)
         finally:
             shutil.rmtree(new, ignore_errors=True)
-            shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
+
+
+def _swap(new: Path, path: Path, old: Path) -> None:
+    """Rename `new` to `path`; a folder that isn't empty can't be renamed over."""
+    if path.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        os.replace(path, old)
+    try:
+        os.replace(new, path)
+    except OSError:
+        if old.exists():
+            os.replace(old, path)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

@@ -11,17 +11,15 @@ The stage is the only source. It is written beside its place and put there as a 
 
 import json
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from stereocell.engine import Engine
 from stereocell.errors import OutputError, StageError
-from stereocell.interrupts import children_ignore_interrupts
 from stereocell.specimen import evaluate
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
@@ -37,25 +35,25 @@ FILES = "files.json"
 
 
 def write_bundle(
-    stage_path: Path, bundle_dir: Path, viewer_dist: Path | None, workers: int = 0
+    stage_path: Path, bundle_dir: Path, viewer_dist: Path | None, engine: Engine
 ) -> None:
     """Write the bundle of a stage, or of a layer over it, in place of an older one.
 
     viewer_dist  the built viewer, copied into the bundle; None: no viewer
-    workers      processes that share the tiles; 0: this one. The bytes don't depend on it
+    engine       whose workers share the tiles; the bytes don't depend on their number
 
-    Raises StageError where the stage lacks something, naming prim and file; OutputError where
-    `bundle_dir` can't be written, or is something else.
+    Raises StageError where the stage lacks something, naming prim and file (TasksFailedError where
+    a tile does); OutputError where `bundle_dir` can't be written, or is something else.
     """
     if bundle_dir.exists() and not (bundle_dir / MANIFEST).is_file() and _holds(bundle_dir):
         raise OutputError(f"{bundle_dir}: exists and is no bundle: no {MANIFEST} in it")
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
     with replacing_folder(bundle_dir) as folder:
-        _fill(stage_path, folder, viewer_dist, workers)
+        _fill(stage_path, folder, viewer_dist, engine)
 
 
-def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, workers: int) -> None:
+def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine) -> None:
     stage = open_stage(stage_path)
     looks = read_looks(stage)
     prims = tile_prims(stage)
@@ -70,7 +68,8 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, workers: int) 
         looks=tuple(looks),
         step_m=step_m,
     )
-    tiles = _run(export, [str(prim.GetName()) for prim in prims], workers)
+    names = [str(prim.GetName()) for prim in prims]
+    tiles = engine.run("bundle", export, [(name, name) for name in names])
 
     files = [ref for tile in tiles for channel in tile.channels for ref in channel.files]
     channels = []
@@ -92,17 +91,6 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, workers: int) 
         "files": asdict(index),
     }
     write_file(root, MANIFEST, _json(manifest))
-
-
-def _run(export: "partial[BundleTile]", tile_ids: list[str], workers: int) -> list[BundleTile]:
-    processes = min(workers, len(tile_ids))
-    if processes < 2:
-        return [export(tile_id) for tile_id in tile_ids]
-    # not forked: USD's threads would be lost halfway through what they do
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        with children_ignore_interrupts():
-            futures = [pool.submit(export, tile_id) for tile_id in tile_ids]
-        return [future.result() for future in futures]
 
 
 def _write_channel(

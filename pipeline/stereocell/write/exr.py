@@ -16,10 +16,9 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from stereocell.errors import OutputError, StageError
-from stereocell.specimen import OpacityPoints, evaluate
+from stereocell.specimen import APRON, OpacityPoints, evaluate
 from stereocell.write.atomic import replacing
 
-APRON = 1
 _MAGIC = b"\x76\x2f\x31\x01"
 _OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # tiles, deep data, several parts
 _ROWS_OF = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}  # by compression

@@ -23,11 +23,20 @@ from stereocell.assets import find_asset
 from stereocell.specimen import Look, Provenance, TileContent
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.usd_cameras import define_cameras
-from stereocell.write.usd_layer import ROOT, TILES, export, new_stage, vec3f, world_box
+from stereocell.write.usd_layer import (
+    LAYER_SUFFIXES,
+    ROOT,
+    TILES,
+    export,
+    is_layer,
+    new_stage,
+    vec3f,
+    world_box,
+)
 from stereocell.write.usd_looks import write_looks
 from stereocell.write.usd_tile import LAYER_NAME, write_tile
 
-__all__ = ["LAYER_NAME", "TileExtent", "write_stage", "write_tile"]
+__all__ = ["LAYER_SUFFIXES", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
 STAGE_NAME = "stage.usda"
 

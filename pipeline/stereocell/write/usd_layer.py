@@ -23,6 +23,7 @@ CHANNELS = ROOT.AppendChild("Channels")
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
 CHANNEL_API = "StereoCellChannelAPI"
+LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 
 Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
 
@@ -38,6 +39,14 @@ def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
     UsdGeom.SetStageMetersPerUnit(stage, METERS_PER_UNIT)
     UsdGeom.SetStageUpAxis(stage, UP_AXIS)
     return stage
+
+
+def is_layer(file: Path) -> bool:
+    """Return whether USD can open a file as a layer, read anew from the disk."""
+    try:
+        return Sdf.Layer.OpenAsAnonymous(str(file)) is not None
+    except Tf.ErrorException:
+        return False
 
 
 def export(layer: Sdf.Layer, path: Path) -> None:

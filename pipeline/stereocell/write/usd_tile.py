@@ -18,9 +18,9 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
 
 from stereocell.mesh import Lod
 from stereocell.names import from_identifier
-from stereocell.specimen import ChannelContent, TileContent
+from stereocell.specimen import APRON, ChannelContent, TileContent
 from stereocell.write.atomic import replacing_folder
-from stereocell.write.exr import APRON, write_atlas
+from stereocell.write.exr import write_atlas
 from stereocell.write.usd_layer import (
     CHANNELS,
     export,

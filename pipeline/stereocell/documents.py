@@ -1,0 +1,60 @@
+"""JSON files of ours: read against their schema, one line for what is wrong; written whole."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import best_match
+
+from stereocell.assets import schema_path
+from stereocell.errors import OutputError
+from stereocell.write.atomic import write_bytes
+
+
+def read_json(path: Path, schema: str | None, remedy: str) -> Any:
+    """Return the content of a JSON file that fits `schema`.
+
+    schema  a file of schemas/, with `#Name` for one of its definitions; None: any JSON
+    remedy  what the user can do about a file that is missing or damaged
+
+    Raises OutputError, which names file, field and remedy.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        raise OutputError(f"{path} is missing: {remedy}") from None
+    except OSError as error:
+        raise OutputError(f"{path}: can't be read ({error.strerror})") from None
+    except ValueError as error:
+        raise OutputError(f"{path}: damaged, no JSON ({error}): {remedy}") from None
+    if schema is None:
+        return content
+    fault = best_match(_validator(schema).iter_errors(content))
+    if fault is not None:
+        reason = fault.message if len(fault.message) < 200 else f"{fault.message[:200]}..."
+        raise OutputError(f"{path}: {fault.json_path}: {reason}: {remedy}")
+    return content
+
+
+def find_json(path: Path, schema: str) -> Any:
+    """Return the content of a JSON file, or None where there is none that fits the schema."""
+    try:
+        return read_json(path, schema, "")
+    except OutputError:
+        return None
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Put `content` at `path` as JSON, whole or not at all. Raises OutputError."""
+    write_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
+
+
+@cache
+def _validator(schema: str) -> Draft202012Validator:
+    name, _, definition = schema.partition("#")
+    content = json.loads(schema_path(name).read_bytes())
+    if definition:
+        content = {"$defs": content["$defs"], "$ref": f"#/$defs/{definition}"}
+    return Draft202012Validator(content)

@@ -1,0 +1,127 @@
+"""What a worker is given and does: find a window, find an iso-value, build a unit. Picklable.
+
+The keys of the results hold this module's whole lineage: see lineage.py.
+"""
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stereocell.config import Settings
+from stereocell.documents import write_json
+from stereocell.errors import NoSurfaceError
+from stereocell.isovalue import find_iso_value
+from stereocell.read import Dataset
+from stereocell.sources import SourceRef, open_source
+from stereocell.surface import smooth
+from stereocell.survey import Display, find_display
+from stereocell.tiling import Box
+from stereocell.unit import UnitInput, build_unit
+from stereocell.unit_files import save_unit
+
+SURVEY_VOXELS = 16_000_000  # a channel's window is found on at most about so many
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayTask:
+    ref: SourceRef
+    level: int
+    channel: int
+    region: Box
+    settings: Settings
+
+
+@dataclass(frozen=True, slots=True)
+class IsoTask:
+    ref: SourceRef
+    level: int
+    channel: int
+    box: Box
+    settings: Settings
+    given: float | None
+    file: Path
+
+
+@dataclass(frozen=True, slots=True)
+class UnitTask:
+    ref: SourceRef
+    level: int
+    channel: int
+    given: UnitInput
+    directory: Path
+
+
+def run_display(task: DisplayTask) -> Display:
+    """Return a channel's window and histogram, from a coarse level or from some of the planes."""
+    dataset = open_source(task.ref)
+    level = task.level
+    # the finest level that is small enough; a source without one gives every k-th plane
+    while level + 1 < len(dataset.levels) and _voxels(task, dataset, level) > SURVEY_VOXELS:
+        level += 1
+    box = _region_at(task, dataset, level)
+    step = -(-int(np.prod(box.shape, dtype=np.int64)) // SURVEY_VOXELS)
+    planes = range(box.start[0], box.stop[0], step)
+    voxels = np.concatenate(
+        [
+            dataset.read(
+                task.channel, Box((z, *box.start[1:]), (z + 1, *box.stop[1:])), level
+            ).voxels
+            for z in planes
+        ]
+        if step > 1
+        else [dataset.read(task.channel, box, level).voxels]
+    )
+    return find_display(voxels, task.settings.window)
+
+
+def _voxels(task: DisplayTask, dataset: Dataset, level: int) -> int:
+    return int(np.prod(_region_at(task, dataset, level).shape, dtype=np.int64))
+
+
+def _region_at(task: DisplayTask, dataset: Dataset, level: int) -> Box:
+    """Return the region in voxels of a coarser level."""
+    fine, coarse = dataset.levels[task.level].shape, dataset.levels[level].shape
+    start = [a * n // m for a, n, m in zip(task.region.start, coarse, fine, strict=True)]
+    stop = [-(-b * n // m) for b, n, m in zip(task.region.stop, coarse, fine, strict=True)]
+    z0, y0, x0 = start
+    z1, y1, x1 = (max(b, a + 1) for a, b in zip(start, stop, strict=True))
+    return Box((z0, y0, x0), (z1, y1, x1))
+
+
+def run_iso(task: IsoTask) -> dict[str, Any]:
+    """Find one unit's iso-value and write it down with its curve."""
+    volume = open_source(task.ref).read(task.channel, task.box, task.level)
+    field = smooth(volume, float(task.settings.surface.smoothing_um))
+    result: dict[str, Any] = {"value": None, "confidence": 0.0, "reason": ""}
+    options = task.settings.isovalue
+    try:
+        found = find_iso_value(field, volume.spacing_um, options)
+    except NoSurfaceError as error:
+        result["reason"] = str(error)
+    else:
+        result["found"], result["confidence"] = found.value, found.confidence
+        if found.is_clear:
+            result["value"] = found.value
+        else:
+            result["reason"] = (
+                f"no clear surface: the gradient at {found.value:.5g} is {found.sharpness:.2f} "
+                f"times the tile's median, expected at least {options.min_sharpness:g}"
+            )
+        result["levels"] = [float(f"{v:.6g}") for v in found.levels]
+        result["score"] = [round(float(v), 5) for v in found.score]
+    if task.given is not None and "found" in result:  # who gives a value is sure of it
+        result |= {"value": task.given, "confidence": 1.0, "reason": ""}
+    write_json(task.file, result)
+    return result
+
+
+def run_unit(task: UnitTask) -> dict[str, Any]:
+    """Build one unit and write it down."""
+    start = time.perf_counter()
+    volume = open_source(task.ref).read(task.channel, task.given.window, task.level)
+    seconds = time.perf_counter() - start
+    built = build_unit(volume, task.given)
+    return save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))

@@ -1,0 +1,115 @@
+"""A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.documents import find_json, read_json, write_json
+from stereocell.errors import OutputError
+from stereocell.mesh import Lod, Mesh
+from stereocell.unit import Unit
+from stereocell.write.atomic import replacing_folder
+
+SCHEMA = "units.schema.json#Unit"
+_RECORD, _VOLUME = "unit.json", "volume.npy"
+
+
+def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
+    """Write a unit as a folder under its final name, and return its record. Raises OutputError."""
+    lods = [
+        {
+            "triangles": len(lod.mesh.triangles),
+            "vertices": len(lod.mesh.positions),
+            "distance_um": lod.distance_um,
+            "normal_map": 0 if lod.normal_map is None else len(lod.normal_map),
+        }
+        for lod in unit.lods
+    ]
+    with replacing_folder(directory) as folder:
+        np.save(folder / _VOLUME, unit.volume)
+        for level, lod in enumerate(unit.lods):
+            np.savez(lod_file(folder, level), **_arrays(lod))
+        record = {
+            "reason": unit.reason,
+            "lods": lods,
+            "volume": list(unit.volume.shape),
+            "fragments_dropped": unit.fragments_dropped,
+            "cavities_filled": unit.cavities_filled,
+            "seconds": {step: round(s, 3) for step, s in unit.seconds.items()},
+            "files": {file.name: file.stat().st_size for file in sorted(folder.iterdir())},
+        }
+        write_json(folder / _RECORD, record)
+    return record
+
+
+def is_whole(directory: Path) -> bool:
+    """Return whether a unit's folder holds all that its record names, in full length."""
+    record = find_json(directory / _RECORD, SCHEMA)
+    if record is None:
+        return False
+    try:
+        sizes = {name: (directory / name).stat().st_size for name in record["files"]}
+    except OSError:
+        return False
+    return bool(sizes == record["files"])
+
+
+def load_record(directory: Path) -> dict[str, Any]:
+    """Return what unit.json holds: triangles, distances, seconds, reason. Raises OutputError."""
+    return dict(read_json(directory / _RECORD, SCHEMA, _remedy(directory)))
+
+
+def lod_file(directory: Path, level: int) -> Path:
+    """Return where `save_unit` puts one level of detail."""
+    return directory / f"lod{level}.npz"
+
+
+def load_lods(directory: Path) -> tuple[Lod, ...]:
+    """Return the levels of detail that `save_unit` wrote. Raises OutputError for a damaged file."""
+    lods = load_record(directory)["lods"]
+    try:
+        return tuple(_load_lod(directory, level, lod) for level, lod in enumerate(lods))
+    except (OSError, ValueError, LookupError, BadZipFile) as error:
+        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
+
+
+def load_volume(directory: Path) -> NDArray[np.uint8]:
+    """Return the 8-bit voxels (z, y, x), mapped from the file. Raises OutputError."""
+    try:
+        volume: NDArray[np.uint8] = np.load(directory / _VOLUME, mmap_mode="r")
+    except (OSError, ValueError) as error:
+        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
+    return volume
+
+
+def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
+    # opened here: numpy leaves a damaged file open
+    with lod_file(directory, level).open("rb") as file, np.load(file) as arrays:
+        mesh = Mesh(
+            arrays["positions"],
+            arrays["triangles"],
+            arrays["normals"],
+            arrays.get("uvs"),
+            arrays.get("tangents"),
+        )
+        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"))
+
+
+def _arrays(lod: Lod) -> dict[str, Any]:
+    arrays = {
+        "positions": lod.mesh.positions,
+        "triangles": lod.mesh.triangles,
+        "normals": lod.mesh.normals,
+        "uvs": lod.mesh.uvs,
+        "tangents": lod.mesh.tangents,
+        "normal_map": lod.normal_map,
+    }
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _remedy(directory: Path) -> str:
+    return f"remove {directory} and run `stereocell units OUT`"

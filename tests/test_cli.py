@@ -1,0 +1,113 @@
+"""The command line: what contradicts itself, what is missing, and the exit codes."""
+
+import os
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import phantoms
+from stereocell.cli import COMMANDS, main
+from stereocell.store import Store
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    body = phantoms.f_phantom()
+    return phantoms.write_ome_tiff(
+        tmp_path / "f.ome.tif", np.stack([body, body]), axes="CZYX", names=["F body", "F again"]
+    )
+
+
+def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Run a command that is wrong usage; return its only line."""
+    capsys.readouterr()
+    assert main(arguments) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1, lines
+    return lines[0].removeprefix("stereocell: ")
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--grid", "2x1", "--tile-size", "8,8,8"], "--grid and --tile-size both say how to cut"),
+        (["--channels="], "--channels is '', expected names or indices"),
+        (["--channels", ","], "--channels is ',', expected names or indices"),
+        (["--channels", "0,,1"], "--channels is '0,,1', expected names or indices"),
+        (["--channels", "nope"], "channel 'nope': not found, expected one of F body, F again or"),
+        (["--channels", "2"], "channel '2': not found, expected an index from 0 to 1"),
+        (["--time", "9"], "--time: found 9, expected 0 to 0"),
+        (["--time=-1"], "plan.time is -1, expected 0 or more"),
+        (
+            ["--iso-value", "7=500"],
+            "--iso-value names channel '7', expected one of F body,",
+        ),
+        (["--preset", "mri", "--spacing-um", ".2,.01,.01"], "don't suit voxels of 0.2 x 0.01 x"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_leaves_nothing(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], message: str
+) -> None:
+    out = tmp_path / "out"
+    assert message in _refused(capsys, "plan", str(source), "-o", str(out), *flags)
+    assert not out.exists()
+
+
+def test_out_inside_the_input_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = phantoms.write_ome_zarr(tmp_path / "v.ome.zarr", [phantoms.f_phantom()])
+    for out in (path, path / "out"):
+        line = _refused(capsys, "build", str(path), "-o", str(out), "--workers", "0")
+        assert "inside the input" in line
+    assert sorted(file.name for file in path.iterdir()) == ["0", "zarr.json"]
+
+
+def test_an_iso_value_by_index_is_kept_by_name(source: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flags = ["--grid", "2x1", "--iso-value", "1=400"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert Store(out).plan().settings.iso_values == {"F again": 400.0}
+
+
+def test_the_settings_that_a_build_leaves_make_the_same_plan(source: Path, tmp_path: Path) -> None:
+    first, second, third = (tmp_path / name for name in "abc")
+    assert main(["plan", str(source), "-o", str(first), "--grid", "5x3", "--region", ":,:,1:"]) == 0
+    used = ["--config", str(first / "stereocell.toml")]
+    assert main(["plan", str(source), "-o", str(second), *used]) == 0
+    assert Store(second).plan().tiles == Store(first).plan().tiles
+    assert Store(second).plan().settings == Store(first).plan().settings
+    assert main(["plan", str(source), "-o", str(third), *used, "--tile-size", "16,48,36"]) == 0
+    assert len(Store(third).plan().tiles) == 1
+
+
+def test_printed_settings_are_to_be_edited_and_left_ones_to_be_copied(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["settings"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("# StereoCell settings. Every key may be left out")
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    left = (tmp_path / "out" / "stereocell.toml").read_text()
+    assert left.startswith("# The settings that this build used")
+    assert tomllib.loads(left).keys() == tomllib.loads(printed).keys()
+
+
+def test_workers_are_the_cores_that_we_may_run_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from stereocell import cli
+
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3}, raising=False)
+    assert cli._parser().parse_args(["units", "out"]).workers == 1
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert cli._parser().parse_args(["units", "out"]).workers == os.cpu_count()
+
+
+def test_help_says_what_a_region_counts(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["build", "--help"])
+    assert "voxels of the level that is built" in " ".join(capsys.readouterr().out.split())
+    assert "build" in COMMANDS

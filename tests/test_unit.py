@@ -1,0 +1,46 @@
+"""One unit in memory: its 8-bit volume and the range of voxel values that it bears."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from phantoms import blurred_ball
+from stereocell.config import Settings
+from stereocell.isofield import IsoField
+from stereocell.specimen import APRON
+from stereocell.tiling import Box
+from stereocell.unit import UnitInput, build_unit, to_eight_bit
+from stereocell.volume import Volume
+
+SPACING = (0.28, 0.14, 0.14)
+SHAPE = (20, 40, 40)
+BOX = Box((0, 0, 0), SHAPE)
+
+
+def _given(scale: float) -> UnitInput:
+    settings = Settings()
+    settings = replace(settings, surface=settings.surface.resolved(SPACING))
+    iso = IsoField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
+    return UnitInput(BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, (0.0, scale), settings)
+
+
+@pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])
+def test_voxels_whose_squares_leave_float32_give_the_same_unit(scale: float) -> None:
+    ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
+    plain = build_unit(Volume(ball, SPACING), _given(1.0))
+    scaled = build_unit(Volume(ball * np.float32(scale), SPACING), _given(scale))
+    np.testing.assert_array_equal(scaled.volume, plain.volume)
+    assert len(plain.lods) == len(scaled.lods) == 4
+    for a, b in zip(plain.lods, scaled.lods, strict=True):
+        np.testing.assert_array_equal(a.mesh.positions, b.mesh.positions)
+        np.testing.assert_array_equal(a.mesh.triangles, b.mesh.triangles)
+
+
+def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end() -> None:
+    voxels = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE) % 251
+    lattice = Box((0, 10, 20), (10, 20, 40))
+    given = replace(_given(1.0), lattice=lattice, display=(0.0, 255.0))
+    eight_bit = to_eight_bit(voxels, given)
+    padded = np.pad(voxels, APRON, mode="edge")
+    np.testing.assert_array_equal(eight_bit, padded[0:12, 10:22, 20:42])
