@@ -22,8 +22,9 @@ from stereocell.plan import PALETTE, Channel, Plan, choose_level, make_plan
 from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
-from stereocell.specimen import ChannelContent, Look, TileContent
+from stereocell.specimen import ChannelContent, TileContent
 from stereocell.store import Store
+from stereocell.survey import look_from
 from stereocell.unit_files import load_lods, load_volume
 from stereocell.write import bundle, usd
 from stereocell.write.atomic import write_bytes
@@ -113,7 +114,7 @@ def run_tile(task: TileTask) -> None:
 
 
 def run_stage(out: Path, engine: Engine) -> None:
-    """Write OUT/stage from the units. Layers of the user's own that lie there are left alone."""
+    """Write OUT/stage from the units: stage.usda, looks/ and tiles/; other files are left alone."""
     store = Store(out)
     plan = store.plan()
     with _phase(store, "stage") as phase:
@@ -155,22 +156,6 @@ def _tile_task(
         channels=(),
     )
     return tile_id, TileTask(store.stage_dir, content, tuple(units))
-
-
-def look_from(content: Mapping[str, Any]) -> Look:
-    """Return the look that survey.json holds."""
-    functions = {
-        name: tuple((float(x), float(opacity)) for x, opacity in points)
-        for name, points in content["transfer_functions"].items()
-    }
-    return Look(
-        content["name"],
-        tuple(content["color"]),
-        tuple(content["window"]),
-        content["iso_value"],
-        content["iso_confidence"],
-        functions,
-    )
 
 
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:

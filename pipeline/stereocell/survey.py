@@ -52,3 +52,19 @@ def make_look(
     look = Look(name, color, display.window, iso_value, confidence, {})
     functions = make_transfer_functions(np.asarray(display.histogram), look.iso_normalized)
     return replace(look, transfer_functions=functions)
+
+
+def look_from(content: Mapping[str, Any]) -> Look:
+    """Return the look that survey.json holds."""
+    functions = {
+        name: tuple((float(x), float(opacity)) for x, opacity in points)
+        for name, points in content["transfer_functions"].items()
+    }
+    return Look(
+        content["name"],
+        tuple(content["color"]),
+        tuple(content["window"]),
+        content["iso_value"],
+        content["iso_confidence"],
+        functions,
+    )

@@ -24,6 +24,7 @@ from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
 from stereocell.report.slices import cut_unit, draw_slices
 from stereocell.specimen import APRON
 from stereocell.store import Store
+from stereocell.survey import look_from
 from stereocell.tiling import Box, Tile
 from stereocell.unit_files import load_lods, load_volume, lod_file
 from stereocell.volume import zyx_to_xyz
@@ -113,25 +114,22 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
     rows = []
     for channel in facts.plan.channels:
         entry = facts.survey[channel.id]
-        look = entry["look"]
+        look = look_from(entry["look"])
         units = [unit for unit in facts.units if unit.channel == channel]
         values = [unit.iso_value for unit in units if unit.iso_value is not None]
-        low, high = look["window"]
-        normalized = None
-        if look["iso_value"] is not None:
-            normalized = (look["iso_value"] - low) / (high - low)
-        functions = look["transfer_functions"]
         rows.append(
             {
                 "name": channel.name,
                 "color": css_color(channel.color),
-                "window": (low, high),
-                "iso_value": look["iso_value"],
-                "confidence": look["iso_confidence"],
+                "window": look.window,
+                "iso_value": look.iso_value,
+                "confidence": look.iso_confidence,
                 "spread": (min(values), max(values)) if values else None,
                 "given": channel.name in facts.plan.settings.iso_values,
-                "histogram": charts.histogram(entry["display"]["histogram"], functions, normalized),
-                "functions": list(functions),
+                "histogram": charts.histogram(
+                    entry["display"]["histogram"], look.transfer_functions, look.iso_normalized
+                ),
+                "functions": list(look.transfer_functions),
                 "total": sum_up(units),
             }
         )
