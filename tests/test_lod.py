@@ -40,7 +40,7 @@ def test_coarser_level_has_fewer_triangles_and_stays_near(error: float) -> None:
     fine = _sphere()
     coarse = simplify(fine, error)
     assert len(coarse.triangles) < 0.6 * len(fine.triangles)
-    assert measure_distance(Nearest(fine), Nearest(coarse), 4000) < 3 * error
+    assert measure_distance(Nearest(fine, 4000), Nearest(coarse, 4000)) < 3 * error
 
 
 def test_cut_edges_are_locked() -> None:
@@ -51,7 +51,7 @@ def test_cut_edges_are_locked() -> None:
 
 
 def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> None:
-    measured = measure_distance(Nearest(_sphere(5.0)), Nearest(_sphere(4.0)), 4000)
+    measured = measure_distance(Nearest(_sphere(5.0), 4000), Nearest(_sphere(4.0), 4000))
     assert measured == pytest.approx(1.0, abs=0.02)
 
 

@@ -68,12 +68,27 @@ def build_unit(volume: Volume, given: UnitInput) -> Unit:
     if given.iso is None:
         return Unit((), eight_bit, "the channel has no iso-value", 0, 0, clock.seconds)
 
-    surface = given.settings.surface
-    spacing = volume.spacing_um
+    fine, dropped, filled = _fine_surface(volume, given, given.iso, clock)
+    if not len(fine.triangles):
+        reason = "no voxel crosses the iso-value"
+        return Unit((), eight_bit, reason, dropped, filled, clock.seconds)
+    lods = _make_lods(fine, volume.spacing_um, given.settings, clock)
+    return Unit(lods, eight_bit, "", dropped, filled, clock.seconds)
+
+
+def _fine_surface(
+    volume: Volume, given: UnitInput, iso: IsoField, clock: "_Clock"
+) -> tuple[Mesh, int, int]:
+    """Return the repaired surface, and the numbers of fragments dropped and cavities filled.
+
+    A function of its own: its float32 copies of the window are gone when levels are made.
+    """
+    surface, spacing = given.settings.surface, volume.spacing_um
     with clock("distance"):
         field = smooth(volume, float(surface.smoothing_um))
         value_range = given.display[1] - given.display[0]
-        distance = signed_distance(field, given.iso.at(given.window), spacing, value_range)
+        distance = signed_distance(field, iso.at(given.window), spacing, value_range)
+        del field
     with clock("repair"):
         lengths = (surface.alpha_um, surface.min_diagonal_um, surface.max_cavity_um)
         repaired = repair(distance, spacing, RepairOptions(*(float(um) for um in lengths)))
@@ -81,11 +96,7 @@ def build_unit(volume: Volume, given: UnitInput) -> Unit:
         fine = extract_surface(
             repaired.distance, given.window, given.lattice, given.region, spacing, given.origin_um
         )
-    counts = repaired.fragments_dropped, repaired.cavities_filled
-    if not len(fine.triangles):
-        return Unit((), eight_bit, "no voxel crosses the iso-value", *counts, clock.seconds)
-    lods = _make_lods(fine, spacing, given.settings, clock)
-    return Unit(lods, eight_bit, "", *counts, clock.seconds)
+    return fine, repaired.fragments_dropped, repaired.cavities_filled
 
 
 def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
@@ -113,12 +124,12 @@ def _make_lods(
     lods: list[Lod] = []
     mesh = fine
     with clock("measure"):
-        to_fine = Nearest(fine)
+        to_fine = Nearest(fine, options.samples)
     for level, error in enumerate(options.errors):
         with clock("simplify"):
             mesh = simplify(mesh, error * min(spacing))
         with clock("measure"):
-            distance = measure_distance(to_fine, Nearest(mesh), options.samples)
+            distance = measure_distance(to_fine, Nearest(mesh, options.samples))
             # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
             distance = max(distance, lods[-1].distance_um if lods else 0.0)
         if level >= len(options.errors) - settings.unwrap.coarse_lods and len(mesh.triangles):
