@@ -41,7 +41,7 @@ help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: $(READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20+)
+setup: $(READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -52,8 +52,8 @@ $(READY): requirements.lock pyproject.toml
 	@touch $@
 
 $(VIEWER_READY): $(VIEWER)/package-lock.json
-	@node -e 'process.exit(+(process.versions.node.split(".")[0] < 20))' || \
-	  { echo "setup: node is missing or older than 20, expected Node.js 20 or newer" >&2; exit 1; }
+	@node -e 'const [a, b] = process.versions.node.split("."); process.exit(+(a * 100 + +b < 2019))' || \
+	  { echo "setup: node is missing or older than 20.19, expected Node.js 20.19 or newer" >&2; exit 1; }
 	cd $(VIEWER) && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
 

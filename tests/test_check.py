@@ -176,7 +176,7 @@ def test_missing_node_is_named(made, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     found = lines(made)["glTF validator"]
     assert not found.ok
-    assert "install Node 20 or newer" in found.detail
+    assert "install Node 20.19 or newer" in found.detail
 
 
 def test_missing_packages_are_named(made, monkeypatch):

@@ -217,6 +217,30 @@ def test_used_out_names_the_flag_that_makes_another_input(
     assert words in capsys.readouterr().err
 
 
+def test_stage_that_was_not_finished_is_not_exported(
+    out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = (_unit(out) / "volume.npy").read_bytes()
+    (_unit(out) / "volume.npy").write_bytes(whole[:200])
+    (out / "stage" / "stage.usda").unlink()
+    assert main(["stage", str(out), "--workers", "0"]) == 1
+    capsys.readouterr()
+    assert main(["bundle", str(out), "--workers", "0"]) == 1
+    assert "stage: begun and not finished: run `stereocell stage OUT`" in capsys.readouterr().err
+    assert main(["check", str(out)]) == 1
+    (_unit(out) / "volume.npy").write_bytes(whole)
+    assert main(["stage", str(out), "--workers", "0"]) == 0
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+
+
+def test_one_unit_s_run_says_how_many_are_missing(
+    tmp_path: Path, source: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--grid", "2x1"]) == 0
+    assert main(["units", str(tmp_path / "out"), "--workers", "0", "--only", "r0_c1/1"]) == 0
+    assert "units: 3 of 4 are still to be built" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_killed_builds_go_on_to_the_same_bytes(tmp_path: Path, built: Path, source: Path) -> None:
     out = tmp_path / "out"

@@ -130,6 +130,24 @@ def test_cycif_on_a_full_disk_is_one_line_and_leaves_nothing(
     assert list(small_disk.iterdir()) == []
 
 
+def test_sample_that_lost_chunks_is_made_again_and_a_damaged_one_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "block.ome.zarr"
+    command = ["sample", "cycif", str(path), "--grid", "1x1", "--tile-size", "8,96,96"]
+    assert main(command) == 0
+    chunk = max((path / "0" / "c").rglob("*"), key=lambda file: file.is_file())
+    content = chunk.read_bytes()
+    chunk.unlink()
+    assert main(command) == 0
+    assert chunk.read_bytes() == content
+    (path / "zarr.json").write_text("{")
+    capsys.readouterr()
+    assert main(command) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "holds something else" in line
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -28,7 +28,5 @@ def schema_path(name: str) -> Path:
 
 def viewer_dist() -> Path | None:
     """Return the folder of the built viewer, or None where it has not been built."""
-    for folder in (_PACKAGE / "viewer", _PACKAGE.parents[1] / "viewer_gltf" / "dist"):
-        if (folder / "index.html").is_file():
-            return folder
-    return None
+    folder = _PACKAGE.parents[1] / "viewer_gltf" / "dist"
+    return folder if (folder / "index.html").is_file() else None

@@ -5,13 +5,13 @@ Every phase skips what is done already: results are named by what they depend on
 
 import hashlib
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from stereocell import report, tasks
+from stereocell import report, staging, tasks
 from stereocell.assets import viewer_dist
 from stereocell.config import Settings, to_dict, to_toml
 from stereocell.documents import write_json
@@ -22,10 +22,9 @@ from stereocell.plan import PALETTE, Channel, Plan, choose_level, make_plan
 from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
-from stereocell.specimen import ChannelContent, TileContent
+from stereocell.staging import run_tile, tile_task
 from stereocell.store import Store
 from stereocell.survey import look_from
-from stereocell.unit_files import load_lods, load_volume
 from stereocell.write import bundle, usd
 from stereocell.write.atomic import write_bytes
 from stereocell.write.composed import dependencies
@@ -82,7 +81,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
-        "libraries": {**libraries_of(tasks), **libraries_of(usd)},
+        "libraries": {**libraries_of(tasks), **libraries_of(staging)},
     }
 
 
@@ -91,26 +90,12 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     store = Store(out)
     plan = store.plan()
     with _phase(store, "units") as phase:
-        built = run_rounds(store, plan, engine, only)
+        built, missing = run_rounds(store, plan, engine, only)
         phase.is_up_to_date = not built
         units = len(plan.tiles) * len(plan.channels)
         phase.about = "" if built == units else f"{built} of {units} units"
-
-
-@dataclass(frozen=True, slots=True)
-class TileTask:
-    stage_dir: Path
-    content: TileContent  # without its channels
-    units: tuple[tuple[str, Path], ...]  # channel id, unit folder
-
-
-def run_tile(task: TileTask) -> None:
-    """Write one tile of the stage from its units."""
-    channels = tuple(
-        ChannelContent(channel_id, load_lods(folder), load_volume(folder))
-        for channel_id, folder in task.units
-    )
-    usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
+        if missing:
+            console.print(f"units: {missing} of {units} are still to be built")
 
 
 def run_stage(out: Path, engine: Engine) -> None:
@@ -121,12 +106,12 @@ def run_stage(out: Path, engine: Engine) -> None:
         store.require_units_of(plan)
         index, content = store.index(), store.survey()
         looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
-        tiles = [_tile_task(store, plan, index, tile.id) for tile in plan.tiles]
+        tiles = [(tile.id, tile_task(store, plan, index, tile)) for tile in plan.tiles]
         about = provenance(plan)
         depends = [index, [asdict(look) for look in looks], about, plan.name]
         folders = [store.stage_dir / "tiles" / tile.id for tile in plan.tiles]
         if phase.is_done(
-            key_of(depends, usd), store.stage_file, store.stage_dir / "looks", *folders
+            key_of(depends, staging), store.stage_file, store.stage_dir / "looks", *folders
         ):
             return
         engine.run("stage", run_tile, tiles)
@@ -138,30 +123,11 @@ def run_stage(out: Path, engine: Engine) -> None:
         store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
 
 
-def _tile_task(
-    store: Store, plan: Plan, index: Mapping[str, str], tile_id: str
-) -> tuple[str, TileTask]:
-    tile = plan.tile(tile_id)
-    lattice = tile.lattice(plan.region)
-    units = []
-    for channel in plan.channels:
-        key = index[f"{tile_id}/{channel.id}"]
-        units.append((channel.id, store.unit_dir(tile_id, channel.id, key)))
-    content = TileContent(
-        id=tile_id,
-        spacing_um=plan.spacing_um,
-        first_um=plan.position_um(lattice.start),
-        last_um=plan.position_um([end - 1 for end in lattice.stop]),
-        own_shape=tile.box.shape,
-        channels=(),
-    )
-    return tile_id, TileTask(store.stage_dir, content, tuple(units))
-
-
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
     """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it."""
     store = Store(out)
     with _phase(store, "bundle") as phase:
+        store.require_finished("stage")
         path = stage if stage is not None else store.stage_file
         if not path.is_file():
             remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"

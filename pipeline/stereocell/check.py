@@ -18,6 +18,7 @@ from typing import Any
 from stereocell.assets import find_asset
 from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
+from stereocell.store import Store
 from stereocell.validate_usd import validate_stage
 from stereocell.write.bundle import FILES, MANIFEST
 from stereocell.write.exr import check_exr
@@ -29,7 +30,7 @@ _NODE_TIMEOUT_S = 1200.0
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
 _RUN_BUNDLE = "run `stereocell bundle OUT`"
-_GET_NODE = "install Node 20 or newer, then run `make setup`"
+_GET_NODE = "install Node 20.19 or newer, then run `make setup`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ def check(out: Path) -> Iterator[CheckLine]:
     bundle = out / "bundle"
     checks: list[tuple[str, Callable[[], str]]] = [
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
-        ("stage", lambda: _check_stage(out / "stage" / "stage.usda")),
+        ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out / "stage")),
         ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
@@ -73,7 +74,10 @@ def _check_json(path: Path, schema: str, remedy: str) -> str:
     return f"{path.name} fits {schema}"
 
 
-def _check_stage(path: Path) -> str:
+def _check_stage(out: Path) -> str:
+    store = Store(out)
+    store.require_finished("stage")
+    path = store.stage_file
     findings = validate_stage(path)
     _raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"

@@ -218,7 +218,7 @@ def _known(key: str, known: list[str], where: str, what: str) -> None:
 
 def _typed(where: str, value: Any, expected: str) -> Any:
     """Return the value as the field's type (its annotation as text), or raise UsageError."""
-    number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    number = isinstance(value, int | float) and not isinstance(value, bool) and _is_finite(value)
     whole = isinstance(value, int) and not isinstance(value, bool)
     if expected.startswith("tuple["):
         inner = expected.removeprefix("tuple[").split(",")[0]
@@ -241,3 +241,10 @@ def _length(where: str, value: float | str, auto: float) -> float:
     if isinstance(value, str) or not value >= 0:
         raise UsageError(f"{where} is {value!r}, expected a length in um or {AUTO!r}")
     return value
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return isfinite(value)
+    except OverflowError:  # TOML's whole numbers have no end
+        return False

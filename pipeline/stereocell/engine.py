@@ -44,13 +44,17 @@ class Engine:
         """
         results: dict[int, R] = {}
         failures: dict[int, str] = {}
-        with _progress(label, len(tasks)) as advance:
-            for place, result, error in self._outcomes(function, [task for _, task in tasks]):
-                if error is None:
-                    results[place] = result
-                else:
-                    failures[place] = _in_words(error)
-                advance(error is not None)
+        try:
+            with _progress(label, len(tasks)) as advance:
+                for place, result, error in self._outcomes(function, [task for _, task in tasks]):
+                    if error is None:
+                        results[place] = result
+                    else:
+                        failures[place] = _in_words(error)
+                    advance(error is not None)
+        except KeyboardInterrupt:
+            self.close()  # now: workers would go on writing into folders that are being removed
+            raise
         if failures:
             named: dict[str, list[str]] = {}  # one line for all that failed alike
             for place in sorted(failures):
@@ -79,18 +83,15 @@ class Engine:
         futures = {
             client.submit(function, task, pure=False): place for place, task in enumerate(tasks)
         }
-        try:
-            for future in as_completed(futures):
-                failure = future.exception()
-                yield futures[future], None if failure else future.result(), failure
-                future.release()
-        except KeyboardInterrupt:
-            self.close()  # now: workers would go on writing into folders that are being removed
-            raise
+        for future in as_completed(futures):
+            failure = future.exception()
+            yield futures[future], None if failure else future.result(), failure
+            future.release()
 
     def _start(self) -> Any:
         if self._client is None:
             from distributed import Client
+            from distributed.gc import disable_gc_diagnosis
 
             with children_ignore_interrupts():
                 # units hold arrays of known size; distributed's spilling and pausing is in the way
@@ -102,6 +103,8 @@ class Engine:
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
                 )
+            # its callback stays for good, and Python drops a Ctrl-C that falls into a callback
+            disable_gc_diagnosis()
         return self._client
 
     def close(self) -> None:

@@ -1,23 +1,21 @@
 """Ctrl-C reaches every process of a terminal's group; only the command itself is to answer it."""
 
 import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 
 
 @contextmanager
 def children_ignore_interrupts() -> Iterator[None]:
-    """Within, processes are started that ignore SIGINT: they inherit it, and Python leaves it so.
+    """Within, processes and threads are started that SIGINT doesn't reach: they inherit the mask.
 
-    Without it each worker prints a traceback of its own. Elsewhere than in the main thread, where
-    signals can't be set, nothing is changed.
+    Without it each worker prints a traceback of its own. One that comes meanwhile is not lost: it
+    is delivered at the end.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource_tracker.ensure_running()  # when it starts, it unblocks SIGINT in our thread
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

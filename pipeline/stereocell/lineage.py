@@ -16,6 +16,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from stereocell.assets import find_asset
+
 _PACKAGE = Path(__file__).parent
 _NAME = _PACKAGE.name
 
@@ -43,7 +45,7 @@ def _digest(module: str) -> str:
 
 @cache
 def _lineage(module: str) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]]:
-    """Return the sources of ours that a module needs, itself among them, and (library, version)."""
+    """Return the files of ours that a module needs, itself among them, and (library, version)."""
     found: dict[Path, None] = {}
     foreign: set[str] = set()
     waiting = [module]
@@ -55,6 +57,7 @@ def _lineage(module: str) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]
         file = _source(name)
         if file is not None and file not in found:
             found[file] = None
+            found.update(dict.fromkeys(_assets(file)))
             waiting += _imports(file)
     known = packages_distributions()  # a lone extension module isn't in it: it has its own name
     tops = foreign - sys.stdlib_module_names
@@ -67,6 +70,15 @@ def _source(name: str) -> Path | None:
     path = _PACKAGE.joinpath(*name.split(".")[1:])
     candidates = (path.with_suffix(".py"), path / "__init__.py")
     return next((file for file in candidates if file.is_file()), None)
+
+
+def _assets(file: Path) -> Iterator[Path]:
+    """Yield the files that ship beside the code and that a module finds by a literal name."""
+    calls = (n for n in ast.walk(ast.parse(file.read_bytes())) if isinstance(n, ast.Call))
+    for call in calls:
+        if ast.unparse(call.func) == "find_asset" and isinstance(call.args[0], ast.Constant):
+            asset = find_asset(str(call.args[0].value))
+            yield from asset.rglob("*.*") if asset.is_dir() else [asset]
 
 
 def _imports(file: Path) -> Iterator[str]:

@@ -30,8 +30,10 @@ _DISPLAY, _ISO_VALUE = "units.schema.json#Display", "units.schema.json#IsoValue"
 _AGAIN = "run `stereocell units OUT` again"
 
 
-def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> int:
-    """Build the units (or `only` one, `<tile>/<channel>`); return how many were not done already.
+def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> tuple[int, int]:
+    """Build the units (or `only` one, `<tile>/<channel>`).
+
+    Returns how many were not done already, and how many others are still to be built.
 
     Raises SourceError if the source is no longer what was planned, TasksFailedError once all
     others are finished.
@@ -56,7 +58,7 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> in
     _run(plan, engine, "units", run_unit, tasks)
     if not others:  # all there: the stage may be made of them
         store.save_units(plan, keys)
-    return len(tasks)
+    return len(tasks), others
 
 
 def _run(
@@ -82,7 +84,7 @@ def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel]]:
     wanted = [(tile.id, channel) for tile in plan.tiles for channel in plan.channels]
     if only is None:
         return wanted
-    chosen = [(t, c) for t, c in wanted if only in (f"{t}/{c.name}", f"{t}/{c.id}")]
+    chosen = [(t, c) for t, c in wanted if only in {f"{t}/{n}" for n in (c.name, c.id, c.index)}]
     if not chosen:
         raise UsageError(
             f"--only is {only!r}, expected TILE/CHANNEL with a tile from {plan.tiles[0].id} to "

@@ -128,6 +128,13 @@ class Store:
         """Return what is known of each phase; damaged, nothing counts as done."""
         return dict(find_json(self.phases_file, _PHASES) or {})
 
+    def require_finished(self, name: str) -> None:
+        """Raise OutputError if a phase was begun and never came to its end."""
+        if not self.phases().get(name, {"key": "done"})["key"]:
+            raise OutputError(
+                f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
+            )
+
     def save_phase(self, name: str, key: str, results: str, seconds: float, about: str) -> None:
         """Keep what a phase was made from and left; an empty key: it isn't finished."""
         entry = {"key": key, "results": results, "seconds": round(seconds, 2), "about": about}

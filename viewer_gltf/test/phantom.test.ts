@@ -17,7 +17,7 @@ const DIST = new URL("../dist/", import.meta.url).pathname;
 const BUNDLES = (process.env.STEREOCELL_F_BUNDLES ?? "").split(":").filter((path) => path !== "");
 
 describeInChromium("the pipeline's F", () => {
-  it.skipIf(BUNDLES.length > 0)("needs STEREOCELL_F_BUNDLES", ({ skip }) => skip());
+  if (BUNDLES.length === 0) it.skip("needs STEREOCELL_F_BUNDLES");
 
   for (const bundle of BUNDLES) {
     for (const as of ["surface", "volume"] as const) {

@@ -88,14 +88,18 @@ def _check(
 def _is_there(path: Path, attributes: dict[str, Any]) -> bool:
     if not path.exists():
         return False
-    metadata = path / "zarr.json"
-    found = json.loads(metadata.read_text(encoding="utf-8")) if metadata.is_file() else {}
-    if found.get("attributes") != attributes:
+    try:
+        group = zarr.open_group(path, mode="r")
+        found = group.attrs.asdict()
+    except (OSError, ValueError, LookupError, TypeError):  # no group, or a damaged one
+        found = {}
+    if found != attributes:
         raise OutputError(
             f"{path}: holds something else, expected nothing or this very sample: "
             "remove it or choose another name"
         )
-    return True
+    levels = [array for _, array in group.arrays()]
+    return bool(levels) and all(level.nchunks == level.nchunks_initialized for level in levels)
 
 
 def _level_shapes(shape: tuple[int, int, int]) -> list[tuple[int, int, int]]:
