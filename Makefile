@@ -35,7 +35,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view report check lint test test-fast bench lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view report check lint test test-fast test-blender bench bench-iso lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -129,8 +129,23 @@ test: setup browser ## All tests, in headless Chromium too
 	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) \
 	  STEREOCELL_F_BUNDLES=$(abspath out/f/tif/bundle):$(abspath out/f/zarr/bundle) npm run --silent test:browser
 
+# Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
+BLENDER := $(VENV)/blender
+BLENDER_BASE ?= python3.11
+test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .venv/blender)
+	@$(BLENDER)/bin/python -c 'import bpy' >/dev/null 2>&1 \
+	  || { $(BLENDER_BASE) -m venv --clear $(BLENDER) \
+	       && $(BLENDER)/bin/pip install --quiet --disable-pip-version-check bpy==5.0.1 'numpy<2'; } \
+	  || echo "test-blender: bpy 5.0.1 can't be installed here (it wants $(BLENDER_BASE) and 350 MB)" >&2
+	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
+	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/test_blender.py; \
+	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
+
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py
+
+bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids are known
+	$(BIN)/python tests/bench/iso.py
 
 lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

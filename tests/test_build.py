@@ -46,7 +46,8 @@ def _files(folder: Path) -> dict[str, str]:
 
 
 def test_build_leaves_everything(built: Path) -> None:
-    for name in ("plan.json", "provenance.json", "stage/stage.usda", "report/index.html"):
+    parts = ("stage/stage.usda", "stage/specimen.usdz", "report/index.html")
+    for name in ("plan.json", "provenance.json", *parts):
         assert (built / name).is_file(), name
     assert (built / "bundle" / "manifest.json").is_file()
     assert not [f for f in built.rglob("*") if f.name.startswith(".")]
@@ -71,7 +72,7 @@ def test_f_is_upright_and_not_mirrored_in_the_composed_stage(built: Path) -> Non
             points += [matrix.Transform(p) for p in UsdGeom.Mesh(prim).GetPointsAttr().Get()]
     x, y, z = np.array(points).T
     # um: x 0.2, y 0.2, z 0.5 a voxel; stem voxels 6..13, arms to 30, rows 6..42, foot from plane 8
-    assert 6 * 0.2 - 0.2 < x.min() < 6 * 0.2 + 0.2
+    assert 5.5 * 0.2 - 0.2 < x.min() < 5.5 * 0.2 + 0.2
     assert 29 * 0.2 - 0.2 < x.max() < 30 * 0.2 + 0.2
     assert -42 * 0.2 - 0.2 < y.min() < -41 * 0.2 + 0.2
     right = x > 26 * 0.2
@@ -152,6 +153,7 @@ def test_given_iso_value_is_used_and_the_found_one_kept(tmp_path: Path) -> None:
     assert main(["units", str(out), "--workers", "0"]) == 0
     iso = Store(out).survey()["F_x20_body"]["iso"]["r0_c0"]
     assert iso["value"] == 400
+    assert iso["background"] == 0
     assert json.loads((out / iso["file"]).read_text())["found"] == pytest.approx(550, abs=250)
 
 

@@ -59,9 +59,9 @@ def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None
 
 def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
     file = tmp_path / "ours.toml"
-    file.write_text('[isovalue]\ncriterion = "mean"\n[iso_values]\n"Hoechst 33342" = 800\n')
+    file.write_text('[isovalue]\ncriterion = "pekar-mean"\n[iso_values]\n"Hoechst 33342" = 800\n')
     settings = config.load(str(file), None, {})
-    assert settings.isovalue.criterion == "mean"
+    assert settings.isovalue.criterion == "pekar-mean"
     assert settings.iso_values == {"Hoechst 33342": 800.0}
     assert config.from_dict(tomllib.loads(config.to_toml(settings))) == settings
 

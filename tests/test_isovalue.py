@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from phantoms import blurred_ball
+from stereocell.denoise import smooth
 from stereocell.errors import NoSurfaceError, UsageError
 from stereocell.isovalue import CRITERIA, PEAK_SHARE, IsoValueOptions, _peak, find_iso_value
-from stereocell.surface import extract_surface, signed_distance, smooth
+from stereocell.surface import extract_surface, signed_distance
 from stereocell.tiling import Box
 from stereocell.volume import Volume
 from test_surface import enclosed_volume
@@ -26,7 +27,7 @@ def _ball(noise: float = 0.0) -> np.ndarray:
     return (field + np.random.default_rng(0).normal(0, 1, SHAPE) * noise).astype(np.float32)
 
 
-@pytest.mark.parametrize("criterion", ["compromise", "mean"])
+@pytest.mark.parametrize("criterion", ["edges", "compromise", "pekar-mean"])
 def test_blurred_ball_is_cut_at_half_its_height(criterion: str) -> None:
     found = find_iso_value(_ball(), SPACING, IsoValueOptions(criterion=criterion))
     assert found.value == pytest.approx(700, abs=0.15 * 700)
@@ -57,13 +58,13 @@ def _volume_error(radius: float, sigma: float, noise: float, seed: int) -> float
 @pytest.mark.parametrize("sigma", [0.15, 0.3, 0.5])
 @pytest.mark.parametrize("radius", [1.5, 3.0, 5.0])
 def test_blurred_ball_keeps_its_volume(radius: float, sigma: float, noise: float) -> None:
-    """Within 2 %; a ball of only 5 x 11 x 11 voxels' radius within 6 %, wherever its centre lies.
+    """Within 2 %; a ball of only 5 x 11 x 11 voxels' radius within 7 %, wherever its centre lies.
 
     1.2 % of the small one are lost to chords: the mesh's corners lie on the ball, its faces inside.
     The rest is how few voxels its edge has. Half the height would lose 35 % of it at a blur of 0.5.
     """
     errors = [_volume_error(radius, sigma, noise, seed) for seed in range(4)]
-    assert np.abs(errors).max() < (0.06 if radius < 3 else 0.02)
+    assert np.abs(errors).max() < (0.07 if radius < 3 else 0.02)
 
 
 @settings(max_examples=10, deadline=None)
@@ -143,5 +144,5 @@ def test_options_out_of_range_are_wrong_usage(values: dict[str, Any], message: s
 
 
 def test_unknown_criterion_is_wrong_usage() -> None:
-    with pytest.raises(UsageError, match=r"'best', expected one of compromise"):
+    with pytest.raises(UsageError, match=r"'best', expected one of edges"):
         IsoValueOptions(criterion="best")

@@ -6,8 +6,9 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from stereocell import unwrap as unwrap_module
+from stereocell.distance import Nearest, measure_distance
 from stereocell.errors import UsageError
-from stereocell.lod import FEWEST, LodOptions, Nearest, drop_doubles, measure_distance, simplify
+from stereocell.lod import FEWEST, LodOptions, drop_doubles, simplify
 from stereocell.mesh import Mesh
 from stereocell.unwrap import bake_normals, unwrap
 from test_surface import open_edges

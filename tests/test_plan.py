@@ -130,9 +130,9 @@ def test_lengths_for_other_voxels_are_wrong_usage(surface: dict[str, object]) ->
 
 def test_a_long_reach_is_fine_where_little_is_read() -> None:
     surface: dict[str, object] = {"min_diagonal_um": 10000.0}
-    assert _plan({"region": "0:16,0:48,0:36"}, surface=surface).halo == (18, 50, 38)
+    assert _plan({"region": "0:16,0:48,0:36"}, surface=surface).halo == (19, 51, 39)
     endless: dict[str, object] = {"min_diagonal_um": 1e308, "max_cavity_um": 1e308}
-    assert _plan({"region": "0:16,0:48,0:36"}, surface=endless).halo == (18, 50, 38)
+    assert _plan({"region": "0:16,0:48,0:36"}, surface=endless).halo == (19, 51, 39)
     wide = (Level((64, 3000, 3000), (0.28, 0.14, 0.14)),)
     with pytest.raises(UsageError, match="for a tile of 64 x 512 x 512"):
         _plan(levels=wide, surface=surface)

@@ -210,6 +210,7 @@ def _unit(**changed: object) -> UnitFacts:
         "directory": Path("unit"),
         "iso_file": "iso.json",
         "iso_value": 100.0,
+        "background": 0.0,
         "confidence": 0.5,
         "iso_reason": "",
         "reason": "",
@@ -303,7 +304,7 @@ def test_page_tells_of_each_unit(built: Path) -> None:
         for tile in ("r0_c0", "r0_c1"):
             assert f"Slices of {channel} in tile {tile}" in parsed.alts
     assert any(re.match(r"\(given; found [\d.]+\)", text) for text in parsed.texts)
-    assert "(found)" in parsed.texts
+    assert any(text.startswith("above a background of") for text in parsed.texts)
     assert "1 channel without a surface in any tile" in parsed.texts
     assert "empty: every voxel is 300" in parsed.texts
     assert "as the test has it" not in html  # it starts a sentence
@@ -386,3 +387,10 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
         "1,200 fragments dropped": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
         "3 cavities filled": ("CD31: 3 in 1 tile, most in r0_c0 (3)",),
     }
+
+
+def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:
+    one = LodFacts(10, 0.1, 100, 0.02, 0.05, 0.4, 0, 2, 9.0)
+    other = LodFacts(5, 0.3, 40, 0.01, 0.2, 0.3, 1, 0, 4.0)
+    total = sum_up([_unit(lods=(one,)), _unit(lods=(other,))])
+    assert total.lods == (LodFacts(15, 0.3, 140, 0.02, 0.2, 0.4, 1, 2, 4.0),)

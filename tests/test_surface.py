@@ -5,15 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from phantoms import blurred_ball, f_phantom
+from stereocell.denoise import SMOOTHING_REACH, smooth
 from stereocell.mesh import Mesh
 from stereocell.repair import RepairOptions, repair
-from stereocell.surface import (
-    SMOOTHING_REACH,
-    extract_surface,
-    gradient_magnitude,
-    signed_distance,
-    smooth,
-)
+from stereocell.surface import extract_surface, gradient_magnitude, signed_distance
 from stereocell.tiling import Box, cut
 from stereocell.volume import Volume, zyx_to_xyz
 

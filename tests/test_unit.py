@@ -7,7 +7,7 @@ import pytest
 
 from phantoms import blurred_ball
 from stereocell.config import Settings
-from stereocell.isofield import IsoField
+from stereocell.latticefield import LatticeField
 from stereocell.specimen import APRON
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput, build_unit, to_eight_bit
@@ -21,8 +21,8 @@ BOX = Box((0, 0, 0), SHAPE)
 def _given(scale: float) -> UnitInput:
     settings = Settings()
     settings = replace(settings, surface=settings.surface.resolved(SPACING))
-    iso = IsoField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
-    return UnitInput(BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, (0.0, scale), settings)
+    iso = LatticeField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
+    return UnitInput(BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, None, (0.0, scale), settings)
 
 
 @pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])

@@ -1,10 +1,13 @@
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdValidation
 
-from stages import F_ID, HEAD, leaf, write_whole
+from stages import F_ID, FUNCTIONS, HEAD, TILES, leaf, write_whole
 from stereocell.validate_usd import validate_stage
+from stereocell.write.vdb import write_vdb
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +109,85 @@ def test_what_is_no_stage_is_one_finding(tmp_path: Path) -> None:
     for path in (tmp_path / "stage.usda", tmp_path / "missing.usda"):
         (finding,) = validate_stage(path)
         assert path.name in str(finding)
+
+
+def test_every_combination_of_variants_composes(stage_path: Path) -> None:
+    stage = Usd.Stage.Open(str(stage_path))
+    tiles = [stage.GetPrimAtPath(f"/Specimen/Tiles/{tile}") for tile in TILES]
+    channel = stage.GetPrimAtPath(f"/Specimen/Channels/{F_ID}")
+    lods, representations = (
+        tiles[0].GetVariantSet(name).GetVariantNames() for name in ("lod", "representation")
+    )
+    assert (len(lods), len(representations)) == (3, 3)
+    for lod, representation, function in product(lods, representations, FUNCTIONS):
+        for tile in tiles:
+            assert tile.GetVariantSet("lod").SetVariantSelection(lod)
+            assert tile.GetVariantSet("representation").SetVariantSelection(representation)
+        assert channel.GetVariantSet("transferFunction").SetVariantSelection(function)
+        assert not stage.GetCompositionErrors()
+        drawn = {prim.GetName(): prim.GetTypeName() for prim in stage.Traverse()}
+        for tile in TILES:
+            shown = {"Mesh": f"{F_ID}_{tile}", "Volume": f"{F_ID}_{tile}_volume"}
+            for kind, name in shown.items():
+                # what is not shown is inactive: not there for a client that asks
+                expected = representation in ("both", kind.lower())
+                assert (drawn.get(name) == kind) == expected
+        assert np.allclose(
+            channel.GetAttribute("stereocell:opacityPoints").Get(), FUNCTIONS[function]
+        )
+
+
+def edit_volume(stage_path: Path, folder: Path, content: str) -> list[str]:
+    field = f'over "{F_ID}_r0_c0_volume"\n{{\n{content}\n}}'
+    return validate_edit(
+        stage_path, folder, f'over "r0_c0"\n{{\nover "{F_ID}"\n{{\n{field}\n}}\n}}'
+    )
+
+
+def test_a_field_that_its_vdb_lacks_is_found(stage_path: Path, tmp_path: Path) -> None:
+    field = 'over "density"\n{\ntoken fieldName = "temperature"\n}'
+    (text,) = edit_volume(stage_path, tmp_path, field)
+    assert text.startswith(leaf("r0_c0", F_ID, "_volume") + "/density")
+    assert "fieldName is 'temperature', expected one of ['density']" in text
+
+
+def test_a_vdb_in_metres_is_found(stage_path: Path, tmp_path: Path) -> None:
+    voxels = np.full((16, 48, 18), 9, np.uint8)
+    write_vdb(tmp_path / "metres.vdb", voxels, (0, 0, 0), (0.5e-6, 0.25e-6, 0.25e-6))
+    field = 'over "density"\n{\nasset filePath = @./metres.vdb@\n}'
+    (text,) = edit_volume(stage_path, tmp_path, field)
+    assert "voxels of [2.5e-07, 2.5e-07, 5e-07]" in text
+    assert "expected [0.25, 0.25, 0.5]" in text
+
+
+def test_a_volume_with_two_fields_is_found(stage_path: Path, tmp_path: Path) -> None:
+    path = leaf("r0_c0", F_ID, "_volume") + "/density"
+    findings = edit_volume(stage_path, tmp_path, f"rel field:second = <{path}>")
+    assert any("2 fields, expected 1" in text for text in findings)
+
+
+def test_two_things_of_one_name_are_found(stage_path: Path, tmp_path: Path) -> None:
+    twin = f'over "r0_c0"\n{{\ndef Sphere "{F_ID}_r0_c1"\n{{\n}}\n}}'
+    findings = validate_edit(stage_path, tmp_path, twin)
+    named = [text for text in findings if f"2 prims are called {F_ID}_r0_c1, expected 1" in text]
+    assert {text.split(": ")[0].split(" ")[0] for text in named} == {
+        f"/Specimen/Tiles/r0_c0/{F_ID}_r0_c1",
+        leaf("r0_c1", F_ID),
+    }
+
+
+def test_a_selection_in_a_set_that_is_not_there_is_found(stage_path: Path, tmp_path: Path) -> None:
+    selected = 'over "r0_c0" (variants = {\nstring level = "lod0"\n})\n{\n}'
+    findings = validate_edit(stage_path, tmp_path, selected)
+    assert any("variant set level selects 'lod0', expected one of []" in text for text in findings)
+
+
+def test_units_of_a_layer_in_an_unselected_variant_are_found(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "cm.usda").write_text('#usda 1.0\n(defaultPrim = "A")\ndef "A"\n{\n}\n')
+    hidden = 'over "extra" (references = @./cm.usda@)\n{\n}'
+    variant = f'variantSet "lod" = {{\n"lod2" {{\n{hidden}\n}}\n}}'
+    tiles = f'over "r0_c0" (prepend variantSets = "lod")\n{{\n{variant}\n}}'
+    findings = validate_edit(stage_path, tmp_path, tiles)
+    assert any("cm.usda: metersPerUnit is None, expected 1e-06" in text for text in findings)

@@ -25,7 +25,7 @@ from stereocell.sources import SourceRef, open_source
 from stereocell.staging import run_tile, tile_task
 from stereocell.store import Store
 from stereocell.survey import look_from
-from stereocell.write import bundle, usd
+from stereocell.write import bundle, usd, usdz
 from stereocell.write.atomic import write_bytes
 from stereocell.write.composed import dependencies
 from stereocell.write.generator import GENERATOR
@@ -99,7 +99,9 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
 
 
 def run_stage(out: Path, engine: Engine) -> None:
-    """Write OUT/stage from the units: stage.usda, looks/ and tiles/; other files are left alone."""
+    """Write OUT/stage from the units: stage.usda, looks/, tiles/ and, where there is a surface,
+    specimen.usdz; other files are left alone.
+    """
     store = Store(out)
     plan = store.plan()
     with _phase(store, "stage") as phase:
@@ -110,9 +112,9 @@ def run_stage(out: Path, engine: Engine) -> None:
         about = provenance(plan)
         depends = [index, [asdict(look) for look in looks], about, plan.name]
         folders = [store.stage_dir / "tiles" / tile.id for tile in plan.tiles]
-        if phase.is_done(
-            key_of(depends, staging), store.stage_file, store.stage_dir / "looks", *folders
-        ):
+        key = key_of(key_of(depends, staging), usdz)
+        small = store.stage_dir / usdz.USDZ_NAME
+        if phase.is_done(key, store.stage_file, small, store.stage_dir / "looks", *folders):
             return
         engine.run("stage", run_tile, tiles)
         extents = [
@@ -121,6 +123,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         ]
         usd.write_stage(store.stage_dir, plan.name, looks, extents, about)
         store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
+        usdz.write_usdz(store.stage_file, small)
 
 
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:

@@ -19,9 +19,10 @@ from stereocell.assets import find_asset
 from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.store import Store
-from stereocell.validate_usd import validate_stage
+from stereocell.validate_usd import validate_stage, validate_usdz
 from stereocell.write.bundle import FILES, MANIFEST
 from stereocell.write.exr import check_exr
+from stereocell.write.usdz import USDZ_NAME
 from stereocell.write.vdb import check_vdb
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb}
@@ -54,6 +55,7 @@ def check(out: Path) -> Iterator[CheckLine]:
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out / "stage")),
+        ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
         ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
@@ -81,6 +83,15 @@ def _check_stage(out: Path) -> str:
     findings = validate_stage(path)
     _raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"
+
+
+def _check_usdz(path: Path) -> str:
+    if not path.parent.is_dir():
+        raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
+    if not path.is_file():
+        return f"no {path.name}: a specimen without surfaces has none"
+    _raise_on([str(finding) for finding in validate_usdz(path)])
+    return f"{path.name}: nothing found by the validators of usdz and by our own rules"
 
 
 def _check_stage_files(folder: Path) -> str:

@@ -71,6 +71,9 @@ def _input(parser: argparse.ArgumentParser) -> None:
     plan.add_argument("--time", type=int, help="index into a time series")
     plan.add_argument("--spacing-um", help="z,y,x voxel spacing in um, instead of the file's")
     plan.add_argument(
+        "--iso-criterion", help="how iso-values are found: edges (default), pekar-mean, ..."
+    )
+    plan.add_argument(
         "--iso-value",
         action="append",
         metavar="CHANNEL=VALUE",
@@ -144,7 +147,8 @@ def _flags(options: argparse.Namespace) -> dict[str, Any]:
             name = ""
         if not name:
             raise UsageError(f"--iso-value is {text!r}, expected CHANNEL=VALUE")
-    return {"plan": plan, "iso_values": iso_values}
+    isovalue = {} if options.iso_criterion is None else {"criterion": options.iso_criterion}
+    return {"plan": plan, "isovalue": isovalue, "iso_values": iso_values}
 
 
 # --- handlers; heavy imports wait until they are needed, so that --help is quick

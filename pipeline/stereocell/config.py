@@ -80,6 +80,9 @@ class SurfaceOptions:
     )
     min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
     max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
+    background_um: float | str = setting(
+        AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
+    )
 
     def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
         """Return the options with every `auto` replaced by a length."""
@@ -88,6 +91,7 @@ class SurfaceOptions:
             "alpha_um": 2 * max(spacing_um),
             "min_diagonal_um": 3 * max(spacing_um),
             "max_cavity_um": 4 * max(spacing_um),
+            "background_um": 64 * min(spacing_um),
         }
         lengths = {key: _length(f"surface.{key}", getattr(self, key), auto[key]) for key in auto}
         return SurfaceOptions(**lengths)

@@ -1,17 +1,26 @@
-"""Choose the iso-value of one (tile, channel): the level whose surface is sharpest.
+"""Choose the iso-value of one (tile, channel): the level whose surface follows the most edges.
 
 The coarea formula turns the integrals over the iso-surfaces, area and total gradient, into
 histograms over the voxels, so that one pass scores every level. Criteria: the family of Pekar,
 Wiemker & Hempel, "Fast detection of meaningful isosurfaces for volume data visualization", IEEE
-Visualization 2001: area, total gradient, mean gradient (total / area). The default is the
-compromise total / sqrt(area): on real stacks the mean gradient climbs with brightness and cuts
-only the cores of the brightest cells, and the total gradient floods the noise; between them the
-compromise outlines the bright cells and stays under smoothing.
+Visualization 2001: area, total gradient, mean gradient (total / area), and between them total /
+sqrt(area). As stated they fail on real stacks: the mean climbs with brightness and cuts only the
+cores of the brightest cells, the total floods the noise.
 
-The compromise also keeps the volume of a blurred ball, where half the height and the steepest
-level do not: r f(r) is a blur in one dimension, so that |f'| r, which is this score over the level
-of radius r, peaks at the true radius R but for s^4 / R^3 (s the blur's sigma). Half the height and
-the mean gradient's peak lie s^2 / R further in, where 3 s^2 / R^2 of the volume are missing.
+The default, `edges`, lets only what is steeper than noise count: a voxel's weight is 1 - n / g^2,
+where g is its gradient and n NOISE_FACTOR times the mean square gradient of the tile's dim part.
+The total of that says where the edges are, for bodies of any brightness; on its summit, total /
+sqrt(area) settles the level. Over 144 tiles of balls, tubes and membranes (1 to 40 % of the tile,
+alike or 1 to 8 times as bright, 10 to 200 photons, even and uneven background; `make bench-iso`)
+its solids have a mean Dice of .734 with the truth; total / sqrt(area) .680, mean .610, total .608,
+area .403; Otsu .658, isodata .643, Li .641 on the smoothed voxels, .678, .665, .654 on the same
+denoised field above its background.
+
+That last step keeps the volume of a blurred ball, where half the height, the steepest level and the
+total's own peak do not: r f(r) is a blur in one dimension, so that |f'| r, which is total /
+sqrt(area) over the level of radius r, peaks at the true radius R but for s^4 / R^3 (s the blur's
+sigma). Half the height and the mean's peak lie s^2 / R further in, the total's as far out, where
+3 s^2 / R^2 of the volume are missing or too much.
 """
 
 from dataclasses import dataclass
@@ -24,7 +33,11 @@ from stereocell.errors import NoSurfaceError, UsageError
 from stereocell.options import setting
 from stereocell.surface import gradient_magnitude
 
-CRITERIA = ("compromise", "mean", "total", "area")
+CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
+NOISE_FACTOR = 8.0  # noise's own gradients rarely reach it; 3 to 16 choose alike
+DIM_PERCENTILE = 40.0  # of the voxels: taken as free of edges, where the noise is measured
+CHI = 0.789  # median over mean of a chi-square of three: of noise's squared gradient
+EDGES_SHARE = 0.75  # of the most edges: levels that follow nearly as many are in the choice
 PEAK_SHARE = 0.75  # of the best score: the summit of the curve, to which a parabola is fitted
 
 
@@ -32,7 +45,7 @@ PEAK_SHARE = 0.75  # of the best score: the summit of the curve, to which a para
 class IsoValueOptions:
     """How iso-values are found."""
 
-    criterion: str = setting("compromise", "compromise, mean, total or area")
+    criterion: str = setting("edges", "edges, compromise, pekar-mean, pekar-total, pekar-area")
     bins: int = setting(256, "levels tried over the range of a tile's voxels")
     clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
     min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
@@ -92,40 +105,55 @@ def find_iso_value(
 
     Raises NoSurfaceError if all voxels are equal, or if no level separates anything.
     """
-    low, high = float(field.min()), float(np.percentile(field, options.clip_percentile))
+    low = float(field.min())
+    dim, high = (float(v) for v in np.percentile(field, [DIM_PERCENTILE, options.clip_percentile]))
     if not high > low:
         raise NoSurfaceError(f"every voxel is {low:g}")
     # in heights of the range per um: voxels may be so large that their squares leave float32
     gradient = gradient_magnitude(field, spacing_um)
     gradient /= np.float32(high - low)
+    weights = gradient
+    if options.criterion == "edges":
+        noise = NOISE_FACTOR / CHI * float(np.median(gradient[field <= dim])) ** 2
+        tiny = np.float32(1e-12)
+        weights = gradient * np.maximum(0, 1 - noise / np.maximum(gradient**2, tiny))
     span = (low, high)
-    area, edges = np.histogram(field, options.bins, span, weights=gradient)
-    total, _ = np.histogram(field, options.bins, span, weights=gradient**2)
+    area, edges = np.histogram(field, options.bins, span, weights=weights)
+    total, _ = np.histogram(field, options.bins, span, weights=weights * gradient)
+    slope, _ = np.histogram(field, options.bins, span, weights=gradient)
     count, _ = np.histogram(field, options.bins, span)
     levels = (edges[:-1] + edges[1:]) / 2
 
     # single bins are noisy where few voxels fall. On six synthetic tiles a sigma of 1 % of the
     # levels put the peak up to 15 % off the boundary's intensity, 3 % at most 10 %
-    area, total, count = (
+    area, total, slope, count = (
         ndimage.gaussian_filter1d(h.astype(np.float64), 0.03 * options.bins)
-        for h in (area, total, count)
+        for h in (area, total, slope, count)
     )
-    large = area >= options.min_area_share * area.max()
-    exponent = {"mean": 1.0, "compromise": 0.5, "total": 0.0}
-    if options.criterion == "area":
-        score = np.where(large, area, 0.0)
-    else:
-        divisor = np.where(large, area, 1.0) ** exponent[options.criterion]
-        score = np.where(large, total / divisor, 0.0)
+    score = _score(area, total, options)
     if not score.max() > 0:
         raise NoSurfaceError("no level separates anything")
     score = score / score.max()
     best = int(score.argmax())
     # a tile without any noise has a median of 0: the tiniest slope keeps the ratio finite
     usual = max(float(np.median(gradient)), 1e-6)
-    sharpness = float(area[best] / max(count[best], 1e-9)) / usual
+    sharpness = float(slope[best] / max(count[best], 1e-9)) / usual
     clear = sharpness >= options.min_sharpness
     return IsoValue(_peak(levels, score, best), sharpness, clear, levels, score)
+
+
+def _score(
+    area: NDArray[np.float64], total: NDArray[np.float64], options: IsoValueOptions
+) -> NDArray[np.float64]:
+    """Return the criterion over the levels; 0 for those that are out of the choice."""
+    large = area >= options.min_area_share * area.max()
+    if options.criterion == "pekar-area":
+        return np.where(large, area, 0.0)
+    exponent = {"pekar-total": 0.0, "pekar-mean": 1.0}.get(options.criterion, 0.5)
+    score = np.where(large, total / np.where(large, area, 1.0) ** exponent, 0.0)
+    if options.criterion == "edges":
+        score = np.where(total >= EDGES_SHARE * total.max(), score, 0.0)
+    return score
 
 
 def _peak(levels: NDArray[np.float64], score: NDArray[np.float64], best: int) -> float:

@@ -25,13 +25,43 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True)
+class Spread:
+    """Distances in um from one surface to another: see `distance.measure_spread`."""
+
+    mean: float
+    p95: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """What is known of a level of detail beside its distance.
+
+    away, back  distances from the iso-surface to this mesh, and from this mesh to it
+    mended      bodies that had to be simplified again, as the first attempt had faults
+    fallbacks   bodies that kept the level before's surface, as every attempt had faults
+    faults      left over, by the exact check: see `certify`
+    angle_deg   1st percentile of the triangles' smallest angles
+    """
+
+    away: Spread
+    back: Spread
+    mended: int
+    fallbacks: int
+    faults: int
+    angle_deg: float
+
+
+@dataclass(frozen=True, slots=True)
 class Lod:
     """One level of detail. `lod0` is the finest.
 
-    distance_um  measured distance between this mesh and the iso-surface: see `lod`
+    distance_um  measured distance between this mesh and the iso-surface: see `distance`
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
+    quality      how it was made and how true it is; None where the writer doesn't know
     """
 
     mesh: Mesh
     distance_um: float
     normal_map: NDArray[np.uint8] | None = None
+    quality: Quality | None = None

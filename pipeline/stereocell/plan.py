@@ -11,10 +11,10 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Protocol
 
 from stereocell.config import AUTO, Settings, from_dict, to_dict
+from stereocell.denoise import SMOOTHING_REACH
 from stereocell.errors import SourceError, UsageError
 from stereocell.names import to_identifier
 from stereocell.repair import RepairOptions
-from stereocell.surface import SMOOTHING_REACH
 from stereocell.tiling import Box, Tile, cut, cut_evenly
 
 FORMAT = "stereocell-plan"
@@ -232,7 +232,7 @@ def _halo(
     tile_size = settings.plan.tile_size
     limit = max(UNIT_VOXELS, UNIT_TILES * math.prod(tile_size))
     z, y, x = (
-        min(size + 2 * (reach / step + 3), n) + 2 * padding / step
+        min(size + 2 * (reach / step + 4), n) + 2 * padding / step
         for size, n, step in zip(tile_size, region.shape, spacing_um, strict=True)
     )
     if z * y * x > limit:
@@ -247,9 +247,10 @@ def _halo(
             f"{_by(tile_size)}, expected at most {limit:,}: "
             "choose another --preset, smaller lengths or larger tiles"
         )
-    # two more: one voxel for the gradient, one because the tile's last plane is its neighbour's
+    # three more: one voxel for the median, one for the gradient, one because the tile's last plane
+    # is its neighbour's
     lengths = zip(region.shape, spacing_um, strict=True)
-    depth, height, width = (math.ceil(min(reach / step, n)) + 2 for n, step in lengths)
+    depth, height, width = (math.ceil(min(reach / step, n)) + 3 for n, step in lengths)
     return depth, height, width
 
 

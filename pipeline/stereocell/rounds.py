@@ -4,20 +4,21 @@ Round one finds each channel's window, dataset-wide, and an iso-value for each (
 Round two builds meshes and volumes. Every result lies under a name that says what it depends on.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, TypeVar
 
 from stereocell import tasks as maker
+from stereocell.agreement import agree
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.engine import Engine
 from stereocell.errors import SourceError, UsageError
-from stereocell.isofield import IsoField, make_iso_field
+from stereocell.latticefield import LatticeField, make_iso_field
 from stereocell.lineage import key_of
 from stereocell.plan import Channel, Plan
 from stereocell.sources import open_source, source_of
 from stereocell.store import Store
-from stereocell.survey import Display, make_look
+from stereocell.survey import Display, display_from_json, display_to_json, make_look
 from stereocell.tasks import DisplayTask, IsoTask, UnitTask, run_display, run_iso, run_unit
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput
@@ -40,14 +41,15 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> tu
     """
     wanted = {(tile_id, channel.id) for tile_id, channel in _select(plan, only)}
     content = _survey(store, plan, engine)
+    displays = {id_: display_from_json(entry["display"]) for id_, entry in content.items()}
     fields = {
         channel_id: make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
         for channel_id, entry in content.items()
     }
     tasks, keys, others = [], {}, 0
     for tile_id, channel in _select(plan, None):
-        window = content[channel.id]["display"]["window"]
-        task, key = _unit_task(store, plan, tile_id, channel, fields[channel.id], window)
+        display = displays[channel.id]
+        task, key = _unit_task(store, plan, tile_id, channel, fields[channel.id], display)
         keys[f"{tile_id}/{channel.id}"] = key
         if is_whole(task.directory):
             continue
@@ -96,22 +98,28 @@ def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel]]:
 def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
     """Return (and write) each channel's display, iso-values and transfer functions."""
     displays = _displays(store, plan, engine)
-    isos = _isos(store, plan, engine)
+    isos = _isos(store, plan, engine, displays)
     content = {}
     for channel in plan.channels:
         found = {tile.id: isos[tile.id, channel.id] for tile in plan.tiles}
+        if channel.name not in plan.settings.iso_values:
+            agreed = agree(plan.tiles, found)
+            found = {tile: f | {"value": agreed[tile]} for tile, f in found.items()}
         display = displays[channel.id]
         look = make_look(
             channel.name,
             channel.color,
             display,
-            {tile: f["value"] for tile, f in found.items()},
+            {
+                tile: None if f["value"] is None else f["value"] + f["background"]
+                for tile, f in found.items()
+            },
             {tile: f["confidence"] for tile, f in found.items()},
         )
         content[channel.id] = {
-            "display": asdict(display),
+            "display": display_to_json(display),
             "iso": {
-                tile: {key: f[key] for key in ("value", "confidence", "reason")}
+                tile: {key: f[key] for key in ("value", "background", "confidence", "reason")}
                 | {"file": f["file"]}
                 for tile, f in found.items()
             },
@@ -124,30 +132,42 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
 def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
     files, tasks = {}, []
     for channel in plan.channels:
-        depends = [_input_key(plan), channel.index, _box(plan.region), asdict(plan.settings.window)]
+        settings = plan.settings
+        # a value that is given speaks of the voxels as they are
+        subtracts = channel.name not in settings.iso_values and settings.surface.background_um != 0
+        depends = [
+            _input_key(plan),
+            channel.index,
+            _box(plan.region),
+            asdict(settings.window),
+            settings.surface.background_um if subtracts else 0,
+        ]
         file = store.display_file(channel.id, key_of(depends, maker))
         files[channel.id] = file
         if find_json(file, _DISPLAY) is None:
             task = DisplayTask(
-                source_of(plan), plan.level, channel.index, plan.region, plan.settings
+                source_of(plan), plan.level, channel.index, plan.region, settings, subtracts
             )
             tasks.append((channel.id, task))
     displays = _run(plan, engine, "windows", run_display, tasks)
     for (channel_id, _), display in zip(tasks, displays, strict=True):
-        write_json(files[channel_id], asdict(display))
+        write_json(files[channel_id], display_to_json(display))
     found = {}
     for channel_id, file in files.items():
         content = read_json(file, _DISPLAY, _AGAIN)
-        found[channel_id] = Display(tuple(content["window"]), tuple(content["histogram"]))
+        found[channel_id] = display_from_json(content)
     return found
 
 
-def _isos(store: Store, plan: Plan, engine: Engine) -> dict[tuple[str, str], dict[str, Any]]:
+def _isos(
+    store: Store, plan: Plan, engine: Engine, displays: Mapping[str, Display]
+) -> dict[tuple[str, str], dict[str, Any]]:
     files, tasks = {}, []
     settings, ref = plan.settings, source_of(plan)
     for tile in plan.tiles:
         for channel in plan.channels:
             given = settings.iso_values.get(channel.name)
+            background = _around(displays[channel.id].background, tile.box)
             depends = [
                 _input_key(plan),
                 channel.index,
@@ -155,11 +175,14 @@ def _isos(store: Store, plan: Plan, engine: Engine) -> dict[tuple[str, str], dic
                 asdict(settings.isovalue),
                 settings.surface.smoothing_um,
                 given,
+                None if background is None else background.to_json(),
             ]
             file = store.iso_file(tile.id, channel.id, key_of(depends, maker))
             files[tile.id, channel.id] = file
             if find_json(file, _ISO_VALUE) is None:
-                task = IsoTask(ref, plan.level, channel.index, tile.box, settings, given, file)
+                task = IsoTask(
+                    ref, plan.level, channel.index, tile.box, settings, given, background, file
+                )
                 tasks.append((f"{tile.id}/{channel.name}", task))
     _run(plan, engine, "iso-values", run_iso, tasks)
     return {
@@ -173,11 +196,10 @@ def _unit_task(
     plan: Plan,
     tile_id: str,
     channel: Channel,
-    iso: IsoField | None,
-    display: tuple[float, float],
+    iso: LatticeField | None,
+    display: Display,
 ) -> tuple[UnitTask, str]:
     tile = plan.tile(tile_id)
-    low, high = display
     lattice = tile.lattice(plan.region)
     window = lattice.grown(plan.halo, plan.region)
     given = UnitInput(
@@ -185,15 +207,16 @@ def _unit_task(
         lattice=lattice,
         region=plan.region,
         origin_um=plan.origin_um,
-        iso=None if iso is None else iso.around(window),
-        display=(low, high),
+        iso=_around(iso, window),
+        background=_around(display.background, window),
+        display=display.window,
         settings=plan.settings,
     )
     depends = [
         _input_key(plan),
         channel.index,
         [_box(box) for box in (given.window, given.lattice, given.region)],
-        None if given.iso is None else [given.iso.centres, given.iso.values.tolist()],
+        [None if f is None else f.to_json() for f in (given.iso, given.background)],
         given.display,
         [asdict(options) for options in (plan.settings.surface, plan.settings.lod)],
         asdict(plan.settings.unwrap),
@@ -201,6 +224,10 @@ def _unit_task(
     key = key_of(depends, maker)
     directory = store.unit_dir(tile_id, channel.id, key)
     return UnitTask(source_of(plan), plan.level, channel.index, given, directory), key
+
+
+def _around(field: LatticeField | None, box: Box) -> LatticeField | None:
+    return None if field is None else field.around(box)
 
 
 def _input_key(plan: Plan) -> list[Any]:

@@ -17,21 +17,11 @@ from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from stereocell.mesh import Mesh
 from stereocell.tiling import Box
-from stereocell.volume import Volume, zyx_to_xyz
+from stereocell.volume import zyx_to_xyz
 
-SMOOTHING_REACH = 4.0  # sigmas of the Gaussian that are summed
 # Values nearer to zero than this share of the distance's clip are moved off it: a vertex on a
 # lattice point would make degenerate triangles.
 SNAP = 0.01
-
-
-def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
-    """Return the voxels (z, y, x) after a Gaussian of `sigma_um`, float32; 0 turns it off."""
-    field = volume.voxels.astype(np.float32)
-    if sigma_um > 0:
-        sigma = sigma_um / np.asarray(volume.spacing_um)
-        field = ndimage.gaussian_filter(field, sigma, mode="nearest", truncate=SMOOTHING_REACH)
-    return field
 
 
 def gradient_magnitude(
@@ -126,6 +116,27 @@ def extract_surface(
     normals = _normals(distance, lattice_zyx - np.asarray(window.start) + margin, steps)
     # VTK winds by the image's own axes; the world mirrors y, which turns every triangle over
     return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
+
+
+def cut_planes(
+    lattice: Box,
+    region: Box,
+    spacing_um: tuple[float, float, float],
+    origin_um: tuple[float, float, float],
+) -> tuple[tuple[int, float], ...]:
+    """Return where `extract_surface` leaves the mesh open: where another tile follows.
+
+    Each plane is a column of the positions (0 x, 1 y, 2 z) and its value in um, as float32 has it.
+    """
+    planes = []
+    sides = ((lattice.start, region.start, 0), (lattice.stop, region.stop, -1))
+    for ends, outer, last in sides:
+        place = zyx_to_xyz((np.asarray(ends) + last) * np.asarray(spacing_um) + origin_um)
+        value = place.astype(np.float32)  # as of the mesh's vertices
+        for axis in range(3):
+            if ends[axis] != outer[axis]:
+                planes.append((2 - axis, float(value[2 - axis])))
+    return tuple(planes)
 
 
 def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.config import WindowOptions
+from stereocell.latticefield import LatticeField
 from stereocell.specimen import Look
 from stereocell.transfer import make_transfer_functions
 
@@ -20,13 +21,16 @@ BINS = 256
 
 @dataclass(frozen=True, slots=True)
 class Display:
-    """One channel's window in voxel values, and voxel counts (int64, 256 bins) inside it."""
+    """One channel's window in voxel values, voxel counts (256 bins) inside it, its background."""
 
     window: tuple[float, float]
     histogram: tuple[int, ...]
+    background: LatticeField | None
 
 
-def find_display(voxels: NDArray[Any], options: WindowOptions) -> Display:
+def find_display(
+    voxels: NDArray[Any], options: WindowOptions, background: LatticeField | None = None
+) -> Display:
     """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide."""
     percentiles = (options.low_percentile, options.high_percentile)
     low, high = (float(v) for v in np.percentile(voxels, percentiles))
@@ -35,7 +39,28 @@ def find_display(voxels: NDArray[Any], options: WindowOptions) -> Display:
     if not high > low:
         high = low + 1.0
     counts, _ = np.histogram(np.clip(voxels, low, high), BINS, (low, high))
-    return Display((low, high), tuple(int(n) for n in counts))
+    return Display((low, high), tuple(int(n) for n in counts), background)
+
+
+def display_to_json(display: Display) -> dict[str, Any]:
+    """Return a display as plain values, as survey.json holds it."""
+    field = display.background
+    return {
+        "window": list(display.window),
+        "histogram": list(display.histogram),
+        "background": None if field is None else field.to_json(),
+    }
+
+
+def display_from_json(content: Mapping[str, Any]) -> Display:
+    """Return the display that `display_to_json` was given; the content has passed its schema."""
+    field = content["background"]
+    low, high = content["window"]
+    return Display(
+        (low, high),
+        tuple(content["histogram"]),
+        None if field is None else LatticeField.from_json(field),
+    )
 
 
 def make_look(

@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.background import find_background
 from stereocell.config import Settings
+from stereocell.denoise import denoise
 from stereocell.documents import write_json
 from stereocell.errors import NoSurfaceError
 from stereocell.isovalue import find_iso_value
+from stereocell.latticefield import LatticeField
 from stereocell.read import Dataset
 from stereocell.sources import SourceRef, open_source
-from stereocell.surface import smooth
 from stereocell.survey import Display, find_display
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput, build_unit
@@ -32,6 +34,7 @@ class DisplayTask:
     channel: int
     region: Box
     settings: Settings
+    subtracts: bool  # a background
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,7 @@ class IsoTask:
     box: Box
     settings: Settings
     given: float | None
+    background: LatticeField | None
     file: Path
 
 
@@ -74,7 +78,17 @@ def run_display(task: DisplayTask) -> Display:
         if step > 1
         else [dataset.read(task.channel, box, level).voxels]
     )
-    return find_display(voxels, task.settings.window)
+    background = None
+    if task.subtracts:
+        surface = task.settings.surface
+        # sharp hot voxels and noise don't reach a percentile of whole blocks: planes as they are
+        background = find_background(
+            voxels.astype(np.float32),
+            task.region,
+            dataset.levels[task.level].spacing_um,
+            float(surface.background_um),
+        )
+    return find_display(voxels, task.settings.window, background)
 
 
 def _voxels(task: DisplayTask, dataset: Dataset, level: int) -> int:
@@ -94,10 +108,20 @@ def _region_at(task: DisplayTask, dataset: Dataset, level: int) -> Box:
 def run_iso(task: IsoTask) -> dict[str, Any]:
     """Find one unit's iso-value and write it down with its curve."""
     volume = open_source(task.ref).read(task.channel, task.box, task.level)
-    field = smooth(volume, float(task.settings.surface.smoothing_um))
-    result: dict[str, Any] = {"value": None, "confidence": 0.0, "reason": ""}
+    field = denoise(volume, float(task.settings.surface.smoothing_um))
+    first, below = float(field.flat[0]), 0.0
+    is_constant = bool((field == first).all())
+    if task.background is not None:
+        under = task.background.at(task.box)
+        below = float(np.mean(np.broadcast_to(under, field.shape), dtype=np.float64))
+        field -= under
+    result: dict[str, Any] = {
+        "value": None, "confidence": 0.0, "reason": "", "background": below
+    }  # fmt: skip
     options = task.settings.isovalue
     try:
+        if is_constant:  # said of the voxels as they are, not of what is above the background
+            raise NoSurfaceError(f"every voxel is {first:g}")
         found = find_iso_value(field, volume.spacing_um, options)
     except NoSurfaceError as error:
         result["reason"] = str(error)

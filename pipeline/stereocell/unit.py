@@ -1,8 +1,5 @@
 """The unit of work: one (tile, channel), from voxels to meshes and an 8-bit volume. Pure."""
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.config import Settings
-from stereocell.isofield import IsoField
-from stereocell.lod import Nearest, measure_distance, simplify
+from stereocell.denoise import denoise
+from stereocell.latticefield import LatticeField
+from stereocell.levels import Clock, make_levels
 from stereocell.mesh import Lod, Mesh
 from stereocell.repair import RepairOptions, repair
 from stereocell.specimen import APRON
-from stereocell.surface import extract_surface, signed_distance, smooth
+from stereocell.surface import cut_planes, extract_surface, signed_distance
 from stereocell.tiling import Box
-from stereocell.unwrap import bake_normals, unwrap
 from stereocell.volume import Volume
 
 
@@ -27,7 +24,8 @@ class UnitInput:
 
     window, lattice, region  what was read, the tile's lattice points, all that is built (voxels)
     origin_um                where voxel (0, 0, 0) lies; the plan's, as every tile must use the same
-    iso                      the iso-value field near the tile; None: no surface
+    iso                      the iso-value near the tile, above the background; None: no surface
+    background               what lies under it; None: nothing is subtracted
     display                  voxel values that become 0 and 255
     """
 
@@ -35,7 +33,8 @@ class UnitInput:
     lattice: Box
     region: Box
     origin_um: tuple[float, float, float]
-    iso: IsoField | None
+    iso: LatticeField | None
+    background: LatticeField | None
     display: tuple[float, float]
     settings: Settings
 
@@ -62,7 +61,7 @@ def build_unit(volume: Volume, given: UnitInput) -> Unit:
 
     A unit whose part of the field never crosses the iso-value has no surface, and says so.
     """
-    clock = _Clock()
+    clock = Clock()
     with clock("volume"):
         eight_bit = to_eight_bit(volume.voxels, given)
     if given.iso is None:
@@ -72,12 +71,13 @@ def build_unit(volume: Volume, given: UnitInput) -> Unit:
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
         return Unit((), eight_bit, reason, dropped, filled, clock.seconds)
-    lods = _make_lods(fine, volume.spacing_um, given.settings, clock)
+    planes = cut_planes(given.lattice, given.region, volume.spacing_um, given.origin_um)
+    lods = make_levels(fine, planes, volume.spacing_um, given.settings, clock)
     return Unit(lods, eight_bit, "", dropped, filled, clock.seconds)
 
 
 def _fine_surface(
-    volume: Volume, given: UnitInput, iso: IsoField, clock: "_Clock"
+    volume: Volume, given: UnitInput, iso: LatticeField, clock: Clock
 ) -> tuple[Mesh, int, int]:
     """Return the repaired surface, and the numbers of fragments dropped and cavities filled.
 
@@ -85,7 +85,9 @@ def _fine_surface(
     """
     surface, spacing = given.settings.surface, volume.spacing_um
     with clock("distance"):
-        field = smooth(volume, float(surface.smoothing_um))
+        field = denoise(volume, float(surface.smoothing_um))
+        if given.background is not None:
+            field -= given.background.at(given.window)
         value_range = given.display[1] - given.display[0]
         distance = signed_distance(field, iso.at(given.window), spacing, value_range)
         del field
@@ -115,41 +117,3 @@ def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
     low, high = given.display
     values = voxels[np.ix_(*index)].astype(np.float32)
     return np.round(np.clip((values - low) / (high - low), 0, 1) * 255).astype(np.uint8)
-
-
-def _make_lods(
-    fine: Mesh, spacing: tuple[float, float, float], settings: Settings, clock: "_Clock"
-) -> tuple[Lod, ...]:
-    options = settings.lod
-    lods: list[Lod] = []
-    mesh = fine
-    with clock("measure"):
-        to_fine = Nearest(fine, options.samples)
-    for level, error in enumerate(options.errors):
-        with clock("simplify"):
-            mesh = simplify(mesh, error * min(spacing))
-        with clock("measure"):
-            distance = measure_distance(to_fine, Nearest(mesh, options.samples))
-            # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
-            distance = max(distance, lods[-1].distance_um if lods else 0.0)
-        if level >= len(options.errors) - settings.unwrap.coarse_lods and len(mesh.triangles):
-            with clock("unwrap"):
-                unwrapped, size = unwrap(mesh, settings.unwrap.max_texture, max(spacing))
-            with clock("bake"):
-                lods.append(Lod(unwrapped, distance, bake_normals(unwrapped, fine, size)))
-        else:
-            lods.append(Lod(mesh, distance))
-    return tuple(lods)
-
-
-class _Clock:
-    """Seconds spent, by step."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, step: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start

@@ -1,6 +1,7 @@
 """A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
-from stereocell.mesh import Lod, Mesh
+from stereocell.mesh import Lod, Mesh, Quality, Spread
 from stereocell.unit import Unit
 from stereocell.write.atomic import replacing_folder
 
@@ -26,6 +27,7 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
             "vertices": len(lod.mesh.positions),
             "distance_um": lod.distance_um,
             "normal_map": 0 if lod.normal_map is None else len(lod.normal_map),
+            "quality": None if lod.quality is None else asdict(lod.quality),
         }
         for lod in unit.lods
     ]
@@ -77,6 +79,12 @@ def load_lods(directory: Path) -> tuple[Lod, ...]:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
 
 
+def load_quality(stored: Mapping[str, Any]) -> Quality:
+    """Return what a record holds of one level's quality."""
+    ways = {way: Spread(**stored[way]) for way in ("away", "back")}
+    return Quality(**{**stored, **ways})
+
+
 def load_volume(directory: Path) -> NDArray[np.uint8]:
     """Return the 8-bit voxels (z, y, x), mapped from the file. Raises OutputError."""
     try:
@@ -96,7 +104,8 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
             arrays.get("uvs"),
             arrays.get("tangents"),
         )
-        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"))
+        quality = stored["quality"] and load_quality(stored["quality"])
+        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"), quality)
 
 
 def _arrays(lod: Lod) -> dict[str, Any]:

@@ -2,14 +2,16 @@
 
 USD's validators find missing files (in unselected variants too), faults of metadata, of API schemas
 and of nesting. They do not see units that differ between layers, selections of variants that do
-not exist, wrong counts, indices and extents: those are checked here. No validator needs an
-exception: what write/usd.py writes passes all of them.
+not exist, wrong counts, indices and extents, names that only their folder tells apart, fields whose
+grid their .vdb lacks: those are checked here. No validator needs an exception: what write/usd.py
+writes passes all of them.
 
 Both run once for each level of detail, since each has a geometry of its own; the channels' transfer
 functions take turns with them, and meshes and volumes are active together.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdValidation, UsdVol
 
+from stereocell.errors import StageError
 from stereocell.write.usd_layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
+from stereocell.write.vdb_head import read_vdb_head
 
 _ALL_SHOWN = {"representation": "both"}
 _TOLERANCE = 1e-4  # of a box's size: extents are float32
@@ -44,7 +48,7 @@ def validate_stage(path: Path) -> list[Finding]:
     except Tf.ErrorException as error:
         reasons = " ".join(fault.commentary for fault in error.args)
         return [Finding("open", str(path), " ".join(reasons.split()))]
-    findings = [*_check_layers(stage), *_check_selections(stage), *_check_all(stage)]
+    findings = [*_check_selections(stage), *_check_all(stage)]
     passes = _select_variants(stage, 0)
     for turn in range(passes):
         _select_variants(stage, turn)
@@ -53,9 +57,36 @@ def validate_stage(path: Path) -> list[Finding]:
     return list(dict.fromkeys(findings))
 
 
+def validate_usdz(path: Path) -> list[Finding]:
+    """Return the faults of a specimen.usdz: USD's validators, those of usdz among them, and ours.
+
+    Its units are metres, as AR viewers expect, and all of it is drawn at once.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        reasons = " ".join(fault.commentary for fault in error.args)
+        return [Finding("open", str(path), " ".join(reasons.split()))]
+    unit, axis = UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)
+    findings = [*_run_validators(stage), *_check_names(stage)]
+    if (unit, axis) != (1.0, UP_AXIS):
+        message = f"metersPerUnit {unit} and upAxis {axis}, expected 1.0 and {UP_AXIS}"
+        findings.append(Finding("units", str(path), message))
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            findings += _check_mesh(UsdGeom.Mesh(prim))
+        elif prim.IsA(UsdVol.Volume):
+            findings.append(Finding("volume", _place(prim), "no client of usdz draws volumes"))
+    del quiet
+    return findings
+
+
 def _check_all(stage: Usd.Stage) -> Iterator[Finding]:
     """Yield the faults of the stage with the variants that are selected now."""
+    yield from _check_layers(stage)
     yield from _run_validators(stage)
+    yield from _check_names(stage)
     boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Mesh):
@@ -106,6 +137,16 @@ def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(
                 "defaultPrim", where, f"defaultPrim is {found}, expected one of its prims"
             )
+
+
+def _check_names(stage: Usd.Stage) -> Iterator[Finding]:
+    """Yield names that two drawn things share: clients that flatten the tree rename one of them."""
+    leaves = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Gprim)]
+    counts = Counter(prim.GetName() for prim in leaves)
+    for prim in leaves:
+        if counts[prim.GetName()] > 1:
+            message = f"{counts[prim.GetName()]} prims are called {prim.GetName()}, expected 1"
+            yield Finding("names", _place(prim), message)
 
 
 def _check_selections(stage: Usd.Stage) -> Iterator[Finding]:
@@ -202,7 +243,10 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     if len(fields) != 1:
         yield Finding("volume", where, f"{len(fields)} fields, expected 1: clients read one file")
     for name, path in sorted(fields.items()):
-        if not prim.GetStage().GetPrimAtPath(path).IsA(UsdVol.OpenVDBAsset):
+        asset = UsdVol.OpenVDBAsset(prim.GetStage().GetPrimAtPath(path))
+        if asset:
+            yield from _check_grid(prim, asset)
+        else:
             yield Finding("volume", where, f"field {name} is no OpenVDBAsset at {path}")
     names = ("boundsMin", "boundsMax", "atlasSize")
     low, high, size = (prim.GetAttribute(f"stereocell:{name}").Get() for name in names)
@@ -217,6 +261,39 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
         return
     # own voxels reach half a voxel out of the lattice's box, or end half a voxel before it
     yield from _check_extent(volume, where, box, 0.5 * (box[1] - box[0]) / cells)
+
+
+def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Finding]:
+    """Yield a field whose file lacks its grid, or has it in other units: clients draw nothing."""
+    where, file = str(asset.GetPath()), asset.GetFilePathAttr().Get()
+    if file is None or not file.resolvedPath:
+        return  # a validator of USD's finds it
+    try:
+        grids = read_vdb_head(Path(file.resolvedPath))
+    except StageError as error:
+        yield Finding("grid", where, str(error))
+        return
+    named = asset.GetFieldNameAttr().Get()
+    grid = next((grid for grid in grids if grid.name == named), None)
+    if grids and grid is None:
+        known = [grid.name for grid in grids]
+        yield Finding("grid", where, f"fieldName is {named!r}, expected one of {known} in {file}")
+    if grid is None or grid.spacing is None:
+        return
+    spacing = _voxel_spacing(volume)
+    if spacing is not None and not np.allclose(grid.spacing, spacing, rtol=_TOLERANCE, atol=0):
+        message = f"voxels of {grid.spacing.tolist()} in {file}, expected {spacing.tolist()}"
+        yield Finding("grid", where, message)
+
+
+def _voxel_spacing(volume: Usd.Prim) -> NDArray[np.float64] | None:
+    """Return the voxels' spacing (x, y, z) by the volume's own attributes; None if they lack."""
+    names = ("boundsMin", "boundsMax", "atlasSize")
+    low, high, size = (volume.GetAttribute(f"stereocell:{name}").Get() for name in names)
+    if low is None or high is None or size is None:
+        return None
+    cells = np.array(size) - 2 * (volume.GetAttribute("stereocell:apron").Get() or 0) - 1
+    return (np.array(high) - np.array(low)) / cells if (cells > 0).all() else None
 
 
 def _check_extent(

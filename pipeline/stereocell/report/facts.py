@@ -20,11 +20,21 @@ PHASES = ("plan", "units", "stage", "bundle")
 
 @dataclass(frozen=True, slots=True)
 class LodFacts:
-    """bytes: of the glb where the bundle has one, else of the unit's own file."""
+    """One level of detail; None where the record doesn't tell.
+
+    bytes     of the glb where the bundle has one, else of the unit's own file
+    mean_um, p95_um, max_um  distance between mesh and iso-surface, of both ways the larger
+    """
 
     triangles: int
     distance_um: float
     bytes: int
+    mean_um: float | None = None
+    p95_um: float | None = None
+    max_um: float | None = None
+    faults: int | None = None
+    fallbacks: int | None = None
+    angle_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +43,8 @@ class UnitFacts:
 
     directory   its results
     iso_file    the criterion's curve, relative to OUT
-    iso_value   None: the tile has none of its own
+    iso_value   above the background; None: the tile has none of its own
+    background  its mean over the tile; 0: none was subtracted
     confidence  0..1
     iso_reason  why the criterion found nothing; empty if it did
     reason      why there is no surface; empty if there is one
@@ -47,6 +58,7 @@ class UnitFacts:
     directory: Path
     iso_file: str
     iso_value: float | None
+    background: float
     confidence: float
     iso_reason: str
     reason: str
@@ -148,7 +160,7 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
     for level, lod in enumerate(record["lods"]):
         glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
         file = glb if glb.is_file() else lod_file(directory, level)
-        lods.append(LodFacts(lod["triangles"], lod["distance_um"], file.stat().st_size))
+        lods.append(_lod(lod, file.stat().st_size))
     ktx2 = [bundle / "volumes" / tile.id / f"{channel.id}{end}.ktx2" for end in ("", "_bricks")]
     z, y, x = record["volume"]
     return UnitFacts(
@@ -157,6 +169,7 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
         directory=directory,
         iso_file=found["file"],
         iso_value=found["value"],
+        background=found["background"],
         confidence=found["confidence"],
         iso_reason=found["reason"],
         reason=record["reason"],
@@ -167,6 +180,21 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
         fragments_dropped=record["fragments_dropped"],
         cavities_filled=record["cavities_filled"],
         seconds=record["seconds"],
+    )
+
+
+def _lod(record: dict[str, Any], size: int) -> LodFacts:
+    q = record["quality"]
+    return LodFacts(
+        triangles=record["triangles"],
+        distance_um=record["distance_um"],
+        bytes=size,
+        mean_um=q and max(q["away"]["mean"], q["back"]["mean"]),
+        p95_um=q and max(q["away"]["p95"], q["back"]["p95"]),
+        max_um=q and max(q["away"]["max"], q["back"]["max"]),
+        faults=q and q["faults"],
+        fallbacks=q and q["fallbacks"],
+        angle_deg=q and q["angle_deg"],
     )
 
 
@@ -185,14 +213,7 @@ def sum_up(units: Iterable[UnitFacts]) -> Total:
     levels = max((len(unit.lods) for unit in units), default=0)
     lods = []
     for level in range(levels):
-        there = [unit.lods[level] for unit in units if level < len(unit.lods)]
-        lods.append(
-            LodFacts(
-                sum(lod.triangles for lod in there),
-                max(lod.distance_um for lod in there),
-                sum(lod.bytes for lod in there),
-            )
-        )
+        lods.append(_all_of([unit.lods[level] for unit in units if level < len(unit.lods)]))
     return Total(
         lods=tuple(lods),
         units=len(units),
@@ -201,6 +222,25 @@ def sum_up(units: Iterable[UnitFacts]) -> Total:
         ktx2_bytes=sum(unit.ktx2_bytes for unit in units),
         fragments_dropped=sum(unit.fragments_dropped for unit in units),
         cavities_filled=sum(unit.cavities_filled for unit in units),
+    )
+
+
+def _all_of(lods: Sequence[LodFacts]) -> LodFacts:
+    """Return sums of counts, the largest distances and the smallest angle."""
+
+    def known(name: str) -> list[Any]:
+        return [value for lod in lods if (value := getattr(lod, name)) is not None]
+
+    return LodFacts(
+        triangles=sum(lod.triangles for lod in lods),
+        distance_um=max(lod.distance_um for lod in lods),
+        bytes=sum(lod.bytes for lod in lods),
+        mean_um=max(known("mean_um"), default=None),
+        p95_um=max(known("p95_um"), default=None),
+        max_um=max(known("max_um"), default=None),
+        faults=sum(known("faults")) if known("faults") else None,
+        fallbacks=sum(known("fallbacks")) if known("fallbacks") else None,
+        angle_deg=min(known("angle_deg"), default=None),
     )
 
 

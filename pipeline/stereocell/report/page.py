@@ -15,7 +15,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from stereocell.isofield import IsoField, make_iso_field
+from stereocell.latticefield import LatticeField, make_iso_field
 from stereocell.report import charts
 from stereocell.report.choice import choose_level, choose_units, thin_out
 from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
@@ -24,7 +24,7 @@ from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
 from stereocell.report.slices import cut_unit, draw_slices
 from stereocell.specimen import APRON
 from stereocell.store import Store
-from stereocell.survey import look_from
+from stereocell.survey import display_from_json, look_from
 from stereocell.tiling import Box, Tile
 from stereocell.unit_files import load_lods, load_volume, lod_file
 from stereocell.volume import zyx_to_xyz
@@ -116,7 +116,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
         entry = facts.survey[channel.id]
         look = look_from(entry["look"])
         units = [unit for unit in facts.units if unit.channel == channel]
-        values = [unit.iso_value for unit in units if unit.iso_value is not None]
+        values = [u.iso_value + u.background for u in units if u.iso_value is not None]
         rows.append(
             {
                 "name": channel.name,
@@ -136,13 +136,14 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
     return rows
 
 
-def _card(store: Store, facts: Facts, unit: UnitFacts, iso: IsoField | None) -> dict[str, Any]:
+def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None) -> dict[str, Any]:
     """Return what the page shows of one unit: its slices and its curve."""
     plan = facts.plan
     lattice = unit.tile.lattice(plan.region)
     inner = slice(APRON, -APRON)
     volume = load_volume(unit.directory)[inner, inner, inner]
-    low, high = facts.survey[unit.channel.id]["look"]["window"]
+    display = display_from_json(facts.survey[unit.channel.id]["display"])
+    low, high = display.window
     slices = cut_unit(
         volume,
         lattice,
@@ -150,7 +151,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: IsoField | None) -> 
         plan.spacing_um,
         load_lods(unit.directory)[0].mesh if unit.lods else None,
         float(plan.settings.surface.smoothing_um),
-        None if iso is None else partial(_in_eight_bits, iso, low, high),
+        None if iso is None else partial(_in_eight_bits, iso, display.background, low, high),
     )
     curve = read_curve(store.out, unit)
     levels, found = curve.get("levels"), curve.get("found")
@@ -166,11 +167,14 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: IsoField | None) -> 
     }
 
 
-def _in_eight_bits(iso: IsoField, low: float, high: float, box: Box) -> NDArray[np.float32]:
-    return (iso.at(box) - np.float32(low)) * np.float32(255 / (high - low))
+def _in_eight_bits(
+    iso: LatticeField, background: LatticeField | None, low: float, high: float, box: Box
+) -> NDArray[np.float32]:
+    level = iso.at(box) if background is None else iso.at(box) + background.at(box)
+    return (np.broadcast_to(level, box.shape) - np.float32(low)) * np.float32(255 / (high - low))
 
 
-def _iso_fields(facts: Facts) -> dict[str, IsoField | None]:
+def _iso_fields(facts: Facts) -> dict[str, LatticeField | None]:
     """Return the iso-value as the units took it, by channel id."""
     return {
         channel.id: make_iso_field(

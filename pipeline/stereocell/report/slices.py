@@ -17,8 +17,8 @@ from matplotlib import get_data_path
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
+from stereocell.denoise import SMOOTHING_REACH, smooth
 from stereocell.mesh import Mesh
-from stereocell.surface import SMOOTHING_REACH, smooth
 from stereocell.tiling import Box
 from stereocell.volume import Volume, zyx_to_xyz
 

@@ -5,8 +5,11 @@ looks/channels.usda           /Specimen/Channels, see usd_looks.py
 looks/lights.usda             a copy of usd_assets/lights.usda
 tiles/<tile>/tile.usdc        see usd_tile.py
 
-stage.usda says nothing about what the tiles and looks hold, so that a layer of an artist's, over it
-or among its sublayers, is stronger than all of them.
+specimen.usdz                 see usdz.py
+
+stage.usda says nothing about what the tiles and looks hold but which variants of the tiles are
+selected, so that they are seen, and changed, in the one layer that a person reads, and known while
+a tile is unloaded. A layer of an artist's over it is stronger than all of them.
 """
 
 import json
@@ -17,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Kind, Usd, UsdGeom
+from pxr import Kind, Sdf, Usd, UsdGeom
 
 from stereocell.assets import find_asset
 from stereocell.specimen import Look, Provenance, TileContent
@@ -71,7 +74,9 @@ def write_stage(
     tiles: Sequence[TileExtent],
     provenance: Provenance,
 ) -> None:
-    """Write stage.usda and looks/ over tiles that `write_tile` writes, before or after.
+    """Write stage.usda and looks/ over tiles that `write_tile` has written.
+
+    A tile that is written afterwards has its default variants, and no selection in stage.usda.
 
     name        the specimen's, kept as the display name of /Specimen
     provenance  settings and versions, kept in the layer's customLayerData; numbers, text and
@@ -93,6 +98,8 @@ def write_stage(
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
         prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
+        for variant_set, variant in _selections(stage_dir / "tiles" / tile.id / LAYER_NAME):
+            prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
         # what an unloaded tile is known by
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(tile.drawn_box))
     boxes = np.array([tile.drawn_box for tile in tiles])
@@ -104,6 +111,15 @@ def write_stage(
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
     export(layer, stage_dir / STAGE_NAME)
+
+
+def _selections(file: Path) -> list[tuple[str, str]]:
+    """Return the variants that a tile's own layer selects: (variant set, variant)."""
+    if not file.is_file():
+        return []
+    layer = Sdf.Layer.OpenAsAnonymous(str(file))
+    selected = layer.GetPrimAtPath(f"/{layer.defaultPrim}").variantSelections
+    return sorted((str(name), str(variant)) for name, variant in selected.items())
 
 
 def _plain(value: object) -> object:

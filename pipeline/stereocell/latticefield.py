@@ -1,11 +1,13 @@
-"""The iso-value as a smooth field between the tiles' centres.
+"""Fields that run linearly between the knots of a lattice: iso-values and backgrounds.
 
 Each tile has its own iso-value, and neighbours must agree on their common plane; so the surface is
-taken where f(x) = iso(x), iso running linearly from centre to centre, constant beyond the last.
+taken where f(x) = iso(x), iso running linearly from tile centre to tile centre, constant beyond the
+last. The background that is subtracted from f is such a field too, on a lattice of its own.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +16,8 @@ from stereocell.tiling import Box, Tile
 
 
 @dataclass(frozen=True, slots=True)
-class IsoField:
-    """Iso-values on the grid of tile centres.
+class LatticeField:
+    """Values on a grid of places.
 
     centres  three rising tuples, (z, y, x), in voxels of the level
     values   float64 (z, y, x), one for each combination of centres
@@ -25,7 +27,7 @@ class IsoField:
     values: NDArray[np.float64]
 
     def at(self, box: Box) -> NDArray[np.float32]:
-        """Return iso(x) at the voxels of the box, float32; it broadcasts over (z, y, x).
+        """Return the field at the voxels of the box, float32; it broadcasts over (z, y, x).
 
         An axis along which only one centre reaches into the box is 1 long. A voxel's value depends
         on nothing but its place, bit by bit: linear steps axis by axis, weights from the voxel's
@@ -42,7 +44,7 @@ class IsoField:
             plane[...] = _blend(column, 1, weights[2])
         return field
 
-    def around(self, window: Box) -> "IsoField":
+    def around(self, window: Box) -> "LatticeField":
         """Return the part that reaches into a unit's window: what its result depends on."""
         keep = []
         for axis, centres in enumerate(self.centres):
@@ -50,7 +52,17 @@ class IsoField:
             last = np.searchsorted(centres, window.stop[axis] - 1, side="left")
             keep.append(slice(max(0, int(first)), int(last) + 1))
         z, y, x = (centres[part] for centres, part in zip(self.centres, keep, strict=True))
-        return IsoField((z, y, x), self.values[tuple(keep)])
+        return LatticeField((z, y, x), self.values[tuple(keep)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the field as plain values."""
+        return {"centres": [list(axis) for axis in self.centres], "values": self.values.tolist()}
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "LatticeField":
+        """Return the field that `to_json` was given."""
+        z, y, x = (tuple(axis) for axis in content["centres"])
+        return cls((z, y, x), np.array(content["values"], np.float64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +93,7 @@ def _blend(values: NDArray[np.float64], axis: int, weights: _Weights) -> NDArray
     return blended
 
 
-def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> IsoField | None:
+def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> LatticeField | None:
     """Return the field of one channel's iso-values, by tile id; None if no tile has one.
 
     A tile without a value takes the mean of the channel's others.
@@ -100,4 +112,4 @@ def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> 
         if value is not None:
             k, j, i = centre[tile.id]
             values[z.index(k), y.index(j), x.index(i)] = value
-    return IsoField((z, y, x), values)
+    return LatticeField((z, y, x), values)

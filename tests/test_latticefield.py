@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stereocell.isofield import make_iso_field
+from stereocell.latticefield import make_iso_field
 from stereocell.tiling import Box, cut
 
 REGION = Box((0, 0, 0), (10, 40, 100))

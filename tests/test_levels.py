@@ -1,0 +1,133 @@
+"""Levels of detail as they are written: sound, with their borders, measured and recorded."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista as pv
+from scipy import ndimage
+
+from stereocell import mend
+from stereocell.certify import border, certify
+from stereocell.config import Settings
+from stereocell.distance import Nearest, measure_spread
+from stereocell.levels import Clock, make_levels, sharpest_angle
+from stereocell.lod import simplify
+from stereocell.mend import Mended, simplify_soundly
+from stereocell.mesh import Mesh
+from stereocell.surface import cut_planes, extract_surface
+from stereocell.tiling import Box
+from test_certify import ball, kinds, moved, to_mesh
+
+SPACING = (1.0, 1.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
+REGION = Box((0, 0, 0), (40, 40, 60))
+LATTICE = Box((0, 0, 0), (40, 40, 31))
+PLANES = cut_planes(LATTICE, REGION, SPACING, ORIGIN)
+
+
+@pytest.fixture(scope="module")
+def sponge() -> Mesh:
+    """Smoothed noise: handles, thin walls and bodies side by side, cut by a plane."""
+    noise = np.random.default_rng(0).normal(size=REGION.shape)
+    field = ndimage.gaussian_filter(noise, 1.6)
+    distance = np.clip((field - 0.3 * field.std()) / field.std(), -2, 2).astype(np.float32)
+    part = distance[LATTICE.slices]
+    return extract_surface(part, LATTICE, LATTICE, REGION, SPACING, ORIGIN)
+
+
+def _chain(mesh: Mesh) -> Iterator[Mended]:
+    for error in (0.1, 0.5, 2.0, 4.0):
+        mended = simplify_soundly(mesh, PLANES, error)
+        yield mended
+        mesh = mended.mesh
+
+
+def _rim(mesh: Mesh) -> set[bytes]:
+    return {ends.tobytes() for ends in mesh.positions[border(mesh.triangles)]}
+
+
+def test_simplification_alone_makes_faults_here(sponge: Mesh) -> None:
+    """Else the tests below would show nothing."""
+    assert kinds(certify(sponge, PLANES)) == set()
+    found = certify(simplify(sponge, 2.0), PLANES)
+    assert {"crowded", "pinched", "crossings"} <= kinds(found)
+
+
+def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
+    levels = list(_chain(sponge))
+    for level in levels:
+        assert kinds(certify(level.mesh, PLANES)) == set()
+        assert _rim(level.mesh) == _rim(sponge)
+        assert level.fallbacks == 0
+    assert levels[1].mended > 0
+    counts = [len(sponge.triangles), *(len(level.mesh.triangles) for level in levels)]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] < 0.1 * counts[0]
+
+
+def test_body_that_cannot_be_mended_keeps_its_surface_and_is_counted(
+    sponge: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alone = moved(ball(1.0), (15.0, -20.0, -9.0))
+    start = np.uint32(len(sponge.positions))
+    both = Mesh(
+        np.concatenate([sponge.positions, alone.positions]),
+        np.concatenate([sponge.triangles, alone.triangles + start]),
+        np.concatenate([sponge.normals, alone.normals]),
+    )
+    monkeypatch.setattr(mend, "ROUNDS", 0)
+    kept = simplify_soundly(both, PLANES, 2.0)
+    assert kept.fallbacks > 0
+    assert kinds(certify(kept.mesh, PLANES)) == set()
+    assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # the sponge is one body, mostly
+    assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)  # the ball isn't
+
+
+def test_mesh_with_faults_of_its_own_keeps_the_body_that_has_them() -> None:
+    """Nothing hides: what is at fault stays, and is found by whoever checks."""
+    holed = replace(ball(), triangles=ball().triangles[1:])
+    done = simplify_soundly(holed, (), 0.5)
+    assert done.fallbacks == 1
+    np.testing.assert_array_equal(done.mesh.triangles, holed.triangles)
+    assert kinds(certify(done.mesh)) == {"open"}
+
+
+def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
+    first, second = (list(_chain(sponge)) for _ in range(2))
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a.mesh.triangles, b.mesh.triangles)
+        np.testing.assert_array_equal(a.mesh.positions, b.mesh.positions)
+
+
+def test_record_tells_distances_faults_and_angles(sponge: Mesh) -> None:
+    settings = Settings()
+    settings = replace(settings, surface=settings.surface.resolved(SPACING))
+    lods = make_levels(sponge, PLANES, SPACING, settings, Clock())
+    for lod in lods:
+        quality = lod.quality
+        assert quality is not None
+        assert quality.faults == 0
+        for spread in (quality.away, quality.back):
+            assert 0 < spread.mean <= spread.p95 <= spread.max
+        assert max(quality.away.p95, quality.back.p95) <= lod.distance_um
+        assert 0 < quality.angle_deg < 60
+
+
+def test_spread_between_concentric_balls_is_the_difference_of_radii() -> None:
+    near, far = Nearest(ball(4.0, 60), 2000), Nearest(ball(5.0, 60), 2000)
+    for spread in (measure_spread(near, far), measure_spread(far, near)):
+        np.testing.assert_allclose([spread.mean, spread.p95, spread.max], 1.0, atol=0.02)
+
+
+def test_largest_distance_counts_vertices_that_no_sample_meets() -> None:
+    spike = ball(5.0, 60)
+    positions = spike.positions.copy()
+    positions[int(positions[:, 2].argmax())] = [0, 0, 7]
+    found = measure_spread(Nearest(replace(spike, positions=positions), 50), Nearest(spike, 50))
+    assert found.max == pytest.approx(2.0, abs=0.01)
+
+
+def test_angle_of_equilateral_triangles_is_60_degrees() -> None:
+    assert sharpest_angle(to_mesh(pv.Tetrahedron())) == pytest.approx(60, abs=1e-3)

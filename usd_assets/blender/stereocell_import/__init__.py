@@ -1,0 +1,116 @@
+"""Blender add-on: import a StereoCell stage as it is meant, export the edits as a USD layer.
+
+Blender's own importer has no way to choose variants, drops the materials of volumes, doesn't follow
+a surface's colour to the material's interface and doesn't read lists of numbers. So this add-on
+chooses before the import, in a layer over the stage (choice.py), lets Blender import it, and builds
+what is missing from the stage's attributes (looks.py, cameras.py). overlay.py writes what the
+artist changed as a layer over the stage, which `stereocell bundle OUT --stage LAYER` takes.
+
+Blender 4.5 or newer. 1 unit is 1 um, or the specimen has its true size.
+"""
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from .choice import AS_STAGED, Choice
+from .importing import import_stage
+from .overlay import export_edits
+from .problem import StageProblem
+
+bl_info = {
+    "name": "StereoCell stage",
+    "author": "StereoCell",
+    "version": (0, 1, 0),
+    "blender": (4, 5, 0),
+    "location": "File > Import, File > Export",
+    "description": "Import StereoCell stages as they are meant, export edits as a layer",
+    "category": "Import-Export",
+}
+
+_STAGED = (AS_STAGED, "As in the stage", "What the stage, or the layer over it, selects")
+
+
+def _items(*names):
+    return [_STAGED, *[(name, name, "") for name in names]]
+
+
+class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
+    """Import a StereoCell stage, or a layer over one"""
+
+    bl_idname = "import_scene.stereocell"
+    bl_label = "Import StereoCell stage"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    filename_ext = ".usda"
+    filter_glob: StringProperty(default="*.usda;*.usdc;*.usd", options={"HIDDEN"})
+    tiles: StringProperty(
+        name="Tiles", description="Names or patterns, with commas: r0_c0, r1_*", default="*"
+    )
+    lod: EnumProperty(
+        name="Level of detail",
+        description="lod0 is the finest; a tile with fewer levels shows its coarsest",
+        items=_items("lod0", "lod1", "lod2", "lod3"),
+    )
+    representation: EnumProperty(name="Show", items=_items("mesh", "volume", "both"))
+    transfer_function: EnumProperty(
+        name="Transfer function", items=_items("default", "soft", "sharp", "surface")
+    )
+    size: EnumProperty(
+        name="Size",
+        items=[
+            ("MICROMETRES", "1 unit is 1 um", "Right for viewing, lighting and rendering"),
+            ("TRUE", "True size", "1 unit is 1 m: to stand beside other true things"),
+        ],
+    )
+
+    def execute(self, context):
+        choice = Choice(self.tiles, self.lod, self.representation, self.transfer_function)
+        try:
+            root = import_stage(context, self.filepath, choice, self.size == "TRUE")
+        except StageProblem as problem:
+            self.report({"ERROR"}, str(problem))
+            return {"CANCELLED"}
+        context.view_layer.objects.active = root
+        return {"FINISHED"}
+
+
+class ExportStereoCellEdits(bpy.types.Operator, ExportHelper):
+    """Write what was changed since the import as a layer over the stage"""
+
+    bl_idname = "export_scene.stereocell_edits"
+    bl_label = "Export StereoCell edits"
+
+    filename_ext = ".usda"
+    filter_glob: StringProperty(default="*.usda", options={"HIDDEN"})
+
+    def execute(self, context):
+        try:
+            edits = export_edits(context, self.filepath)
+        except StageProblem as problem:
+            self.report({"ERROR"}, str(problem))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{len(edits)} edits: " + "; ".join(edits))
+        return {"FINISHED"}
+
+
+def _import_entry(menu, _context):
+    menu.layout.operator(ImportStereoCellStage.bl_idname, text="StereoCell stage (.usda)")
+
+
+def _export_entry(menu, _context):
+    menu.layout.operator(ExportStereoCellEdits.bl_idname, text="StereoCell edits (.usda)")
+
+
+def register():
+    bpy.utils.register_class(ImportStereoCellStage)
+    bpy.utils.register_class(ExportStereoCellEdits)
+    bpy.types.TOPBAR_MT_file_import.append(_import_entry)
+    bpy.types.TOPBAR_MT_file_export.append(_export_entry)
+
+
+def unregister():
+    bpy.types.TOPBAR_MT_file_export.remove(_export_entry)
+    bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
+    bpy.utils.unregister_class(ExportStereoCellEdits)
+    bpy.utils.unregister_class(ImportStereoCellStage)

@@ -1,0 +1,31 @@
+"""Make the stage's cameras a stereo pair of Blender's: one camera, two eyes, off-axis."""
+
+from .choice import ROOT
+
+
+def pair_cameras(scene, stage, objects, scale):
+    """Look through `mono` with the eyes of `left` and `right`, whose ranges become the scene's.
+
+    objects  Blender's objects by the path of their prim
+    scale    Blender's units for a unit of the stage
+    """
+    for block in objects.values():
+        if block.type == "CAMERA":
+            block.data.clip_start *= scale
+            block.data.clip_end *= scale
+    mono = objects.get(f"{ROOT}/Cameras/mono")
+    prims = {name: stage.GetPrimAtPath(f"{ROOT}/Cameras/{name}") for name in ("left", "right")}
+    if mono is None or mono.type != "CAMERA":
+        return
+    scene.camera = mono
+    focus = stage.GetPrimAtPath(f"{ROOT}/Cameras/mono").GetAttribute("focusDistance").Get()
+    shifts = [prim.GetAttribute("xformOp:translate").Get() for prim in prims.values() if prim]
+    if focus is None or len(shifts) != 2 or None in shifts:
+        return
+    left, right = shifts
+    stereo = mono.data.stereo
+    stereo.convergence_mode = "OFFAXIS"
+    stereo.interocular_distance = (right - left).GetLength() * scale
+    stereo.convergence_distance = focus * scale
+    scene.render.use_multiview = True
+    scene.render.views_format = "STEREO_3D"

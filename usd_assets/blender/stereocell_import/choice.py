@@ -1,0 +1,104 @@
+"""Choose tiles and variants of a stage by a layer over it, since Blender's importer can't."""
+
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from pxr import Sdf, Tf, Usd
+
+from .problem import StageProblem
+
+AS_STAGED = "AS_STAGED"
+ROOT = "/Specimen"
+TILES = f"{ROOT}/Tiles"
+CHANNELS = f"{ROOT}/Channels"
+METERS_PER_UNIT = 1e-6
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is to be imported. AS_STAGED leaves a variant as the stage selects it.
+
+    tiles  names or patterns with * and ?, separated by commas
+    """
+
+    tiles: str = "*"
+    lod: str = AS_STAGED
+    representation: str = AS_STAGED
+    transfer_function: str = AS_STAGED
+
+
+def open_stage(path):
+    """Open a StereoCell stage without its payloads. Raises StageProblem if it is none."""
+    try:
+        stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+    except Tf.ErrorException as error:
+        raise StageProblem(f"{path}: can't be opened as a USD stage") from error
+    lacking = [place for place in (TILES, CHANNELS) if not stage.GetPrimAtPath(place)]
+    if lacking:
+        raise StageProblem(f"{path}: no prim {lacking[0]}, expected a StereoCell stage")
+    unit = stage.GetMetadata("metersPerUnit")
+    if abs(unit / METERS_PER_UNIT - 1) > 1e-6:
+        raise StageProblem(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+    return stage
+
+
+def write_choice(stage, choice, file):
+    """Write a layer over a stage that selects what was chosen.
+
+    Return the variants of the chosen tiles as the stage selects them, by tile and variant set.
+
+    Raises StageProblem if no tile fits, or a channel lacks the transfer function.
+    """
+    tiles = stage.GetPrimAtPath(TILES).GetAllChildren()
+    chosen = [tile for tile in tiles if _fits(tile.GetName(), choice.tiles)]
+    if not chosen:
+        raise StageProblem(f"no tile fits {choice.tiles!r}; there are {_some_names(tiles)}")
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.subLayerPaths = [Path(stage.GetRootLayer().realPath).as_posix()]
+    layer.defaultPrim = ROOT.strip("/")
+    layer.pseudoRoot.SetInfo("metersPerUnit", METERS_PER_UNIT)
+    layer.pseudoRoot.SetInfo("upAxis", "Y")
+    staged = {}
+    for tile in tiles:
+        over = Sdf.CreatePrimInLayer(layer, tile.GetPath())
+        if tile not in chosen:
+            over.active = False
+            continue
+        tile.Load()
+        staged[tile.GetName()] = dict(tile.GetVariantSets().GetAllVariantSelections())
+        for name in ("lod", "representation"):
+            variant = _variant(tile, name, getattr(choice, name))
+            if variant is not None:
+                over.variantSelections[name] = variant
+        tile.Unload()
+    if choice.transfer_function != AS_STAGED:
+        for channel in stage.GetPrimAtPath(CHANNELS).GetChildren():
+            known = channel.GetVariantSet("transferFunction").GetVariantNames()
+            if choice.transfer_function not in known:
+                raise StageProblem(
+                    f"{channel.GetName()} has no transfer function {choice.transfer_function!r}, "
+                    f"but {', '.join(known)}"
+                )
+            over = Sdf.CreatePrimInLayer(layer, channel.GetPath())
+            over.variantSelections["transferFunction"] = choice.transfer_function
+    if not layer.Export(str(file)):
+        raise StageProblem(f"{file}: can't be written")
+    return staged
+
+
+def _fits(name, patterns):
+    return any(fnmatchcase(name, pattern.strip()) for pattern in patterns.split(","))
+
+
+def _some_names(tiles):
+    names = [tile.GetName() for tile in tiles]
+    return ", ".join(names[:6]) + (" ..." if len(names) > 6 else "")
+
+
+def _variant(tile, variant_set, wanted):
+    """Return the variant to select; None leaves it. A level too coarse is the coarsest there is."""
+    known = sorted(tile.GetVariantSet(variant_set).GetVariantNames())
+    if wanted == AS_STAGED or not known:
+        return None
+    return wanted if wanted in known else known[-1]

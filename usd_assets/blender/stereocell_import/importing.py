@@ -1,0 +1,181 @@
+"""Import a stage through Blender's own importer, and finish what that leaves undone.
+
+What was imported, and how it was then, is kept in custom properties, so that the edits are known
+when they are exported: on the root object `stereocell` (JSON) and each channel's colour group and
+volume material; on every other object the path of its prim.
+"""
+
+import json
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from .cameras import pair_cameras
+from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
+from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
+from .problem import StageProblem
+
+STATE = "stereocell"
+PRIM = "stereocell_prim"
+COLOR = "stereocell_color_"
+VOLUME = "stereocell_volume_"
+
+
+class _Hook(bpy.types.USDHook):
+    """Hands over the composed stage and what Blender made of its prims."""
+
+    bl_idname = "stereocell_import_hook"
+    bl_label = "StereoCell"
+
+    finish = None
+
+    @staticmethod
+    def on_import(import_context):
+        _Hook.finish(import_context.get_stage(), import_context.get_prim_map())
+        return True
+
+
+def import_stage(context, path, choice, is_true_size):
+    """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem."""
+    stage = open_stage(path)
+    scale = METERS_PER_UNIT if is_true_size else 1.0
+    made = {}
+
+    def keep(composed, prim_map):
+        made["state"] = _finish(context, composed, prim_map, scale)
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "choice.usda"
+        staged = write_choice(stage, choice, file)
+        _Hook.finish = keep
+        bpy.utils.register_class(_Hook)
+        try:
+            bpy.ops.wm.usd_import(
+                filepath=str(file),
+                apply_unit_conversion_scale=False,
+                merge_parent_xform=False,
+                import_lights=False,  # they light the room of a USD client, not the scene at hand
+                mtl_name_collision_mode="MAKE_UNIQUE",
+                set_frame_range=False,
+            )
+        except RuntimeError as error:
+            raise StageProblem(f"{path}: {' '.join(str(error).split())}") from error
+        finally:
+            bpy.utils.unregister_class(_Hook)
+            _Hook.finish = None
+    if "state" not in made:
+        raise StageProblem(f"{path}: Blender imported nothing of it")
+    root, state = made["state"]
+    state["chosen"] = {
+        tile: {
+            name: variant for name, variant in found.items() if staged[tile].get(name) != variant
+        }
+        for tile, found in state.pop("selected").items()
+    }
+    state["stage"] = str(Path(stage.GetRootLayer().realPath))
+    root[STATE] = json.dumps(state)
+    units = context.scene.unit_settings
+    units.system, units.scale_length = "METRIC", METERS_PER_UNIT / scale
+    units.length_unit = "ADAPTIVE"
+    return root
+
+
+def _finish(context, stage, prim_map, scale):
+    """Build the looks and cameras; return the root object and the state to be compared with."""
+    objects, materials = {}, []
+    for path, made in prim_map.items():
+        for block in made:
+            if isinstance(block, bpy.types.Object):
+                objects[str(path)] = block
+                block[PRIM] = str(path)
+            elif isinstance(block, bpy.types.Material):
+                materials.append((str(path), block))
+    if ROOT not in objects:
+        raise StageProblem(f"Blender made no object of {ROOT}")
+    root = objects[ROOT]
+    root.scale *= scale  # Blender's importer takes no scale below 1e-4
+    channels = {}
+    for prim in stage.GetPrimAtPath(CHANNELS).GetChildren():
+        look = _read_look(prim)
+        channels[prim.GetName()] = look
+        group = make_color_group(prim.GetName(), look["color"])
+        root[COLOR + prim.GetName()] = group
+        _color_surfaces(stage, prim.GetName(), look, group, materials)
+        _shade_volumes(stage, root, prim.GetName(), look, group, objects)
+    context.view_layer.update()
+    pair_cameras(context.scene, stage, objects, scale)
+    leaves = [p for p, o in objects.items() if o.type in ("MESH", "VOLUME")]
+    selected = {}
+    matrices = {}
+    for prim in stage.GetPrimAtPath(TILES).GetChildren():
+        sets = prim.GetVariantSets()
+        selected[prim.GetName()] = dict(sets.GetAllVariantSelections())
+        if str(prim.GetPath()) in objects:
+            frame = objects.get(TILES, root)
+            matrices[prim.GetName()] = matrix_in(frame, objects[str(prim.GetPath())])
+    return root, {
+        "channels": channels,
+        "leaves": leaves,
+        "selected": selected,
+        "matrices": matrices,
+    }
+
+
+def matrix_in(frame, tile):
+    """Return a tile's matrix below another object, in the stage's units: rows, column vectors."""
+    return [list(row) for row in frame.matrix_world.inverted() @ tile.matrix_world]
+
+
+def _read_look(prim):
+    def value(name):
+        found = prim.GetAttribute(name).Get()
+        if found is None:
+            raise StageProblem(f"{prim.GetPath()}.{name}: no value")
+        return found
+
+    window = tuple(value("stereocell:window"))
+    stored = prim.GetAttribute("stereocell:volumeWindow").Get()
+    return {
+        "color": list(value("inputs:color")),
+        "points": [list(pair) for pair in value("stereocell:opacityPoints")],
+        "windows": [window, window if stored is None else tuple(stored)],
+        "function": prim.GetVariantSet("transferFunction").GetVariantSelection(),
+    }
+
+
+def _color_surfaces(stage, channel, look, group, materials):
+    for path, material in materials:
+        prim = stage.GetPrimAtPath(path)
+        if prim.GetParent().GetName() != channel or material.node_tree is None:
+            continue
+        own = prim.GetAttribute("inputs:color").Get()
+        if own is None or list(own) == look["color"]:
+            color_surface(material, group)
+        else:
+            set_surface_color(material, own)
+
+
+def _shade_volumes(stage, root, channel, look, group, objects):
+    volumes = {
+        path: block
+        for path, block in objects.items()
+        if block.type == "VOLUME" and stage.GetPrimAtPath(path).GetParent().GetName() == channel
+    }
+    if not volumes:
+        return
+    voxel = min(_voxel_um(stage.GetPrimAtPath(path)) for path in volumes)
+    material = make_volume_material(channel, group, look["points"], look["windows"], voxel)
+    root[VOLUME + channel] = material
+    for block in volumes.values():
+        block.data.materials.clear()
+        block.data.materials.append(material)
+
+
+def _voxel_um(volume):
+    """Return the shortest edge of a volume's voxels."""
+    names = ("boundsMin", "boundsMax", "atlasSize", "apron")
+    low, high, size, apron = (volume.GetAttribute(f"stereocell:{name}").Get() for name in names)
+    if low is None or high is None or size is None:
+        raise StageProblem(f"{volume.GetPath()}: no stereocell:boundsMin, boundsMax or atlasSize")
+    return min((high[k] - low[k]) / (size[k] - 2 * (apron or 0) - 1) for k in range(3))

@@ -1,0 +1,147 @@
+"""Build what Blender's importer leaves out of a channel's look: its colour and its volume shader.
+
+Each channel has one node group with its colour, which all of its materials use, of meshes and of
+volumes: recolouring is done there, in one place, as in the stage. (No network of a stage does both:
+recolour by the material's interface and import with the right colour. Blender 5.0.1 shows grey for
+a connected diffuseColor, also with a value beside the connection, through a node graph, another
+shader, a texture's fallback or a primvar reader's.) Each channel has one volume
+material, whose colour ramp is the transfer function: positions are intensities, alphas opacities.
+
+An opacity holds for one voxel of the volume, as it does in the bundle's viewer: the extinction per
+um is -ln(1 - opacity) / voxel. Blender keeps densities in object space, so that a scaled specimen
+looks alike. Voxels that let light pass glow as a fluorescent stain does.
+"""
+
+import math
+
+import bpy
+
+from .problem import StageProblem
+
+GLOW = 0.4  # emission for the same density of absorption
+_MAX_POINTS = 32  # a ramp of Blender's holds no more
+_LEAST = 0.001  # what light always passes of a voxel: an opacity of 1 has no logarithm
+
+
+def make_color_group(channel, color):
+    """Return a node group whose output is a channel's linear colour."""
+    group = bpy.data.node_groups.new(f"{channel} colour", "ShaderNodeTree")
+    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    rgb = group.nodes.new("ShaderNodeRGB")
+    rgb.label = channel
+    rgb.outputs[0].default_value = (*color, 1.0)
+    output = group.nodes.new("NodeGroupOutput")
+    output.location.x = 200
+    group.links.new(rgb.outputs[0], output.inputs[0])
+    return group
+
+
+def color_of(group):
+    """Return the linear colour of a group that `make_color_group` made. Raises StageProblem."""
+    for node in group.nodes:
+        if node.bl_idname == "ShaderNodeRGB":
+            return tuple(node.outputs[0].default_value)[:3]
+    raise StageProblem(f"node group {group.name!r} has no RGB node, expected its channel's colour")
+
+
+def color_surface(material, group):
+    """Feed a channel's colour to a material that Blender made of a UsdPreviewSurface."""
+    tree = material.node_tree
+    for surface in [node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled"]:
+        _feed(tree, group, surface, "Base Color")
+    material.diffuse_color = (*color_of(group), 1.0)  # what a viewport without shading shows
+
+
+def set_surface_color(material, color):
+    """Give a material a colour of its own: a tile's that an artist set apart from its channel's."""
+    for node in material.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeBsdfPrincipled":
+            node.inputs["Base Color"].default_value = (*color, 1.0)
+    material.diffuse_color = (*color, 1.0)
+
+
+def make_volume_material(channel, group, points, windows, voxel_um):
+    """Return the material of a channel's volumes.
+
+    points   transfer function: pairs of intensity and opacity, 0..1, intensities rising
+    windows  voxel values that are shown as 0 and 1, and those that are 0 and 1 in the volumes
+    """
+    if len(points) > _MAX_POINTS:
+        raise StageProblem(
+            f"{channel}: its transfer function has {len(points)} points, "
+            f"and a colour ramp holds {_MAX_POINTS}"
+        )
+    material = bpy.data.materials.new(f"{channel} volume")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    info = _node(tree, "ShaderNodeVolumeInfo", -1000)
+    window = _node(tree, "ShaderNodeMapRange", -800)
+    (low, high), (first, last) = windows
+    window.inputs["From Min"].default_value = (low - first) / (last - first)
+    window.inputs["From Max"].default_value = (high - first) / (last - first)
+    ramp = _node(tree, "ShaderNodeValToRGB", -600)
+    ramp.label = "transfer function"
+    _fill_ramp(ramp.color_ramp, points)
+    tree.links.new(info.outputs["Density"], window.inputs["Value"])
+    tree.links.new(window.outputs["Result"], ramp.inputs["Fac"])
+
+    passed = _math(tree, "SUBTRACT", -300, 1.0, ramp.outputs["Alpha"])
+    passed = _math(tree, "MAXIMUM", -150, passed, _LEAST)
+    depth = _math(tree, "LOGARITHM", 0, passed, math.e)
+    density = _math(tree, "MULTIPLY", 150, depth, -1 / voxel_um)
+    glow = _math(tree, "MULTIPLY", 300, density, GLOW)
+
+    shader = _node(tree, "ShaderNodeVolumePrincipled", 500)
+    shader.inputs["Density Attribute"].default_value = ""  # the ramp's, and not the grid's
+    tree.links.new(density, shader.inputs["Density"])
+    tree.links.new(glow, shader.inputs["Emission Strength"])
+    _feed(tree, group, shader, "Color", "Emission Color")
+    output = _node(tree, "ShaderNodeOutputMaterial", 800)
+    tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])
+    return material
+
+
+def points_of(material):
+    """Return the transfer function of a material that `make_volume_material` made."""
+    for node in material.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeValToRGB":
+            return [(e.position, e.color[3]) for e in node.color_ramp.elements]
+    raise StageProblem(f"material {material.name!r} has no colour ramp, expected its opacities")
+
+
+def _fill_ramp(ramp, points):
+    ramp.interpolation = "LINEAR"
+    while len(ramp.elements) > 1:
+        ramp.elements.remove(ramp.elements[-1])
+    ramp.elements[0].position = points[0][0]
+    for intensity, _ in points[1:]:
+        ramp.elements.new(intensity)
+    for element, (_, opacity) in zip(ramp.elements, points, strict=True):
+        element.color = (1.0, 1.0, 1.0, opacity)
+
+
+def _feed(tree, group, shader, *inputs):
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.location = (shader.location.x - 250, shader.location.y + 150)
+    for name in inputs:
+        tree.links.new(node.outputs[0], shader.inputs[name])
+
+
+def _node(tree, kind, x):
+    node = tree.nodes.new(kind)
+    node.location.x = x
+    return node
+
+
+def _math(tree, operation, x, *values):
+    """Add a node that calculates; its values are numbers or other nodes' outputs."""
+    node = _node(tree, "ShaderNodeMath", x)
+    node.operation = operation
+    for socket, value in zip(node.inputs, values, strict=False):
+        if isinstance(value, float):
+            socket.default_value = value
+        else:
+            tree.links.new(value, socket)
+    return node.outputs[0]
