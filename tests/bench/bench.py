@@ -16,7 +16,7 @@ from skimage import measure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from phantoms import blurred_ball, write_ome_tiff
-from stereocell import build, config, lod, repair, surface
+from stereocell import build, config, denoise, lod, repair, surface
 from stereocell.engine import Engine
 from stereocell.tiling import Box
 from stereocell.volume import Volume
@@ -55,7 +55,7 @@ def main() -> None:
     voxels = nuclei(shape, 150)
     volume = Volume(voxels, SPACING)
     region = Box((0, 0, 0), shape)
-    field = surface.smooth(volume, 0.14)
+    field = denoise.smooth(volume, 0.14)
     distance = surface.signed_distance(field, np.float32(700), SPACING, 1000.0)
     print(f"phantom {shape}, {voxels.size / 1e6:.1f} M voxels; medians of {ROUNDS}")
     compare(
