@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -267,19 +268,21 @@ def test_killed_builds_go_on_to_the_same_bytes(tmp_path: Path, built: Path, sour
 
 @pytest.mark.slow
 def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(out: Path) -> None:
-    shutil.rmtree(out / "bundle")
-    bundle = subprocess.Popen(
-        [sys.executable, "-m", "stereocell.cli", "bundle", str(out), "--workers", "2"],
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-        text=True,
-    )
-    while bundle.poll() is None and not list(out.glob(".bundle.partial/volumes/*/*")):
-        time.sleep(
-            0.005
-        )  # a worker is at work: the command waits in Python, which sees an interrupt at once
-    os.killpg(bundle.pid, signal.SIGINT)
-    _, printed = bundle.communicate()
+    for _ in range(5):  # on a busy machine the interrupt may come when all is done
+        shutil.rmtree(out / "bundle", ignore_errors=True)
+        bundle = subprocess.Popen(
+            [sys.executable, "-m", "stereocell.cli", "bundle", str(out), "--workers", "2"],
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            text=True,
+        )
+        while bundle.poll() is None and not list(out.glob(".bundle.partial/volumes/*/*")):
+            time.sleep(0.005)  # once a worker writes, the command waits in Python
+        with suppress(ProcessLookupError):
+            os.killpg(bundle.pid, signal.SIGINT)
+        _, printed = bundle.communicate()
+        if bundle.returncode != 0:
+            break
     assert bundle.returncode == 130
     assert printed.endswith("stereocell: stopped; the same command goes on from here\n")
     assert "Traceback" not in printed
