@@ -20,9 +20,15 @@ def _found(value: float, width: float) -> dict[str, Any]:
 def test_a_jump_without_evidence_is_drawn_to_the_neighbours() -> None:
     found = {tile.id: _found(400, 300) for tile in TILES} | {"r0_c1": _found(420, 300)}
     drawn = agree(TILES, found)
-    assert drawn["r0_c1"] == pytest.approx(400)
+    assert drawn["r0_c1"] == pytest.approx(410)
     assert drawn["r1_c0"] == pytest.approx(400)
-    assert drawn["r0_c0"] == pytest.approx(410)  # half-way between its two neighbours
+    assert drawn["r0_c0"] == pytest.approx(405)  # its neighbours are 420 and 400
+
+
+def test_two_neighbours_meet_and_do_not_change_places() -> None:
+    pair = cut(Box((0, 0, 0), (4, 10, 20)), (4, 10, 10))
+    drawn = agree(pair, {"r0_c0": _found(400, 300), "r0_c1": _found(420, 300)})
+    assert drawn == pytest.approx({"r0_c0": 410, "r0_c1": 410})
 
 
 def test_a_jump_with_evidence_stays_but_for_its_summit() -> None:

@@ -58,13 +58,13 @@ def _volume_error(radius: float, sigma: float, noise: float, seed: int) -> float
 @pytest.mark.parametrize("sigma", [0.15, 0.3, 0.5])
 @pytest.mark.parametrize("radius", [1.5, 3.0, 5.0])
 def test_blurred_ball_keeps_its_volume(radius: float, sigma: float, noise: float) -> None:
-    """Within 2 %; a ball of only 5 x 11 x 11 voxels' radius within 7 %, wherever its centre lies.
+    """Within 2 %; a ball of only 5 x 11 x 11 voxels' radius within 6 %, wherever its centre lies.
 
     1.2 % of the small one are lost to chords: the mesh's corners lie on the ball, its faces inside.
     The rest is how few voxels its edge has. Half the height would lose 35 % of it at a blur of 0.5.
     """
     errors = [_volume_error(radius, sigma, noise, seed) for seed in range(4)]
-    assert np.abs(errors).max() < (0.07 if radius < 3 else 0.02)
+    assert np.abs(errors).max() < (0.06 if radius < 3 else 0.02)
 
 
 @settings(max_examples=10, deadline=None)

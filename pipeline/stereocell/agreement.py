@@ -17,7 +17,7 @@ SUMMIT = 0.99  # of the best score: levels that are as good; .95 cost a lone bal
 
 
 def agree(tiles: Sequence[Tile], found: Mapping[str, Mapping[str, Any]]) -> dict[str, float | None]:
-    """Return each tile's value, drawn towards the median of those that share a face with it.
+    """Return each tile's value, drawn half-way to the median of those that share a face with it.
 
     found  by tile id: `value` (None: the tile has none), and `levels` and `score` where it has
     """
@@ -32,7 +32,8 @@ def agree(tiles: Sequence[Tile], found: Mapping[str, Mapping[str, Any]]) -> dict
         ]
         if value is not None and beside:
             low, high = _summit(value, found[tile.id])
-            drawn[tile.id] = min(max(median(beside), low), high)
+            # half the way: going all of it, two neighbours would only change places
+            drawn[tile.id] = min(max((value + median(beside)) / 2, low), high)
     return drawn
 
 

@@ -83,9 +83,20 @@ class Engine:
         futures = {
             client.submit(function, task, pure=False): place for place, task in enumerate(tasks)
         }
+        suspects = []
         for future in as_completed(futures):
             failure = future.exception()
-            yield futures[future], None if failure else future.result(), failure
+            if _is_killed(failure):
+                suspects.append(futures[future])
+            else:
+                yield futures[future], None if failure else future.result(), failure
+            future.release()
+        # whoever waited on a worker when another task killed it is blamed too: each once more, by
+        # itself, and only the one to blame fails again
+        for place in sorted(suspects):
+            future = client.submit(function, tasks[place], pure=False)
+            failure = future.exception()
+            yield place, None if failure else future.result(), failure
             future.release()
 
     def _start(self) -> Any:
@@ -114,11 +125,16 @@ class Engine:
             self._client = None
 
 
+def _is_killed(error: BaseException | None) -> bool:
+    """Return whether a task's worker died under it in each of distributed's four tries."""
+    return type(error).__name__ == "KilledWorker"
+
+
 def _in_words(error: BaseException) -> str:
     words = " ".join(str(error).split())
     if isinstance(error, StereoCellError):
         return words
-    if type(error).__name__ == "KilledWorker":  # distributed tries a task four times
+    if _is_killed(error):
         return (
             "its worker process was killed each time, most likely for want of memory: try fewer "
             "--workers or a smaller --tile-size"
