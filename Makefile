@@ -35,7 +35,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view report check lint test test-fast test-blender bench bench-iso lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view report check lint test test-fast test-blender bench bench-iso bench-wrap lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -126,8 +126,15 @@ test: setup browser ## All tests, in headless Chromium too
 	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
 	for kind in tif zarr; do $(RUN) build out/f/f.ome.$$kind -o out/f/$$kind --workers 0 || exit 1; done
+	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit
+	$(MAKE) --no-print-directory bundle INPUT=out/edit/balls.ome.tif OUT=out/edit/built ARGS="--grid 3x2" WORKERS=0
+	cp -r out/edit/built/bundle out/edit/before
+	$(BIN)/python tests/edits.py layer out/edit
+	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) \
-	  STEREOCELL_F_BUNDLES=$(abspath out/f/tif/bundle):$(abspath out/f/zarr/bundle) npm run --silent test:browser
+	  STEREOCELL_F_BUNDLES=$(abspath out/f/tif/bundle):$(abspath out/f/zarr/bundle) \
+	  STEREOCELL_EDIT_BUNDLES=$(abspath out/edit/before):$(abspath out/edit/built/bundle) \
+	  npm run --silent test:browser
 
 # Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
 BLENDER := $(VENV)/blender
@@ -146,6 +153,9 @@ bench: setup ## Ratios of two things in one run, medians
 
 bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids are known
 	$(BIN)/python tests/bench/iso.py
+
+bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
+	$(BIN)/python tests/bench/wrap.py
 
 lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

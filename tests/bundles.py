@@ -10,11 +10,11 @@ TILES = (spheres.tile(0), spheres.tile(1))
 CD31 = "/Specimen/Channels/CD31"
 
 
-def write_tiles(folder):
-    for tile in TILES:
+def write_tiles(folder, tiles=TILES):
+    for tile in tiles:
         write_tile(folder, tile)
     write_stage(
-        folder, "two tiles", (spheres.RED, spheres.BLUE), [TileExtent.of(t) for t in TILES], {}
+        folder, "two tiles", (spheres.RED, spheres.BLUE), [TileExtent.of(t) for t in tiles], {}
     )
     return folder / "stage.usda"
 

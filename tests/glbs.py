@@ -18,7 +18,7 @@ def read(data):
     assert kind == b"BIN\0"
     binary = data[28 + json_length :]
     assert binary_length == len(binary) == document["buffers"][0]["byteLength"]
-    types = {5120: np.int8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+    types = {5120: np.int8, 5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
     arrays = []
     for accessor in document["accessors"]:
         view = document["bufferViews"][accessor["bufferView"]]["extensions"][

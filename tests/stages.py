@@ -65,7 +65,9 @@ def make_tiles() -> list[TileContent]:
 
 def make_looks() -> list[Look]:
     return [
-        Look(name, color, (100.0, 1100.0), None if name == "1st" else 600.0, 0.75, FUNCTIONS)
+        Look(name, color, (100.0, 1100.0), None, 0.0, "none", FUNCTIONS)
+        if name == "1st"
+        else Look(name, color, (100.0, 1100.0), 600.0, 0.75, "clear", FUNCTIONS)
         for name, color in zip(NAMES, COLORS, strict=True)
     ]
 

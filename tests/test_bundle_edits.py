@@ -190,15 +190,127 @@ def test_edited_points_are_taken(edit):
             with variants.GetVariantEditContext():
                 points = stage.GetAttributeAtPath(f"{tile.GetPath()}/CD31/CD31_r0_c0.points")
                 points.Set([point + Gf.Vec3f(0, 0, 1) for point in points.Get()])
+        variants.ClearVariantSelection()  # to edit a level isn't to choose it
 
     points = decoded_positions_m((edit(change) / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     away = np.linalg.norm(points * 1e6 - (0, 0, 1) - spheres.CENTER, axis=1)
     assert np.abs(away - spheres.RADIUS).max() < 0.003
 
 
+def choose(stage, tile, **variants):
+    for name, variant in variants.items():
+        prim = stage.GetPrimAtPath(f"/Specimen/Tiles/{tile}")
+        assert prim.GetVariantSet(name).SetVariantSelection(variant)
+
+
+def chain(bundle, tile):
+    """Return the levels of detail of a tile in the tileset of CD31, coarsest first."""
+    root = load(bundle / channel(bundle)["tileset"]["path"])["root"]
+    found = []
+    for entry in root["children"]:
+        levels = []
+        while True:
+            folder, level = entry["content"]["uri"].split("/")
+            levels.append(level)
+            if "children" not in entry:
+                break
+            (entry,) = entry["children"]
+        assert entry["geometricError"] == 0  # nothing finer: a reader stops there
+        found += [levels] * (folder == tile)
+    (levels,) = found
+    return levels
+
+
+@pytest.mark.parametrize("chosen", ["mesh", "volume", "both"])
+def test_representation_chosen_for_a_tile_reaches_the_manifest_and_takes_nothing_away(
+    bundle, edit, chosen
+):
+    edited = edit(lambda s: choose(s, "r0_c1", representation=chosen))
+    found = [tile["representation"] for tile in load(edited / "manifest.json")["tiles"]]
+    assert found == ["mesh", chosen]
+    for name in ("CD31", "Hoechst 33342"):  # its other form stays for the viewer's user
+        assert channel(edited, name) == channel(bundle, name)
+
+
+def test_representation_survives_flattening(edit, tmp_path):
+    def change(stage):
+        choose(stage, "r0_c0", representation="volume")
+        choose(stage, "r0_c1", representation="both")
+
+    edit(change)
+    for kept in ({"r0_c0", "r0_c1"}, {"r0_c1"}):
+        flat = tmp_path / "flat.usda"
+        stage = Usd.Stage.Open(str(tmp_path / "edited.usda"))
+        if "r0_c0" not in kept:
+            choose(stage, "r0_c0", representation="mesh")
+        stage.Export(str(flat))
+        write_bundle(flat, tmp_path / "flat", None, Engine(0))
+        found = [tile["representation"] for tile in load(tmp_path / "flat/manifest.json")["tiles"]]
+        assert found == ["volume" if "r0_c0" in kept else "mesh", "both"]
+
+
+def test_coarse_lod_chosen_for_a_tile_is_the_finest_that_the_bundle_has(bundle, edit):
+    edited = edit(lambda s: choose(s, "r0_c1", lod="lod2"))
+    whole = ["lod2.glb", "lod1.glb", "lod0.glb"]
+    assert chain(bundle, "r0_c1") == chain(edited, "r0_c0") == whole
+    assert chain(edited, "r0_c1") == ["lod2.glb"]
+    assert [p.name for p in (edited / "channels/CD31/r0_c1").iterdir()] == ["lod2.glb"]
+    kept = "channels/CD31/r0_c1/lod2.glb"
+    assert (edited / kept).read_bytes() == (bundle / kept).read_bytes()
+    assert not [path for path in load(edited / "files.json") if "r0_c1/lod0" in path]
+    # two tiles alike: half of each level is the other one's
+    two = channel(bundle)["triangles"]
+    assert channel(edited)["triangles"] == [n // 2 + two[2] // 2 for n in two]
+    assert volumes(edited) == volumes(bundle)
+
+
+def test_triangles_are_told_by_the_stage_s_levels_whatever_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(spheres, "LEVELS", (*spheres.LEVELS, (6, 0.6)))
+    tiles = [spheres.tile(0), spheres.tile(1)]
+    stage = Usd.Stage.Open(str(write_tiles(tmp_path, tiles)))
+    choose(stage, "r0_c1", lod="lod2")
+    stage.GetRootLayer().Save()
+    write_bundle(tmp_path / "stage.usda", tmp_path / "bundle", None, Engine(0))
+    assert chain(tmp_path / "bundle", "r0_c1") == ["lod3.glb", "lod2.glb"]
+    full, cut = ([len(lod.mesh.triangles) for lod in tile.channels[0].lods] for tile in tiles)
+    cut[:2] = [cut[2]] * 2
+    assert channel(tmp_path / "bundle")["triangles"] == [
+        sum(n) for n in zip(full, cut, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("level", ["lod0", "lod1"])
+def test_lod_that_is_fine_enough_to_work_with_leaves_all_levels(bundle, edit, level):
+    edited = edit(lambda s: choose(s, "r0_c1", lod=level))
+    assert channel(edited) == channel(bundle)
+
+
+@pytest.mark.parametrize("chosen", ["mesh", "volume", "both"])
+def test_channel_hidden_in_a_tile_stays_hidden_whatever_is_chosen(bundle, edit, chosen):
+    def change(stage):
+        choose(stage, "r0_c0", representation=chosen, lod="lod2")
+        for suffix in ("", "_volume"):
+            path = f"/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0{suffix}"
+            stage.OverridePrim(path).SetActive(False)
+
+    edited = edit(change)
+    assert load(edited / "manifest.json")["tiles"][0]["representation"] == chosen
+    assert [volume["tile"] for volume in volumes(edited)] == ["r0_c1"]
+    assert not (edited / "channels/CD31/r0_c0").exists()
+    assert chain(edited, "r0_c1") == chain(bundle, "r0_c1")
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
+        (
+            lambda s: choose(s, "r0_c1", lod="lod7"),
+            "/Specimen/Tiles/r0_c1: lod 'lod7', expected one of lod0, lod1, lod2",
+        ),
+        (
+            lambda s: choose(s, "r0_c1", representation="wire"),
+            "r0_c1: representation 'wire', expected one of mesh, volume, both",
+        ),
         (lambda s: s.SetMetadata("metersPerUnit", 0.01), "metersPerUnit is 0.01, expected 1e-06"),
         (
             lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(1, 2, 0)),

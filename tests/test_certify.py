@@ -110,6 +110,25 @@ def test_bow_tie_of_two_boxes_at_a_corner() -> None:
     assert kinds(certify(both)) == {"crossings"}
 
 
+def test_wall_in_a_cut_plane() -> None:
+    """A ball cut open at x = 0, and a triangle of three vertices of its rim."""
+    mesh = ball()
+    x = mesh.positions[:, 0].copy()
+    x[np.abs(x) < 1e-3] = 0
+    mesh = replace(mesh, positions=np.column_stack([x, mesh.positions[:, 1:]]))
+    half = _with(mesh, mesh.triangles[(x[mesh.triangles] >= 0).all(axis=1)])
+    plane = (0, 0.0)
+    assert kinds(certify(half, (plane,))) == set()
+    rim = border(half.triangles)
+    after = dict(rim.tolist())
+    first = int(rim[0, 0])
+    second = after[first]
+    lid = [[after[second], second, first]]
+    faults = certify(_with(half, np.concatenate([half.triangles, lid])), (plane,))
+    assert kinds(faults) == {"walls"}
+    assert faults.walls.tolist() == [len(half.triangles)]
+
+
 def test_vertex_pushed_through_the_other_side() -> None:
     positions = ball().positions.copy()
     top = int(positions[:, 2].argmax())

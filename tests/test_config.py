@@ -105,13 +105,14 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
 
 def test_auto_lengths_follow_the_spacing() -> None:
     resolved = config.SurfaceOptions().resolved((5.0, 2.0, 2.0))
-    assert (resolved.smoothing_um, resolved.alpha_um) == (2.0, 10.0)
+    assert (resolved.smoothing_um, resolved.max_alpha_um) == (2.0, 10.0)
+    assert resolved.alpha_um == "auto"  # by the channel's solids
     with pytest.raises(UsageError, match="alpha_um is -1"):
         config.SurfaceOptions(alpha_um=-1.0).resolved((1.0, 1.0, 1.0))
 
 
 def test_whole_number_without_end_is_wrong_usage(tmp_path: Path) -> None:
     file = tmp_path / "huge.toml"
-    file.write_text("[isovalue]\nmin_sharpness = " + "9" * 400)
-    with pytest.raises(UsageError, match=r"isovalue\.min_sharpness is 9"):
+    file.write_text("[isovalue]\nmin_confidence = " + "9" * 400)
+    with pytest.raises(UsageError, match=r"isovalue\.min_confidence is 9"):
         config.load(None, file, {})

@@ -6,7 +6,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from stereocell.crossings import are_collinear, find_crossings, orient_2d
+from stereocell.crossings import are_collinear, find_crossings, orient_2d, orient_3d
 
 CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 KINDS = {
@@ -133,3 +133,26 @@ def test_signs_are_exact_where_floats_round() -> None:
     signs = set(orient_2d(a, b, c).tolist())
     assert len(signs) == 1
     assert signs != {0}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-4, 1e6])
+@pytest.mark.parametrize("kind", ["anywhere", "on a grid", "nearly in a plane"])
+def test_side_of_a_plane_is_as_in_exact_arithmetic(kind: str, scale: float) -> None:
+    """Rationals of Python against floats that are trusted where they may be."""
+    rng = np.random.default_rng(1)
+    points = scale * rng.normal(size=(4, 300, 3))
+    if kind == "on a grid":
+        points = np.round(2 * points / scale) * scale / 2
+    if kind == "nearly in a plane":
+        weights = rng.dirichlet([1, 1, 1], 300)
+        points[3] = np.einsum("nk,knd->nd", weights, points[:3])
+    signs = orient_3d(*points)
+    assert {"on a grid": {-1, 0, 1}}.get(kind, {-1, 1}) <= set(signs.tolist())
+    for found, rows in zip(signs.tolist(), points.transpose(1, 0, 2), strict=True):
+        a, b, c, d = ([Fraction(x) for x in row] for row in rows.tolist())
+        u, v, w = ([x - y for x, y in zip(p, d, strict=True)] for p in (a, b, c))
+        volume = sum(
+            u[i] * (v[(i + 1) % 3] * w[(i + 2) % 3] - v[(i + 2) % 3] * w[(i + 1) % 3])
+            for i in range(3)
+        )
+        assert found == (volume > 0) - (volume < 0)

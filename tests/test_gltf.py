@@ -1,12 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from glbs import decoded_positions_m, read
 from stereocell.mesh import Mesh
-from stereocell.write.gltf import Material, choose_step, encode_glb
+from stereocell.write.gltf import Material, Textures, choose_step, encode_glb
 
 EXTRAS = {"tile": "r0_c0", "channel": "CD31"}
 RED = Material((1.0, 0.25, 0.0), 0.0, 0.75)
+MAP = Textures(b"map")
 
 
 def patch(x0, x1, y=-40.0, n=9):
@@ -87,7 +90,7 @@ def test_color_and_extras_are_written():
 def test_normal_map_brings_uvs_with_v_down_and_tangents():
     mesh = patch(0, 10)
     document, arrays = read(
-        encode_glb(mesh, choose_step(20), RED, "mesh", EXTRAS, b"not looked into").data
+        encode_glb(mesh, choose_step(20), RED, "m", EXTRAS, Textures(b"not looked into")).data
     )
     attributes = document["meshes"][0]["primitives"][0]["attributes"]
     uvs = arrays[attributes["TEXCOORD_0"]] / 65535
@@ -100,10 +103,39 @@ def test_normal_map_brings_uvs_with_v_down_and_tangents():
     assert image["byteLength"] == len(b"not looked into")
 
 
+def test_occlusion_and_colour_maps_come_beside_the_normal_map():
+    maps = Textures(b"normals", b"occlusion", b"colours")
+    document, _ = read(encode_glb(patch(0, 10), choose_step(20), RED, "m", EXTRAS, maps).data)
+    (material,) = document["materials"]
+    texture = {
+        b"normals": material["normalTexture"],
+        b"occlusion": material["occlusionTexture"],
+        b"colours": material["pbrMetallicRoughness"]["baseColorTexture"],
+    }
+    for content, reference in texture.items():
+        source = document["textures"][reference["index"]]["extensions"]["KHR_texture_basisu"]
+        view = document["bufferViews"][document["images"][source["source"]]["bufferView"]]
+        assert view["byteLength"] == len(content)
+    assert "COLOR_0" not in document["meshes"][0]["primitives"][0]["attributes"]
+
+
+def test_vertex_colours_are_linear_and_dimmed_where_the_sky_is_hidden():
+    mesh = patch(0, 10, n=2)
+    colors = np.float32([[1, 0.5, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+    openness = np.float32([1, 1, 0, 0])
+    painted = replace(mesh, colors=colors, openness=openness)
+    document, arrays = read(encode_glb(painted, choose_step(20), RED, "m", EXTRAS).data)
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    expected = np.rint(colors * np.where(openness, 1, 0.6)[:, None] * 255)
+    points = arrays[attributes["POSITION"]][:, [0, 2]].astype(float)
+    order = np.lexsort((points[:, 0], points[:, 1]))  # as the patch numbers its corners
+    assert np.abs(arrays[attributes["COLOR_0"]][order] - expected).max() <= 1
+
+
 def test_uvs_outside_the_unit_square_survive():
     mesh = patch(0, 10)
     wide = Mesh(mesh.positions, mesh.triangles, mesh.normals, mesh.uvs * 3 - 1, mesh.tangents)
-    document, arrays = read(encode_glb(wide, choose_step(20), RED, "mesh", EXTRAS, b"map").data)
+    document, arrays = read(encode_glb(wide, choose_step(20), RED, "m", EXTRAS, MAP).data)
     uvs = arrays[document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]]
     assert (uvs.min(), uvs.max()) == (-1, 2)
 
@@ -127,6 +159,6 @@ def test_what_can_not_be_written_is_refused():
     with pytest.raises(ValueError, match="no triangles"):
         encode_glb(nothing, choose_step(20), RED, "m", EXTRAS)
     with pytest.raises(ValueError, match="no UVs"):
-        encode_glb(plain, choose_step(20), RED, "m", EXTRAS, b"map")
+        encode_glb(plain, choose_step(20), RED, "m", EXTRAS, MAP)
     with pytest.raises(ValueError, match="lattice steps"):
         encode_glb(mesh, choose_step(1), RED, "m", EXTRAS)

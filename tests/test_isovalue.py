@@ -92,10 +92,13 @@ def test_noise_alone_has_no_clear_surface_and_a_dim_ball_in_it_has(seed: int) ->
     _, y, _ = np.indices(SHAPE)
     rng = np.random.default_rng(seed)
     noise = ndimage.gaussian_filter(rng.normal(200, 20, SHAPE) + y / 2, (0.5, 1, 1))
-    empty = find_iso_value(noise.astype(np.float32), SPACING, IsoValueOptions())
-    assert not empty.is_clear
+    options = IsoValueOptions()
+    empty = find_iso_value(noise.astype(np.float32), SPACING, options)
+    assert empty.confidence < options.min_confidence / 2
     ball = noise + 400 * blurred_ball(SHAPE, SPACING, CENTER, 2.0, 0.3)
-    assert find_iso_value(ball.astype(np.float32), SPACING, IsoValueOptions()).is_clear
+    dim = find_iso_value(ball.astype(np.float32), SPACING, options)
+    assert dim.confidence > options.min_confidence
+    assert dim.raggedness < empty.raggedness / 2
 
 
 def test_constant_tile_has_no_surface() -> None:
@@ -134,7 +137,8 @@ def test_voxels_whose_squares_leave_float32_change_nothing(scale: float) -> None
         ({"clip_percentile": 101.0}, "isovalue.clip_percentile is 101, expected more than 0"),
         ({"min_area_share": -0.1}, "isovalue.min_area_share is -0.1, expected 0 to 1"),
         ({"min_area_share": 2.0}, "isovalue.min_area_share is 2, expected 0 to 1"),
-        ({"min_sharpness": -1.0}, "isovalue.min_sharpness is -1, expected 0 or more"),
+        ({"min_confidence": -1.0}, "isovalue.min_confidence is -1, expected 0 to 1"),
+        ({"min_confidence": 1.1}, "isovalue.min_confidence is 1.1, expected 0 to 1"),
     ],
 )
 def test_options_out_of_range_are_wrong_usage(values: dict[str, Any], message: str) -> None:

@@ -127,5 +127,5 @@ def test_normal_map_keeps_its_normals_and_its_bytes():
 
 
 def test_normal_map_of_odd_size_is_refused():
-    with pytest.raises(ValueError, match="a normal map of 30 x 32 x 3"):
+    with pytest.raises(ValueError, match="a baked map of 30 x 32 x 3"):
         encode_normal_map(np.zeros((32, 30, 3), np.uint8))

@@ -10,9 +10,10 @@ from scipy import ndimage
 
 from stereocell import mend
 from stereocell.certify import border, certify
+from stereocell.clock import Clock
 from stereocell.config import Settings
 from stereocell.distance import Nearest, measure_spread
-from stereocell.levels import Clock, make_levels, sharpest_angle
+from stereocell.levels import make_levels, sharpest_angle
 from stereocell.lod import simplify
 from stereocell.mend import Mended, simplify_soundly
 from stereocell.mesh import Mesh

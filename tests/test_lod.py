@@ -1,16 +1,13 @@
-"""Levels of detail: error, borders, measured distance; what is unwrapped and baked on them."""
+"""Levels of detail: error, borders, measured distance."""
 
 import numpy as np
 import pytest
 import pyvista as pv
-from numpy.typing import NDArray
 
-from stereocell import unwrap as unwrap_module
 from stereocell.distance import Nearest, measure_distance
 from stereocell.errors import UsageError
 from stereocell.lod import FEWEST, LodOptions, drop_doubles, simplify
 from stereocell.mesh import Mesh
-from stereocell.unwrap import bake_normals, unwrap
 from test_surface import open_edges
 
 
@@ -116,87 +113,3 @@ def test_errors_must_rise() -> None:
 def test_no_samples_is_wrong_usage() -> None:
     with pytest.raises(UsageError, match=r"lod\.samples is 0, expected 1 or more"):
         LodOptions(samples=0)
-
-
-def test_unwrapped_charts_do_not_overlap_and_fill_the_square() -> None:
-    mesh, size = unwrap(simplify(_sphere(), 0.2), 256, 0.1)
-    assert mesh.uvs is not None
-    assert mesh.uvs.min() >= 0
-    assert mesh.uvs.max() <= 1
-    count = np.zeros((size, size), int)
-    for triangle in mesh.uvs[mesh.triangles] * size:  # a second, plain rasteriser
-        low, high = np.floor(triangle.min(axis=0)).astype(int), np.ceil(triangle.max(axis=0))
-        u, v = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
-        a, b, c = triangle
-        signs = [
-            (q[0] - p[0]) * (v - p[1]) - (q[1] - p[1]) * (u - p[0])
-            for p, q in ((a, b), (b, c), (c, a))
-        ]
-        inside = np.all([s > 1e-3 for s in signs], axis=0) | np.all(
-            [s < -1e-3 for s in signs], axis=0
-        )
-        count[v[inside].astype(int), u[inside].astype(int)] += 1
-    assert count.max() == 1
-    assert (count > 0).mean() > 0.3
-
-
-def test_an_atlas_outlives_its_unwrap_and_a_few_after() -> None:
-    """Destroying one whose worker thread is just falling asleep can hang for ever."""
-    mesh = simplify(_sphere(sides=24), 0.2)
-    for _ in range(unwrap_module.ATLASES_KEPT + 3):
-        unwrap(mesh, 64, 1.0)
-    assert len(unwrap_module._past_atlases) == unwrap_module.ATLASES_KEPT
-
-
-def test_tangents_are_unit_and_across_the_normals() -> None:
-    mesh, _ = unwrap(simplify(_sphere(), 0.2), 256, 0.1)
-    assert mesh.tangents is not None
-    np.testing.assert_allclose(np.linalg.norm(mesh.tangents[:, :3], axis=1), 1, atol=1e-4)
-    assert np.abs((mesh.tangents[:, :3] * mesh.normals).sum(axis=1)).max() < 1e-3
-
-
-def test_baked_map_of_a_thin_shell_shows_no_other_wall() -> None:
-    """The inner wall's vertices are nearer than the outer wall's to a chord of a coarse mesh."""
-    outer, inner = _sphere(5.0, 24), _sphere(4.8, 96)
-    turned = inner.triangles[:, ::-1] + np.uint32(len(outer.positions))
-    shell = Mesh(
-        np.concatenate([outer.positions, inner.positions]),
-        np.concatenate([outer.triangles, turned]),
-        np.concatenate([outer.normals, -inner.normals]),
-    )
-    coarse, size = unwrap(simplify(_sphere(), 0.5), 128, 0.1)
-    image = bake_normals(coarse, shell, size)
-    assert image[..., 2].min() > 128 + 50  # no normal is turned away
-
-
-def _rippled(positions: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Unit normals of a sphere with ripples that no coarse vertex normal can hold."""
-    radial = positions / np.linalg.norm(positions, axis=1, keepdims=True)
-    x, y, z = radial.T
-    ripples = radial + 0.35 * np.stack([np.sin(9 * y), np.sin(9 * z), np.sin(9 * x)], axis=1)
-    return ripples / np.linalg.norm(ripples, axis=1, keepdims=True)
-
-
-def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
-    """Shade a coarse sphere by its map: it must have the fine one's normals, ripples and all."""
-    sphere = _sphere()
-    fine = Mesh(sphere.positions, sphere.triangles, _rippled(sphere.positions).astype(np.float32))
-    coarse, size = unwrap(simplify(sphere, 0.8), 256, 0.1)
-    image = bake_normals(coarse, fine, size)
-    assert coarse.uvs is not None
-    assert coarse.tangents is not None
-    corners = coarse.triangles
-    at = coarse.uvs[corners].mean(axis=1) * size  # triangle centres
-    texel = image[size - 1 - at[:, 1].astype(int), at[:, 0].astype(int)] / 127.5 - 1
-    smooth = coarse.normals[corners].mean(axis=1)
-    smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-    tangent = coarse.tangents[corners, :3].mean(axis=1)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    bitangent = np.cross(smooth, tangent) * coarse.tangents[corners[:, 0], 3:]
-    shaded = texel[:, :1] * tangent + texel[:, 1:2] * bitangent + texel[:, 2:] * smooth
-    shaded /= np.linalg.norm(shaded, axis=1, keepdims=True)
-    truth = _rippled(coarse.positions[corners].mean(axis=1))
-    assert np.median((smooth * truth).sum(axis=1)) < 0.97  # without the map it would not do
-    cosine = (shaded * truth).sum(axis=1)
-    assert np.median(cosine) > 0.99
-    assert np.percentile(cosine, 5) > 0.95

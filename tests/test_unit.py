@@ -8,6 +8,7 @@ import pytest
 from phantoms import blurred_ball
 from stereocell.config import Settings
 from stereocell.latticefield import LatticeField
+from stereocell.repair import RepairOptions
 from stereocell.specimen import APRON
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput, build_unit, to_eight_bit
@@ -22,7 +23,10 @@ def _given(scale: float) -> UnitInput:
     settings = Settings()
     settings = replace(settings, surface=settings.surface.resolved(SPACING))
     iso = LatticeField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
-    return UnitInput(BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, None, (0.0, scale), settings)
+    repair, step = RepairOptions(0.6, 0.9, 1.2), (1, 1, 1)
+    return UnitInput(
+        BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, None, repair, step, (0.0, scale), settings
+    )
 
 
 @pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])

@@ -244,9 +244,11 @@ def test_a_look_keeps_the_channels_own_name_and_levels(stage_path: Path) -> None
     assert tuple(prim.GetAttribute("stereocell:window").Get()) == (100, 1100)
     assert prim.GetAttribute("stereocell:isoValue").Get() == 600
     assert prim.GetAttribute("stereocell:volumeWindow").Get() == (100, 1100)
+    assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == "clear"
     empty = stage.GetPrimAtPath(f"/Specimen/Channels/{EMPTY_ID}")
     assert empty.GetDisplayName() == "1st"
     assert not empty.GetAttribute("stereocell:isoValue").HasAuthoredValue()
+    assert empty.GetAttribute("stereocell:surfaceVerdict").Get() == "none"
 
 
 def test_cameras_see_the_whole_specimen(stage_path: Path) -> None:
@@ -323,7 +325,7 @@ def test_the_json_twin_of_the_schema_has_the_same_attributes() -> None:
     assert twin["title"] == "StereoCellChannelAPI"
     assert set(twin["properties"]) == {attribute.name for attribute in attributes}
     json_types = {"color3f": "array", "float2": "array", "float2[]": "array"}
-    json_types |= {"float": "number", "asset": "string"}
+    json_types |= {"float": "number", "asset": "string", "token": "string"}
     for attribute in attributes:
         field = twin["properties"][attribute.name]
         assert field["usdType"] == str(attribute.typeName)

@@ -33,7 +33,7 @@ def content(row: int, column: int, looks: list[Look]) -> TileContent:
 def test_242_tiles_are_known_without_their_payloads(tmp_path: Path) -> None:
     ramp = {"default": ((0.0, 0.0), (1.0, 1.0))}
     looks = [
-        Look(f"channel {k}", (0.1 * k, 0.5, 0.5), (0.0, 9.0), 4.0, 1.0, ramp)
+        Look(f"channel {k}", (0.1 * k, 0.5, 0.5), (0.0, 9.0), 4.0, 1.0, "clear", ramp)
         for k in range(CHANNELS)
     ]
     extents = []

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from stereocell import report, staging, tasks
+from stereocell.alphawrap import find_wrapper
 from stereocell.assets import viewer_dist
 from stereocell.config import Settings, to_dict, to_toml
 from stereocell.documents import write_json
@@ -39,27 +40,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     require_apart(source, out)
     store = Store(out)
     with _phase(store, "plan") as phase:
-        location = Location.of(source).source
-        options = settings.plan
-        dataset = open_source(SourceRef(location, options.time, options.spacing_um))
-        for note in dataset.notes:
-            console.print(f"plan: {note}", markup=False)
-        indices = dataset.find_channels(options.channels) if options.channels else None
-        chosen = range(len(dataset.channels)) if indices is None else indices
-        channels = [
-            Channel(
-                index,
-                dataset.channels[index].name,
-                dataset.channels[index].color or PALETTE[place % len(PALETTE)],
-            )
-            for place, index in enumerate(chosen)
-        ]
-        level = choose_level(dataset.levels, len(channels), settings)
-        origin = dataset.levels[level[0]].origin_um
-        plan = make_plan(
-            location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
-            settings,
-        )  # fmt: skip
+        plan = settle(source, settings)
         store.require_writable()
         phase.is_up_to_date = not store.save_plan(plan)
         write_bytes(store.settings_file, to_toml(plan.settings).encode())
@@ -70,6 +51,36 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
         f"{len(plan.tiles)} tiles x {len(plan.channels)} channels"
     )
     return plan
+
+
+def settle(source: str, settings: Settings) -> Plan:
+    """Return the plan of a build, and tell what is odd about the source. Nothing is written.
+
+    Raises StereoCellError.
+    """
+    location = Location.of(source).source
+    options = settings.plan
+    if settings.surface.wrap == "alpha-wrap":
+        find_wrapper()
+    dataset = open_source(SourceRef(location, options.time, options.spacing_um))
+    for note in dataset.notes:
+        console.print(f"plan: {note}", markup=False)
+    indices = dataset.find_channels(options.channels) if options.channels else None
+    chosen = range(len(dataset.channels)) if indices is None else indices
+    channels = [
+        Channel(
+            index,
+            dataset.channels[index].name,
+            dataset.channels[index].color or PALETTE[place % len(PALETTE)],
+        )
+        for place, index in enumerate(chosen)
+    ]
+    level = choose_level(dataset.levels, len(channels), settings)
+    origin = dataset.levels[level[0]].origin_um
+    return make_plan(
+        location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
+        settings,
+    )  # fmt: skip
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """The promise that every mesh keeps before it is written, checked exactly.
 
-Closed but where another tile follows, 2-manifold edges and vertices, wound consistently and
-outward, nowhere touching itself. Topology is counted, and geometry decided by the signs of
-determinants (see `crossings`), without tolerances; only which way round a whole body is wound is
-the sign of a sum in float64, its volume.
+Closed but where another tile follows, without a wall there, 2-manifold edges and vertices, wound
+consistently and outward, nowhere touching itself. Topology is counted, and geometry decided by the
+signs of determinants (see `crossings`), without tolerances; only which way round a whole body is
+wound is the sign of a sum in float64, its volume.
 """
 
 from dataclasses import dataclass, fields
@@ -30,6 +30,7 @@ class Faults:
     pinched     vertices (n,) whose triangles make more than one fan
     inside_out  one triangle (n,) of each body that is wound inwards
     crossings   pairs (n, 2) of triangles that meet beside their common corners
+    walls       triangles (n,) that lie in a cut plane, where the neighbour's may lie as well
     """
 
     degenerate: Indices
@@ -38,6 +39,7 @@ class Faults:
     pinched: Indices
     inside_out: Indices
     crossings: Indices
+    walls: Indices
 
     @property
     def counts(self) -> dict[str, int]:
@@ -50,7 +52,8 @@ class Faults:
 
     def vertices(self, triangles: NDArray[np.integer]) -> Indices:
         """Return the vertices (n,) of all that is at fault, sorted."""
-        at = np.concatenate([self.degenerate, self.inside_out, self.crossings.ravel()])
+        whole = (self.degenerate, self.inside_out, self.walls, self.crossings.ravel())
+        at = np.concatenate(whole)
         corners = triangles[at].astype(np.int64).ravel()
         parts = [corners, self.open.ravel(), self.crowded.ravel(), self.pinched]
         return np.unique(np.concatenate(parts))
@@ -83,6 +86,7 @@ def certify(mesh: Mesh, planes: tuple[Plane, ...] = ()) -> Faults:
         pinched=pinched,
         inside_out=_inside_out(mesh, corners, edges, border_edges, planes),
         crossings=used[crossings],
+        walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
 
 
@@ -107,7 +111,8 @@ def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]
     Edge 3 t + k goes from corner k of triangle t to the next one.
     """
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    low, high = edges.min(axis=1), edges.max(axis=1)
+    one, other = edges.T
+    low, high = np.minimum(one, other), np.maximum(one, other)
     key = low * (high.max(initial=0) + 1) + high
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
@@ -124,12 +129,12 @@ def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]
 
 
 def _on_planes(
-    positions: NDArray[np.float32], edges: Indices, planes: tuple[Plane, ...]
+    positions: NDArray[np.float32], corners: Indices, planes: tuple[Plane, ...]
 ) -> NDArray[np.bool_]:
-    """Return which edges have both ends on one of the planes, bit by bit."""
-    on = np.zeros(len(edges), bool)
+    """Return which edges (n, 2) or triangles (n, 3) lie in one of the planes, bit by bit."""
+    on = np.zeros(len(corners), bool)
     for column, value in planes:
-        on |= (positions[edges, column] == np.float32(value)).all(axis=1)
+        on |= (positions[corners, column] == np.float32(value)).all(axis=1)
     return on
 
 

@@ -54,8 +54,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _input(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address")
+    _source(parser)
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the results")
+
+
+def _source(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address")
     parser.add_argument("--preset", help="cycif, lightsheet, mri, or a TOML file of your own")
     parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
     plan = parser.add_argument_group("what to build")
@@ -74,10 +78,26 @@ def _input(parser: argparse.ArgumentParser) -> None:
         "--iso-criterion", help="how iso-values are found: edges (default), pekar-mean, ..."
     )
     plan.add_argument(
+        "--wrap", help="how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"
+    )
+    plan.add_argument(
+        "--closed-tiles",
+        action="store_const",
+        const=True,
+        help="also a closed STL of every tile and channel, for printing and booleans",
+    )
+    plan.add_argument(
         "--iso-value",
         action="append",
         metavar="CHANNEL=VALUE",
         help="use this iso-value (voxel values) for a channel, by name or index; may be repeated",
+    )
+    plan.add_argument(
+        "--paint",
+        action="append",
+        metavar="CHANNEL=CHANNEL",
+        help="paint the second channel's intensity on the first one's surface, as CD31=MART1; "
+        "may be repeated",
     )
 
 
@@ -147,8 +167,25 @@ def _flags(options: argparse.Namespace) -> dict[str, Any]:
             name = ""
         if not name:
             raise UsageError(f"--iso-value is {text!r}, expected CHANNEL=VALUE")
+    paint: dict[str, str] = {}
+    for text in options.paint or []:
+        name, _, painted = text.rpartition("=")
+        if not name or not painted:
+            raise UsageError(f"--paint is {text!r}, expected CHANNEL=CHANNEL, as CD31=MART1")
+        paint[name] = painted
     isovalue = {} if options.iso_criterion is None else {"criterion": options.iso_criterion}
-    return {"plan": plan, "isovalue": isovalue, "iso_values": iso_values}
+    surface = {
+        key: getattr(options, key)
+        for key in ("wrap", "closed_tiles")
+        if getattr(options, key) is not None
+    }
+    return {
+        "plan": plan,
+        "isovalue": isovalue,
+        "surface": surface,
+        "iso_values": iso_values,
+        "paint": paint,
+    }
 
 
 # --- handlers; heavy imports wait until they are needed, so that --help is quick
@@ -167,6 +204,18 @@ def _plan(options: argparse.Namespace) -> int:
 
     settings = config.load(options.preset, options.config, _flags(options))
     build.make(options.input, options.out, settings)
+    return 0
+
+
+def _iso(options: argparse.Namespace) -> int:
+    from stereocell import config, iso_preview
+
+    settings = config.load(options.preset, options.config, _flags(options))
+    candidates, path = iso_preview.preview(
+        options.input, options.channel, options.tile, options.out, settings
+    )
+    print("\n".join(iso_preview.table(candidates)))
+    print(f"wrote {path}")
     return 0
 
 
@@ -250,6 +299,15 @@ def _declare_build(parser: argparse.ArgumentParser) -> None:
     _workers(parser)
 
 
+def _declare_iso(parser: argparse.ArgumentParser) -> None:
+    _source(parser)
+    parser.add_argument("--channel", required=True, metavar="X", help="by name or index, as CD31")
+    parser.add_argument("--tile", required=True, help="as a build names it: r0_c0")
+    parser.add_argument(
+        "-o", "--out", type=Path, metavar="PNG", help="default: iso_CHANNEL_TILE.png here"
+    )
+
+
 def _declare_units(parser: argparse.ArgumentParser) -> None:
     _out(parser)
     _workers(parser)
@@ -299,6 +357,12 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         "plan my.ome.tif -o out/mine --channels CD31,MART1",
         _input,
         _plan,
+    ),
+    "iso": (
+        "look at one tile's iso-value: slices with the contours of every candidate",
+        "iso my.ome.zarr --channel CD31 --tile r0_c0 -o cd31.png --preset cycif --grid 5x2",
+        _declare_iso,
+        _iso,
     ),
     "units": (
         "find iso-values, build meshes and volumes of every tile and channel",

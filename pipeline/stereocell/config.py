@@ -15,11 +15,10 @@ from typing import Any
 from stereocell.errors import UsageError
 from stereocell.isovalue import IsoValueOptions
 from stereocell.lod import LodOptions
-from stereocell.options import setting
+from stereocell.options import AUTO, length_um, setting
 from stereocell.unwrap import UnwrapOptions
 
 PRESETS = Path(__file__).parent / "presets"
-AUTO = "auto"
 # What the first lines of a file of settings say about it.
 TEMPLATE = "StereoCell settings. Every key may be left out; unknown keys are errors."
 RECORD = (
@@ -70,31 +69,67 @@ class WindowOptions:
             )
 
 
+WRAPS = ("voxels", "alpha-wrap")
+
+
 @dataclass(frozen=True, slots=True)
 class SurfaceOptions:
     """Lengths in um; auto follows the voxel spacing."""
 
     smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
     alpha_um: float | str = setting(
-        AUTO, "radius of the ball that closes gaps; auto: 2 coarsest spacings"
+        AUTO, "radius of the ball that closes gaps; auto: by the channel's solids, see max_alpha_um"
+    )
+    max_alpha_um: float | str = setting(
+        AUTO, "what auto alpha may reach; auto: 2 coarsest spacings"
+    )
+    offset_um: float | str = setting(
+        0.0, "how far outside the surface lies: volumes grow by it; auto: a tenth of alpha"
+    )
+    grid_um: float = setting(
+        0.0,
+        "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
     )
     min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
+    max_fragment_um: float | str = setting(
+        AUTO,
+        "fragments up to this go as well if they are under half the mean of the channel's solids, "
+        "by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
+    )
     max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
+    wrap: str = setting(
+        "voxels", "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)"
+    )
+    closed_tiles: bool = setting(
+        False, "whether the stage gets a closed STL of every tile and channel, in um"
+    )
     background_um: float | str = setting(
         AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
     )
 
     def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
-        """Return the options with every `auto` replaced by a length."""
+        """Return the options with lengths for `auto`; alpha and offset may wait for the solids."""
+        coarsest = max(spacing_um)
         auto = {
             "smoothing_um": min(spacing_um),
-            "alpha_um": 2 * max(spacing_um),
-            "min_diagonal_um": 3 * max(spacing_um),
-            "max_cavity_um": 4 * max(spacing_um),
+            "max_alpha_um": 2 * coarsest,
+            "min_diagonal_um": 3 * coarsest,
+            "max_fragment_um": 6 * coarsest,
+            "max_cavity_um": 4 * coarsest,
             "background_um": 64 * min(spacing_um),
         }
-        lengths = {key: _length(f"surface.{key}", getattr(self, key), auto[key]) for key in auto}
-        return SurfaceOptions(**lengths)
+        lengths: dict[str, Any] = {
+            key: length_um(f"surface.{key}", getattr(self, key), auto[key]) for key in auto
+        }
+        if self.wrap not in WRAPS:
+            raise UsageError(f"surface.wrap is {self.wrap!r}, expected one of {', '.join(WRAPS)}")
+        for key in ("alpha_um", "offset_um", "grid_um"):
+            length_um(f"surface.{key}", getattr(self, key), 0.0)
+        if self.offset_um != AUTO and float(self.offset_um) > coarsest:
+            raise UsageError(
+                f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"
+            )
+        return replace(self, **lengths)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +144,15 @@ class Settings:
     unwrap: UnwrapOptions = field(default_factory=UnwrapOptions)
     # voxel values that override what is found, by channel name
     iso_values: Mapping[str, float] = field(default_factory=dict)
+    # whose intensity is painted on a channel's surface, by that channel's name
+    paint: Mapping[str, str] = field(default_factory=dict)
+
+
+# sections that are no fixed keys but channels: what a value is, and what the file says of them
+_BY_CHANNEL = {
+    "iso_values": ("float", "channel = voxel value, instead of the iso-value that is found"),
+    "paint": ("str", "channel = channel whose intensity is painted on its surface"),
+}
 
 
 def load(preset: str | None, config: Path | None, flags: Mapping[str, Any]) -> Settings:
@@ -143,9 +187,11 @@ def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings
         _known(section, [f.name for f in fields(settings)], where, "section")
         if not isinstance(content, Mapping):
             raise UsageError(f"{where}: {section} is {content!r}, expected a table")
-        if section == "iso_values":
-            given = {k: _typed(f"{where}: iso_values.{k}", v, "float") for k, v in content.items()}
-            settings = replace(settings, iso_values={**settings.iso_values, **given})
+        if section in _BY_CHANNEL:
+            type_ = _BY_CHANNEL[section][0]
+            given = {k: _typed(f"{where}: {section}.{k}", v, type_) for k, v in content.items()}
+            merged: dict[str, Any] = {section: {**getattr(settings, section), **given}}
+            settings = replace(settings, **merged)
             continue
         current = getattr(settings, section)
         types = {f.name: str(f.type) for f in fields(current)}
@@ -180,8 +226,8 @@ def to_toml(settings: Settings, header: str = RECORD) -> str:
         value = getattr(settings, section.name)
         lines += ["", f"[{section.name}]"]
         if not is_dataclass(value):
-            lines.append("# channel = voxel value, instead of the iso-value that is found")
-            lines += [f"{_toml(key)} = {_toml(number)}" for key, number in value.items()]
+            lines.append(f"# {_BY_CHANNEL[section.name][1]}")
+            lines += [f"{_toml(key)} = {_toml(given)}" for key, given in value.items()]
             continue
         for f in fields(value):
             lines.append(f"{f.name} = {_toml(getattr(value, f.name))}  # {f.metadata['comment']}")
@@ -197,6 +243,8 @@ def _toml(value: Any) -> str:
     if isinstance(value, str):
         # a TOML string is a JSON string, but for DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
     return repr(value)
@@ -228,23 +276,19 @@ def _typed(where: str, value: Any, expected: str) -> Any:
         inner = expected.removeprefix("tuple[").split(",")[0]
         if isinstance(value, list | tuple):
             return tuple(_typed(where, v, inner) for v in value)
-    elif "str" in expected and isinstance(value, str):
+    elif ("str" in expected and isinstance(value, str)) or (
+        "bool" in expected and isinstance(value, bool)
+    ):
         return value
     elif ("float" in expected and number) or ("int" in expected and whole):
         return float(value) if "float" in expected else value
-    plain = {"str": "text", "int": "a whole number", "float": "a number"}
+    plain = {
+        "str": "text", "int": "a whole number", "float": "a number", "bool": "true or false"
+    }  # fmt: skip
     wanted = "a list" if expected.startswith("tuple[") else plain.get(expected, expected)
     if wanted == expected:
         wanted = f"{'a number' if 'float' in expected else 'a whole number'} or {AUTO!r}"
     raise UsageError(f"{where} is {value!r}, expected {wanted}")
-
-
-def _length(where: str, value: float | str, auto: float) -> float:
-    if value == AUTO:
-        return auto
-    if isinstance(value, str) or not value >= 0:
-        raise UsageError(f"{where} is {value!r}, expected a length in um or {AUTO!r}")
-    return value
 
 
 def _is_finite(value: float) -> bool:

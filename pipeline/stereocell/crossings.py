@@ -6,6 +6,8 @@ with one are tested here, as libigl decides those by tolerances and does not see
 each other.
 """
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 from igl import predicates
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _BLOCK = 400_000  # pairs at a time
 MARGIN = 1e-6
+ERROR_BOUND = (7 + 56 * 2.0**-53) * 2.0**-53
 
 
 def find_crossings(
@@ -34,7 +37,9 @@ def find_crossings(
     doubtful = np.ones(len(positions), bool)
     if one_fan is not None:
         doubtful = ~(one_fan & _spread_out(positions, triangles))
-    near = [_meet(positions, triangles, pairs) for pairs in _neighbours(triangles, doubtful)]
+    near = [
+        _meet(positions, triangles, pairs) for pairs in _gathered(_neighbours(triangles, doubtful))
+    ]
     pairs = np.concatenate([apart, *near]).astype(np.int64)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
@@ -68,10 +73,24 @@ def _spread_out(positions: Points, triangles: Indices) -> NDArray[np.bool_]:
 
 
 def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
-    """Return the exact sign (n,) of the volume of a, b, c, d, for each row of points (n, 3)."""
-    if not len(a):
-        return np.zeros(0, np.int32)
-    return np.asarray(predicates.orient3d(*map(np.ascontiguousarray, (a, b, c, d)))).ravel()
+    """Return the exact sign (n,) of the volume of a, b, c, d, for each row of points (n, 3).
+
+    Floats decide where the determinant is larger than its error can be (Shewchuk 1997, bound A of
+    orient3d), exact arithmetic where it is not: few, and every call of it starts threads.
+    """
+    u, v, w = a - d, b - d, c - d
+    first, second = (
+        np.roll(v, -1, axis=1) * np.roll(w, -2, axis=1),
+        np.roll(v, -2, axis=1) * np.roll(w, -1, axis=1),
+    )
+    volume = (u * (first - second)).sum(axis=1)
+    bound = ERROR_BOUND * (np.abs(u) * (np.abs(first) + np.abs(second))).sum(axis=1)
+    signs = np.sign(volume).astype(np.int32)
+    doubtful = np.flatnonzero(np.abs(volume) <= bound)
+    if len(doubtful):
+        points = (np.ascontiguousarray(x[doubtful]) for x in (a, b, c, d))
+        signs[doubtful] = np.asarray(predicates.orient3d(*points)).ravel()
+    return signs
 
 
 def orient_2d(a: Points, b: Points, c: Points) -> NDArray[np.int32]:
@@ -95,8 +114,8 @@ def _share_corners(triangles: Indices, pairs: Indices) -> NDArray[np.bool_]:
     return (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
 
 
-def _neighbours(triangles: Indices, vertices: NDArray[np.bool_]) -> list[Indices]:
-    """Return all pairs (n, 2) of triangles round each of the vertices, in blocks.
+def _neighbours(triangles: Indices, vertices: NDArray[np.bool_]) -> Iterator[Indices]:
+    """Yield all pairs (n, 2) of triangles round each of the vertices, in blocks.
 
     A pair that shares an edge may come up at both of its ends.
     """
@@ -106,15 +125,25 @@ def _neighbours(triangles: Indices, vertices: NDArray[np.bool_]) -> list[Indices
     around = corners[order] // 3
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     sizes = np.diff(starts, append=len(order))
-    blocks = []
     for size in np.unique(sizes[sizes > 1]).tolist():
         i, j = np.triu_indices(size, 1)
         groups = starts[sizes == size]
         step = max(1, _BLOCK // len(i))
         for start in range(0, len(groups), step):
             first = groups[start : start + step, None]
-            blocks.append(np.stack([around[first + i], around[first + j]], axis=-1).reshape(-1, 2))
-    return blocks
+            yield np.stack([around[first + i], around[first + j]], axis=-1).reshape(-1, 2)
+
+
+def _gathered(blocks: Iterable[Indices]) -> Iterator[Indices]:
+    """Yield the same pairs in few blocks: each exact test starts threads, whatever its length."""
+    held: list[Indices] = []
+    for block in blocks:
+        held.append(block)
+        if sum(map(len, held)) >= _BLOCK:
+            yield np.concatenate(held)
+            held = []
+    if held:
+        yield np.concatenate(held)
 
 
 def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:

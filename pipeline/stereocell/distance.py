@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from stereocell.mesh import Mesh, Spread
 
 PERCENTILE = 99.0  # a sliver that vanishes, less than 1 % of the area, does not count
+ON_UM = 1e-6  # what float32 positions leave of a point on the surface
 
 
 class Nearest:
@@ -18,14 +19,28 @@ class Nearest:
     def __init__(self, mesh: Mesh, samples: int) -> None:
         self.points = spread_points(mesh, samples)
         self.vertices = mesh.positions.astype(np.float64)
-        self._triangles = mesh.triangles.astype(np.int64)
+        self.triangles = mesh.triangles.astype(np.int64)
         self._tree = igl.AABB()
-        self._tree.init(self.vertices, self._triangles)
+        self._tree.init(self.vertices, self.triangles)
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance in um from each of the points (n, 3)."""
-        squares, _, _ = self._tree.squared_distance(self.vertices, self._triangles, points)
+        squares, _, _ = self._tree.squared_distance(self.vertices, self.triangles, points)
         return np.sqrt(np.asarray(squares).ravel())
+
+
+def measure_enclosure(source: Nearest, target: Nearest) -> float:
+    """Return the share of the source's area that lies inside the target or on it, 0..1.
+
+    By the target's pseudonormals (Baerentzen & Aanaes 2005, as libigl has it).
+    """
+    signed, _, _, _ = igl.signed_distance(
+        source.points,
+        target.vertices,
+        target.triangles,
+        sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
+    )
+    return float((signed <= ON_UM).mean())
 
 
 def measure_distance(a: Nearest, b: Nearest) -> float:

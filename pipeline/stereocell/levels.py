@@ -1,18 +1,19 @@
 """All levels of detail of one unit, from its fine surface; each certified, each measured."""
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 
+from stereocell.bake import Baker, FineSurface
 from stereocell.certify import Plane, certify
+from stereocell.clock import Clock
 from stereocell.config import Settings
-from stereocell.distance import Nearest, measure_distance, measure_spread
-from stereocell.flips import turn_edges
+from stereocell.distance import Nearest, measure_distance, measure_enclosure, measure_spread
+from stereocell.dressing import dress
+from stereocell.fairing import make_fair
 from stereocell.mend import simplify_soundly
 from stereocell.mesh import Lod, Mesh, Quality
-from stereocell.unwrap import bake_normals, unwrap
+
+STRAY = 3.0  # errors: how far a vertex may lie from the next level; about .1 % would be further
+SLIDE = 0.5  # finest voxel spacings: how far a vertex of lod0 may go along the surface
 
 
 def make_levels(
@@ -20,24 +21,31 @@ def make_levels(
     planes: tuple[Plane, ...],
     spacing: tuple[float, float, float],
     settings: Settings,
-    clock: "Clock",
+    clock: Clock,
+    source: FineSurface | None = None,
 ) -> tuple[Lod, ...]:
     """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
 
+    `source`: what maps are baked from, the fine surface and what lies past the planes; without one
+    the fine surface alone, which nothing hides.
     Meshes are certified before seams of charts split their vertices: places stay the same.
     """
     options = settings.lod
     lods: list[Lod] = []
     mesh = fine
+    unwrapping = settings.unwrap.resolved(spacing)
+    with clock("bake"):
+        baker = Baker(source or FineSurface.bare(fine))
     with clock("measure"):
         to_fine = Nearest(fine, options.samples)
     for level, error in enumerate(options.errors):
         with clock("simplify"):
-            mended = simplify_soundly(mesh, planes, error * min(spacing))
+            length = error * min(spacing)
+            mended = simplify_soundly(mesh, planes, length, STRAY * length)
             mesh = mended.mesh
         if level == 0:
-            with clock("turn"):
-                mesh = turn_edges(mesh, planes, error * min(spacing))
+            with clock("fair"):
+                mesh = make_fair(mesh, planes, SLIDE * min(spacing), error * min(spacing))
         with clock("certify"):
             left = certify(mesh, planes).total
         with clock("measure"):
@@ -52,15 +60,12 @@ def make_levels(
                 fallbacks=mended.fallbacks,
                 faults=left,
                 angle_deg=sharpest_angle(mesh),
+                enclosed=measure_enclosure(to_fine, to_mesh),
             )
-        if level >= len(options.errors) - settings.unwrap.coarse_lods and len(mesh.triangles):
-            with clock("unwrap"):
-                unwrapped, size = unwrap(mesh, settings.unwrap.max_texture, max(spacing))
-            with clock("bake"):
-                baked = bake_normals(unwrapped, fine, size)
-            lods.append(Lod(unwrapped, distance, baked, quality))
-        else:
-            lods.append(Lod(mesh, distance, quality=quality))
+        lod = Lod(mesh, distance, quality=quality)
+        if len(mesh.triangles):
+            lod = dress(lod, level, baker, unwrapping, clock)
+        lods.append(lod)
     return tuple(lods)
 
 
@@ -72,16 +77,3 @@ def sharpest_angle(mesh: Mesh) -> float:
     cosine = (b**2 + c**2 - a**2) / np.maximum(2 * b * c, 1e-30)
     smallest = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     return float(np.percentile(smallest, 1))
-
-
-class Clock:
-    """Seconds spent, by step."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, step: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start

@@ -45,7 +45,7 @@ class LodOptions:
     """How levels of detail are made."""
 
     errors: tuple[float, ...] = setting(
-        (0.1, 0.5, 2.0, 4.0), "simplification error of lod0, lod1, ..., in finest voxel spacings"
+        (0.1, 0.5, 0.8, 4.0), "simplification error of lod0, lod1, ..., in finest voxel spacings"
     )
     samples: int = setting(1000, "points at which distances are measured, each way")
 

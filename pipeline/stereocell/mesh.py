@@ -15,6 +15,8 @@ class Mesh:
     normals    float32 (n, 3)  unit length, pointing out
     uvs        float32 (n, 2)  origin at the lower left, v upwards (USD's convention), or None
     tangents   float32 (n, 4)  xyz and the bitangent's sign (glTF's convention), or None
+    colors     float32 (n, 3)  linear RGB 0..1, what a stage draws it in, or None: its look's colour
+    openness   float32 (n,)    0..1, what a stage says of ambient occlusion (1: none of it), or None
     """
 
     positions: NDArray[np.float32]
@@ -22,6 +24,8 @@ class Mesh:
     normals: NDArray[np.float32]
     uvs: NDArray[np.float32] | None = None
     tangents: NDArray[np.float32] | None = None
+    colors: NDArray[np.float32] | None = None
+    openness: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,7 @@ class Quality:
     fallbacks   bodies that kept the level before's surface, as every attempt had faults
     faults      left over, by the exact check: see `certify`
     angle_deg   1st percentile of the triangles' smallest angles
+    enclosed    share of the iso-surface's area that lies inside this mesh or on it
     """
 
     away: Spread
@@ -50,6 +55,25 @@ class Quality:
     fallbacks: int
     faults: int
     angle_deg: float
+    enclosed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Baked:
+    """What the fine surface told a level: at texels (h, w) if it has UVs, else at vertices (n,).
+
+    openness  uint8; 255: no ambient occlusion
+    paint     uint8; another channel's intensity, or None
+    texel_um  edge of a texel on the surface; 0: no maps
+    charts    of its UVs
+    reason    why there are no maps; empty if there are
+    """
+
+    openness: NDArray[np.uint8]
+    paint: NDArray[np.uint8] | None = None
+    texel_um: float = 0.0
+    charts: int = 0
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +83,11 @@ class Lod:
     distance_um  measured distance between this mesh and the iso-surface: see `distance`
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
     quality      how it was made and how true it is; None where the writer doesn't know
+    baked        ambient occlusion and paint; None: neither
     """
 
     mesh: Mesh
     distance_um: float
     normal_map: NDArray[np.uint8] | None = None
     quality: Quality | None = None
+    baked: Baked | None = None

@@ -8,15 +8,17 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-from stereocell.config import AUTO, Settings, from_dict, to_dict
+from stereocell.config import Settings, from_dict, to_dict
 from stereocell.denoise import SMOOTHING_REACH
 from stereocell.errors import SourceError, UsageError
 from stereocell.names import to_identifier
+from stereocell.options import AUTO
 from stereocell.repair import RepairOptions
 from stereocell.tiling import Box, Tile, cut, cut_evenly
 
+T = TypeVar("T")
 FORMAT = "stereocell-plan"
 VERSION = 1
 
@@ -82,7 +84,18 @@ class Plan:
 
     @property
     def repair(self) -> RepairOptions:
+        """The most that is cleaned, which the halo covers; a channel's own is in wrap.py."""
         return _repair_options(self.settings)
+
+    @property
+    def step(self) -> tuple[int, int, int]:
+        """Every so many planes of voxels (z, y, x) carry the surface."""
+        return _step(self.settings, self.spacing_um)
+
+    def painter(self, channel: Channel) -> Channel | None:
+        """Return the channel that is painted on a channel's surface; None: none is."""
+        painted = self.settings.paint.get(channel.name)
+        return next((other for other in self.channels if other.name == painted), None)
 
     def tile(self, tile_id: str) -> Tile:
         return next(tile for tile in self.tiles if tile.id == tile_id)
@@ -152,11 +165,18 @@ def make_plan(
             f"{source}: {_by(region.shape)} voxels (z, y, x) to build, expected at least 2 each way"
         )
     tile_size, tiles = _tiles(settings, region)
+    if settings.surface.wrap == "alpha-wrap" and len(tiles) > 1:
+        raise UsageError(
+            f"surface.wrap is 'alpha-wrap', which closes each tile by itself, and there are "
+            f"{len(tiles)} tiles: expected one (--grid 1x1, or a --region of one tile)"
+        )
     settings = replace(
         settings,
         surface=settings.surface.resolved(chosen.spacing_um),
+        unwrap=settings.unwrap.resolved(chosen.spacing_um),
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
-        iso_values=_by_name(settings.iso_values, channels),
+        iso_values=_by_name("--iso-value", settings.iso_values, channels),
+        paint=_painted(settings.paint, channels),
     )
     return Plan(
         source=source,
@@ -227,8 +247,11 @@ def _halo(
     """
     surface = settings.surface
     smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
-    reach = _repair_options(settings).reach_um(spacing_um) + smoothing
-    padding = max(float(surface.alpha_um), smoothing)
+    every = _step(settings, spacing_um)
+    z, y, x = (step * n for step, n in zip(spacing_um, every, strict=True))
+    repair = _repair_options(settings)
+    reach = repair.reach_um((z, y, x)) + smoothing
+    padding = max(repair.alpha_um, smoothing)
     tile_size = settings.plan.tile_size
     limit = max(UNIT_VOXELS, UNIT_TILES * math.prod(tile_size))
     z, y, x = (
@@ -236,10 +259,11 @@ def _halo(
         for size, n, step in zip(tile_size, region.shape, spacing_um, strict=True)
     )
     if z * y * x > limit:
+        lengths = {f.name: getattr(surface, f.name) for f in fields(surface)}
         found = ", ".join(
-            f"{f.name} = {getattr(surface, f.name):g} um "
-            f"({getattr(surface, f.name) / min(spacing_um):,.0f} voxels)"
-            for f in fields(surface)
+            f"{name} = {length:g} um ({length / min(spacing_um):,.0f} voxels)"
+            for name, length in lengths.items()
+            if name.endswith("_um") and length != AUTO
         )
         raise UsageError(
             f"the surface's lengths don't suit voxels of {_by(spacing_um)} um (z, y, x): {found} "
@@ -249,35 +273,60 @@ def _halo(
         )
     # three more: one voxel for the median, one for the gradient, one because the tile's last plane
     # is its neighbour's
-    lengths = zip(region.shape, spacing_um, strict=True)
-    depth, height, width = (math.ceil(min(reach / step, n)) + 3 for n, step in lengths)
+    depth, height, width = (
+        math.ceil(min(reach / step, n)) + 3 * k
+        for n, step, k in zip(region.shape, spacing_um, every, strict=True)
+    )
     return depth, height, width
 
 
-def _by_name(iso_values: Mapping[str, float], channels: Sequence[Channel]) -> dict[str, float]:
-    """Return iso-values by the channels' names; an index stands for a channel without that name."""
-    by_index = {str(channel.index): channel.name for channel in channels}
-    names = {channel.name for channel in channels}
-    found: dict[str, float] = {}
-    for key, value in iso_values.items():
-        name = key if key in names else by_index.get(key)
-        if name is None:
-            raise UsageError(
-                f"--iso-value names channel {key!r}, expected one of "
-                f"{', '.join(c.name for c in channels)}, or an index of {', '.join(by_index)}"
-            )
+def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
+    """Return what is given by the channels' names; an index stands for one without that name."""
+    found: dict[str, T] = {}
+    for key, value in given.items():
+        name = _name(flag, key, channels)
         if name in found:
-            raise UsageError(
-                f"--iso-value names channel {name!r} by name and by index, expected one"
-            )
+            raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
         found[name] = value
     return found
 
 
+def _painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
+    """Return, by the name of a channel, that of the channel that is painted on its surface."""
+    by_name = _by_name("--paint", paint, channels)
+    found = {name: _name("--paint", key, channels) for name, key in by_name.items()}
+    for name, painted in found.items():
+        if name == painted:
+            raise UsageError(f"--paint {name}={painted}: expected another channel than its own")
+    return found
+
+
+def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
+    by_index = {str(channel.index): channel.name for channel in channels}
+    name = key if key in by_index.values() else by_index.get(key)
+    if name is None:
+        raise UsageError(
+            f"{flag} names channel {key!r}, expected one of "
+            f"{', '.join(by_index.values())}, or an index of {', '.join(by_index)}"
+        )
+    return name
+
+
+def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, int]:
+    # a hair more: .42 um are three times .14 um
+    z, y, x = (max(1, int(settings.surface.grid_um / h + 0.01)) for h in spacing_um)
+    return z, y, x
+
+
 def _repair_options(settings: Settings) -> RepairOptions:
     surface = settings.surface
+    alpha = surface.max_alpha_um if surface.alpha_um == AUTO else surface.alpha_um
     return RepairOptions(
-        float(surface.alpha_um), float(surface.min_diagonal_um), float(surface.max_cavity_um)
+        alpha_um=float(alpha),
+        min_diagonal_um=float(surface.min_diagonal_um),
+        max_cavity_um=float(surface.max_cavity_um),
+        max_fragment_um=float(surface.max_fragment_um),
+        offset_um=0.0 if surface.offset_um == AUTO else float(surface.offset_um),
     )
 
 

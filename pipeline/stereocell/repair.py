@@ -6,87 +6,115 @@ that lie wholly inside the window are dropped or filled, and only up to a size t
 covers (`reach_um`): whoever sees such a component near a common plane sees all of it.
 
 Closing is done on voxels, by a ball of radius alpha, and keeps the paper's meaning of alpha (the
-size of the gaps that are bridged) at a fraction of the time of an alpha wrap over triangles
-(Portaneri et al. 2022).
+size of the gaps that are bridged) and of offset (how far outside the surface lies) at a fraction
+of the time of an alpha wrap over triangles (Portaneri et al. 2022).
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
-import cc3d
 import edt
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.solids import find_solids
+
+Distance = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
 class RepairOptions:
-    """Lengths in um."""
+    """What is cleaned, lengths in um.
+
+    alpha_um         radius of the ball that closes gaps; 0: none are closed
+    min_diagonal_um  fragments of a smaller diagonal go
+    max_cavity_um    cavities of a smaller diagonal are filled
+    min_faces        fragments of fewer triangles go as well,
+    max_fragment_um  if their diagonal is under this
+    offset_um        how far the surface moves outward; at most a voxel, beyond which the field's
+                     distance means nothing
+    """
 
     alpha_um: float
     min_diagonal_um: float
     max_cavity_um: float
+    min_faces: float = 0.0
+    max_fragment_um: float = 0.0
+    offset_um: float = 0.0
 
     def reach_um(self, spacing_um: tuple[float, float, float]) -> float:
         """Return how far from a voxel lies what decides on it: the halo must cover it."""
         closing = 2 * self.alpha_um + 2 * max(spacing_um) if self.alpha_um > 0 else 0.0
-        return closing + self.min_diagonal_um + self.max_cavity_um + 2 * max(spacing_um)
+        fragment = max(self.min_diagonal_um, self.max_fragment_um)
+        return closing + fragment + self.max_cavity_um + 2 * max(spacing_um)
 
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
     """`distance` (z, y, x) um, positive inside, and what was done to it."""
 
-    distance: NDArray[np.float32]
+    distance: Distance
     fragments_dropped: int
     cavities_filled: int
 
 
 def repair(
-    distance: NDArray[np.float32], spacing_um: tuple[float, float, float], options: RepairOptions
+    distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
 ) -> Repaired:
     """Return the cleaned signed distance; the argument stays as it is."""
     distance = distance.copy()
-    outside = np.float32(-2 * max(spacing_um))
-    # 26-connected solids: a fragment joined by a corner belongs to its neighbour
-    dropped = _replace_small(
-        distance, distance > 0, 26, spacing_um, options.min_diagonal_um, outside
-    )
+    dropped = _drop_fragments(distance, spacing_um, options)
+    if options.offset_um > 0:
+        limit = np.float32(2 * max(spacing_um))
+        np.clip(distance + np.float32(options.offset_um), -limit, limit, out=distance)
     if options.alpha_um > 0:
         distance = _close(distance, spacing_um, options.alpha_um)
-    filled = _replace_small(distance, distance <= 0, 6, spacing_um, options.max_cavity_um, -outside)
+    filled = _fill_cavities(distance, spacing_um, options.max_cavity_um)
     return Repaired(distance, dropped, filled)
 
 
-def _replace_small(
-    distance: NDArray[np.float32],
-    mask: NDArray[np.bool_],
-    connectivity: Literal[6, 26],
-    spacing_um: tuple[float, float, float],
-    max_diagonal_um: float,
-    value: np.float32,
+def _drop_fragments(
+    distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
 ) -> int:
-    """Set the mask's small components that lie inside the window to `value`; return how many."""
-    labels = cc3d.connected_components(mask, connectivity=connectivity)
-    found = cc3d.statistics(labels, no_slice_conversion=True)["bounding_boxes"]
-    boxes = np.asarray(found, np.int64).reshape(-1, 3, 2)[1:]  # (label, axis, first and last)
-    if not len(boxes):
+    """Set small solids that lie inside the window far outside; return how many."""
+    # 26-connected: a fragment joined by a corner belongs to its neighbour
+    solids = find_solids(distance > 0, spacing_um, 26)
+    small = solids.diagonal_um < options.min_diagonal_um
+    doubtful = ~small & (solids.diagonal_um < options.max_fragment_um)
+    if options.min_faces > 0 and doubtful.any():
+        small |= doubtful & (solids.faces() < options.min_faces)
+    small &= solids.whole
+    if not small.any():
         return 0
-    diagonal = np.linalg.norm((boxes[:, :, 1] - boxes[:, :, 0]) * np.asarray(spacing_um), axis=1)
-    end = np.asarray(mask.shape) - 1
-    whole = ((boxes[:, :, 0] > 0) & (boxes[:, :, 1] < end)).all(axis=1)
-    small = np.concatenate([[False], whole & (diagonal < max_diagonal_um)])
-    if small.any():
-        distance[small[labels]] = value
+    outside = np.float32(-2 * max(spacing_um))
+    gone = np.concatenate([[False], small])[solids.labels]
+    if options.offset_um > 0:
+        # just outside a fragment the distance is hardly negative: the offset would bring it back
+        near = ndimage.maximum_filter(gone.view(np.uint8), 3, mode="constant")
+        kept = ((solids.labels > 0) & ~gone).view(np.uint8)
+        near &= ~ndimage.maximum_filter(kept, 3, mode="constant") & 1
+        gone |= near.view(bool)
+    distance[gone] = outside
     return int(small.sum())
 
 
-def _close(
-    distance: NDArray[np.float32], spacing_um: tuple[float, float, float], alpha_um: float
-) -> NDArray[np.float32]:
+def _fill_cavities(
+    distance: Distance, spacing_um: tuple[float, float, float], max_diagonal_um: float
+) -> int:
+    """Set small holes that no path joins to the outside far inside; return how many."""
+    holes = find_solids(distance <= 0, spacing_um, 6)
+    small = holes.whole & (holes.diagonal_um < max_diagonal_um)
+    if small.any():
+        distance[np.concatenate([[False], small])[holes.labels]] = 2 * max(spacing_um)
+    return int(small.sum())
+
+
+def _close(distance: Distance, spacing_um: tuple[float, float, float], alpha_um: float) -> Distance:
     """Add to the solid what a ball of radius alpha, rolling outside, cannot reach.
 
-    The joint lies one voxel inside, so that smooth parts of the surface stay where they are.
+    The joint lies one voxel inside, so that smooth parts of the surface stay where they are. It is
+    done on the whole window: in boxes round the solids, with the margins that they need, it took
+    .75 to 1.2 of the time on nuclei, membranes, vessels and the cells of a real brain.
     """
     h = float(max(spacing_um))
     margin = [int(np.ceil(alpha_um / step)) + 1 for step in spacing_um]

@@ -5,24 +5,28 @@ Round two builds meshes and volumes. Every result lies under a name that says wh
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
 from stereocell import tasks as maker
-from stereocell.agreement import agree
+from stereocell.agreement import Agreed, agree, find_neighbours
+from stereocell.alphawrap import find_wrapper
+from stereocell.calm import plan_for
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.engine import Engine
 from stereocell.errors import SourceError, UsageError
 from stereocell.latticefield import LatticeField, make_iso_field
 from stereocell.lineage import key_of
 from stereocell.plan import Channel, Plan
+from stereocell.repair import RepairOptions
 from stereocell.sources import open_source, source_of
 from stereocell.store import Store
 from stereocell.survey import Display, display_from_json, display_to_json, make_look
-from stereocell.tasks import DisplayTask, IsoTask, UnitTask, run_display, run_iso, run_unit
-from stereocell.tiling import Box
+from stereocell.tasks import DisplayTask, IsoTask, UnitTask, run_display, run_unit, write_iso
+from stereocell.tiling import Box, Tile
 from stereocell.unit import UnitInput
 from stereocell.unit_files import is_whole
+from stereocell.wrap import choose_repair
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -46,10 +50,16 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> tu
         channel_id: make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
         for channel_id, entry in content.items()
     }
+    plans = {id_: plan_for(plan, entry["look"]["surface"]) for id_, entry in content.items()}
     tasks, keys, others = [], {}, 0
     for tile_id, channel in _select(plan, None):
         display = displays[channel.id]
-        task, key = _unit_task(store, plan, tile_id, channel, fields[channel.id], display)
+        painter = plan.painter(channel)
+        painted = None if painter is None else (painter.index, displays[painter.id].window)
+        as_built = plans[channel.id]
+        field = fields[channel.id]
+        repair = RepairOptions(**content[channel.id]["repair"])
+        task, key = _unit_task(store, as_built, tile_id, channel, field, repair, display, painted)
         keys[f"{tile_id}/{channel.id}"] = key
         if is_whole(task.directory):
             continue
@@ -99,55 +109,105 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
     """Return (and write) each channel's display, iso-values and transfer functions."""
     displays = _displays(store, plan, engine)
     isos = _isos(store, plan, engine, displays)
+    neighbours = find_neighbours(plan.tiles)
     content = {}
     for channel in plan.channels:
         found = {tile.id: isos[tile.id, channel.id] for tile in plan.tiles}
-        if channel.name not in plan.settings.iso_values:
-            agreed = agree(plan.tiles, found)
-            found = {tile: f | {"value": agreed[tile]} for tile, f in found.items()}
-        display = displays[channel.id]
+        agreed = (
+            _as_given(found)
+            if channel.name in plan.settings.iso_values
+            else agree(neighbours, found, plan.settings.isovalue.min_confidence)
+        )
+        display, painter = displays[channel.id], plan.painter(channel)
         look = make_look(
             channel.name,
             channel.color,
             display,
             {
-                tile: None if f["value"] is None else f["value"] + f["background"]
-                for tile, f in found.items()
+                tile: None if value is None else value + found[tile]["background"]
+                for tile, value in agreed.values.items()
             },
-            {tile: f["confidence"] for tile, f in found.items()},
+            agreed.confidence,
+            agreed.verdict,
         )
         content[channel.id] = {
             "display": display_to_json(display),
             "iso": {
-                tile: {key: f[key] for key in ("value", "background", "confidence", "reason")}
-                | {"file": f["file"]}
+                tile: {
+                    "value": agreed.values[tile],
+                    "background": f["background"],
+                    "confidence": agreed.confidences[tile],
+                    "reason": f["reason"] or _doubt(f, agreed.confidences[tile], plan),
+                    "file": f["file"],
+                }
                 for tile, f in found.items()
             },
-            "look": asdict(look),
+            "repair": asdict(
+                choose_repair(
+                    plan, agreed.verdict, [f["solids"] for f in found.values() if "solids" in f]
+                )
+            ),
+            "look": asdict(replace(look, painted_by=painter.id if painter else "")),
         }
     write_json(store.survey_file, content)
     return content
 
 
+def _as_given(found: Mapping[str, Mapping[str, Any]]) -> Agreed:
+    """Return the values that the user gave: who gives one is sure of it."""
+    values = {tile: f["value"] for tile, f in found.items()}
+    is_known = any(value is not None for value in values.values())
+    confidences = {tile: f["confidence"] for tile, f in found.items()}
+    return Agreed(values, confidences, float(is_known), "clear" if is_known else "none")
+
+
+def _doubt(found: Mapping[str, Any], confidence: float, plan: Plan) -> str:
+    """Return why a tile's surface is not clear; empty if it is."""
+    least = plan.settings.isovalue.min_confidence
+    if confidence >= least:
+        return ""
+    return (
+        f"no clear surface: confidence {confidence:.2f}, expected at least {least:g}: at "
+        f"{found['value']:.5g} the gradient is {found['sharpness']:.2f} times the tile's median, "
+        f"{found['raggedness']:.0%} of the surface is ragged"
+    )
+
+
+def display_task(plan: Plan, channel: Channel) -> DisplayTask:
+    """Return the task that finds a channel's window and background."""
+    settings = plan.settings
+    # a value that is given speaks of the voxels as they are
+    subtracts = channel.name not in settings.iso_values and settings.surface.background_um != 0
+    return DisplayTask(source_of(plan), plan.level, channel.index, plan.region, settings, subtracts)
+
+
+def iso_task(plan: Plan, tile: Tile, channel: Channel, display: Display) -> IsoTask:
+    """Return the task that finds one unit's iso-value."""
+    return IsoTask(
+        source_of(plan),
+        plan.level,
+        channel.index,
+        tile.box,
+        plan.settings,
+        plan.settings.iso_values.get(channel.name),
+        _around(display.background, tile.box),
+    )
+
+
 def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
     files, tasks = {}, []
     for channel in plan.channels:
-        settings = plan.settings
-        # a value that is given speaks of the voxels as they are
-        subtracts = channel.name not in settings.iso_values and settings.surface.background_um != 0
+        task = display_task(plan, channel)
         depends = [
             _input_key(plan),
             channel.index,
             _box(plan.region),
-            asdict(settings.window),
-            settings.surface.background_um if subtracts else 0,
+            asdict(plan.settings.window),
+            plan.settings.surface.background_um if task.subtracts else 0,
         ]
         file = store.display_file(channel.id, key_of(depends, maker))
         files[channel.id] = file
         if find_json(file, _DISPLAY) is None:
-            task = DisplayTask(
-                source_of(plan), plan.level, channel.index, plan.region, settings, subtracts
-            )
             tasks.append((channel.id, task))
     displays = _run(plan, engine, "windows", run_display, tasks)
     for (channel_id, _), display in zip(tasks, displays, strict=True):
@@ -163,28 +223,25 @@ def _isos(
     store: Store, plan: Plan, engine: Engine, displays: Mapping[str, Display]
 ) -> dict[tuple[str, str], dict[str, Any]]:
     files, tasks = {}, []
-    settings, ref = plan.settings, source_of(plan)
+    settings = plan.settings
     for tile in plan.tiles:
         for channel in plan.channels:
-            given = settings.iso_values.get(channel.name)
-            background = _around(displays[channel.id].background, tile.box)
+            task = iso_task(plan, tile, channel, displays[channel.id])
             depends = [
                 _input_key(plan),
                 channel.index,
                 _box(tile.box),
-                asdict(settings.isovalue),
+                asdict(settings.isovalue) | {"min_confidence": None},  # nothing to this round
                 settings.surface.smoothing_um,
-                given,
-                None if background is None else background.to_json(),
+                settings.surface.min_diagonal_um,
+                task.given,
+                None if task.background is None else task.background.to_json(),
             ]
             file = store.iso_file(tile.id, channel.id, key_of(depends, maker))
             files[tile.id, channel.id] = file
             if find_json(file, _ISO_VALUE) is None:
-                task = IsoTask(
-                    ref, plan.level, channel.index, tile.box, settings, given, background, file
-                )
-                tasks.append((f"{tile.id}/{channel.name}", task))
-    _run(plan, engine, "iso-values", run_iso, tasks)
+                tasks.append((f"{tile.id}/{channel.name}", (task, file)))
+    _run(plan, engine, "iso-values", write_iso, tasks)
     return {
         unit: read_json(file, _ISO_VALUE, _AGAIN) | {"file": file.relative_to(store.out).as_posix()}
         for unit, file in files.items()
@@ -197,7 +254,9 @@ def _unit_task(
     tile_id: str,
     channel: Channel,
     iso: LatticeField | None,
+    repair: RepairOptions,
     display: Display,
+    painted: tuple[int, tuple[float, float]] | None,
 ) -> tuple[UnitTask, str]:
     tile = plan.tile(tile_id)
     lattice = tile.lattice(plan.region)
@@ -209,8 +268,11 @@ def _unit_task(
         origin_um=plan.origin_um,
         iso=_around(iso, window),
         background=_around(display.background, window),
+        repair=repair,
+        step=plan.step,
         display=display.window,
         settings=plan.settings,
+        painted=painted and painted[1],
     )
     depends = [
         _input_key(plan),
@@ -218,12 +280,18 @@ def _unit_task(
         [_box(box) for box in (given.window, given.lattice, given.region)],
         [None if f is None else f.to_json() for f in (given.iso, given.background)],
         given.display,
-        [asdict(options) for options in (plan.settings.surface, plan.settings.lod)],
+        plan.settings.surface.smoothing_um,
+        find_wrapper() if plan.settings.surface.wrap == "alpha-wrap" else None,
+        plan.settings.surface.closed_tiles,
+        [asdict(options) for options in (given.repair, plan.settings.lod)],
+        given.step,
         asdict(plan.settings.unwrap),
+        painted,
     ]
     key = key_of(depends, maker)
     directory = store.unit_dir(tile_id, channel.id, key)
-    return UnitTask(source_of(plan), plan.level, channel.index, given, directory), key
+    ref, index = source_of(plan), painted and painted[0]
+    return UnitTask(ref, plan.level, channel.index, given, directory, index), key
 
 
 def _around(field: LatticeField | None, box: Box) -> LatticeField | None:

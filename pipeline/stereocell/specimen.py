@@ -1,7 +1,8 @@
 """What the stages make of a volume, and the stage writer takes: looks, and the content of tiles."""
 
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from stereocell.mesh import Lod
 from stereocell.names import to_identifier
 
 APRON = 1  # voxels around the lattice's on every side of a volume: what trilinear filtering reads
+# on a channel's surface; `unclear`: built where a level was found, and nothing to rely on
+Verdict = Literal["clear", "unclear", "none"]
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 
 
@@ -20,7 +23,9 @@ class Look:
     color             linear RGB, 0..1
     window            the voxel values that become 0 and 1 in the 8-bit volumes
     iso_value         mean over the tiles, in voxel values; None: no tile has a surface
-    iso_confidence    0..1, mean over the tiles
+    iso_confidence    0..1, of the channel
+    surface           the verdict on it
+    painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
     """
 
@@ -29,7 +34,9 @@ class Look:
     window: tuple[float, float]
     iso_value: float | None
     iso_confidence: float
+    surface: Verdict
     transfer_functions: dict[str, OpacityPoints]
+    painted_by: str = ""
 
     @property
     def id(self) -> str:
@@ -43,16 +50,44 @@ class Look:
 
 
 @dataclass(frozen=True, slots=True)
+class PaintColors:
+    """A surface's colour and that of the channel that is painted on it, linear RGB 0..1."""
+
+    base: tuple[float, float, float]
+    painted: tuple[float, float, float]
+
+    def mix(self, intensity: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return linear RGB (..., 3) of intensities (...): 0 the surface's colour, 255 the other's.
+
+        The intensity of half of the window mixes them half and half.
+        """
+        share = intensity[..., None].astype(np.float32) / 255
+        base, painted = (np.array(color, np.float32) for color in (self.base, self.painted))
+        return base + share * (painted - base)
+
+
+def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return sRGB, uint8, of linear 0..1 (IEC 61966-2-1)."""
+    clipped = np.clip(linear.astype(np.float64), 0, 1)
+    bent = 1.055 * clipped ** (1 / 2.4) - 0.055
+    return np.round(255 * np.where(clipped <= 0.0031308, 12.92 * clipped, bent)).astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
 class ChannelContent:
     """One (tile, channel): what a unit of work leaves.
 
     lods    finest first; empty: no surface
     volume  uint8 (z, y, x), window applied, with an apron of APRON voxels on every side
+    paint   colours of the channel that is painted on the surface; None: none is
+    closed  the STL of a closed copy of the surface; None: there is none
     """
 
     channel_id: str
     lods: tuple[Lod, ...]
     volume: NDArray[np.uint8]
+    paint: PaintColors | None = None
+    closed: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,27 +8,32 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from stereocell.plan import Plan
-from stereocell.specimen import ChannelContent, TileContent
+from stereocell.specimen import ChannelContent, PaintColors, TileContent
 from stereocell.store import Store
 from stereocell.tiling import Tile
-from stereocell.unit_files import load_lods, load_volume
+from stereocell.unit_files import find_closed, load_lods, load_volume
 from stereocell.write import usd
 
 
 @dataclass(frozen=True, slots=True)
 class TileTask:
-    """content: the tile without its channels; units: (channel id, unit folder) of each channel."""
+    """content: the tile without its channels; units: id, unit folder and paint of each channel."""
 
     stage_dir: Path
     content: TileContent
-    units: tuple[tuple[str, Path], ...]
+    units: tuple[tuple[str, Path, PaintColors | None], ...]
 
 
 def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) -> TileTask:
     """Return the task of one tile; `index` holds the units' keys, by `<tile>/<channel>`."""
     units = tuple(
-        (channel.id, store.unit_dir(tile.id, channel.id, index[f"{tile.id}/{channel.id}"]))
+        (
+            channel.id,
+            store.unit_dir(tile.id, channel.id, index[f"{tile.id}/{channel.id}"]),
+            None if painter is None else PaintColors(channel.color, painter.color),
+        )
         for channel in plan.channels
+        for painter in [plan.painter(channel)]
     )
     lattice = tile.lattice(plan.region)
     content = TileContent(
@@ -45,7 +50,9 @@ def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) ->
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units. Raises OutputError."""
     channels = tuple(
-        ChannelContent(channel_id, load_lods(folder), load_volume(folder))
-        for channel_id, folder in task.units
+        ChannelContent(
+            channel_id, load_lods(folder), load_volume(folder), paint, find_closed(folder)
+        )
+        for channel_id, folder, paint in task.units
     )
     usd.write_tile(task.stage_dir, replace(task.content, channels=channels))

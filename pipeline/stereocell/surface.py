@@ -8,6 +8,8 @@ units and put into the world in float64, by the same arithmetic for every tile.
 Extraction is Flying Edges (Schroeder, Maynard & Geveci, LDAV 2015) as VTK has it.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -22,6 +24,9 @@ from stereocell.volume import zyx_to_xyz
 # Values nearer to zero than this share of the distance's clip are moved off it: a vertex on a
 # lattice point would make degenerate triangles.
 SNAP = 0.01
+# On a cut plane no simplification and no fairing may move a vertex later: there they are moved off
+# by this share of the finest spacing, or short edges would stay, and sharp triangles on them.
+RIM_SNAP = 0.2
 
 
 def gradient_magnitude(
@@ -75,12 +80,14 @@ def extract_surface(
     region: Box,
     spacing_um: tuple[float, float, float],
     origin_um: tuple[float, float, float],
+    cuts: Box | None = None,
 ) -> Mesh:
     """Return the surface distance = 0 inside `lattice`, in world um; empty if there is none.
 
     `distance` (z, y, x) covers `window`. The mesh is open where another tile follows, and closed
     by a cap, within one voxel, where `region` (all that is built) ends. Normals come from the
-    field's gradient, which halos make continuous across tiles.
+    field's gradient, which halos make continuous across tiles. `cuts`: the lattice at whose ends
+    tiles are cut, if it isn't this one; there the surface is as that one's.
     """
     inner = tuple(
         slice(a - w, b - w)
@@ -102,9 +109,10 @@ def extract_surface(
             for part, (low, high) in zip(inner, cap, strict=True)
         )
     ].copy()
-    snap = np.float32(SNAP) * limit
-    near = np.abs(values) < snap
-    values[near] = np.where(values[near] > 0, snap, -snap)
+    _move_off_zero(values, np.float32(SNAP) * limit)
+    for axis, place in _cut_places(cuts or lattice, region):
+        plane = np.moveaxis(values, axis, 0)[place - lattice.start[axis] + cap[axis][0]]
+        _move_off_zero(plane, np.float32(RIM_SNAP * min(spacing_um)))
     points, triangles = _flying_edges(values)
     if not len(triangles):
         empty = np.zeros((0, 3), np.float32)
@@ -118,6 +126,11 @@ def extract_surface(
     return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
 
 
+def _move_off_zero(values: NDArray[np.float32], least: np.float32) -> None:
+    near = np.abs(values) < least
+    values[near] = np.where(values[near] > 0, least, -least)
+
+
 def cut_planes(
     lattice: Box,
     region: Box,
@@ -129,14 +142,21 @@ def cut_planes(
     Each plane is a column of the positions (0 x, 1 y, 2 z) and its value in um, as float32 has it.
     """
     planes = []
-    sides = ((lattice.start, region.start, 0), (lattice.stop, region.stop, -1))
-    for ends, outer, last in sides:
-        place = zyx_to_xyz((np.asarray(ends) + last) * np.asarray(spacing_um) + origin_um)
-        value = place.astype(np.float32)  # as of the mesh's vertices
-        for axis in range(3):
-            if ends[axis] != outer[axis]:
-                planes.append((2 - axis, float(value[2 - axis])))
+    for axis, place in _cut_places(lattice, region):
+        zyx = np.zeros(3)
+        zyx[axis] = place * spacing_um[axis] + origin_um[axis]
+        value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # as of the mesh's vertices
+        planes.append((2 - axis, float(value)))
     return tuple(planes)
+
+
+def _cut_places(lattice: Box, region: Box) -> Iterator[tuple[int, int]]:
+    """Yield where another tile follows: the axis, and the plane's index along it."""
+    for axis in range(3):
+        if lattice.start[axis] != region.start[axis]:
+            yield axis, lattice.start[axis]
+        if lattice.stop[axis] != region.stop[axis]:
+            yield axis, lattice.stop[axis] - 1
 
 
 def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:

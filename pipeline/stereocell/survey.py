@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stereocell.config import WindowOptions
 from stereocell.latticefield import LatticeField
-from stereocell.specimen import Look
+from stereocell.specimen import Look, Verdict
 from stereocell.transfer import make_transfer_functions
 
 BINS = 256
@@ -68,14 +68,16 @@ def make_look(
     color: tuple[float, float, float],
     display: Display,
     iso_values: Mapping[str, float | None],
-    confidences: Mapping[str, float],
+    confidence: float,
+    surface: Verdict,
 ) -> Look:
-    """Return how a channel is drawn; iso-values and confidences by tile id."""
-    known = {tile: value for tile, value in iso_values.items() if value is not None}
-    iso_value = float(np.mean(list(known.values()))) if known else None
-    confidence = float(np.mean([confidences[tile] for tile in known])) if known else 0.0
-    look = Look(name, color, display.window, iso_value, confidence, {})
-    functions = make_transfer_functions(np.asarray(display.histogram), look.iso_normalized)
+    """Return how a channel is drawn; iso-values by tile id, confidence and verdict for all."""
+    known = [value for value in iso_values.values() if value is not None]
+    iso_value = float(np.mean(known)) if known else None
+    look = Look(name, color, display.window, iso_value, confidence, surface, {})
+    # a level that nothing tells from noise is no place for opacity to begin
+    level = look.iso_normalized if surface == "clear" else None
+    functions = make_transfer_functions(np.asarray(display.histogram), level)
     return replace(look, transfer_functions=functions)
 
 
@@ -91,5 +93,7 @@ def look_from(content: Mapping[str, Any]) -> Look:
         tuple(content["window"]),
         content["iso_value"],
         content["iso_confidence"],
+        content["surface"],
         functions,
+        content["painted_by"],
     )

@@ -4,18 +4,19 @@ The keys of the results hold this module's whole lineage: see lineage.py.
 """
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.background import find_background
 from stereocell.config import Settings
 from stereocell.denoise import denoise
 from stereocell.documents import write_json
 from stereocell.errors import NoSurfaceError
-from stereocell.isovalue import find_iso_value
+from stereocell.isovalue import IsoValue, IsoValueOptions, find_iso_value
 from stereocell.latticefield import LatticeField
 from stereocell.read import Dataset
 from stereocell.sources import SourceRef, open_source
@@ -23,6 +24,8 @@ from stereocell.survey import Display, find_display
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput, build_unit
 from stereocell.unit_files import save_unit
+from stereocell.volume import Volume
+from stereocell.wrap import sum_solids
 
 SURVEY_VOXELS = 16_000_000  # a channel's window is found on at most about so many
 
@@ -46,7 +49,6 @@ class IsoTask:
     settings: Settings
     given: float | None
     background: LatticeField | None
-    file: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,7 @@ class UnitTask:
     channel: int
     given: UnitInput
     directory: Path
+    painted: int | None = None  # the channel that is painted on the surface
 
 
 def run_display(task: DisplayTask) -> Display:
@@ -81,7 +84,8 @@ def run_display(task: DisplayTask) -> Display:
     background = None
     if task.subtracts:
         surface = task.settings.surface
-        # sharp hot voxels and noise don't reach a percentile of whole blocks: planes as they are
+        # sharp hot voxels and noise don't reach a percentile of whole blocks: planes as they are.
+        # A median before changed the mean Dice over 48 tiles of known solids by .0006
         background = find_background(
             voxels.astype(np.float32),
             task.region,
@@ -105,8 +109,28 @@ def _region_at(task: DisplayTask, dataset: Dataset, level: int) -> Box:
     return Box((z0, y0, x0), (z1, y1, x1))
 
 
-def run_iso(task: IsoTask) -> dict[str, Any]:
-    """Find one unit's iso-value and write it down with its curve."""
+@dataclass(frozen=True, slots=True)
+class IsoField:
+    """What iso-values are sought in, float32 (z, y, x): denoised, above the background.
+
+    below     the background, mean over the tile; 0: none
+    constant  what every voxel is, background and all; None: they differ
+    """
+
+    values: NDArray[np.float32]
+    volume: Volume
+    below: float
+    constant: float | None
+
+    def find_iso_value(self, options: IsoValueOptions) -> IsoValue:
+        """Return the iso-value. Raises NoSurfaceError."""
+        if self.constant is not None:  # said of the voxels as they are, not above the background
+            raise NoSurfaceError(f"every voxel is {self.constant:g}")
+        return find_iso_value(self.values, self.volume.spacing_um, options)
+
+
+def read_iso_field(task: IsoTask) -> IsoField:
+    """Read one unit's voxels, without a halo, and make of them what iso-values are sought in."""
     volume = open_source(task.ref).read(task.channel, task.box, task.level)
     field = denoise(volume, float(task.settings.surface.smoothing_um))
     first, below = float(field.flat[0]), 0.0
@@ -115,37 +139,44 @@ def run_iso(task: IsoTask) -> dict[str, Any]:
         under = task.background.at(task.box)
         below = float(np.mean(np.broadcast_to(under, field.shape), dtype=np.float64))
         field -= under
+    return IsoField(field, volume, below, first if is_constant else None)
+
+
+def write_iso(task_and_file: tuple[IsoTask, Path]) -> None:
+    """Find one unit's iso-value and write it down with its curve."""
+    task, file = task_and_file
+    write_json(file, _find(task))
+
+
+def _find(task: IsoTask) -> dict[str, Any]:
+    field = read_iso_field(task)
     result: dict[str, Any] = {
-        "value": None, "confidence": 0.0, "reason": "", "background": below
+        "value": None, "confidence": 0.0, "reason": "", "background": field.below
     }  # fmt: skip
-    options = task.settings.isovalue
     try:
-        if is_constant:  # said of the voxels as they are, not of what is above the background
-            raise NoSurfaceError(f"every voxel is {first:g}")
-        found = find_iso_value(field, volume.spacing_um, options)
+        found = field.find_iso_value(task.settings.isovalue)
     except NoSurfaceError as error:
         result["reason"] = str(error)
     else:
-        result["found"], result["confidence"] = found.value, found.confidence
-        if found.is_clear:
-            result["value"] = found.value
-        else:
-            result["reason"] = (
-                f"no clear surface: the gradient at {found.value:.5g} is {found.sharpness:.2f} "
-                f"times the tile's median, expected at least {options.min_sharpness:g}"
-            )
+        result |= {"value": found.value, "found": found.value, "confidence": found.confidence}
+        result |= {name: getattr(found, name) for name in ("sharpness", "raggedness", "strength")}
+        level = found.value if task.given is None else task.given
+        smallest = float(task.settings.surface.min_diagonal_um)
+        sums = sum_solids(field.values > level, field.volume.spacing_um, smallest)
+        result["solids"] = asdict(sums)
         result["levels"] = [float(f"{v:.6g}") for v in found.levels]
         result["score"] = [round(float(v), 5) for v in found.score]
     if task.given is not None and "found" in result:  # who gives a value is sure of it
-        result |= {"value": task.given, "confidence": 1.0, "reason": ""}
-    write_json(task.file, result)
+        result |= {"value": task.given, "confidence": 1.0}
     return result
 
 
 def run_unit(task: UnitTask) -> dict[str, Any]:
     """Build one unit and write it down."""
     start = time.perf_counter()
-    volume = open_source(task.ref).read(task.channel, task.given.window, task.level)
+    source, window = open_source(task.ref), task.given.window
+    volume = source.read(task.channel, window, task.level)
+    painted = None if task.painted is None else source.read(task.painted, window, task.level)
     seconds = time.perf_counter() - start
-    built = build_unit(volume, task.given)
+    built = build_unit(volume, task.given, painted)
     return save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))

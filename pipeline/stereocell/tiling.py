@@ -35,6 +35,22 @@ class Box:
         z1, y1, x1 = stop
         return Box((z0, y0, x0), (z1, y1, x1))
 
+    def thinned(self, region: "Box", step: tuple[int, int, int], outward: bool = False) -> "Box":
+        """Return the box in planes of which every `step` one stays, from the region's first on.
+
+        It ends with the last of these inside, or `outward` the next one, if the region has it: so
+        that boxes that share a plane still share one.
+        """
+        start, stop = [], []
+        ends = zip(self.start, self.stop, region.start, region.stop, step, strict=True)
+        for a, b, first, end, k in ends:
+            start.append(-(-(a - first) // k))
+            last = -(-(b - 1 - first) // k) if outward else (b - 1 - first) // k
+            stop.append(min(last, (end - 1 - first) // k) + 1)
+        z0, y0, x0 = start
+        z1, y1, x1 = stop
+        return Box((z0, y0, x0), (z1, y1, x1))
+
 
 @dataclass(frozen=True, slots=True)
 class Tile:

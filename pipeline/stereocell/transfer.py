@@ -20,7 +20,7 @@ def make_transfer_functions(
 
     `histogram`: voxel counts over 0..1 in equal bins. Background is what most voxels are: opacity
     starts half-way between the median and the level, which is the iso-value, or the 99th
-    percentile in a channel without a surface.
+    percentile in a channel without a clear surface.
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)

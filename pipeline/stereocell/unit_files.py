@@ -1,5 +1,6 @@
 """A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail."""
 
+import io
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -11,12 +12,13 @@ from numpy.typing import NDArray
 
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
-from stereocell.mesh import Lod, Mesh, Quality, Spread
+from stereocell.mesh import Baked, Lod, Mesh, Quality, Spread
 from stereocell.unit import Unit
 from stereocell.write.atomic import replacing_folder
+from stereocell.write.stl import write_stl
 
 SCHEMA = "units.schema.json#Unit"
-_RECORD, _VOLUME = "unit.json", "volume.npy"
+_RECORD, _VOLUME, _CLOSED = "unit.json", "volume.npy", "closed.stl"
 
 
 def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
@@ -26,15 +28,20 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
             "triangles": len(lod.mesh.triangles),
             "vertices": len(lod.mesh.positions),
             "distance_um": lod.distance_um,
-            "normal_map": 0 if lod.normal_map is None else len(lod.normal_map),
+            "maps": _describe_maps(lod),
             "quality": None if lod.quality is None else asdict(lod.quality),
         }
         for lod in unit.lods
     ]
     with replacing_folder(directory) as folder:
-        np.save(folder / _VOLUME, unit.volume)
+        # numpy's own way to a file has no word for a full disk
+        buffer = io.BytesIO()
+        np.save(buffer, unit.volume)
+        (folder / _VOLUME).write_bytes(buffer.getbuffer())
         for level, lod in enumerate(unit.lods):
             np.savez(lod_file(folder, level), **_arrays(lod))
+        if unit.closed is not None:
+            write_stl(folder / _CLOSED, unit.closed)
         record = {
             "reason": unit.reason,
             "lods": lods,
@@ -68,6 +75,12 @@ def load_record(directory: Path) -> dict[str, Any]:
 def lod_file(directory: Path, level: int) -> Path:
     """Return where `save_unit` puts one level of detail."""
     return directory / f"lod{level}.npz"
+
+
+def find_closed(directory: Path) -> Path | None:
+    """Return the file of the unit's closed copy; None if it has none."""
+    file = directory / _CLOSED
+    return file if file.exists() else None
 
 
 def load_lods(directory: Path) -> tuple[Lod, ...]:
@@ -105,7 +118,25 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
             arrays.get("tangents"),
         )
         quality = stored["quality"] and load_quality(stored["quality"])
-        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"), quality)
+        baked = None
+        if "openness" in arrays:
+            maps = stored["maps"]
+            facts = (maps["texel_um"], maps["charts"], maps["reason"])
+            baked = Baked(arrays["openness"], arrays.get("paint"), *facts)
+        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"), quality, baked)
+
+
+def _describe_maps(lod: Lod) -> dict[str, Any]:
+    """Return what unit.json says of a level's maps."""
+    height, width = (0, 0) if lod.normal_map is None else lod.normal_map.shape[:2]
+    baked = lod.baked
+    return {
+        "size": [width, height],
+        "texel_um": baked.texel_um if baked else 0.0,
+        "charts": baked.charts if baked else 0,
+        "painted": baked is not None and baked.paint is not None,
+        "reason": baked.reason if baked else "",
+    }
 
 
 def _arrays(lod: Lod) -> dict[str, Any]:
@@ -116,6 +147,8 @@ def _arrays(lod: Lod) -> dict[str, Any]:
         "uvs": lod.mesh.uvs,
         "tangents": lod.mesh.tangents,
         "normal_map": lod.normal_map,
+        "openness": lod.baked and lod.baked.openness,
+        "paint": lod.baked and lod.baked.paint,
     }
     return {name: array for name, array in arrays.items() if array is not None}
 

@@ -29,3 +29,8 @@ def zyx_to_xyz(points_um: ArrayLike) -> NDArray[np.float64]:
     """
     points = np.asarray(points_um, dtype=np.float64)
     return np.stack([points[..., 2], -points[..., 1], points[..., 0]], axis=-1)
+
+
+def xyz_to_zyx(points_um: ArrayLike) -> NDArray[np.float64]:
+    """Return image positions (z, y, x) of world positions (x, y, z); shape (..., 3)."""
+    return zyx_to_xyz(points_um)  # swapping the ends and turning y over is its own inverse

@@ -65,7 +65,7 @@ try {
       await viewer.drawVolume(id, true);
       if (values.transfer !== undefined) await viewer.chooseTransferFunction(id, values.transfer);
     }
-    if (values.volume === "all") await viewer.chooseScope("all");
+    await viewer.chooseScope(values.volume === "all" ? "all" : "one");
     if (values.tile !== undefined) await viewer.chooseTile(values.tile);
   }
   if (values.stereo) await viewer.enterStereo();

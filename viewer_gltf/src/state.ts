@@ -9,6 +9,8 @@ import type { Rgb } from "./color";
 export const CHANNELS_AT_START = 6;
 /** One march samples so many channels at once: each costs a texture unit and a lookup a step. */
 export const MAX_VOLUME_CHANNELS = 4;
+/** So many tiles can open as volumes; of a larger specimen the chosen tile does. */
+export const VOLUME_TILES_AT_START = 16;
 
 export type ChannelState = Readonly<{
   id: string;
@@ -20,14 +22,22 @@ export type ChannelState = Readonly<{
   transferFunction: string;
   transferFunctions: readonly string[];
   hasSurface: boolean;
+  /** Its surface can't be told from noise: as long as the volume is on, no surface is drawn. */
+  prefersVolume: boolean;
 }>;
 
-export type VolumeScope = "one" | "all";
+export type Representation = Manifest["tiles"][number]["representation"];
+
+/** `representation`: what the stage draws there, as far as VOLUME_TILES_AT_START lets it. */
+export type TileState = Readonly<{ id: string; representation: Representation }>;
+
+/** `stage`: where the stage draws volumes; there are none of these unless an artist chose it. */
+export type VolumeScope = "one" | "all" | "stage";
 
 export type ViewerState = Readonly<{
   channels: readonly ChannelState[];
-  tiles: readonly string[];
-  /** Whether volumes are drawn in the chosen tile or in all tiles. */
+  tiles: readonly TileState[];
+  /** Whether volumes are drawn in the chosen tile, in all tiles, or as the stage has it. */
   scope: VolumeScope;
   tile: string;
   /** Faults that leave the rest usable, newest last. */
@@ -44,35 +54,62 @@ export type Action =
   | Readonly<{ type: "notify"; text: string }>
   | Readonly<{ type: "dismiss"; text: string }>;
 
-/** The tile whose centre is nearest to the specimen's. */
-function middleTile({ specimen, tiles }: Manifest): string {
+/** The tiles, those first whose centres are nearest to the specimen's. */
+function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number][] {
   const centerOf = ({ min, max }: Manifest["specimen"]["bounds_um"]) =>
     min.map((v, i) => (v + max[i]) / 2);
   const center = centerOf(specimen.bounds_um);
   const distance = (tile: Manifest["tiles"][number]) =>
     Math.hypot(...centerOf(tile.bounds_um).map((v, i) => v - center[i]));
-  return tiles.reduce((a, b) => (distance(b) < distance(a) ? b : a)).id;
+  return [...tiles].sort((a, b) => distance(a) - distance(b));
 }
 
-/** The state in which a bundle opens: surfaces; volumes are off, ready in the middle tile. */
+/**
+ * The state in which a bundle opens: surfaces, but volumes of the channels without a clear one, and
+ * of all shown channels in the tiles that the stage draws as volumes. Channels that would find no
+ * room there as volumes are off. The other volumes are off, ready in the middle tile.
+ */
 export function initialState(manifest: Manifest): ViewerState {
-  const tiles = manifest.tiles.map((tile) => tile.id);
+  const ordered = fromTheMiddle(manifest);
+  const staged = ordered.filter((tile) => tile.representation !== "mesh");
+  const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
+  const tiles = manifest.tiles.map((tile) => ({
+    id: tile.id,
+    representation: asStaged.has(tile) ? tile.representation : "mesh",
+  }));
+  const lacksSurface = tiles.some((tile) => tile.representation === "volume");
+  const first = manifest.channels.slice(0, CHANNELS_AT_START);
+  const unclear = first.filter((channel) => channel.surface === "unclear");
+  const wanted = new Set(staged.length > 0 ? [...unclear, ...first] : unclear);
+  const asVolumes = new Set([...wanted].slice(0, MAX_VOLUME_CHANNELS).map(({ id }) => id));
+  const isSmall = tiles.length <= VOLUME_TILES_AT_START;
   return {
-    channels: manifest.channels.map((channel, index) => ({
-      id: channel.id,
-      name: channel.name,
-      shown: index < CHANNELS_AT_START,
-      color: channel.color,
-      original: channel.color,
-      volume: false,
-      transferFunction: channel.transfer_function,
-      transferFunctions: channel.transfer_functions,
-      hasSurface: channel.tileset !== null,
-    })),
+    channels: manifest.channels.map((channel, index) => {
+      const prefersVolume = channel.surface === "unclear";
+      const volume = asVolumes.has(channel.id);
+      return {
+        id: channel.id,
+        name: channel.name,
+        shown: index < CHANNELS_AT_START && (volume || !(prefersVolume || lacksSurface)),
+        color: channel.color,
+        original: channel.color,
+        volume,
+        transferFunction: channel.transfer_function,
+        transferFunctions: channel.transfer_functions,
+        hasSurface: channel.tileset !== null,
+        prefersVolume,
+      };
+    }),
     tiles,
-    scope: "one",
-    tile: middleTile(manifest),
-    notices: [],
+    scope: staged.length > 0 ? "stage" : asVolumes.size > 0 && isSmall ? "all" : "one",
+    tile: ordered[0].id,
+    notices:
+      staged.length > VOLUME_TILES_AT_START
+        ? [
+            `The stage draws ${staged.length} tiles as volumes: ` +
+              `the ${VOLUME_TILES_AT_START} in the middle are, "All tiles" draws the rest.`,
+          ]
+        : [],
   };
 }
 
@@ -88,30 +125,40 @@ function withNotice(state: ViewerState, text: string): ViewerState {
   return { ...state, notices: [...state.notices.filter((n) => n !== text), text] };
 }
 
+function otherVolumes(state: ViewerState, id: string): number {
+  return state.channels.filter((c) => c.volume && c.id !== id).length;
+}
+
 /** The next state. Returns the same object if the action changes nothing. */
 export function reduce(state: ViewerState, action: Action): ViewerState {
   switch (action.type) {
-    case "show":
-      return withChannel(state, action.channel, (c) => ({ ...c, shown: action.shown }));
+    case "show": {
+      const hasRoom = otherVolumes(state, action.channel) < MAX_VOLUME_CHANNELS;
+      return withChannel(state, action.channel, (c) => ({
+        ...c,
+        shown: action.shown,
+        volume:
+          c.volume || (action.shown && hasRoom && (c.prefersVolume || state.scope === "stage")),
+      }));
+    }
     case "recolor":
       return withChannel(state, action.channel, (c) => ({ ...c, color: action.color }));
-    case "draw-volume": {
-      const drawn = state.channels.filter((c) => c.volume && c.id !== action.channel).length;
-      if (action.volume && drawn >= MAX_VOLUME_CHANNELS) {
+    case "draw-volume":
+      if (action.volume && otherVolumes(state, action.channel) >= MAX_VOLUME_CHANNELS) {
         return withNotice(
           state,
           `At most ${MAX_VOLUME_CHANNELS} channels can be volumes at once: turn one off first.`,
         );
       }
       return withChannel(state, action.channel, (c) => ({ ...c, volume: action.volume }));
-    }
     case "choose-transfer-function":
       return withChannel(state, action.channel, (c) =>
         c.transferFunctions.includes(action.name) ? { ...c, transferFunction: action.name } : c,
       );
     case "choose-tile":
-      if (action.tile === state.tile || !state.tiles.includes(action.tile)) return state;
-      return { ...state, tile: action.tile };
+      if (!state.tiles.some(({ id }) => id === action.tile)) return state;
+      if (action.tile === state.tile && state.scope !== "stage") return state;
+      return { ...state, tile: action.tile, scope: state.scope === "stage" ? "one" : state.scope };
     case "choose-scope":
       return action.scope === state.scope ? state : { ...state, scope: action.scope };
     case "notify":
@@ -126,10 +173,36 @@ export function volumeChannels(state: ViewerState): readonly ChannelState[] {
   return state.channels.filter((c) => c.shown && c.volume);
 }
 
-/** The tiles in which volumes are drawn; none while no channel is a volume. */
-export function volumeTiles(state: ViewerState): readonly string[] {
-  if (volumeChannels(state).length === 0) return [];
-  return state.scope === "all" ? state.tiles : [state.tile];
+/** How a channel is drawn in a tile, once all has arrived; null: not at all. */
+function drawnAs(
+  state: ViewerState,
+  { shown, volume, prefersVolume }: ChannelState,
+  { id, representation }: TileState,
+): Representation | null {
+  if (!shown) return null;
+  if (!volume) return "mesh";
+  const isChosen = state.scope === "all" || id === state.tile;
+  const otherwise = prefersVolume ? null : "mesh";
+  if (state.scope !== "stage") return isChosen ? "volume" : otherwise;
+  if (representation !== "mesh") return representation;
+  const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
+  return prefersVolume && (isSmall || isChosen) ? "volume" : otherwise;
+}
+
+/** The tiles in which a channel's volumes are drawn. */
+export function volumeTiles(state: ViewerState, channel: ChannelState): readonly string[] {
+  const drawn = state.tiles.filter((tile) => {
+    const as = drawnAs(state, channel, tile);
+    return as === "volume" || as === "both";
+  });
+  return drawn.map(({ id }) => id);
+}
+
+/** Whether a channel's surfaces, if it has any, are drawn anywhere: else they aren't loaded. */
+export function wantsSurface(state: ViewerState, channel: ChannelState): boolean {
+  if (!channel.shown) return false;
+  if (!channel.volume || !channel.prefersVolume) return true;
+  return state.tiles.some((tile) => drawnAs(state, channel, tile) === "both");
 }
 
 /** Whether a tile's surface is drawn. It stays until the volume that replaces it has arrived. */
@@ -140,6 +213,8 @@ export function isSurfaceShown(
   hasVolume: boolean,
 ): boolean {
   const found = state.channels.find((c) => c.id === channel);
-  if (found === undefined || !found.shown) return false;
-  return !(found.volume && hasVolume && volumeTiles(state).includes(tile));
+  const place = state.tiles.find((t) => t.id === tile);
+  if (found === undefined || place === undefined) return false;
+  const as = drawnAs(state, found, place);
+  return as === "mesh" || as === "both" || (as === "volume" && !found.prefersVolume && !hasVolume);
 }

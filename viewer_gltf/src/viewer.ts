@@ -8,7 +8,7 @@ import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
 import { pickTile, type Ray } from "./gaze/pick";
 import { SurfaceLoader } from "./mesh/loader";
 import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX, SurfaceSet } from "./mesh/surface_set";
-import { type Action, initialState, reduce, type ViewerState, volumeTiles } from "./state";
+import { type Action, initialState, reduce, type ViewerState, volumeChannels } from "./state";
 import { DepthPass } from "./view/depth_pass";
 import { framingDistance, place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
@@ -163,8 +163,9 @@ export class Viewer {
   private follow(): void {
     this.volumes.follow(this.state);
     this.surfaces.follow(this.state);
-    const [tile] = volumeTiles(this.state);
-    this.room.mark(this.state.scope === "one" && tile !== undefined ? tile : null);
+    const { scope, tile } = this.state;
+    const isMarked = scope === "one" && volumeChannels(this.state).length > 0;
+    this.room.mark(isMarked ? tile : null);
     this.isStale = true;
   }
 

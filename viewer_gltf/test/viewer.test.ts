@@ -2,77 +2,43 @@
  * The built viewer in headless Chromium. The bundle is the one in STEREOCELL_TEST_BUNDLE (`make
  * test` gives the demo's), or the synthetic fixture.
  */
-import { mkdtemp, readFile, rm } from "node:fs/promises";
-import { tmpdir } from "node:os";
+import { readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
-import type { Manifest } from "../src/bundle/generated/bundle";
-import { addHeadset, type Browser, launch } from "./driver/chromium";
-import { Host } from "./driver/host";
-import { ViewerPage } from "./driver/page";
+import { expect, it } from "vitest";
+import { addHeadset } from "./driver/chromium";
 import { hasColor, isBackground, type Pixel, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
-import { writeFixture } from "./fixture/bundle";
+import { DEMO_BUNDLE, DIST, prepareStand } from "./driver/stand";
 
 const VIEWPORT = { width: 640, height: 360 };
-const DIST = new URL("../dist/", import.meta.url).pathname;
 
 describeInChromium("the viewer", () => {
-  let folder: string;
-  let manifest: Manifest;
-  let host: Host;
-  let browser: Browser;
-  let viewer: ViewerPage;
-
-  beforeAll(async () => {
-    folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
-    const given = process.env.STEREOCELL_TEST_BUNDLE;
-    if (given === undefined) await writeFixture(folder);
-    const bundle = given ?? folder;
-    manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
-    host = await Host.start({
-      "/app/": DIST,
-      "/bundle/": bundle,
+  const stand = prepareStand({
+    bundle: DEMO_BUNDLE,
+    viewport: VIEWPORT,
+    mounts: (bundle) => ({
       "/some/folder/": bundle,
       "/some/folder/assets/": join(DIST, "assets"),
-    });
-    browser = await launch(VIEWPORT);
+    }),
   });
 
-  afterAll(async () => {
-    await browser?.close();
-    await host?.stop();
-    await rm(folder, { recursive: true, force: true });
-  });
-
-  beforeEach(async () => {
-    host.requests.length = 0;
-    viewer = new ViewerPage(await browser.context.newPage());
-  });
-
-  afterEach(async () => {
-    host.overrides.clear();
-    host.hasRanges = true;
-    await viewer.page.close();
-  });
-
-  const open = () => viewer.open(`${host.address}/app/?bundle=../bundle/`);
-  const picture = () => takePicture(viewer.page);
-  const withSurface = () => manifest.channels.filter(({ tileset }) => tileset !== null);
+  const picture = () => takePicture(stand.viewer.page);
+  const withSurface = () => stand.manifest.channels.filter(({ tileset }) => tileset !== null);
 
   async function showOnly(id: string): Promise<void> {
-    const { state } = await viewer.snapshot();
+    const { state } = await stand.viewer.snapshot();
     for (const channel of state.channels) {
-      if (channel.shown !== (channel.id === id)) await viewer.show(channel.id, channel.id === id);
+      const isShown = channel.id === id;
+      if (channel.shown !== isShown) await stand.viewer.show(channel.id, isShown);
     }
   }
 
   it("loads the bundle and draws each channel in its colour", async () => {
-    await open();
-    const { overview } = await viewer.snapshot();
+    await stand.open();
+    const { overview } = await stand.viewer.snapshot();
     expect(overview.isComplete).toBe(true);
     expect(overview.total).toBeGreaterThan(0);
-    await viewer.settled();
+    await stand.viewer.settled();
     const all = await picture();
     expect(all.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     for (const { id, color } of withSurface()) {
@@ -83,27 +49,29 @@ describeInChromium("the viewer", () => {
 
   it("opens the bundle beside it, in any folder of a host", async () => {
     const body = await readFile(join(DIST, "index.html"));
-    host.overrides.set("/some/folder/index.html", { status: 200, body });
-    await viewer.open(`${host.address}/some/folder/index.html`);
-    await viewer.settled();
+    stand.host.overrides.set("/some/folder/index.html", { status: 200, body });
+    await stand.viewer.open(`${stand.host.address}/some/folder/index.html`);
+    await stand.viewer.settled();
     expect((await picture()).count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
-    const outside = host.requests.filter(({ path }) => !path.startsWith("/some/folder/"));
+    const outside = stand.host.requests.filter(({ path }) => !path.startsWith("/some/folder/"));
     expect(outside).toEqual([]);
   });
 
   it("asks for nothing that lies outside the page and the bundle", async () => {
     const addresses: string[] = [];
-    viewer.page.on("request", (request) => addresses.push(request.url()));
-    await open();
-    await viewer.settled();
-    const local = (url: string) => url.startsWith(host.address) || /^(data|blob):/.test(url);
+    stand.viewer.page.on("request", (request) => addresses.push(request.url()));
+    await stand.open();
+    await stand.viewer.settled();
+    const local = (url: string) => url.startsWith(stand.host.address) || /^(data|blob):/.test(url);
     expect(addresses.filter((url) => !local(url))).toEqual([]);
   });
 
   it("fetches every tile's coarsest surface before any finer one", async () => {
-    await open();
-    await viewer.settled();
-    const lods = host.requests.flatMap(({ path }) => /\/lod(\d+)\.glb$/.exec(path)?.[1] ?? []);
+    await stand.open();
+    await stand.viewer.settled();
+    const lods = stand.host.requests.flatMap(
+      ({ path }) => /\/lod(\d+)\.glb$/.exec(path)?.[1] ?? [],
+    );
     const coarsest = Math.max(...lods.map(Number));
     const first = lods.findIndex((lod) => Number(lod) < coarsest);
     const overview = first === -1 ? lods : lods.slice(0, first);
@@ -112,47 +80,47 @@ describeInChromium("the viewer", () => {
 
   it("takes a channel's colour away when the channel is turned off", async () => {
     const { id, color } = withSurface()[0];
-    await open();
-    await viewer.settled();
+    await stand.open();
+    await stand.viewer.settled();
     await showOnly(id);
     expect((await picture()).count(hasColor(color))).toBeGreaterThan(100);
-    await viewer.show(id, false);
+    await stand.viewer.show(id, false);
     expect((await picture()).count((pixel) => !isBackground(pixel))).toBe(0);
   });
 
   it("recolours the surface and the volume, with no volume fetched again", async () => {
     const { id, color } = withSurface()[0];
     const chosen: Pixel = [1, 0, 1];
-    await open();
-    await viewer.settled();
+    await stand.open();
+    await stand.viewer.settled();
     await showOnly(id);
-    await viewer.recolor(id, "#ff00ff");
+    await stand.viewer.recolor(id, "#ff00ff");
     const surface = await picture();
     expect(surface.count(hasColor(chosen))).toBeGreaterThan(100);
     expect(surface.count(hasColor(color))).toBe(0);
 
-    await viewer.drawVolume(id, true);
-    await viewer.chooseScope("all");
-    const volumes = await viewer.snapshot();
-    expect(volumes.volumes).toHaveLength(manifest.tiles.length);
+    await stand.viewer.drawVolume(id, true);
+    await stand.viewer.chooseScope("all");
+    const volumes = await stand.viewer.snapshot();
+    expect(volumes.volumes).toHaveLength(stand.manifest.tiles.length);
     expect(volumes.triangles).toBe(0); // the volumes stand in place of the surfaces
     expect((await picture()).count(hasColor(chosen))).toBeGreaterThan(100);
 
-    const before = host.requests.length;
-    await viewer.recolor(id, "#00ff00");
+    const before = stand.host.requests.length;
+    await stand.viewer.recolor(id, "#00ff00");
     const recoloured = await picture();
     expect(recoloured.count(hasColor([0, 1, 0]))).toBeGreaterThan(100);
     expect(recoloured.count(hasColor(chosen))).toBe(0);
-    expect(host.requests.slice(before)).toEqual([]);
+    expect(stand.host.requests.slice(before)).toEqual([]);
   });
 
   it("fetches a volume by ranges, from coarse to fine", async () => {
-    const { id } = manifest.channels[0];
-    await open();
-    await viewer.drawVolume(id, true);
-    const { state, volumes } = await viewer.snapshot();
+    const { id } = stand.manifest.channels[0];
+    await stand.open();
+    await stand.viewer.drawVolume(id, true);
+    const { state, volumes } = await stand.viewer.snapshot();
     const path = `/bundle/volumes/${state.tile}/${id}.ktx2`;
-    const ranges = host.requests.filter((each) => each.path === path);
+    const ranges = stand.host.requests.filter((each) => each.path === path);
     expect(ranges.length).toBeGreaterThan(1);
     const sizes = ranges.map(({ range }) => {
       const [first, last] = (range ?? "").slice("bytes=".length).split("-").map(Number);
@@ -163,25 +131,25 @@ describeInChromium("the viewer", () => {
   });
 
   it("takes the whole file from a host without ranges", async () => {
-    host.hasRanges = false;
-    const { id } = manifest.channels[0];
-    await open();
-    await viewer.drawVolume(id, true);
-    const { state, volumes } = await viewer.snapshot();
+    stand.host.hasRanges = false;
+    const { id } = stand.manifest.channels[0];
+    await stand.open();
+    await stand.viewer.drawVolume(id, true);
+    const { state, volumes } = await stand.viewer.snapshot();
     const path = `/bundle/volumes/${state.tile}/${id}.ktx2`;
-    expect(host.requests.filter((each) => each.path === path)).toHaveLength(1);
+    expect(stand.host.requests.filter((each) => each.path === path)).toHaveLength(1);
     expect(volumes).toEqual([{ tile: state.tile, channel: id, level: 0 }]);
     expect(state.notices).toEqual([]);
   });
 
   it("draws another picture for each eye", async () => {
-    await addHeadset(viewer.page);
-    await open();
-    await viewer.settled();
-    await viewer.enterStereo();
+    await addHeadset(stand.viewer.page);
+    await stand.open();
+    await stand.viewer.settled();
+    await stand.viewer.enterStereo();
     const half = VIEWPORT.width / 2;
     const eye = (x: number) =>
-      takePicture(viewer.page, { x, y: 0, width: half, height: VIEWPORT.height });
+      takePicture(stand.viewer.page, { x, y: 0, width: half, height: VIEWPORT.height });
     const [left, right] = [await eye(0), await eye(half)];
     const drawn = [left, right].map((each) => each.where((pixel) => !isBackground(pixel)));
     expect(Math.min(...drawn.map((each) => each.length))).toBeGreaterThan(300);
@@ -192,68 +160,71 @@ describeInChromium("the viewer", () => {
   });
 
   it("says why stereo can't start where there is no headset", async () => {
-    await open();
-    const reason = viewer.page.locator("[data-stereo-reason]");
+    await stand.open();
+    const reason = stand.viewer.page.locator("[data-stereo-reason]");
     await expect.poll(() => reason.textContent()).toContain("headset");
-    expect(await viewer.page.locator('[data-action="stereo"]').isDisabled()).toBe(true);
+    expect(await stand.viewer.page.locator('[data-action="stereo"]').isDisabled()).toBe(true);
   });
 
   async function fatalText(address: string): Promise<string> {
-    await viewer.page.goto(address);
-    return (await viewer.page.locator("[data-fatal]").textContent({ timeout: 20_000 })) ?? "";
+    await stand.viewer.page.goto(address);
+    return (await stand.viewer.page.locator("[data-fatal]").textContent({ timeout: 20_000 })) ?? "";
   }
 
   it("says on the page which file is missing", async () => {
-    const text = await fatalText(`${host.address}/app/?bundle=../nowhere/`);
+    const text = await fatalText(`${stand.host.address}/app/?bundle=../nowhere/`);
     expect(text).toContain("manifest.json: not found (404)");
     expect(text).toContain("/nowhere/manifest.json");
   });
 
   it("says on the page which version it found and which it reads", async () => {
-    const body = JSON.stringify({ ...manifest, version: 99 });
-    host.overrides.set("/bundle/manifest.json", { status: 200, body });
-    const text = await fatalText(`${host.address}/app/?bundle=../bundle/`);
+    const body = JSON.stringify({ ...stand.manifest, version: 99 });
+    stand.host.overrides.set("/bundle/manifest.json", { status: 200, body });
+    const text = await fatalText(`${stand.host.address}/app/?bundle=../bundle/`);
     expect(text).toContain("this viewer reads version 1, found 99");
   });
 
   it("says on the page that a file is no JSON", async () => {
-    host.overrides.set("/bundle/manifest.json", { status: 200, body: "<html>Sign in</html>" });
-    const text = await fatalText(`${host.address}/app/?bundle=../bundle/`);
+    stand.host.overrides.set("/bundle/manifest.json", {
+      status: 200,
+      body: "<html>Sign in</html>",
+    });
+    const text = await fatalText(`${stand.host.address}/app/?bundle=../bundle/`);
     expect(text).toContain('manifest.json: expected JSON, found "<html>Sign in</html>"');
   });
 
   it("says on the page that the browser has no WebGL 2", async () => {
-    await viewer.page.addInitScript(() => {
+    await stand.viewer.page.addInitScript(() => {
       HTMLCanvasElement.prototype.getContext = () => null;
     });
-    const text = await fatalText(`${host.address}/app/?bundle=../bundle/`);
+    const text = await fatalText(`${stand.host.address}/app/?bundle=../bundle/`);
     expect(text).toContain("no WebGL 2");
   });
 
   it("names a broken or missing file in a notice and shows the rest", async () => {
-    const { id } = manifest.channels[0];
-    await open();
-    const { tile } = (await viewer.snapshot()).state;
-    host.overrides.set(`/bundle/volumes/${tile}/${id}.ktx2`, { status: 404, body: "" });
-    const lut = manifest.channels[1].lut.path;
-    host.overrides.set(`/bundle/${lut}`, { status: 200, body: "not the file" });
-    await viewer.drawVolume(id, true);
-    await viewer.drawVolume(manifest.channels[1].id, true);
-    const notices = viewer.page.locator("[data-notices]");
+    const { id } = stand.manifest.channels[0];
+    await stand.open();
+    const { tile } = (await stand.viewer.snapshot()).state;
+    stand.host.overrides.set(`/bundle/volumes/${tile}/${id}.ktx2`, { status: 404, body: "" });
+    const lut = stand.manifest.channels[1].lut.path;
+    stand.host.overrides.set(`/bundle/${lut}`, { status: 200, body: "not the file" });
+    await stand.viewer.drawVolume(id, true);
+    await stand.viewer.drawVolume(stand.manifest.channels[1].id, true);
+    const notices = stand.viewer.page.locator("[data-notices]");
     const text = await notices.textContent();
     expect(text).toContain(`volumes/${tile}/${id}.ktx2: not found (404)`);
     expect(text).toMatch(new RegExp(`${lut}: expected \\d+ bytes, found 12`));
-    expect((await viewer.snapshot()).triangles).toBeGreaterThan(0);
+    expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
     await notices.locator("p", { hasText: "(404)" }).getByRole("button").click();
     expect(await notices.textContent()).not.toContain("not found (404)");
   });
 
   it("draws no frames while nothing changes", async () => {
-    await open();
-    await viewer.settled();
-    const frames = () => viewer.page.evaluate(() => window.stereocell?.frames);
+    await stand.open();
+    await stand.viewer.settled();
+    const frames = () => stand.viewer.page.evaluate(() => window.stereocell?.frames);
     const before = await frames();
-    await viewer.page.waitForTimeout(400);
+    await stand.viewer.page.waitForTimeout(400);
     expect(await frames()).toBe(before);
   });
 });

@@ -12,6 +12,7 @@ import {
   KHR_DF_MODEL_ETC1S,
   KHR_DF_MODEL_UASTC,
   KHR_DF_TRANSFER_LINEAR,
+  KHR_DF_TRANSFER_SRGB,
   KHR_SUPERCOMPRESSION_ZSTD,
   read,
   VK_FORMAT_R8_UNORM,
@@ -55,18 +56,19 @@ function checkLevels(texture, problems) {
   });
 }
 
-function checkTexture(bytes, isNormalMap) {
+/** `transfer`: the transfer function that a texture of a mesh must have; null: it is a volume. */
+function checkTexture(bytes, transfer) {
   const problems = [];
   const texture = read(bytes);
   const [descriptor] = texture.dataFormatDescriptor;
   if (!texture.keyValue.KTXwriter) problems.push("no KTXwriter");
   checkLevels(texture, problems);
-  if (isNormalMap) {
+  if (transfer !== null) {
     if (![KHR_DF_MODEL_ETC1S, KHR_DF_MODEL_UASTC].includes(descriptor.colorModel)) {
       problems.push(`colour model ${descriptor.colorModel} is not Basis Universal`);
     }
-    if (descriptor.transferFunction !== KHR_DF_TRANSFER_LINEAR) {
-      problems.push("a normal map's transfer function is not linear");
+    if (descriptor.transferFunction !== transfer) {
+      problems.push(`transfer function ${descriptor.transferFunction}, expected ${transfer}`);
     }
     if (texture.pixelWidth % 4 || texture.pixelHeight % 4) {
       problems.push(`${texture.pixelWidth} x ${texture.pixelHeight} is no multiple of 4`);
@@ -79,16 +81,25 @@ function checkTexture(bytes, isNormalMap) {
   return problems;
 }
 
+/** The images that glTF reads as sRGB; it takes normals and occlusion as they are. */
+function imagesOfColor({ materials = [], textures = [] }) {
+  const used = materials.flatMap(({ pbrMetallicRoughness = {}, emissiveTexture }) =>
+    [pbrMetallicRoughness.baseColorTexture, emissiveTexture].filter(Boolean),
+  );
+  return new Set(used.map(({ index }) => textures[index].extensions.KHR_texture_basisu.source));
+}
+
 function check(path) {
   try {
     const bytes = new Uint8Array(readFileSync(path));
-    if (!path.endsWith(".glb")) return checkTexture(bytes, false);
+    if (!path.endsWith(".glb")) return checkTexture(bytes, null);
     const { document, binary } = unpackGlb(bytes);
-    return (document.images ?? [])
-      .filter(({ mimeType }) => mimeType === "image/ktx2")
-      .flatMap(({ bufferView }) =>
-        checkTexture(bytesOf(document.bufferViews[bufferView], binary), true),
-      );
+    const colors = imagesOfColor(document);
+    return (document.images ?? []).flatMap(({ mimeType, bufferView }, i) => {
+      if (mimeType !== "image/ktx2") return [];
+      const transfer = colors.has(i) ? KHR_DF_TRANSFER_SRGB : KHR_DF_TRANSFER_LINEAR;
+      return checkTexture(bytesOf(document.bufferViews[bufferView], binary), transfer);
+    });
   } catch (error) {
     return [String(error.message ?? error)];
   }

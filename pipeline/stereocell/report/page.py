@@ -15,10 +15,14 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
+from stereocell.calm import plan_for
 from stereocell.latticefield import LatticeField, make_iso_field
+from stereocell.names import from_identifier
 from stereocell.report import charts
 from stereocell.report.choice import choose_level, choose_units, thin_out
 from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
+from stereocell.report.likeness import ERROR_PX
+from stereocell.report.maps import compare, sum_up_maps
 from stereocell.report.remarks import find_remarks
 from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
 from stereocell.report.slices import cut_unit, draw_slices
@@ -27,6 +31,7 @@ from stereocell.store import Store
 from stereocell.survey import display_from_json, look_from
 from stereocell.tiling import Box, Tile
 from stereocell.unit_files import load_lods, load_volume, lod_file
+from stereocell.unwrap import mip_levels_apart
 from stereocell.volume import zyx_to_xyz
 from stereocell.write.atomic import write_bytes
 from stereocell.write.generator import GENERATOR
@@ -100,6 +105,10 @@ def render(store: Store, facts: Facts) -> str:
         cards=sum(len(row) for row in cards),
         rows=_rows(facts.units),
         total=sum_up(facts.units),
+        likenesses=compare(facts),
+        padding=plan.settings.unwrap.padding,
+        mips_apart=mip_levels_apart(plan.settings.unwrap.padding),
+        error_px=ERROR_PX,
         has_bundle=any(file.part == "bundle" for file in facts.files),
         parts={
             part: [file for file in facts.files if file.part == part]
@@ -124,6 +133,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "window": look.window,
                 "iso_value": look.iso_value,
                 "confidence": look.iso_confidence,
+                "surface": look.surface,
                 "spread": (min(values), max(values)) if values else None,
                 "given": channel.name in facts.plan.settings.iso_values,
                 "histogram": charts.histogram(
@@ -131,6 +141,8 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 ),
                 "functions": list(look.transfer_functions),
                 "total": sum_up(units),
+                "maps": sum_up_maps(units),
+                "painted_by": from_identifier(look.painted_by),
             }
         )
     return rows
@@ -143,6 +155,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
     inner = slice(APRON, -APRON)
     volume = load_volume(unit.directory)[inner, inner, inner]
     display = display_from_json(facts.survey[unit.channel.id]["display"])
+    verdict = facts.survey[unit.channel.id]["look"]["surface"]
     low, high = display.window
     slices = cut_unit(
         volume,
@@ -150,7 +163,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
         plan.position_um(lattice.start),
         plan.spacing_um,
         load_lods(unit.directory)[0].mesh if unit.lods else None,
-        float(plan.settings.surface.smoothing_um),
+        float(plan_for(plan, verdict).settings.surface.smoothing_um),
         None if iso is None else partial(_in_eight_bits, iso, display.background, low, high),
     )
     curve = read_curve(store.out, unit)

@@ -32,17 +32,35 @@ def find_remarks(facts: Facts) -> list[Remark]:
         for u in units
         if u.reason and u.channel.name in with_surface
     ]
+    doubtful = {
+        channel.name: look["iso_confidence"]
+        for channel in facts.plan.channels
+        if (look := facts.survey[channel.id]["look"])["surface"] == "unclear"
+    }
+    built = [
+        f"{name}: confidence {confidence:.2f}, expected at least "
+        f"{facts.plan.settings.isovalue.min_confidence:g}; built all the same, at the levels "
+        "found, and smoothed"
+        for name, confidence in doubtful.items()
+    ]
     own = [
         f"{u.name}: {u.iso_reason}; built with the mean of the channel's other tiles"
         for u in units
-        if u.iso_reason and not u.reason
+        if u.iso_reason and not u.reason and u.channel.name not in doubtful
     ]
     unsure = sorted(
-        (u for u in units if u.iso_value is not None and u.confidence < LOW_CONFIDENCE),
+        (
+            u
+            for u in units
+            if u.iso_value is not None
+            and u.confidence < LOW_CONFIDENCE
+            and u.channel.name not in doubtful
+        ),
         key=lambda u: u.confidence,
     )
     found = [
         _remark("without a surface in any tile", whole, "channel"),
+        _remark("with no clear surface", built, "channel"),
         _remark("without an iso-value of their own", own),
         _remark(
             f"with low confidence in their iso-value (below {LOW_CONFIDENCE:g})",

@@ -7,7 +7,7 @@ the two part, repair or simplification has been at work.
 
 import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib import get_data_path
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFilter, ImageFont
+from PIL import Image, ImageDraw, ImageFont
+from scipy import ndimage
 
 from stereocell.denoise import SMOOTHING_REACH, smooth
 from stereocell.mesh import Mesh
@@ -24,6 +25,7 @@ from stereocell.volume import Volume, zyx_to_xyz
 
 # the axes (of z, y, x) that are cut, run down the picture, and run to its right
 VIEWS = {"xy": (0, 1, 2), "xz": (1, 0, 2), "yz": (2, 1, 0)}
+Color = tuple[int, int, int]
 OUTLINE = (255, 190, 40)
 FIELD = (70, 190, 255)
 _GROUND = (38, 43, 51)
@@ -42,6 +44,7 @@ class Slice:
     spacing_um  (row, column)
     outline  float64 (n, 2, 2): n line segments between two points (row, column), in voxels
     above    float32 (rows, columns): field minus iso-value, or None without an iso-value
+    contours colours (RGB), each with a field like `above` whose zero line is drawn whole
     """
 
     name: str
@@ -49,6 +52,7 @@ class Slice:
     spacing_um: tuple[float, float]
     outline: NDArray[np.float64]
     above: NDArray[np.float32] | None
+    contours: tuple[tuple[Color, NDArray[np.float32]], ...] = ()
 
 
 def cut_unit(
@@ -123,16 +127,26 @@ def cross_section(
 
 
 def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
-    """Return a WebP picture of the slices, its width and height: yz right of xy, xz below it.
+    """Return a WebP picture of the slices, its width and height."""
+    picture = paint_slices(slices, _LONGEST_PX)
+    return encode(picture), *picture.size
+
+
+def paint_slices(
+    slices: Sequence[Slice], longest_px: int, shown_px: int = _SHOWN_PX
+) -> Image.Image:
+    """Return a picture of the slices, none longer than so many pixels: yz right of xy, xz below it.
+
+    shown_px  how wide it will be shown
 
     All three have one scale, the specimen's own proportions, and xy's image rows run downwards.
     """
     longest = max(um for s in slices for um in _extent(s))
-    scale = _LONGEST_PX / longest
+    scale = longest_px / longest
     shapes = {s.name: [max(2, round(um * scale)) for um in _extent(s)] for s in slices}
     (down, right), (deep, _) = shapes["xy"], shapes["xz"]
     width, height = right + _GAP_PX + shapes["yz"][1], down + _GAP_PX + deep
-    weight = max(1.0, width / _SHOWN_PX)
+    weight = max(1.0, width / shown_px)
     corners = {"xy": (0, 0), "xz": (0, down + _GAP_PX), "yz": (right + _GAP_PX, 0)}
     picture = Image.new("RGB", (width, height), _GROUND)
     draw = ImageDraw.Draw(picture)
@@ -144,7 +158,7 @@ def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
             _write(draw, (corner[0] + 4, corner[1] + 2), part.name, weight)
     if min(down, right) >= 60 * weight:
         _scale_bar(draw, (right, down), scale, weight)
-    return encode(picture), width, height
+    return picture
 
 
 def encode(picture: Image.Image) -> bytes:
@@ -169,21 +183,26 @@ def _panel(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
     picture = Image.fromarray(part.grey).resize(size, Image.Resampling.BILINEAR)
     panel = picture.convert("RGB")
     if part.above is not None:
-        panel.paste(FIELD, (0, 0), _dashes(part.above, size, weight))
+        panel.paste(FIELD, (0, 0), _zero_line(part.above, size, weight, is_dashed=True))
+    for color, above in part.contours:
+        panel.paste(color, (0, 0), _zero_line(above, size, weight, is_dashed=False))
     if len(part.outline):
         panel.paste(OUTLINE, (0, 0), _lines(part, size, weight))
     return panel
 
 
-def _dashes(above: NDArray[np.float32], size: tuple[int, int], weight: float) -> Image.Image:
-    """Return the mask of the zero line of `above`, broken into dashes."""
+def _zero_line(
+    above: NDArray[np.float32], size: tuple[int, int], weight: float, *, is_dashed: bool
+) -> Image.Image:
+    """Return the mask of the zero line of `above`, whole or broken into dashes."""
     fine = (size[0] * _FINE, size[1] * _FINE)
     inside = np.asarray(Image.fromarray(above).resize(fine, Image.Resampling.BILINEAR)) > 0
     edge = np.zeros(inside.shape, bool)
     edge[:-1] |= inside[:-1] != inside[1:]
     edge[:, :-1] |= inside[:, :-1] != inside[:, 1:]
-    diagonal = np.add.outer(np.arange(fine[1]), np.arange(fine[0]))
-    edge &= diagonal // round(_DASH_PX * _FINE * weight) % 2 == 0
+    if is_dashed:
+        diagonal = np.add.outer(np.arange(fine[1]), np.arange(fine[0]))
+        edge &= diagonal // round(_DASH_PX * _FINE * weight) % 2 == 0
     return _averaged(edge, weight)
 
 
@@ -207,17 +226,19 @@ def _lines(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
 def _averaged(mask: NDArray[np.bool_], weight: float) -> Image.Image:
     """Return the mask at the picture's size, its lines about `weight` pixels wide."""
     reach = max(1, round((_FINE * weight - 1) / 2))
-    fine = Image.fromarray(mask.astype(np.uint8) * 255).filter(ImageFilter.MaxFilter(2 * reach + 1))
-    return fine.reduce(_FINE)
+    wide = mask.astype(np.uint8) * 255
+    for axis in (0, 1):
+        wide = ndimage.maximum_filter1d(wide, 2 * reach + 1, axis=axis, mode="constant")
+    return Image.fromarray(wide).reduce(_FINE)
 
 
 def _write(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, weight: float) -> None:
-    font = _font(round(10 * weight))
+    font = find_font(round(10 * weight))
     draw.text(at, text, (255, 255, 255), font, stroke_width=1, stroke_fill=(0, 0, 0))
 
 
 @cache
-def _font(size: int) -> ImageFont.FreeTypeFont:
+def find_font(size: int) -> ImageFont.FreeTypeFont:
     """Return a font that every machine with this program has, and that has a micro sign."""
     return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf", size)
 

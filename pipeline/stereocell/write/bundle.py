@@ -86,7 +86,10 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine
         "version": 1,
         "generator": GENERATOR,
         "specimen": {"name": specimen_name(stage), "bounds_um": _bounds(tiles)},
-        "tiles": [{"id": tile.id, "bounds_um": _bounds([tile])} for tile in tiles],
+        "tiles": [
+            {"id": tile.id, "representation": tile.representation, "bounds_um": _bounds([tile])}
+            for tile in tiles
+        ],
         "channels": channels,
         "files": asdict(index),
     }
@@ -112,6 +115,7 @@ def _write_channel(
         "window": list(look.window),
         "iso_value": look.iso_value,
         "iso_normalized": look.iso_normalized,
+        "surface": "none" if tileset is None else look.surface,
         "transfer_function": look.chosen,
         "transfer_functions": list(look.transfer_functions),
         "lut": asdict(lut),

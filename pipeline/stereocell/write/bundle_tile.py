@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 from pxr import Usd
 
@@ -22,11 +23,17 @@ from stereocell.write.composed import (
     read_volume,
     world_box,
 )
+from stereocell.write.composed_choice import Representation
 from stereocell.write.composed_look import ComposedLook
 from stereocell.write.composed_values import Point
 from stereocell.write.exr import read_atlas
-from stereocell.write.gltf import Glb, encode_glb
-from stereocell.write.ktx2 import encode_3d, encode_normal_map
+from stereocell.write.gltf import Glb, Textures, encode_glb
+from stereocell.write.ktx2 import (
+    encode_3d,
+    encode_color_map,
+    encode_normal_map,
+    encode_occlusion_map,
+)
 from stereocell.write.tiles3d import TileLod
 
 
@@ -44,7 +51,7 @@ class TileChannel:
     """One (tile, channel) in the bundle.
 
     lods       for the tileset, finest first; addresses relative to it
-    triangles  by level of detail
+    triangles  by level of detail; levels finer than the finest have as many as that
     volume     its entry in volumes.json, or None
     files      all that was written
     """
@@ -61,6 +68,7 @@ class BundleTile:
     """One tile in the bundle. `low`, `high`: corners (x, y, z) of its box in the world, um."""
 
     id: str
+    representation: Representation
     low: Point
     high: Point
     channels: tuple[TileChannel, ...]
@@ -81,30 +89,41 @@ def export_tile(
     of the others does not grow. Raises StageError and OutputError.
     """
     stage = open_stage(stage_path)
-    with loaded(stage, tile_id) as tile:
+    with loaded(stage, tile_id) as (tile, choice):
         channels, boxes = [], []
         for look in looks:
             volume = read_volume(tile, look.id)
             if volume is not None:
                 boxes.append(world_box(np.array(volume.low), np.array(volume.high), volume.matrix))
-            channels.append(_export_channel(root, tile, look, volume, step_m))
+            channels.append(_export_channel(root, tile, look, volume, choice.finest_lod, step_m))
         low, high = (
             np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True)
         )
-    return BundleTile(tile_id, _point(low.min(axis=0)), _point(high.max(axis=0)), tuple(channels))
+    return BundleTile(
+        tile_id,
+        choice.representation,
+        _point(low.min(axis=0)),
+        _point(high.max(axis=0)),
+        tuple(channels),
+    )
 
 
 def _export_channel(
-    root: Path, tile: Usd.Prim, look: ComposedLook, volume: ComposedVolume | None, step_m: float
+    root: Path,
+    tile: Usd.Prim,
+    look: ComposedLook,
+    volume: ComposedVolume | None,
+    finest_lod: int,
+    step_m: float,
 ) -> TileChannel:
     channel_id = look.id
     files: list[FileRef] = []
     lods: list[TileLod] = []
     triangles: list[int] = []
     finer = b""
-    for lod in read_lods(tile, channel_id):
+    for lod in read_lods(tile, channel_id, finest_lod):
         glb = _encode(tile, channel_id, lod, step_m)
-        triangles.append(len(lod.mesh.triangles))
+        triangles += [len(lod.mesh.triangles)] * (lod.level + 1 - len(triangles))
         if glb.data == finer:
             continue  # a channel with fewer levels than others repeats its last
         finer = glb.data
@@ -120,7 +139,12 @@ def _export_channel(
 
 def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) -> Glb:
     prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
-    normal_map = None if lod.normal_map is None else _read_normal_map(lod.normal_map)
+    maps = lod.maps
+    textures = Textures(
+        None if maps.normal is None else encode_normal_map(_read_image(maps.normal)),
+        None if maps.occlusion is None else encode_occlusion_map(_read_image(maps.occlusion)),
+        None if maps.color is None else encode_color_map(_read_image(maps.color)),
+    )
     try:
         return encode_glb(
             lod.mesh,
@@ -128,13 +152,14 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
             lod.material,
             f"{channel_id}_{tile.GetName()}",
             {"tile": tile.GetName(), "channel": channel_id},
-            normal_map,
+            textures,
         )
     except ValueError as error:  # what an artist may have done to the mesh
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error
 
 
-def _read_normal_map(path: Path) -> bytes:
+def _read_image(path: Path) -> NDArray[np.uint8]:
+    """Return an image (y, x, 3), both edges multiples of 4, as Basis Universal asks."""
     try:
         with Image.open(path) as file:
             image = file.convert("RGB")
@@ -143,7 +168,7 @@ def _read_normal_map(path: Path) -> bytes:
     width, height = (max(4, 4 * round(n / 4)) for n in image.size)
     if (width, height) != image.size:
         image = image.resize((width, height), Image.Resampling.LANCZOS)
-    return encode_normal_map(np.asarray(image))
+    return np.asarray(image)
 
 
 def _export_volume(

@@ -5,7 +5,6 @@ levels of detail are variants; they are looked through one by one by selections 
 layer.
 """
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +16,9 @@ from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from stereocell.errors import StageError
 from stereocell.mesh import Mesh
-from stereocell.write.composed_look import material_of, normal_map_of, surface_of
+from stereocell.write.composed_choice import TileChoice, lod_levels, read_choice
+from stereocell.write.composed_look import material_of, surface_of
+from stereocell.write.composed_maps import ComposedMaps, maps_of, vertex_values_of
 from stereocell.write.composed_mesh import read_mesh
 from stereocell.write.composed_values import (
     Point,
@@ -31,8 +32,6 @@ from stereocell.write.composed_values import (
 from stereocell.write.gltf import Material
 from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES
 
-_LOD = re.compile(r"lod(\d+)")
-
 
 @dataclass(frozen=True, slots=True)
 class ComposedLod:
@@ -42,7 +41,7 @@ class ComposedLod:
     mesh: Mesh
     distance_um: float
     material: Material
-    normal_map: Path | None
+    maps: ComposedMaps
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +121,11 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 @contextmanager
-def loaded(stage: Usd.Stage, tile_id: str) -> Iterator[Usd.Prim]:
-    """Yield a tile's prim with its payload loaded and its meshes and volumes both active."""
+def loaded(stage: Usd.Stage, tile_id: str) -> Iterator[tuple[Usd.Prim, TileChoice]]:
+    """Yield a tile's prim with its payload loaded, and what is chosen for it.
+
+    Its meshes and volumes are both active, whichever was chosen. Raises StageError.
+    """
     path = TILES.AppendChild(tile_id)
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
     stage.Load(path)
@@ -131,23 +133,21 @@ def loaded(stage: Usd.Stage, tile_id: str) -> Iterator[Usd.Prim]:
     try:
         _check_composition(stage)
         prim = stage.GetPrimAtPath(path)
+        choice = read_choice(prim)
         if "both" in prim.GetVariantSet("representation").GetVariantNames():
             select_variant(prim, "representation", "both")
-        yield prim
+        yield prim, choice
     finally:
         stage.Unload(path)
 
 
-def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
-    """Yield a loaded tile's levels of detail of one channel, finest first; none: no surface.
+def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[ComposedLod]:
+    """Yield a loaded tile's levels of detail of one channel, `finest` first; none: no surface.
 
     Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
     """
     path = tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}")
-    variants = tile.GetVariantSet("lod")
-    levels = sorted(
-        int(match[1]) for match in map(_LOD.fullmatch, variants.GetVariantNames()) if match
-    )
+    levels = [level for level in lod_levels(tile) if level >= finest]
     for level in levels or [0]:  # a flattened stage has one level, and no variants
         if levels:
             select_variant(tile, "lod", f"lod{level}")
@@ -156,15 +156,15 @@ def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
             continue
         matrix = _to_world(prim)
         try:
-            mesh = read_mesh(UsdGeom.Mesh(prim), matrix)
+            surface = surface_of(prim)
+            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, vertex_values_of(surface))
         except StageError as error:
             raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
         if mesh is None:
             continue
         stretch = float(np.linalg.norm(matrix[:3, :3], 2))
         distance = shortest(value_of(prim, "stereocell:distance")) * stretch
-        surface = surface_of(prim)
-        yield ComposedLod(level, mesh, distance, material_of(surface), normal_map_of(surface))
+        yield ComposedLod(level, mesh, distance, material_of(surface), maps_of(surface))
 
 
 def _edit_advice(level: int) -> str:

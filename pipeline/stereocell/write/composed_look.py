@@ -2,17 +2,17 @@
 
 import itertools
 from dataclasses import dataclass
-from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdShade
 
 from stereocell.errors import StageError
-from stereocell.specimen import OpacityPoints
+from stereocell.specimen import OpacityPoints, Verdict
+from stereocell.write.composed_maps import feeder
 from stereocell.write.composed_values import (
     color_of,
-    file_of,
     select_variant,
     shortest,
     value_of,
@@ -21,6 +21,7 @@ from stereocell.write.gltf import Material
 from stereocell.write.usd_layer import CHANNELS
 from stereocell.write.usd_looks import DEFAULT_FUNCTION
 
+WHITE = (1.0, 1.0, 1.0)
 _VOLUME_WINDOW = "stereocell:volumeWindow"
 
 
@@ -30,6 +31,7 @@ class ComposedLook:
 
     window         the voxel values to be shown as 0 and 1
     volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
+    surface        the verdict on it
     chosen         a transfer function
     """
 
@@ -39,6 +41,7 @@ class ComposedLook:
     window: tuple[float, float]
     volume_window: tuple[float, float]
     iso_value: float | None
+    surface: Verdict
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
 
@@ -77,26 +80,17 @@ def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
 
 
 def material_of(surface: UsdShade.Shader) -> Material:
-    """Return what glTF takes over of a UsdPreviewSurface. Raises StageError."""
-    diffuse = _source(surface, "diffuseColor")
-    if diffuse is None:
-        raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
+    """Return what glTF takes over of a UsdPreviewSurface; white where an image or the mesh's own
+    colours feed it. Raises StageError.
+    """
+    color = WHITE
+    if feeder(surface, "color") is None:
+        diffuse = _source(surface, "diffuseColor")
+        if diffuse is None:
+            raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
+        color = color_of(diffuse)
     # defaults: the specification of UsdPreviewSurface
-    return Material(
-        color_of(diffuse), _share(surface, "metallic", 0.0), _share(surface, "roughness", 0.5)
-    )
-
-
-def normal_map_of(surface: UsdShade.Shader) -> Path | None:
-    """Return the image that feeds a surface's normals. Raises StageError if it is missing."""
-    normal = surface.GetInput("normal")
-    attributes = normal.GetValueProducingAttributes() if normal else []
-    if not attributes or not UsdShade.Output.IsOutput(attributes[0]):
-        return None
-    texture = UsdShade.Shader(attributes[0].GetPrim())
-    if texture.GetShaderId() != "UsdUVTexture":
-        raise StageError(f"{texture.GetPath()}: expected a UsdUVTexture to feed inputs:normal")
-    return file_of(texture.GetPrim().GetAttribute("inputs:file"))
+    return Material(color, _share(surface, "metallic", 0.0), _share(surface, "roughness", 0.5))
 
 
 def _read_look(prim: Usd.Prim) -> ComposedLook:
@@ -120,6 +114,7 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
         # only stages of other programs lack it
         _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
         _number(prim, "stereocell:isoValue"),
+        _verdict(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
     )
@@ -135,6 +130,18 @@ def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:
 def _number(prim: Usd.Prim, name: str) -> float | None:
     value = prim.GetAttribute(name).Get()
     return None if value is None else shortest(value)
+
+
+def _verdict(prim: Usd.Prim, name: str) -> Verdict:
+    value = prim.GetAttribute(name).Get()
+    if value is None:  # only stages of other programs lack it
+        return "clear"
+    for verdict in get_args(Verdict):
+        if value == verdict:
+            return verdict
+    raise StageError(
+        f"{prim.GetPath()}.{name}: {value!r}, expected one of {', '.join(get_args(Verdict))}"
+    )
 
 
 def _opacity_points(prim: Usd.Prim) -> OpacityPoints:

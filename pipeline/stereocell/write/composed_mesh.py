@@ -5,6 +5,7 @@ tool may have made of them passes too: polygons, values per face corner, left-ha
 moved and mirrored tiles.
 """
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,13 @@ from stereocell.mesh import Mesh
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
 
-def read_mesh(mesh: UsdGeom.Mesh, to_world: NDArray[np.float64]) -> Mesh | None:
+def read_mesh(
+    mesh: UsdGeom.Mesh, to_world: NDArray[np.float64], shown: Collection[str] = ()
+) -> Mesh | None:
     """Return the mesh in world um, at the default time; None if it has no faces.
 
-    `to_world`: matrix for row vectors, (4, 4).
+    `to_world`: matrix for row vectors, (4, 4). `shown`: which of the primvars `displayColor` and
+    `occlusion` its look takes up.
 
     Raises StageError where its arrays contradict each other.
     """
@@ -43,6 +47,7 @@ def read_mesh(mesh: UsdGeom.Mesh, to_world: NDArray[np.float64]) -> Mesh | None:
         "normals": _normals(mesh),
         "st": _primvar(primvars.GetPrimvar("st")),
         "tangents": _primvar(primvars.GetPrimvar("tangents")),
+        **{name: _primvar(primvars.GetPrimvar(name)) for name in sorted(shown)},
     }
     values = {name: given for name, given in found.items() if given is not None}
     if all(kind in ("vertex", "varying") for _, kind in values.values()):
@@ -62,6 +67,8 @@ def read_mesh(mesh: UsdGeom.Mesh, to_world: NDArray[np.float64]) -> Mesh | None:
             arrays["normals"],
             arrays.get("st"),
             arrays.get("tangents"),
+            arrays.get("displayColor"),
+            arrays.get("occlusion"),
         ),
         to_world,
     )
@@ -120,12 +127,14 @@ def _split(
             array = np.repeat(array, len(indices), axis=0)
         elif kind != "faceVarying":
             array = array[indices]
-        columns[name] = array
+        columns[name] = array.reshape(len(array), -1)
     rows = np.hstack(list(columns.values())) + np.float32(0)  # -0.0 becomes 0.0
     unique, vertex_of = np.unique(rows, axis=0, return_inverse=True)
     widths = np.cumsum([array.shape[1] for array in columns.values()])[:-1]
     parts = dict(zip(columns, np.hsplit(unique, widths), strict=True))
     split_points = np.ascontiguousarray(parts.pop("points"))
+    if "occlusion" in parts:
+        parts["occlusion"] = parts["occlusion"][:, 0]
     return vertex_of.reshape(-1)[corners], split_points, parts
 
 
@@ -164,4 +173,6 @@ def _transform(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
         normals.astype(np.float32),
         mesh.uvs,
         tangents,
+        mesh.colors,
+        mesh.openness,
     )

@@ -1,7 +1,7 @@
 """Write one mesh as a binary glTF 2.0 file that a phone decodes fast.
 
 Assembled here because no package on PyPI writes EXT_meshopt_compression. Also used:
-KHR_mesh_quantization and, for the normal map, KHR_texture_basisu.
+KHR_mesh_quantization and, for baked maps, KHR_texture_basisu.
 
 No cracks between tiles. Neighbouring tiles hold the vertices on their common plane as equal
 floats; they must decode to equal positions too. So all files of a bundle share ONE lattice: a
@@ -28,7 +28,9 @@ from stereocell.write.meshopt import CompressedBuffers, reorder
 _METRES_PER_UM = 1e-6
 _MOST_STEPS = 0xFFFF  # that 16 bits span
 _WANTED_STEPS = 1 << 14  # as fine as a 20th of a voxel, and the low bits don't compress
-_BYTE, _UNSIGNED_SHORT, _FLOAT = 5120, 5123, 5126
+_BYTE, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5120, 5121, 5123, 5126
+_AMBIENT_SHARE = 0.4  # of the light in the viewer's room, about
+_OF_COLOR = {"baseColorTexture"}  # the maps that lie one level deeper in a material
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
 
 
@@ -39,6 +41,15 @@ class Material:
     color: tuple[float, float, float]
     metallic: float = 0.0
     roughness: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Textures:
+    """Baked maps, KTX2 files of Basis Universal: normals and occlusion linear, colours in sRGB."""
+
+    normal: bytes | None = None
+    occlusion: bytes | None = None
+    color: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +77,16 @@ def encode_glb(
     material: Material,
     name: str,
     extras: dict[str, str],
-    normal_map: bytes | None = None,
+    textures: Textures | None = None,
 ) -> Glb:
     """Return the mesh as .glb.
 
-    `extras` come on the scene and on its one node. `normal_map`: a KTX2 file, Basis Universal,
-    linear. UVs and tangents are written only where there is a normal map to look up.
+    `extras` come on the scene and on its one node. UVs are written only where there is a map to
+    look up, tangents where it is one of normals.
     Raises ValueError for a mesh without triangles, one that is larger than 65535 steps along
-    an axis, and a normal map without UVs.
+    an axis, and maps without UVs.
     """
+    maps = _pick(textures or Textures())
     if len(mesh.triangles) == 0:
         raise ValueError(f"{name} has no triangles")
     indices, order = reorder(mesh.triangles, len(mesh.positions))
@@ -103,12 +115,14 @@ def encode_glb(
             {"componentType": _BYTE, "normalized": True, "type": "VEC3"},
         ),
     }
-    if normal_map is not None:
+    if maps:
         if mesh.uvs is None:
-            raise ValueError(f"{name} has a normal map and no UVs")
+            raise ValueError(f"{name} has baked maps and no UVs")
         attributes["TEXCOORD_0"] = _add_uvs(buffers, mesh.uvs[order])
-        if mesh.tangents is not None:
+        if mesh.tangents is not None and "normalTexture" in maps:
             attributes["TANGENT"] = _add_tangents(buffers, mesh.tangents[order])
+    if mesh.colors is not None or mesh.openness is not None:
+        attributes["COLOR_0"] = _add_colors(buffers, mesh, order)
     primitive = {
         "attributes": attributes,
         "indices": buffers.add_indices(indices, len(order)),
@@ -143,11 +157,18 @@ def encode_glb(
         "meshes": [{"name": name, "primitives": [primitive]}],
         "materials": [drawn],
     }
-    if normal_map is not None:
+    if maps:
         extensions.append("KHR_texture_basisu")
-        drawn["normalTexture"] = {"index": 0}
-        document["textures"] = [{"sampler": 0, "extensions": {"KHR_texture_basisu": {"source": 0}}}]
-        document["images"] = [{"mimeType": "image/ktx2", "bufferView": buffers.add(normal_map)}]
+        for i, name_of_map in enumerate(maps):
+            holder = drawn["pbrMetallicRoughness"] if name_of_map in _OF_COLOR else drawn
+            holder[name_of_map] = {"index": i}
+        document["textures"] = [
+            {"sampler": 0, "extensions": {"KHR_texture_basisu": {"source": i}}}
+            for i in range(len(maps))
+        ]
+        document["images"] = [
+            {"mimeType": "image/ktx2", "bufferView": buffers.add(data)} for data in maps.values()
+        ]
         document["samplers"] = [
             {
                 "magFilter": _LINEAR,
@@ -176,6 +197,34 @@ def _add_uvs(buffers: CompressedBuffers, uvs: NDArray[np.float32]) -> int:
     values = np.rint(flipped * 0xFFFF).astype(np.uint16)
     return buffers.add_attribute(
         values, {"componentType": _UNSIGNED_SHORT, "normalized": True, "type": "VEC2"}
+    )
+
+
+def _pick(textures: Textures) -> dict[str, bytes]:
+    """Return the maps that there are, by their names in a material."""
+    named = {
+        "normalTexture": textures.normal,
+        "occlusionTexture": textures.occlusion,
+        "baseColorTexture": textures.color,
+    }
+    return {name: data for name, data in named.items() if data is not None}
+
+
+def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> int:
+    """Store what the base colour is multiplied by: the mesh's colours, dimmed where it is hidden.
+
+    glTF has no occlusion at vertices. An occlusion map dims ambient light only; what dims a colour
+    dims all light, so it gets the share that is ambient.
+    """
+    colors = np.ones((len(order), 3))
+    if mesh.colors is not None:
+        colors *= np.clip(mesh.colors[order], 0, 1)
+    if mesh.openness is not None:
+        hidden = 1 - np.clip(mesh.openness[order].astype(np.float64), 0, 1)
+        colors *= (1 - _AMBIENT_SHARE * hidden)[:, np.newaxis]
+    values = _padded(np.rint(colors * 255).astype(np.uint8))
+    return buffers.add_attribute(
+        values, {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "VEC3"}
     )
 
 

@@ -1,4 +1,4 @@
-"""Write KTX 2.0 textures: 8-bit volumes and tables, and normal maps.
+"""Write KTX 2.0 textures: 8-bit volumes and tables, and baked maps.
 
 Volumes and tables are uncompressed texels, each mip level a zstd frame of its own.
 
@@ -11,6 +11,7 @@ asks; readers also know the older 0. Level data of a supercompressed file has no
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import alktx2
 import numpy as np
@@ -26,6 +27,7 @@ _VK_FORMATS = {1: 9, 2: 16, 4: 37}  # components: R8_UNORM, R8G8_UNORM, R8G8B8A8
 _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
 # texture x to the right, y down, z out of the picture, towards the viewer
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
+_ETC1S_QUALITY = 80  # of 100
 _ZSTD = 2
 _ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
 
@@ -75,15 +77,8 @@ def encode_normal_map(image: NDArray[np.uint8]) -> bytes:
         UASTC, effort 3, lambda 1       12 kB  1.1     43 kB  2.1   0.10 s
         UASTC, effort 5, lambda 0.5      -             45 kB  1.8   0.32 s
     """
-    height, width, components = image.shape
-    if width % 4 or height % 4 or components != 3:
-        raise ValueError(f"a normal map of {width} x {height} x {components}")
-    opaque = np.full((height, width, 1), 255, dtype=np.uint8)
-    data: bytes = alktx2.encode_raw_rgba_to_ktx2(
-        np.concatenate([image, opaque], axis=2).tobytes(),
-        width,
-        height,
-        False,
+    return _encode_map(
+        image,
         codec="uastc",
         quality=100,
         effort=3,
@@ -91,9 +86,30 @@ def encode_normal_map(image: NDArray[np.uint8]) -> bytes:
         uastc_rdo_dict_size=256,
         srgb=False,
         linear=True,
-        mipmaps=True,
-        threads=1,
         zstd_supercompression_level=9,
+    )
+
+
+def encode_occlusion_map(image: NDArray[np.uint8]) -> bytes:
+    """Return an ambient-occlusion map, uint8 (y, x, 3), grey: as a normal map, but ETC1S, whose
+    blocks don't show on what varies so slowly.
+    """
+    return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=False, linear=True)
+
+
+def encode_color_map(image: NDArray[np.uint8]) -> bytes:
+    """Return a base-colour map, uint8 (y, x, 3) in sRGB, ETC1S."""
+    return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=True, linear=False)
+
+
+def _encode_map(image: NDArray[np.uint8], **options: Any) -> bytes:
+    height, width, components = image.shape
+    if width % 4 or height % 4 or components != 3:
+        raise ValueError(f"a baked map of {width} x {height} x {components}")
+    opaque = np.full((height, width, 1), 255, dtype=np.uint8)
+    pixels = np.concatenate([image, opaque], axis=2).tobytes()
+    data: bytes = alktx2.encode_raw_rgba_to_ktx2(
+        pixels, width, height, False, mipmaps=True, threads=1, **options
     )
     return data
 

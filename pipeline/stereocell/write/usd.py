@@ -94,15 +94,18 @@ def write_stage(
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
     group = UsdGeom.Xform.Define(stage, TILES).GetPrim()
     Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
-    for tile in tiles:
+    boxes = np.zeros((len(tiles), 2, 3))
+    for box, tile in zip(boxes, tiles, strict=True):
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
         prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
-        for variant_set, variant in _selections(stage_dir / "tiles" / tile.id / LAYER_NAME):
+        selections, extents = _read_layer(stage_dir / "tiles" / tile.id / LAYER_NAME)
+        for variant_set, variant in selections:
             prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
-        # what an unloaded tile is known by
-        UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(tile.drawn_box))
-    boxes = np.array([tile.drawn_box for tile in tiles])
+        # what an unloaded tile is known by; an offset takes surfaces further than its own box
+        every = np.array([tile.drawn_box, *extents])
+        box[:] = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
+        UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
     define_cameras(stage, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
 
     layer = stage.GetRootLayer()
@@ -113,13 +116,24 @@ def write_stage(
     export(layer, stage_dir / STAGE_NAME)
 
 
-def _selections(file: Path) -> list[tuple[str, str]]:
-    """Return the variants that a tile's own layer selects: (variant set, variant)."""
+def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
+    """Return the variants that a tile's own layer selects, (variant set, variant), and all extents.
+
+    Extents (2, 3) are of everything in it, whatever is selected.
+    """
     if not file.is_file():
-        return []
+        return [], []
     layer = Sdf.Layer.OpenAsAnonymous(str(file))
+    extents: list[NDArray[np.float64]] = []
+
+    def collect(path: Sdf.Path) -> None:
+        if path.name == "extent":
+            extents.append(np.array(layer.GetAttributeAtPath(path).default, np.float64))
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, collect)
     selected = layer.GetPrimAtPath(f"/{layer.defaultPrim}").variantSelections
-    return sorted((str(name), str(variant)) for name, variant in selected.items())
+    chosen = sorted((str(name), str(variant)) for name, variant in selected.items())
+    return chosen, extents
 
 
 def _plain(value: object) -> object:

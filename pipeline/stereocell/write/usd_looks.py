@@ -8,7 +8,8 @@ The material has no volume output: USD ships no volume shader that renderers agr
 UsdPreviewSurface. So the binding of a Volume prim to its look hands over the channel's values
 (colour, opacity points, LUT), and does NOT make a renderer draw the volume by them: an artist
 connects `outputs:volume` to the renderer's own shader, in a layer over the stage, and feeds its
-colour from `inputs:color`. The bundle's viewer has its own ray caster.
+colour from `inputs:color`. The bundle's viewer has its own ray caster. docs/stage.md has what was
+tried (usd-core's validators refuse every shader that a renderer knows), and such a layer.
 """
 
 from collections.abc import Sequence
@@ -40,7 +41,7 @@ def write_looks(folder: Path, looks: Sequence[Look]) -> None:
     for look in looks:
         material = UsdShade.Material.Define(stage, CHANNELS.AppendChild(look.id))
         _author_look(material, look)
-        _author_surface(material)
+        _author_surface(material, look)
         _author_functions(material.GetPrim(), look)
         for name, points in look.transfer_functions.items():
             write_lut(folder / _lut_name(look, name), points)
@@ -59,16 +60,20 @@ def _author_look(material: UsdShade.Material, look: Look) -> None:
     for name in ("window", "volumeWindow"):
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*look.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, look.iso_confidence)
+    set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, look.surface)
+    if look.painted_by:
+        set_attribute(prim, "stereocell:paintedBy", _Types.String, look.painted_by, custom=True)
     if look.iso_value is not None:
         set_attribute(prim, "stereocell:isoValue", _Types.Float, look.iso_value)
 
 
-def _author_surface(material: UsdShade.Material) -> None:
+def _author_surface(material: UsdShade.Material, look: Look) -> None:
     stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface")
     surface = UsdShade.Shader.Define(stage, path)
     surface.CreateIdAttr("UsdPreviewSurface")
-    color = surface.CreateInput("diffuseColor", _Types.Color3f)
-    color.ConnectToSource(material.GetInput("color"))
+    if not look.painted_by:  # else tiles feed it: an opinion here would be stronger than theirs
+        color = surface.CreateInput("diffuseColor", _Types.Color3f)
+        color.ConnectToSource(material.GetInput("color"))
     surface.CreateInput("metallic", _Types.Float).Set(0.0)
     surface.CreateInput("roughness", _Types.Float).Set(0.5)
     output = surface.CreateOutput("surface", _Types.Token)

@@ -1,24 +1,30 @@
-"""Write one tile of a stage: tile.usdc, and beside it the volumes and normal maps that it names.
+"""Write one tile of a stage: tile.usdc, and beside it the volumes and baked maps that it names.
 
 A tile names no look but its channel's: its materials inherit the prim /Specimen/Channels/<channel>,
 which lies outside this file. USD resolves such an inherit in the stage that holds the payload, so
 the one prim there gives the look to all tiles, and an opinion about it in any layer over the stage
-reaches them all.
+reaches them all. What is baked is the tile's own: normals, occlusion and paint of each level are
+fed to the shader inside its variant. An opinion of the channel's would be the stronger one, so the
+look of a channel that is painted has no opinion about diffuseColor.
 
 `lod1` is selected unless someone asks otherwise: an artist arranges and lights all tiles at once,
 for which the finest level is millions of triangles too heavy, and picks `lod0` for the final frame.
+So neither of the two is a wish for less on the phone, but a coarser one is (composed_choice.py).
 """
 
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
+from pxr import Kind as Kinds
 
 from stereocell.mesh import Lod
 from stereocell.names import from_identifier
-from stereocell.specimen import APRON, ChannelContent, TileContent
+from stereocell.specimen import APRON, ChannelContent, TileContent, to_srgb8
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.exr import write_atlas
 from stereocell.write.usd_layer import (
@@ -30,6 +36,7 @@ from stereocell.write.usd_layer import (
     vec3f,
     world_box,
 )
+from stereocell.write.usd_maps import Kind, feed_image, feed_vertices
 from stereocell.write.vdb import GRID_NAME, write_vdb
 
 DEFAULT_LOD = 1
@@ -55,7 +62,7 @@ def _compose(tile: TileContent) -> Sdf.Layer:
     """Return the layer tile.usdc."""
     stage = new_stage(".usdc", tile.id)
     root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
-    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)
     for channel in tile.channels:
         branch = UsdGeom.Xform.Define(stage, root.GetPath().AppendChild(channel.channel_id))
         branch.GetPrim().SetDisplayName(from_identifier(channel.channel_id))
@@ -80,14 +87,27 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> No
     own = channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)]
     write_vdb(folder / f"{channel.channel_id}.vdb", own, tile.first_um, tile.spacing_um)
     write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
+    if channel.closed is not None:
+        shutil.copyfile(channel.closed, folder / f"{channel.channel_id}_closed.stl")
     for level, lod in enumerate(channel.lods):
-        if lod.normal_map is not None:
-            picture = Image.fromarray(lod.normal_map)
-            picture.save(folder / _normal_map_name(channel, level), format="PNG")
+        for kind, image in _images(channel, lod):
+            picture = Image.fromarray(image)
+            picture.save(folder / _map_name(channel, level, kind), format="PNG")
 
 
-def _normal_map_name(channel: ChannelContent, level: int) -> str:
-    return f"{channel.channel_id}_lod{level}_normal.png"
+def _images(channel: ChannelContent, lod: Lod) -> Iterator[tuple[Kind, NDArray[np.uint8]]]:
+    """Yield the images of a level that has UVs."""
+    if lod.normal_map is None:
+        return
+    yield "normal", lod.normal_map
+    if lod.baked is not None:
+        yield "occlusion", lod.baked.openness
+        if lod.baked.paint is not None and channel.paint is not None:
+            yield "color", to_srgb8(channel.paint.mix(lod.baked.paint))
+
+
+def _map_name(channel: ChannelContent, level: int, kind: Kind) -> str:
+    return f"{channel.channel_id}_lod{level}_{kind}.png"
 
 
 def _leaf(tile: TileContent, channel: ChannelContent, suffix: str = "") -> str:
@@ -184,33 +204,33 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
     if lod.mesh.tangents is not None:
         tangents = primvars.CreatePrimvar("tangents", _Types.Float4Array, vertex)
         tangents.Set(Vt.Vec4fArray.FromNumpy(_float32(lod.mesh.tangents)))
-    if lod.normal_map is not None:
-        look = branch.AppendChild(_leaf(tile, channel, "_look"))
-        _author_normal_map(root.GetStage(), look, _normal_map_name(channel, level), lod)
+    _author_maps(mesh, branch.AppendChild(_leaf(tile, channel, "_look")), channel, level)
 
 
-def _author_normal_map(stage: Usd.Stage, look: Sdf.Path, file: str, lod: Lod) -> None:
-    """Feed the normal map to the surface shader that the look inherits."""
-    if lod.mesh.uvs is None:
-        raise ValueError(f"{file}: a normal map on a mesh without UVs")
-    reader = UsdShade.Shader.Define(stage, look.AppendChild("st"))
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", _Types.String).Set("st")
-    st = reader.CreateOutput("result", _Types.Float2)
-
-    texture = UsdShade.Shader.Define(stage, look.AppendChild("normal_map"))
-    texture.CreateIdAttr("UsdUVTexture")
-    texture.CreateInput("file", _Types.Asset).Set(f"./{file}")
-    texture.CreateInput("sourceColorSpace", _Types.Token).Set("raw")
-    texture.CreateInput("wrapS", _Types.Token).Set("clamp")
-    texture.CreateInput("wrapT", _Types.Token).Set("clamp")
-    texture.CreateInput("scale", _Types.Float4).Set(Gf.Vec4f(2, 2, 2, 1))  # 0..1 -> -1..1
-    texture.CreateInput("bias", _Types.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
-    texture.CreateInput("st", _Types.Float2).ConnectToSource(st)
-    normal = texture.CreateOutput("rgb", _Types.Float3)
-
-    surface = UsdShade.Shader(stage.OverridePrim(look.AppendChild("surface")))
-    surface.CreateInput("normal", _Types.Normal3f).ConnectToSource(normal)
+def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, level: int) -> None:
+    """Feed what is baked to the surface shader that the look inherits."""
+    lod, stage = channel.lods[level], mesh.GetPrim().GetStage()
+    has_maps = lod.normal_map is not None
+    if has_maps and lod.mesh.uvs is None:
+        raise ValueError(f"{look}: maps of lod{level} on a mesh without UVs")
+    if has_maps:
+        feed_image(stage, look, "normal", f"./{_map_name(channel, level, 'normal')}")
+    baked = lod.baked
+    if baked is None:
+        return
+    if has_maps:
+        feed_image(stage, look, "occlusion", f"./{_map_name(channel, level, 'occlusion')}")
+    else:
+        feed_vertices(mesh, look, "occlusion", np.divide(baked.openness, 255, dtype=np.float32))
+    if baked.paint is None or channel.paint is None:
+        return
+    if has_maps:
+        feed_image(stage, look, "color", f"./{_map_name(channel, level, 'color')}")
+        # for those that draw without materials
+        average = channel.paint.mix(baked.paint).reshape(-1, 3).mean(axis=0)
+        UsdGeom.Gprim(mesh).CreateDisplayColorAttr([Gf.Vec3f(*map(float, average))])
+    else:
+        feed_vertices(mesh, look, "color", channel.paint.mix(baked.paint))
 
 
 def _author_representations(root: Usd.Prim, tile: TileContent) -> None:

@@ -7,7 +7,7 @@ MAX_TRIANGLES triangles (the coarsest one, if none is so small). The scale stand
 customLayerData: `stereocell:scale`, metres in the file for one metre of the specimen, and `size`.
 
 Volumes stay out: usdz allows no .vdb. Nothing is composed: one .usdc without variants or payloads,
-first in the archive, and beside it the normal maps of that level. The same stage gives the same
+first in the archive, and beside it the baked maps of that level. The same stage gives the same
 bytes.
 """
 
@@ -20,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Kind as Kinds
 
 from stereocell.write.atomic import replacing
 from stereocell.write.composed import (
@@ -35,6 +36,7 @@ from stereocell.write.composed import (
 from stereocell.write.composed_values import select_variant
 from stereocell.write.gltf import Material
 from stereocell.write.usd_layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
+from stereocell.write.usd_maps import Kind, feed_image, feed_vertices
 
 USDZ_NAME = "specimen.usdz"
 SIZE_M = 0.15
@@ -79,7 +81,7 @@ def _choose_level(stage: Usd.Stage) -> int | None:
     """Return the finest level within MAX_TRIANGLES, else the coarsest; None: there is no mesh."""
     counts: list[list[int]] = []
     for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
-        with loaded(stage, name) as tile:
+        with loaded(stage, name) as (tile, _):
             counts.append([])
             variants = tile.GetVariantSet("lod").GetVariantNames()
             for variant in sorted(variants, key=lambda v: int(v.removeprefix("lod"))) or [""]:
@@ -108,7 +110,7 @@ def _read_parts(stage: Usd.Stage, level: int) -> Iterator[_Part]:
     """Yield every drawn mesh with triangles at a level, or at its coarsest where it has fewer."""
     channels = [str(prim.GetName()) for prim in stage.GetPrimAtPath(CHANNELS).GetChildren()]
     for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
-        with loaded(stage, name) as tile:
+        with loaded(stage, name) as (tile, _):
             for channel in channels:
                 lods = [lod for lod in read_lods(tile, channel) if lod.level <= level]
                 if lods and len(lods[-1].mesh.triangles):
@@ -131,7 +133,7 @@ def _new_stage(name: str, longest_um: float, level: int) -> Usd.Stage:
     UsdGeom.SetStageUpAxis(stage, UP_AXIS)
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
     root.SetDisplayName(name)
-    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)
     return stage
 
 
@@ -150,10 +152,11 @@ def _define_parts(
         branch = UsdGeom.Xform.Define(stage, ROOT.AppendChild(part.tile)).GetPath()
         leaf = f"{part.channel}_{part.tile}"
         is_usual = usual.setdefault(part.channel, part.lod.material) == part.lod.material
-        is_own = not is_usual or part.lod.normal_map is not None
+        mesh_itself = part.lod.mesh.colors is not None or part.lod.mesh.openness is not None
+        is_own = not is_usual or part.lod.maps.any or mesh_itself
         look = looks.AppendChild(f"{leaf if is_own else part.channel}_look")
-        material = _define_look(stage, look, part)
         mesh = UsdGeom.Mesh.Define(stage, branch.AppendChild(leaf))
+        material = _define_look(stage, look, part, mesh)
         _fill_mesh(mesh, part.lod, (part.lod.mesh.positions - foot) * scale)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
@@ -175,7 +178,9 @@ def _fill_mesh(mesh: UsdGeom.Mesh, lod: ComposedLod, positions: NDArray[np.float
         st.Set(Vt.Vec2fArray.FromNumpy(uvs))
 
 
-def _define_look(stage: Usd.Stage, path: Sdf.Path, part: _Part) -> UsdShade.Material:
+def _define_look(
+    stage: Usd.Stage, path: Sdf.Path, part: _Part, mesh: UsdGeom.Mesh
+) -> UsdShade.Material:
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
     surface.CreateIdAttr("UsdPreviewSurface")
@@ -185,31 +190,28 @@ def _define_look(stage: Usd.Stage, path: Sdf.Path, part: _Part) -> UsdShade.Mate
     surface.CreateInput("roughness", _Types.Float).Set(given.roughness)
     surface.CreateOutput("surface", _Types.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface.GetOutput("surface"))
-    if part.lod.normal_map is not None:
-        _feed_normals(stage, path, surface, _texture_name(part))
+    for kind in _images(part):
+        feed_image(stage, path, kind, _texture_name(part, kind))
+    if part.lod.mesh.openness is not None:
+        feed_vertices(mesh, path, "occlusion", part.lod.mesh.openness)
+    if part.lod.mesh.colors is not None:
+        feed_vertices(mesh, path, "color", part.lod.mesh.colors)
     return material
 
 
-def _feed_normals(stage: Usd.Stage, look: Sdf.Path, surface: UsdShade.Shader, file: str) -> None:
-    reader = UsdShade.Shader.Define(stage, look.AppendChild("st"))
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", _Types.String).Set("st")
-    texture = UsdShade.Shader.Define(stage, look.AppendChild("normal_map"))
-    texture.CreateIdAttr("UsdUVTexture")
-    texture.CreateInput("file", _Types.Asset).Set(file)
-    texture.CreateInput("sourceColorSpace", _Types.Token).Set("raw")
-    texture.CreateInput("wrapS", _Types.Token).Set("clamp")
-    texture.CreateInput("wrapT", _Types.Token).Set("clamp")
-    texture.CreateInput("scale", _Types.Float4).Set(Gf.Vec4f(2, 2, 2, 1))  # 0..1 -> -1..1
-    texture.CreateInput("bias", _Types.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
-    st = reader.CreateOutput("result", _Types.Float2)
-    texture.CreateInput("st", _Types.Float2).ConnectToSource(st)
-    normal = texture.CreateOutput("rgb", _Types.Float3)
-    surface.CreateInput("normal", _Types.Normal3f).ConnectToSource(normal)
+def _images(part: _Part) -> dict[Kind, Path]:
+    """Return the images of a mesh."""
+    maps = part.lod.maps
+    named: dict[Kind, Path | None] = {
+        "normal": maps.normal,
+        "occlusion": maps.occlusion,
+        "color": maps.color,
+    }
+    return {kind: file for kind, file in named.items() if file is not None}
 
 
-def _texture_name(part: _Part) -> str:
-    return f"textures/{part.channel}_{part.tile}_normal.png"
+def _texture_name(part: _Part, kind: Kind) -> str:
+    return f"textures/{part.channel}_{part.tile}_{kind}.png"
 
 
 def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path) -> None:
@@ -217,8 +219,8 @@ def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
         files = [(_LAYER, Path(folder) / _LAYER)]
-        maps = [(_texture_name(part), part.lod.normal_map) for part in parts]
-        files += [(name, file) for name, file in maps if file is not None]
+        for part in parts:
+            files += [(_texture_name(part, kind), file) for kind, file in _images(part).items()]
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
             for name, file in files:
                 archive.writestr(_entry(name, archive.start_dir), file.read_bytes())

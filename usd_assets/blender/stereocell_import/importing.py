@@ -20,6 +20,7 @@ STATE = "stereocell"
 PRIM = "stereocell_prim"
 COLOR = "stereocell_color_"
 VOLUME = "stereocell_volume_"
+PAINTED = "stereocell:paintedBy"  # of a channel: which other is painted on its surface
 
 
 class _Hook(bpy.types.USDHook):
@@ -149,6 +150,8 @@ def _color_surfaces(stage, channel, look, group, materials):
         prim = stage.GetPrimAtPath(path)
         if prim.GetParent().GetName() != channel or material.node_tree is None:
             continue
+        if stage.GetPrimAtPath(f"{CHANNELS}/{channel}").GetAttribute(PAINTED).Get():
+            continue  # Blender itself feeds the image, or the mesh's own colours
         own = prim.GetAttribute("inputs:color").Get()
         if own is None or list(own) == look["color"]:
             color_surface(material, group)

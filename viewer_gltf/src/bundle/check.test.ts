@@ -9,7 +9,7 @@ const MANIFEST = {
   version: 1,
   generator: "stereocell 0.1.0",
   specimen: { name: "s", bounds_um: BOUNDS },
-  tiles: [{ id: "r0_c0", bounds_um: BOUNDS }],
+  tiles: [{ id: "r0_c0", representation: "mesh", bounds_um: BOUNDS }],
   channels: [
     {
       id: "A",
@@ -18,6 +18,7 @@ const MANIFEST = {
       window: [0, 10],
       iso_value: null,
       iso_normalized: null,
+      surface: "none",
       transfer_function: "default",
       transfer_functions: ["default"],
       lut: FILE,

@@ -3,8 +3,8 @@ import type { Manifest } from "../bundle/generated/bundle";
 import { distanceToBox, pickTile } from "./pick";
 
 const TILES: Manifest["tiles"] = [
-  { id: "left", bounds_um: { min: [0, -10, 0], max: [10, 0, 5] } },
-  { id: "right", bounds_um: { min: [10, -10, 0], max: [20, 0, 5] } },
+  { id: "left", representation: "mesh", bounds_um: { min: [0, -10, 0], max: [10, 0, 5] } },
+  { id: "right", representation: "mesh", bounds_um: { min: [10, -10, 0], max: [20, 0, 5] } },
 ];
 
 describe("the tile that is looked at", () => {

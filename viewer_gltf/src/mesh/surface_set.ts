@@ -2,7 +2,7 @@
 import { type Camera, Group } from "three";
 import type { Bundle } from "../bundle/load";
 import { surfaceColor } from "../color";
-import { isSurfaceShown, type ViewerState } from "../state";
+import { isSurfaceShown, type ViewerState, wantsSurface } from "../state";
 import type { SurfaceLoader } from "./loader";
 import { overview, type Progress } from "./progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
@@ -45,12 +45,11 @@ export class SurfaceSet {
   follow(state: ViewerState): void {
     this.state = state;
     for (const channel of state.channels) {
-      if (channel.shown && channel.hasSurface && !this.tilesets.has(channel.id)) {
-        this.add(channel.id);
-      }
+      const isWanted = wantsSurface(state, channel);
+      if (isWanted && channel.hasSurface && !this.tilesets.has(channel.id)) this.add(channel.id);
       const tileset = this.tilesets.get(channel.id);
       if (tileset === undefined) continue;
-      tileset.show(channel.shown);
+      tileset.show(isWanted);
       for (const surface of tileset.surfaces.values()) this.dress(channel.id, surface);
     }
   }

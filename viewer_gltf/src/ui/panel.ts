@@ -12,6 +12,11 @@ type Row = Readonly<{
   transferFunction: HTMLSelectElement;
 }>;
 
+function tagsOf({ hasSurface, prefersVolume }: ChannelState): string[] {
+  if (!hasSurface) return ["no surface"];
+  return prefersVolume ? ["no clear surface"] : [];
+}
+
 export class Panel {
   readonly root: HTMLElement;
   private readonly rows = new Map<string, Row>();
@@ -48,7 +53,14 @@ export class Panel {
         },
         { scope: value },
       );
-    this.scopes = { one: scope("one"), all: scope("all") };
+    this.scopes = { one: scope("one"), all: scope("all"), stage: scope("stage") };
+    const names: [VolumeScope, string][] = [
+      ["one", "One tile"],
+      ["all", "All tiles"],
+    ];
+    if (state.tiles.some((tile) => tile.representation !== "mesh")) {
+      names.push(["stage", "Staged"]);
+    }
     this.tile = element(
       "select",
       {
@@ -56,7 +68,7 @@ export class Panel {
         onchange: () => dispatch({ type: "choose-tile", tile: this.tile.value }),
       },
       { tileChoice: "" },
-      ...state.tiles.map((id) => element("option", { value: id, textContent: id })),
+      ...state.tiles.map(({ id }) => element("option", { value: id, textContent: id })),
     );
     this.volumeSection = element(
       "section",
@@ -67,8 +79,9 @@ export class Panel {
         "div",
         { className: "segmented" },
         {},
-        element("label", {}, {}, this.scopes.one, element("span", { textContent: "One tile" })),
-        element("label", {}, {}, this.scopes.all, element("span", { textContent: "All tiles" })),
+        ...names.map(([value, textContent]) =>
+          element("label", {}, {}, this.scopes[value], element("span", { textContent })),
+        ),
       ),
       element(
         "label",
@@ -192,9 +205,7 @@ export class Panel {
           element("span", { textContent: "Volume" }),
         ),
         transferFunction,
-        ...(channel.hasSurface
-          ? []
-          : [element("span", { className: "tag", textContent: "no surface" })]),
+        ...tagsOf(channel).map((text) => element("span", { className: "tag", textContent: text })),
       ),
     );
     return { root, shown, color, volume, transferFunction };

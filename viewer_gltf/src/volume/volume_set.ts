@@ -72,11 +72,14 @@ export class VolumeSet {
 
   follow(state: ViewerState): void {
     this.state = state;
-    const tiles = volumeTiles(state);
-    const channels = volumeChannels(state);
-    const budget = VOLUME_BUDGET_BYTES / Math.max(1, tiles.length * channels.length);
+    const channels = volumeChannels(state).map((channel) => ({
+      id: channel.id,
+      tiles: volumeTiles(state, channel),
+    }));
+    const count = channels.reduce((sum, { tiles }) => sum + tiles.length, 0);
+    const budget = VOLUME_BUDGET_BYTES / Math.max(1, count);
     const wanted = new Set<string>();
-    for (const { id } of channels) {
+    for (const { id, tiles } of channels) {
       const volumes = this.channels.get(id);
       if (volumes === undefined) void this.loadChannel(id);
       if (volumes === undefined || typeof volumes === "string") continue;
@@ -138,9 +141,9 @@ export class VolumeSet {
   }
 
   private updateMarches(state: ViewerState): void {
-    const tiles = volumeTiles(state);
+    const tiles = new Set(volumeChannels(state).flatMap((c) => volumeTiles(state, c)));
     for (const [tile, { march }] of this.marches) {
-      if (tiles.includes(tile)) continue;
+      if (tiles.has(tile)) continue;
       march.dispose();
       this.marches.delete(tile);
     }

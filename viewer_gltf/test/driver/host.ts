@@ -80,6 +80,14 @@ export class Host {
     return host;
   }
 
+  /** Forget the requests, and answer as at the start. */
+  reset(): void {
+    this.requests.length = 0;
+    this.overrides.clear();
+    this.hasRanges = true;
+    this.delay_ms = 0;
+  }
+
   stop(): Promise<void> {
     this.server.closeAllConnections();
     return new Promise((resolve) => {

@@ -60,7 +60,7 @@ export class ViewerPage {
     await this.settled();
   }
 
-  async chooseScope(scope: "one" | "all"): Promise<void> {
+  async chooseScope(scope: "one" | "all" | "stage"): Promise<void> {
     await this.page.locator(`[data-scope="${scope}"]`).setChecked(true, { force: true });
     await this.settled();
   }

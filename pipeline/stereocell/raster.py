@@ -1,0 +1,116 @@
+"""Which triangle lies where in a picture: texels of a map, pixels of a view. Plain numpy."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+_AT_ONCE = 1 << 20  # places looked at in one go: about 0.2 GB
+
+
+def find_texels(
+    uvs: NDArray[np.float32],
+    triangles: NDArray[np.uint32],
+    size: tuple[int, int],
+    beyond: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the texels in and near triangles: their numbers, triangle, barycentric weights (n, 3),
+    and how many texels outside of all triangles they lie: 0 inside.
+
+    `size` (height, width), row 0 at v = 1. A texel's place is its centre. One that lies in no
+    triangle goes with the nearest edge, `beyond` texels off at most; its weights are not clamped:
+    they say where it lies in the triangle's plane.
+    """
+    height, width = size
+    corners = uvs[triangles].astype(np.float64) * (width, height)
+    corners[..., 1] = height - corners[..., 1]
+    nearest = np.full(height * width, np.inf)
+    triangle_of = np.zeros(height * width, np.int64)
+    weights_of = np.zeros((height * width, 3))
+    for triangle, weights, texel, outside in _cover(corners, size, beyond):
+        better = np.flatnonzero(outside < nearest[texel])
+        # the best comes last: of equal places the last assignment stays
+        order = better[np.argsort(-outside[better], kind="stable")]
+        at = texel[order]
+        nearest[at] = outside[order]
+        triangle_of[at], weights_of[at] = triangle[order], weights[order]
+    found = np.flatnonzero(np.isfinite(nearest))
+    return found, triangle_of[found], weights_of[found], nearest[found]
+
+
+def find_pixels(
+    corners: NDArray[np.float64], depth: NDArray[np.float64], size: tuple[int, int]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return what is seen of triangles in a view: pixels, triangle, barycentric weights (n, 3).
+
+    `corners` (m, 3, 2) in pixels, x right, y down; `depth` (m, 3), larger is nearer.
+    """
+    height, width = size
+    nearest = np.full(height * width, -np.inf)
+    triangle_of = np.zeros(height * width, np.int64)
+    weights_of = np.zeros((height * width, 3))
+    for triangle, weights, pixel, _ in _cover(corners, size, 0.0):
+        here = (depth[triangle] * weights).sum(axis=1)
+        better = np.flatnonzero(here > nearest[pixel])
+        order = better[np.argsort(here[better], kind="stable")]
+        at = pixel[order]
+        nearest[at] = here[order]
+        triangle_of[at], weights_of[at] = triangle[order], weights[order]
+    found = np.flatnonzero(np.isfinite(nearest))
+    return found, triangle_of[found], weights_of[found]
+
+
+def _cover(
+    corners: NDArray[np.float64], size: tuple[int, int], beyond: float
+) -> Iterator[
+    tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
+]:
+    """Yield triangle, weights, place and how far outside (0: inside) of each place near triangles.
+
+    `corners` (m, 3, 2) in places, x right, y down.
+    """
+    height, width = size
+    last = np.array([width - 1, height - 1])
+    low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - beyond - 1e-6), 0, last + 1).astype(np.int64)
+    high = np.clip(np.floor(corners.max(axis=1) - 0.5 + beyond + 1e-6), -1, last).astype(np.int64)
+    extent = np.maximum(high - low + 1, 0)
+    count = extent.prod(axis=1)
+    ends = np.cumsum(count)
+    first = 0
+    while first < len(corners):
+        done = ends[first - 1] if first else 0
+        stop = max(int(np.searchsorted(ends, done + _AT_ONCE, side="right")), first + 1)
+        part = slice(first, stop)
+        triangle = np.repeat(np.arange(first, stop), count[part])
+        within = np.arange(len(triangle)) - np.repeat(ends[part] - count[part] - done, count[part])
+        across = np.maximum(extent[triangle, 0], 1)
+        column, row = low[triangle, 0] + within % across, low[triangle, 1] + within // across
+        place = np.stack([column + 0.5, row + 0.5], axis=1)
+        weights, outside = _weigh(corners[triangle], place)
+        near = outside <= beyond + 1e-9
+        yield triangle[near], weights[near], (row * width + column)[near], outside[near]
+        first = stop
+
+
+def _weigh(
+    corners: NDArray[np.float64], place: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return barycentric weights (n, 3), and how far each place lies beyond its triangle's edges.
+
+    Beyond a corner that is less than the distance to it. Flat triangles have nothing near.
+    """
+    a, b, c = corners.transpose(1, 0, 2)
+    whole = _cross(b - a, c - a)
+    sides = np.stack([np.linalg.norm(e, axis=1) for e in (c - b, a - c, b - a)], axis=1)
+    # slivers too: their weights are noise
+    is_flat = np.abs(whole) <= 1e-6 * sides.max(axis=1) ** 2 + 1e-12
+    whole = np.where(is_flat, 1.0, whole)
+    wb, wc = _cross(place - a, c - a) / whole, _cross(b - a, place - a) / whole
+    weights = np.stack([1 - wb - wc, wb, wc], axis=1)
+    heights = np.abs(whole)[:, None] / np.maximum(sides, 1e-12)
+    outside = np.maximum((-weights * heights).max(axis=1), 0.0)
+    return weights, np.where(is_flat, np.inf, outside)
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

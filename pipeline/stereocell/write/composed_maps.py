@@ -1,0 +1,63 @@
+"""What feeds a surface shader of a composed stage beside plain values: images, mesh vertices."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Usd, UsdShade
+
+from stereocell.errors import StageError
+from stereocell.write.composed_values import file_of
+from stereocell.write.usd_maps import FEEDS, Kind
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedMaps:
+    """Images of a surface: normals (raw), ambient occlusion (raw, red), colours (sRGB)."""
+
+    normal: Path | None = None
+    occlusion: Path | None = None
+    color: Path | None = None
+
+    @property
+    def any(self) -> bool:
+        return (self.normal or self.occlusion or self.color) is not None
+
+
+def maps_of(surface: UsdShade.Shader) -> ComposedMaps:
+    """Return the images that feed a surface. Raises StageError if one is missing."""
+    return ComposedMaps(*(_image(surface, kind) for kind in ("normal", "occlusion", "color")))
+
+
+def vertex_values_of(surface: UsdShade.Shader) -> set[str]:
+    """Return the primvars of the mesh that feed occlusion and colour: those that we author."""
+    kinds: tuple[Kind, ...] = ("occlusion", "color")
+    readers = {FEEDS[kind].primvar: (feeder(surface, kind), FEEDS[kind].reader) for kind in kinds}
+    return {
+        primvar
+        for primvar, (shader, reader) in readers.items()
+        if shader is not None
+        and shader.GetShaderId() == reader
+        and shader.GetPrim().GetAttribute("inputs:varname").Get() == primvar
+    }
+
+
+def feeder(surface: UsdShade.Shader, kind: Kind) -> UsdShade.Shader | None:
+    """Return the shader node whose output feeds an input of the surface; None: a plain value."""
+    given = surface.GetInput(FEEDS[kind].input)
+    attributes: list[Usd.Attribute] = given.GetValueProducingAttributes() if given else []
+    if not attributes or not UsdShade.Output.IsOutput(attributes[0]):
+        return None
+    return UsdShade.Shader(attributes[0].GetPrim())
+
+
+def _image(surface: UsdShade.Shader, kind: Kind) -> Path | None:
+    shader = feeder(surface, kind)
+    if shader is None:
+        return None
+    if shader.GetShaderId() == "UsdUVTexture":
+        return file_of(shader.GetPrim().GetAttribute("inputs:file"))
+    feed = FEEDS[kind]
+    if feed.reader and shader.GetShaderId() == feed.reader:
+        return None
+    wanted = f"a UsdUVTexture or a {feed.reader}" if feed.reader else "a UsdUVTexture"
+    raise StageError(f"{shader.GetPath()}: expected {wanted} to feed inputs:{feed.input}")

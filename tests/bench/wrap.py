@@ -1,0 +1,234 @@
+"""What `make bench-wrap` prints: closing on voxels against the first paper's chain on triangles.
+
+From the smoothed volume to a closed mesh, in one run and one process each, medians of ROUNDS; files
+that the other chain reads and writes are not counted. Both keep the same components (the paper's
+rule), bridge gaps of ALPHA and stay OFFSET away. The other chain is seedchain.cpp, beside this file
+(CGAL: components, hole filling, alpha wrap), built here.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell import read
+from stereocell.background import find_background
+from stereocell.certify import bodies, certify
+from stereocell.denoise import denoise
+from stereocell.distance import Nearest, measure_enclosure, measure_spread
+from stereocell.isovalue import IsoValueOptions, find_iso_value
+from stereocell.lod import compact
+from stereocell.mend import simplify_soundly
+from stereocell.mesh import Mesh
+from stereocell.repair import RepairOptions, repair
+from stereocell.samples.fluorescence import SPACING_UM, STAINS, record
+from stereocell.samples.tissue import grow_tissue
+from stereocell.solids import find_solids
+from stereocell.surface import extract_surface, signed_distance
+from stereocell.tiling import Box
+from stereocell.volume import Volume
+
+ROUNDS = 5
+SHAPE = (194, 512, 512)
+ALPHA = 7.2  # finest spacings: 1 um on the phantoms
+OFFSET, GRID = 0.1, 0.42  # of alpha
+SAMPLES = 20_000
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Input:
+    name: str
+    field: NDArray[np.float32]  # smoothed, above its background
+    spacing: Triple
+    iso: float
+    error: float  # of simplification, of alpha: so that faces are no more, and distances no larger
+
+
+def inputs() -> Iterator[Input]:
+    """Yield what is wrapped, one after another."""
+    size = tuple(n * h for n, h in zip(SHAPE, SPACING_UM, strict=True))
+    for name, stain, seed in (
+        ("nuclei, seed 0", 0, 0),
+        ("nuclei, seed 1", 0, 1),
+        ("nuclei, seed 2", 0, 2),
+        ("membranes", 1, 0),
+        ("vessels", 2, 0),
+    ):
+        tissue = grow_tissue((size[0], size[1], size[2]), seed, 1.0)
+        voxels = record(tissue, stain, Box((0, 0, 0), SHAPE), seed)
+        yield prepare(f"{name} ({STAINS[stain].name})", Volume(voxels, SPACING_UM), 0.1)
+    folder = os.environ.get("STEREOCELL_DATA", "")
+    file = Path(folder) / "brain_cells_2ch" / "brain_cells_2ch.ome.tif"
+    if not folder or not file.exists():
+        print("real stack                skipped: STEREOCELL_DATA names no folder that holds it")
+        return
+    source = read.open(str(file))
+    yield prepare(
+        "brain cells, real", source.read(0, Box((0, 0, 0), source.levels[0].shape), 0), 0.15
+    )
+
+
+def prepare(name: str, volume: Volume, error: float) -> Input:
+    """Return a volume as the pipeline smooths it, and the iso-value that it finds."""
+    whole = Box((0, 0, 0), volume.voxels.shape)
+    spacing = volume.spacing_um
+    field = denoise(volume, min(spacing))
+    under = find_background(volume.voxels.astype(np.float32), whole, spacing, 64 * min(spacing))
+    field -= under.at(whole)
+    return Input(
+        name, field, spacing, find_iso_value(field, spacing, IsoValueOptions()).value, error
+    )
+
+
+def wrap(given: Input) -> Mesh:
+    """Return the closed mesh of the solids that the rule keeps, as this project makes it."""
+    alpha = ALPHA * min(given.spacing)
+    step = [max(1, int(GRID * alpha / h + 0.01)) for h in given.spacing]
+    z, y, x = (h * k for h, k in zip(given.spacing, step, strict=True))
+    field = np.ascontiguousarray(given.field[:: step[0], :: step[1], :: step[2]])
+    spacing = (z, y, x)
+    distance = signed_distance(field, np.float32(given.iso), spacing, float(np.ptp(field)))
+    solids = find_solids(distance > 0, spacing, 26)
+    options = RepairOptions(
+        alpha_um=alpha,
+        offset_um=OFFSET * alpha,
+        min_diagonal_um=float(solids.diagonal_um.mean()) / 2,
+        min_faces=float(solids.faces().mean()) / 2,
+        max_fragment_um=np.inf,
+        max_cavity_um=np.inf,
+    )
+    whole = Box((0, 0, 0), distance.shape)
+    closed = repair(distance, spacing, options).distance
+    surface = extract_surface(closed, whole, whole, whole, spacing, (0.0, 0.0, 0.0))
+    return simplify_soundly(surface, (), given.error * alpha).mesh
+
+
+def iso_surface(given: Input) -> Mesh:
+    """Return the iso-surface of the smoothed volume as it is."""
+    whole = Box((0, 0, 0), given.field.shape)
+    height = given.field - np.float32(given.iso)
+    # values by the clip that extraction expects: only their signs and ratios matter
+    height *= np.float32(2 * max(given.spacing)) / np.abs(height).max()
+    return extract_surface(height, whole, whole, whole, given.spacing, (0.0, 0.0, 0.0))
+
+
+def chain(binary: Path, surface: Mesh, alpha: float, folder: Path) -> tuple[Mesh, float]:
+    """Return what the paper's chain makes of the iso-surface, and the seconds that it took."""
+    source, target = folder / "in.ply", folder / "out.ply"
+    write_ply(source, surface)
+    command = [binary, source, target, str(alpha), str(OFFSET * alpha)]
+    said = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return read_ply(target), said["s_components"] + said["s_holes"] + said["s_wrap"]
+
+
+def kept(mesh: Mesh) -> Mesh:
+    """Return the components that the paper's rule keeps."""
+    number = bodies(mesh.triangles, len(mesh.positions))
+    faces = np.bincount(number[mesh.triangles[:, 0]])
+    low, high = np.full((len(faces), 3), np.inf), np.full((len(faces), 3), -np.inf)
+    np.minimum.at(low, number, mesh.positions)
+    np.maximum.at(high, number, mesh.positions)
+    diagonal = np.linalg.norm(high - low, axis=1)
+    good = (faces >= faces.mean() / 2) & (diagonal >= diagonal.mean() / 2)
+    return compact(mesh, mesh.triangles[good[number[mesh.triangles[:, 0]]]])
+
+
+def write_ply(file: Path, mesh: Mesh) -> None:
+    """Write a binary PLY."""
+    faces = np.empty(len(mesh.triangles), [("n", "u1"), ("corners", "<i4", 3)])
+    faces["n"], faces["corners"] = 3, mesh.triangles
+    head = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.positions)}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    file.write_bytes(head.encode() + mesh.positions.astype("<f4").tobytes() + faces.tobytes())
+
+
+def read_ply(file: Path) -> Mesh:
+    """Read the binary PLY that CGAL writes: doubles, triangles alone."""
+    head, _, body = file.read_bytes().partition(b"end_header\n")
+    words = head.decode().split()
+    counts = [int(words[i + 2]) for i, word in enumerate(words) if word == "element"]
+    kind = "<f8" if "double" in words else "<f4"
+    size = counts[0] * 3 * np.dtype(kind).itemsize
+    positions = np.frombuffer(body[:size], kind).reshape(-1, 3).astype(np.float32)
+    faces = np.frombuffer(body[size:], [("n", "u1"), ("corners", "<i4", 3)])
+    return Mesh(positions, faces["corners"].astype(np.uint32), np.zeros_like(positions))
+
+
+def build_chain(folder: Path) -> Path | None:
+    """Return the compiled seedchain; None, and says why, where it can't be built."""
+    compiler = shutil.which("g++")
+    if compiler is None:
+        print("bench-wrap: skipped: no g++ to build seedchain.cpp with")
+        return None
+    binary, source = folder / "seedchain", Path(__file__).with_name("seedchain.cpp")
+    flags = ["-O3", "-DNDEBUG", "-march=native", "-std=c++17"]
+    made = subprocess.run(
+        [compiler, *flags, source, "-o", binary, "-lgmp", "-lmpfr"], capture_output=True, text=True
+    )
+    if made.returncode:
+        reason = next((line for line in made.stderr.splitlines() if "error" in line), "g++ failed")
+        print(f"bench-wrap: skipped: {reason.strip()} (CGAL 5.5 or newer: apt install libcgal-dev)")
+        return None
+    return binary
+
+
+def compare(given: Input, binary: Path, rounds: int, folder: Path) -> None:
+    """Print a row: seconds, faces, distances, of both."""
+    alpha = ALPHA * min(given.spacing)
+    seconds: dict[str, list[float]] = {"ours": [], "peer": []}
+    for _ in range(rounds):
+        start = time.perf_counter()
+        ours = wrap(given)
+        seconds["ours"].append(time.perf_counter() - start)
+        start = time.perf_counter()
+        surface = iso_surface(given)
+        extraction = time.perf_counter() - start
+        peer, spent = chain(binary, surface, alpha, folder)
+        seconds["peer"].append(extraction + spent)
+    a, b = (statistics.median(seconds[label]) for label in ("ours", "peer"))
+    reference, everything = Nearest(kept(surface), SAMPLES), Nearest(surface, SAMPLES)
+    print(f"{given.name}: {b / a:.1f} x as fast")
+    for label, mesh, took in (("ours", ours, a), ("paper's chain", peer, b)):
+        target = Nearest(mesh, SAMPLES)
+        there, back = measure_spread(reference, target), measure_spread(target, everything)
+        print(
+            f"  {label:<14} {took:7.2f} s  {len(mesh.triangles):8d} faces  iso to mesh "
+            f"{there.mean:.3f} / {there.p95:.3f} / {there.max:.2f}  mesh to iso "
+            f"{back.mean:.3f} / {back.p95:.3f} / {back.max:.2f} um (mean / p95 / max)  "
+            f"{measure_enclosure(reference, target):.0%} enclosed  "
+            f"{certify(mesh).total} faults",
+            flush=True,
+        )
+
+
+def main() -> None:
+    """Run all comparisons."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    rounds = parser.parse_args().rounds
+    with tempfile.TemporaryDirectory() as name:
+        binary = build_chain(Path(name))
+        if binary is None:
+            sys.exit(0)
+        for given in inputs():
+            compare(given, binary, rounds, Path(name))
+
+
+if __name__ == "__main__":
+    main()
