@@ -12,7 +12,7 @@ from stereocell import mend
 from stereocell.certify import border, certify
 from stereocell.clock import Clock
 from stereocell.config import Settings
-from stereocell.distance import Nearest, measure_spread
+from stereocell.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.levels import make_levels, sharpest_angle
 from stereocell.lod import simplify
 from stereocell.mend import Mended, simplify_soundly
@@ -93,6 +93,38 @@ def test_mesh_with_faults_of_its_own_keeps_the_body_that_has_them() -> None:
     assert done.fallbacks == 1
     np.testing.assert_array_equal(done.mesh.triangles, holed.triangles)
     assert kinds(certify(done.mesh)) == {"open"}
+
+
+def test_thin_process_is_cut_off_and_with_a_bound_it_stays() -> None:
+    """The simplifier's error, a mean over planes, hardly feels it."""
+    shape = (40, 40, 80)
+    z, y, x = (axis.astype(np.float64) for axis in np.indices(shape))
+    body = 9.5 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - 15.3) ** 2)
+    along = np.clip(x, 15, 70)
+    process = 1.3 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - along) ** 2)
+    whole = Box((0, 0, 0), shape)
+    distance = np.clip(np.maximum(body, process), -2, 2).astype(np.float32)
+    mesh = extract_surface(distance, whole, whole, whole, SPACING, ORIGIN)
+
+    def farthest(simplified: Mesh) -> float:
+        places = mesh.positions.astype(np.float64)
+        return float(Nearest(simplified, 10).distances(places).max())
+
+    assert farthest(simplify_soundly(mesh, (), 2.0).mesh) > 10
+    bound = simplify_soundly(mesh, (), 2.0, 3.0)
+    assert farthest(bound.mesh) <= 3.0
+    assert kinds(certify(bound.mesh)) == set()
+    assert bound.fallbacks == 0
+    assert len(bound.mesh.triangles) < 0.25 * len(mesh.triangles)
+
+
+def test_every_share_of_enclosure_is_measured() -> None:
+    ball_ = Nearest(ball(4.0, 60), 2000)
+    assert measure_enclosure(ball_, Nearest(ball(5.0, 60), 10)) == 1.0
+    assert measure_enclosure(ball_, Nearest(ball(3.0, 60), 10)) == 0.0
+    assert measure_enclosure(ball_, ball_) == 1.0
+    aside = Nearest(moved(ball(4.0, 60), (0.0, 0.0, 1.0)), 10)
+    assert measure_enclosure(ball_, aside) == pytest.approx(0.5 - 0.5 / 8, abs=0.02)
 
 
 def test_simplification_says_the_same_twice(sponge: Mesh) -> None:

@@ -390,7 +390,7 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
 
 
 def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:
-    one = LodFacts(10, 0.1, 100, 0.02, 0.05, 0.4, 0, 2, 9.0)
-    other = LodFacts(5, 0.3, 40, 0.01, 0.2, 0.3, 1, 0, 4.0)
+    one = LodFacts(10, 0.1, 100, 0.02, 0.05, 0.4, 0, 2, 9.0, 0.6)
+    other = LodFacts(5, 0.3, 40, 0.01, 0.2, 0.3, 1, 0, 4.0, 0.9)
     total = sum_up([_unit(lods=(one,)), _unit(lods=(other,))])
-    assert total.lods == (LodFacts(15, 0.3, 140, 0.02, 0.2, 0.4, 1, 2, 4.0),)
+    assert total.lods == (LodFacts(15, 0.3, 140, 0.02, 0.2, 0.4, 1, 2, 4.0, 0.6),)

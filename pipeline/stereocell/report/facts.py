@@ -35,6 +35,7 @@ class LodFacts:
     faults: int | None = None
     fallbacks: int | None = None
     angle_deg: float | None = None
+    enclosed: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,6 +196,7 @@ def _lod(record: dict[str, Any], size: int) -> LodFacts:
         faults=q and q["faults"],
         fallbacks=q and q["fallbacks"],
         angle_deg=q and q["angle_deg"],
+        enclosed=q and q["enclosed"],
     )
 
 
@@ -226,7 +228,7 @@ def sum_up(units: Iterable[UnitFacts]) -> Total:
 
 
 def _all_of(lods: Sequence[LodFacts]) -> LodFacts:
-    """Return sums of counts, the largest distances and the smallest angle."""
+    """Return sums of counts, the largest distances, the smallest angle and enclosure."""
 
     def known(name: str) -> list[Any]:
         return [value for lod in lods if (value := getattr(lod, name)) is not None]
@@ -241,6 +243,7 @@ def _all_of(lods: Sequence[LodFacts]) -> LodFacts:
         faults=sum(known("faults")) if known("faults") else None,
         fallbacks=sum(known("fallbacks")) if known("fallbacks") else None,
         angle_deg=min(known("angle_deg"), default=None),
+        enclosed=min(known("enclosed"), default=None),
     )
 
 

@@ -134,6 +134,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "iso_value": look.iso_value,
                 "confidence": look.iso_confidence,
                 "surface": look.surface,
+                "repair": entry["repair"],
                 "spread": (min(values), max(values)) if values else None,
                 "given": channel.name in facts.plan.settings.iso_values,
                 "histogram": charts.histogram(
