@@ -63,13 +63,14 @@ def blurred_ball(
 SEAM_TILE = 40  # voxels; the scene is two such tiles each way
 
 
-def seam_scene() -> NDArray[np.uint16]:
+def seam_scene(step: float = 1.8, height: float = 1000.0) -> NDArray[np.uint16]:
     """Return bodies on the planes where 2 x 2 x 2 tiles meet, uint16 (z, y, x) = (80, 80, 80).
 
     Each of the 12 faces between two tiles is crossed by a ball with a cavity (8 x 7 x 7 voxels) or
     by two slabs with a gap (5 voxels) between them, and by a fragment (7 x 3 x 3). All three reach
     past the plane by at most 2 voxels on one side and by 4 or 5 on the other. A ball lies where all
-    tiles meet. From tile to tile, bodies and background grow brighter along each axis, by 0.8.
+    tiles meet. From tile to tile, bodies and background grow `step` times as bright along each
+    axis; `height` is that of the bodies in the darkest.
     """
     size, plane = 2 * SEAM_TILE, SEAM_TILE
     grid = np.indices((size,) * 3)
@@ -92,9 +93,9 @@ def seam_scene() -> NDArray[np.uint16]:
                 solid |= slabs & ~((n >= plane) & (n <= plane + 4))
             solid |= past & (n >= plane - 1) & (abs(u - 31) <= 1) & (abs(v - 13) <= 1)
     center = sum((along - plane) ** 2 for along in grid) <= 6**2
-    counts = 200 + 1000 * ndimage.gaussian_filter((solid | center).astype(np.float64), 0.7)
+    counts = height * (0.2 + ndimage.gaussian_filter((solid | center).astype(np.float64), 0.7))
     for along in grid:
-        counts *= 1.4 + 0.4 * np.tanh((along - plane) / 2)
+        counts *= (step + 1) / 2 + (step - 1) / 2 * np.tanh((along - plane) / 2)
     counts += np.random.default_rng(0).normal(0.0, 10.0, counts.shape)
     return np.rint(counts).astype(np.uint16)
 

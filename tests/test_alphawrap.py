@@ -41,7 +41,7 @@ def test_missing_package_is_named_with_its_remedy(
     assert main(["plan", _source(tmp_path), "-o", str(out), "--wrap", "alpha-wrap"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "no_such_wrapper is missing" in line
-    assert line.endswith("expected pip install 'stereocell[alpha-wrap]'")
+    assert line.endswith("expected pip install 'pymeshlab>=2025.7'")
     assert not out.exists()
 
 

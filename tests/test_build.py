@@ -106,6 +106,17 @@ def test_same_input_gives_the_same_bytes(built: Path, tmp_path: Path) -> None:
     assert main(["build", str(source), "-o", str(tmp_path / "out"), *BUILD]) == 0
     for part in ("stage", "bundle"):
         assert _files(tmp_path / "out" / part) == _files(built / part)
+    units, again = (
+        {
+            name: digest
+            for name, digest in _files(out / "units").items()
+            if Path(name).name not in ("seconds.json", "plan.key")  # the latter names the source
+        }
+        for out in (built, tmp_path / "out")
+    )
+    assert {Path(name).name for name in units} >= {"unit.json", "lod0.npz", "volume.npy"}
+    assert again == units
+    assert list((built / "units").rglob("seconds.json"))
 
 
 @pytest.mark.slow

@@ -4,11 +4,16 @@ import subprocess
 import pytest
 
 import spheres
+from stereocell import config
 from stereocell.assets import find_asset
 from stereocell.check import check
 from stereocell.engine import Engine
 from stereocell.errors import OutputError
+from stereocell.plan import Channel, make_plan
+from stereocell.read import Level
+from stereocell.store import Store
 from stereocell.write.bundle import write_bundle
+from stereocell.write.stl import write_stl
 from stereocell.write.usd import TileExtent, write_stage, write_tile
 
 GLB = "channels/CD31/r0_c0/lod0.glb"
@@ -147,6 +152,45 @@ def test_cut_file_of_the_stage_is_found(out, path, capfd):
     assert "stage files" in failed(out)
     assert f"{path}: can't be read as" in lines(out)["stage files"].detail
     assert capfd.readouterr().err == ""
+
+
+@pytest.fixture
+def with_copies(out):
+    """A build whose plan asks for closed copies: of CD31, which has a surface."""
+    settings = config.load(None, None, {"surface": {"closed_tiles": True}})
+    channels = tuple(
+        Channel(k, name, (1, 0, 0)) for k, name in enumerate(("CD31", "Hoechst 33342"))
+    )
+    level = Level((8, 8, 8), (1.0, 1.0, 1.0))
+    plan = make_plan(
+        "in", "in", "ab" * 32, (level,), (0.0, 0.0, 0.0), channels, (0, "asked for"), settings
+    )
+    Store(out).save_plan(plan)
+    copy = out / "stage" / "tiles" / "r0_c0" / "CD31_closed.stl"
+    write_stl(copy, spheres.tile(0).channels[0].lods[0].mesh)
+    return copy
+
+
+def test_closed_copies_are_counted(out, with_copies):
+    line = lines(out)["stage files"]
+    assert line.ok, line.detail
+    assert line.detail.endswith("and 1 closed .stl are whole")
+
+
+def test_cut_closed_copy_is_found(out, with_copies):
+    data = with_copies.read_bytes()
+    with_copies.write_bytes(data[:-50])
+    detail = lines(out)["stage files"].detail
+    assert f"CD31_closed.stl: can't be read as STL: {len(data) - 50} bytes, expected" in detail
+    with_copies.write_bytes(data[:60])
+    assert "its header was cut short" in lines(out)["stage files"].detail
+
+
+def test_lost_closed_copy_is_found(out, with_copies):
+    with_copies.unlink()
+    detail = lines(out)["stage files"].detail
+    assert detail.startswith(f"{with_copies}: missing, expected as surface.closed_tiles is on")
+    assert "Hoechst" not in detail
 
 
 def test_stage_with_a_lost_file_is_found(out):

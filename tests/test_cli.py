@@ -44,6 +44,11 @@ def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
             ["--iso-value", "7=500"],
             "--iso-value names channel '7', expected one of F body,",
         ),
+        (["--paint", "0=1", "--paint", "0=2"], "--paint names channel '0' twice, expected once"),
+        (
+            ["--iso-value", "F body=1", "--iso-value", "F body=2"],
+            "--iso-value names channel 'F body' twice, expected once",
+        ),
         (["--preset", "mri", "--spacing-um", ".2,.01,.01"], "don't suit voxels of 0.2 x 0.01 x"),
     ],
 )

@@ -9,10 +9,14 @@ import pytest
 import pyvista as pv
 from numpy.typing import NDArray
 
-from stereocell.certify import certify
-from stereocell.closed import close_tile
+from stereocell import closed
+from stereocell.certify import Plane, certify
+from stereocell.closed import Closed, close_tile
+from stereocell.mend import Mended
 from stereocell.mesh import Mesh
 from stereocell.tiling import Box, cut
+from stereocell.unit import Unit
+from stereocell.unit_files import find_closed, load_record, save_unit
 from stereocell.write.stl import write_stl
 
 SPACING = (0.5, 0.25, 0.25)
@@ -31,17 +35,24 @@ def distance() -> NDArray[np.float32]:
     return np.clip(-np.minimum(*away), -1, 1).astype(np.float32)
 
 
+def close(field: NDArray[np.float32], lattice: Box) -> Closed:
+    copy = close_tile(field, REGION, lattice, SPACING, (0, 0, 0), ERROR)
+    assert copy is not None
+    return copy
+
+
 def as_manifold(mesh: Mesh) -> manifold3d.Manifold:
     return manifold3d.Manifold(manifold3d.Mesh(mesh.positions, mesh.triangles))
 
 
 def test_copies_are_manifolds_and_their_union_is_the_whole(distance: NDArray[np.float32]) -> None:
     tiles = cut(REGION, (30, 30, 30))
-    whole = as_manifold(close_tile(distance, REGION, REGION, SPACING, (0, 0, 0), ERROR))
+    whole = as_manifold(close(distance, REGION).mesh)
     copies = []
     for tile in tiles:
-        mesh = close_tile(distance, REGION, tile.lattice(REGION), SPACING, (0, 0, 0), ERROR)
-        assert not certify(mesh).total
+        copy = close(distance, tile.lattice(REGION))
+        mesh = copy.mesh
+        assert (copy.faults, copy.fallbacks) == (certify(mesh).total, 0) == (0, 0)
         copies.append(as_manifold(mesh))
         assert copies[-1].status() == manifold3d.Error.NoError
         # no further than a voxel past the cuts
@@ -59,7 +70,7 @@ def test_copies_are_manifolds_and_their_union_is_the_whole(distance: NDArray[np.
 
 
 def test_stl_is_read_back_by_vtk(distance: NDArray[np.float32], tmp_path: Path) -> None:
-    mesh = close_tile(distance, REGION, REGION, SPACING, (0, 0, 0), ERROR)
+    mesh = close(distance, REGION).mesh
     write_stl(tmp_path / "a.stl", mesh)
     read = pv.read(tmp_path / "a.stl")  # merges equal corners
     assert read.n_cells == len(mesh.triangles)
@@ -70,5 +81,33 @@ def test_stl_is_read_back_by_vtk(distance: NDArray[np.float32], tmp_path: Path) 
     assert as_manifold(again).volume() > 0  # wound outward
 
 
-def test_nothing_inside_is_an_empty_mesh(distance: NDArray[np.float32]) -> None:
-    assert not len(close_tile(-abs(distance) - 1, REGION, REGION, SPACING, (0, 0, 0), 1).triangles)
+def test_nothing_inside_is_no_copy(distance: NDArray[np.float32]) -> None:
+    nothing = -abs(distance) - 1
+    assert close_tile(nothing, REGION, REGION, SPACING, (0, 0, 0), 1) is None
+
+
+def test_a_copy_that_simplification_spoilt_stays_unsimplified(
+    distance: NDArray[np.float32], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Mended:
+        return Mended(Mesh(mesh.positions, mesh.triangles[1:], mesh.normals), 0, 0)
+
+    simple = close(distance, REGION)
+    monkeypatch.setattr(closed, "simplify_soundly", spoil)
+    copy = close(distance, REGION)
+    assert len(copy.mesh.triangles) > len(simple.mesh.triangles)
+    assert copy.faults == certify(copy.mesh).total == 0
+    assert copy.fallbacks == 2  # both balls
+
+
+def test_a_unit_s_record_tells_of_its_copy(tmp_path: Path, distance: NDArray[np.float32]) -> None:
+    copy = close(distance, REGION)
+    volume = np.zeros((3, 3, 3), np.uint8)
+    save_unit(tmp_path / "with", Unit((), copy, volume, "", 0, 0, {}))
+    count = len(copy.mesh.triangles)
+    record = load_record(tmp_path / "with")
+    assert record["closed"] == {"triangles": count, "faults": 0, "fallbacks": 0}
+    assert record["files"]["closed.stl"] == 84 + 50 * count
+    save_unit(tmp_path / "without", Unit((), None, volume, "", 0, 0, {}))
+    assert load_record(tmp_path / "without")["closed"] is None
+    assert find_closed(tmp_path / "without") is None

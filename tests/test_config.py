@@ -80,6 +80,12 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[plan]\ntime = -1\n", "plan.time is -1, expected 0 or more"),
         ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um: found 1,0,1, expected z,y,x in um"),
         ("[plan]\nspacing_um = [1, 2]\n", "spacing_um: found 1,2, expected z,y,x in um"),
+        ("[surface]\nclosed_tiles = 1\n", "closed_tiles is 1, expected true or false"),
+        ("[surface]\nwrap = 3\n", "surface.wrap is 3, expected text"),
+        ('[surface]\ngrid_um = "auto"\n', "surface.grid_um is 'auto', expected a number"),
+        ("[surface]\nalpha_um = true\n", "alpha_um is True, expected a number or 'auto'"),
+        ("[unwrap]\npadding = 1.5\n", "unwrap.padding is 1.5, expected a whole number"),
+        ("[unwrap]\npadding = 200\n", "unwrap.padding is 200, expected 3 to 24"),
         ("plan = 3\n", "plan is 3, expected a table"),
         ("[plan\n", "not TOML"),
     ],
@@ -90,6 +96,7 @@ def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: s
     with pytest.raises(UsageError) as raised:
         config.load(None, file, {})
     assert message in str(raised.value)
+    assert ("'auto'" in str(raised.value)) == ("'auto'" in message)
     assert "\n" not in str(raised.value)
 
 

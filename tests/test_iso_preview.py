@@ -9,11 +9,15 @@ from PIL import Image
 import phantoms
 from stereocell.cli import main
 from stereocell.config import load
-from stereocell.iso_preview import COLORS, preview
+from stereocell.iso_preview import COLORS, Candidate, preview, table
 from stereocell.isovalue import CRITERIA
 
 SPACING = (1.0, 1.0, 1.0)
 CONSTANT = 100
+LOW, HEIGHT = 100, 1000  # of the ball
+RADIUS_UM, BLUR_UM = 8.0, np.sqrt(2)  # its own 1 um, and as much by the smoothing
+SLICES_AT = (14 + 14 + 21, 14)  # in the picture: margin, title, margin
+SCALE = 900 / 32  # pixels a um, in slices
 
 
 @pytest.fixture(scope="module")
@@ -39,27 +43,60 @@ def test_the_table_names_every_criterion_with_levels_and_shares(
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert rows[0][0] == "candidate"
     assert rows[1][:2] == ["edges", "*"]
-    assert {row[0] for row in rows[1:-1]} == set(CRITERIA)
+    assert {row[0] for row in rows[1:-2]} == set(CRITERIA)
+    assert " ".join(rows[-2]) == "* found; a build may draw it towards its neighbours'"
     assert rows[-1] == ["wrote", str(out)]
     _, _, above, raw, inside, confidence = rows[1]
     ball = 4 / 3 * np.pi * 8**3 / (24 * 32 * 32)
     # a ball blurred by s has .5 - s / (R sqrt(2 pi)) of its height at R; the smoothing adds 1 um
-    height = 0.5 - np.sqrt(2) / (8 * np.sqrt(2 * np.pi))
+    height = 0.5 - BLUR_UM / (RADIUS_UM * np.sqrt(2 * np.pi))
     assert float(above) == pytest.approx(1000 * height, rel=0.1)
     assert float(raw) - float(above) == pytest.approx(100, abs=10)
     assert float(inside.rstrip("%")) / 100 == pytest.approx(ball, rel=0.1)
     assert float(confidence) > 0.9
 
 
-def test_the_picture_has_every_candidate_s_colour_and_nothing_else_is_written(
+def test_the_legend_has_every_candidate_s_colour_and_nothing_else_is_written(
     source: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "ball.png"
     flags = ("--iso-value", "0=600", "--iso-criterion", "pekar-mean")
     assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(out), *flags) == 0
     assert list(tmp_path.iterdir()) == [out]
-    pixels = {tuple(p) for p in np.asarray(Image.open(out)).reshape(-1, 3).tolist()}
-    assert set(COLORS.values()) <= pixels
+    legend = np.asarray(Image.open(out))[SLICES_AT[0] + round((32 + 24) * SCALE) :]
+    assert set(COLORS.values()) <= {tuple(p) for p in legend.reshape(-1, 3).tolist()}
+
+
+def _radius_um(candidate: Candidate) -> float:
+    """Return where the blurred ball has the candidate's level."""
+    along = phantoms.blurred_ball((1, 1, 1500), (1, 1, 0.01), (0, 0, 0), RADIUS_UM, float(BLUR_UM))
+    return 0.01 * int(np.abs(along[0, 0] - (candidate.raw - LOW) / HEIGHT).argmin())
+
+
+def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
+    source: Path, tmp_path: Path
+) -> None:
+    """Each candidate's line is a circle, whole, in its own colour, and at its own radius."""
+    flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 800.0}}
+    settings = load(None, None, flags)
+    candidates, path = preview(str(source), "0", "r0_c0", tmp_path / "a.png", settings)
+    top, left = SLICES_AT
+    xy = np.asarray(Image.open(path))[top : top + 900, left : left + 900]
+    outlining = [c for c in candidates if 0.01 < c.inside < 0.5]  # others hardly cut this plane
+    assert {"given", "edges"} < {c.name for c in outlining}
+    radii = {c.name: _radius_um(c) for c in outlining}
+    assert np.ptp(list(radii.values())) > 1
+    for name, radius in radii.items():
+        rows, columns = np.nonzero((xy == COLORS[name]).all(axis=-1))
+        down, right = (pixels + 0.5 - 16.5 * SCALE for pixels in (rows, columns))
+        away = np.hypot(down, right)
+        # words, the scale bar and the brightest voxels are white too
+        beside = (away > 6 * SCALE) & (away < 11 * SCALE)
+        assert beside.any(), name
+        assert np.abs(away[beside] - radius * SCALE).max() < 8, name
+        assert away[beside].mean() == pytest.approx(radius * SCALE, abs=4), name
+        sectors = np.floor(np.arctan2(down, right)[beside] / (2 * np.pi) * 36)
+        assert len(np.unique(sectors)) == 36, name
 
 
 def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
@@ -70,6 +107,7 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     chosen = next(c for c in candidates if c.is_chosen)
     assert (chosen.name, chosen.level, chosen.raw, chosen.confidence) == ("given", 600, 600, None)
     assert [c.is_chosen for c in candidates].count(True) == 1
+    assert table(candidates)[-1] == "* given; a build takes it"
 
 
 def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:

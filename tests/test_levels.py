@@ -8,7 +8,7 @@ import pytest
 import pyvista as pv
 from scipy import ndimage
 
-from stereocell import mend
+from stereocell import levels, mend
 from stereocell.certify import border, certify
 from stereocell.clock import Clock
 from stereocell.config import Settings
@@ -43,6 +43,17 @@ def _chain(mesh: Mesh) -> Iterator[Mended]:
         mended = simplify_soundly(mesh, PLANES, error)
         yield mended
         mesh = mended.mesh
+
+
+def _settings(errors: tuple[float, ...]) -> Settings:
+    """Return settings for levels of these errors, none with maps."""
+    settings = Settings()
+    return replace(
+        settings,
+        surface=settings.surface.resolved(SPACING),
+        lod=replace(settings.lod, errors=errors),
+        unwrap=replace(settings.unwrap, first_lod=9),
+    )
 
 
 def _rim(mesh: Mesh) -> set[bytes]:
@@ -95,8 +106,9 @@ def test_mesh_with_faults_of_its_own_keeps_the_body_that_has_them() -> None:
     assert kinds(certify(done.mesh)) == {"open"}
 
 
-def test_thin_process_is_cut_off_and_with_a_bound_it_stays() -> None:
-    """The simplifier's error, a mean over planes, hardly feels it."""
+@pytest.fixture(scope="module")
+def with_process() -> Mesh:
+    """A body of radius 9.5 at x = 15 with a process of radius 1.3 that ends at x = 71."""
     shape = (40, 40, 80)
     z, y, x = (axis.astype(np.float64) for axis in np.indices(shape))
     body = 9.5 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - 15.3) ** 2)
@@ -104,18 +116,46 @@ def test_thin_process_is_cut_off_and_with_a_bound_it_stays() -> None:
     process = 1.3 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - along) ** 2)
     whole = Box((0, 0, 0), shape)
     distance = np.clip(np.maximum(body, process), -2, 2).astype(np.float32)
-    mesh = extract_surface(distance, whole, whole, whole, SPACING, ORIGIN)
+    return extract_surface(distance, whole, whole, whole, SPACING, ORIGIN)
 
-    def farthest(simplified: Mesh) -> float:
-        places = mesh.positions.astype(np.float64)
-        return float(Nearest(simplified, 10).distances(places).max())
 
-    assert farthest(simplify_soundly(mesh, (), 2.0).mesh) > 10
-    bound = simplify_soundly(mesh, (), 2.0, 3.0)
-    assert farthest(bound.mesh) <= 3.0
+def _farthest(mesh: Mesh, simplified: Mesh) -> float:
+    """Return how far the vertex of `mesh` lies that is farthest from the other."""
+    return float(Nearest(simplified, 10).distances(mesh.positions.astype(np.float64)).max())
+
+
+def test_thin_process_is_cut_off_and_with_a_bound_it_stays(with_process: Mesh) -> None:
+    """The simplifier's error, a mean over planes, hardly feels it."""
+    assert _farthest(with_process, simplify_soundly(with_process, (), 2.0).mesh) > 10
+    bound = simplify_soundly(with_process, (), 2.0, 3.0)
+    assert _farthest(with_process, bound.mesh) <= 3.0
     assert kinds(certify(bound.mesh)) == set()
     assert bound.fallbacks == 0
-    assert len(bound.mesh.triangles) < 0.25 * len(mesh.triangles)
+    assert len(bound.mesh.triangles) < 0.25 * len(with_process.triangles)
+
+
+def test_no_level_strays_from_the_one_before_and_the_process_stays(with_process: Mesh) -> None:
+    errors = (0.1, 0.5, 2.0)
+    lods = make_levels(with_process, (), SPACING, _settings(errors), Clock())
+    tip = float(with_process.positions[:, 0].max())
+    for before, lod, error in zip(lods, lods[1:], errors[1:], strict=False):
+        assert _farthest(before.mesh, lod.mesh) <= levels.STRAY * error
+        assert lod.mesh.positions[:, 0].max() > tip - 8
+        assert lod.quality is not None
+        assert lod.quality.away.max < 8
+
+
+@pytest.mark.parametrize(("outward_um", "low", "high"), [(0.4, 0.95, 1.0), (-0.4, 0.0, 0.05)])
+def test_level_outside_the_surface_encloses_it_and_one_inside_does_not(
+    monkeypatch: pytest.MonkeyPatch, outward_um: float, low: float, high: float
+) -> None:
+    fine = ball(4.0, 60)
+    scaled = replace(fine, positions=fine.positions * np.float32(1 + outward_um / 4))
+    monkeypatch.setattr(levels, "simplify_soundly", lambda *_: Mended(scaled, 0, 0))
+    *_, last = make_levels(fine, (), SPACING, _settings((0.1, 0.5)), Clock())
+    assert last.quality is not None
+    assert low <= last.quality.enclosed <= high
+    assert last.quality.away.mean == pytest.approx(abs(outward_um), abs=0.02)
 
 
 def test_every_share_of_enclosure_is_measured() -> None:

@@ -128,11 +128,55 @@ def test_lengths_for_other_voxels_are_wrong_usage(surface: dict[str, object]) ->
     assert "\n" not in message
 
 
+@pytest.mark.parametrize(
+    ("unwrap", "message"),
+    [
+        ({"texel_um": 1e-6}, "texel_um is 1e-06, expected at least 0.014 (the finest voxel"),
+        ({"texel_um": 0.0}, "texel_um is 0, expected at least 0.014"),
+        ({"occlusion_um": 1e9}, "occlusion_um is 1e+09, expected at most 17.92 (64 times the"),
+        ({"paint_um": 18.0}, "paint_um is 18, expected at most 17.92"),
+    ],
+)
+def test_lengths_of_maps_that_would_exhaust_the_machine_are_wrong_usage(
+    unwrap: dict[str, object], message: str
+) -> None:
+    with pytest.raises(UsageError) as raised:
+        _plan(unwrap=unwrap)
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_lengths_of_maps_at_their_limits_make_a_plan() -> None:
+    at_limit = {"texel_um": 0.014, "occlusion_um": 17.92, "paint_um": 17.92, "padding": 24}
+    assert _plan(unwrap=at_limit).settings.unwrap.texel_um == 0.014
+
+
+@pytest.mark.parametrize(
+    ("grid_um", "message"),
+    [
+        (1e9, "grid_um is 1e+09, which leaves 1 of the 64 planes along z of a tile, 0.28 um apart"),
+        (7.0, "leaves 3 of the 64 planes along z of a tile"),
+        (-1.0, "surface.grid_um is -1, expected a length in um, or 0: all planes"),
+    ],
+)
+def test_planes_too_far_apart_for_a_tile_are_wrong_usage(grid_um: float, message: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        _plan(surface={"grid_um": grid_um})
+    assert message in str(raised.value)
+    assert "auto" not in str(raised.value)
+
+
+def test_a_grid_with_four_planes_in_a_tile_makes_a_plan() -> None:
+    assert _plan(surface={"grid_um": 16 * 0.28}).step == (16, 32, 32)
+    thin = {"region": "0:3,:,:"}
+    assert _plan(thin, surface={"grid_um": 0.28}).step == (1, 2, 2)  # all of the few there are
+
+
 def test_a_long_reach_is_fine_where_little_is_read() -> None:
     surface: dict[str, object] = {"min_diagonal_um": 10000.0}
-    assert _plan({"region": "0:16,0:48,0:36"}, surface=surface).halo == (19, 51, 39)
+    assert _plan({"region": "0:16,0:48,0:36"}, surface=surface).halo == (20, 52, 40)
     endless: dict[str, object] = {"min_diagonal_um": 1e308, "max_cavity_um": 1e308}
-    assert _plan({"region": "0:16,0:48,0:36"}, surface=endless).halo == (19, 51, 39)
+    assert _plan({"region": "0:16,0:48,0:36"}, surface=endless).halo == (20, 52, 40)
     wide = (Level((64, 3000, 3000), (0.28, 0.14, 0.14)),)
     with pytest.raises(UsageError, match="for a tile of 64 x 512 x 512"):
         _plan(levels=wide, surface=surface)

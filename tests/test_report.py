@@ -2,6 +2,7 @@
 
 import io
 import re
+import shutil
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -33,6 +34,7 @@ from stereocell.report.slices import (
 )
 from stereocell.store import Store
 from stereocell.tiling import Box, Tile
+from stereocell.unit_files import is_whole
 from stereocell.volume import zyx_to_xyz
 
 NASTY = 'F <b> & "body"'
@@ -387,6 +389,34 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
         "1,200 fragments dropped": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
         "3 cavities filled": ("CD31: 3 in 1 tile, most in r0_c0 (3)",),
     }
+
+
+def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
+    angles = (13.0, 11.0, 9.5)
+    units = tuple(
+        _unit(
+            tile=Tile(f"r0_c{i}", Box((0, 0, 0), (2, 2, 2))),
+            lods=(LodFacts(10, 0.1, 1000, angle_deg=angle), LodFacts(5, 0.3, 40, angle_deg=1.0)),
+        )
+        for i, angle in enumerate(angles)
+    )
+    (remark,) = find_remarks(replace(gather(Store(built)), units=units))
+    assert remark.is_note
+    assert remark.title.startswith("1 channel with thin triangles in lod0")
+    assert remark.lines == ("CD31: 9.5° in r0_c2, 2 tiles below",)
+    assert not find_remarks(replace(gather(Store(built)), units=units[:1]))
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_report_goes_without_seconds_that_were_lost(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    for file in (out / "units").rglob("seconds.json"):
+        file.unlink()
+    _write(out)
+    facts = gather(Store(out))
+    assert facts.steps == ()
+    assert all(is_whole(unit.directory) for unit in facts.units)
 
 
 def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:

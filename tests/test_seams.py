@@ -2,7 +2,8 @@
 
 The scene (`phantoms.seam_scene`) has on every face between two tiles what could make them disagree:
 a change of brightness, and fragments, gaps and cavities of which a window without a halo would see
-only a part.
+only a part. Once more with four times the brightness from tile to tile: there the iso-value at a
+face lies far from what was found on either side.
 """
 
 from dataclasses import dataclass
@@ -78,6 +79,11 @@ def built(tmp_path_factory: pytest.TempPathFactory, scene: NDArray[np.uint16]) -
     return _build(tmp_path_factory.mktemp("seams"), scene, SETTINGS)
 
 
+@pytest.fixture(scope="module")
+def stepped(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    return _build(tmp_path_factory.mktemp("steps"), phantoms.seam_scene(4.0, 800.0), SETTINGS)
+
+
 def _build(folder: Path, scene: NDArray[np.uint16], settings: str) -> Built:
     source, out = folder / "scene.ome.tif", folder / "out"
     phantoms.write_ome_tiff(source, scene, spacing=(1.0, 1.0, 1.0), names=["cells"])
@@ -107,6 +113,28 @@ def _seams(plan: Plan) -> list[Seam]:
             first, second = sorted((a, b), key=lambda tile: tile.box.start)
             seams.append(Seam(first, second, apart[0], second.box.start[apart[0]]))
     return seams
+
+
+def _chessboard(built: Built, even: int, odd: int) -> Mesh:
+    """Return one mesh of all tiles, in turn at one level and at the other."""
+    meshes = [
+        built.lods[tile.id][(even, odd)[sum(start // TILE for start in tile.box.start) % 2]].mesh
+        for tile in built.plan.tiles
+    ]
+    whole = _welded(meshes)
+    assert len(whole.triangles) == sum(len(mesh.triangles) for mesh in meshes)
+    return whole
+
+
+def _assert_same_rims(built: Built, level: int) -> None:
+    for seam in _seams(built.plan):
+        ours, theirs = (built.lods[tile.id] for tile in (seam.first, seam.second))
+        rim = seam.rim(ours[level], built.plan)
+        # a face is crossed by a body of 18 voxels or more
+        assert len(rim) > 40, seam
+        assert set(rim) == set(seam.rim(theirs[level], built.plan)), seam
+        # and at any other level: viewers show neighbours at different ones
+        assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
 
 
 def _welded(meshes: list[Mesh]) -> Mesh:
@@ -140,14 +168,7 @@ def test_scene_could_tell_neighbours_apart(built: Built) -> None:
 
 @pytest.mark.parametrize("level", range(LODS))
 def test_neighbours_have_the_same_vertices_on_their_common_plane(built: Built, level: int) -> None:
-    for seam in _seams(built.plan):
-        ours, theirs = (built.lods[tile.id] for tile in (seam.first, seam.second))
-        rim = seam.rim(ours[level], built.plan)
-        # a face is crossed by a body of 18 voxels or more
-        assert len(rim) > 40, seam
-        assert set(rim) == set(seam.rim(theirs[level], built.plan)), seam
-        # and at any other level: viewers show neighbours at different ones
-        assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
+    _assert_same_rims(built, level)
 
 
 @pytest.mark.parametrize(("even", "odd"), list(product(range(LODS), repeat=2)))
@@ -156,12 +177,30 @@ def test_tiles_make_one_sound_surface_at_any_two_levels(built: Built, even: int,
 
     Nothing is left open, and nothing crosses or doubles: no crack, and no wall in the planes.
     """
-    meshes = [
-        built.lods[tile.id][(even, odd)[sum(start // TILE for start in tile.box.start) % 2]].mesh
-        for tile in built.plan.tiles
-    ]
-    whole = _welded(meshes)
-    assert len(whole.triangles) == sum(len(mesh.triangles) for mesh in meshes)
+    whole = _chessboard(built, even, odd)
+    assert not certify(whole).total, certify(whole).counts
+
+
+@pytest.mark.slow
+def test_scene_with_steps_has_iso_values_far_apart(stepped: Built) -> None:
+    """Else the two tests below would show no more than those above."""
+    for seam in _seams(stepped.plan):
+        dim, bright = sorted(stepped.iso_values[tile.id] for tile in (seam.first, seam.second))
+        assert bright > 3 * dim
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", [0, LODS - 1])
+def test_neighbours_of_other_brightness_have_the_same_vertices(stepped: Built, level: int) -> None:
+    _assert_same_rims(stepped, level)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("even", "odd"), [(0, 0), (0, LODS - 1)])
+def test_tiles_of_other_brightness_make_one_sound_surface(
+    stepped: Built, even: int, odd: int
+) -> None:
+    whole = _chessboard(stepped, even, odd)
     assert not certify(whole).total, certify(whole).counts
 
 
@@ -179,10 +218,11 @@ def test_tiles_make_one_sound_surface_on_thinned_planes(
     assert not certify(whole).total, certify(whole).counts
 
 
-def test_neighbours_have_the_same_normals_on_their_common_plane(built: Built) -> None:
+@pytest.mark.parametrize("level", range(LODS))
+def test_neighbours_have_the_same_normals_on_their_common_plane(built: Built, level: int) -> None:
     for seam in _seams(built.plan):
         ours, theirs = (
-            seam.rim(built.lods[tile.id][0], built.plan) for tile in (seam.first, seam.second)
+            seam.rim(built.lods[tile.id][level], built.plan) for tile in (seam.first, seam.second)
         )
         for position, normal in ours.items():
             np.testing.assert_allclose(normal, theirs[position], atol=1e-5)

@@ -64,14 +64,18 @@ def test_similarity_is_the_peer_s() -> None:
     assert structural_similarity(a, a) == 1
 
 
-@pytest.mark.parametrize("level", [1, 2])
-def test_level_with_maps_looks_like_the_finest(lods: tuple[Lod, ...], level: int) -> None:
+@pytest.mark.parametrize(("level", "least"), [(1, 0.95), (2, 0.94)])
+def test_level_with_maps_looks_like_the_finest(
+    lods: tuple[Lod, ...], level: int, least: float
+) -> None:
+    """The mean over five views is .95 or more; of a single one it is at lod2 .946 here."""
     coarse = lods[level]
     assert len(coarse.mesh.triangles) < 0.6 * len(lods[0].mesh.triangles)
     found = find_likeness(lods[0], coarse)
     bare = find_likeness(lods[0], replace(coarse, normal_map=None, baked=None))
     assert len(found) == len(VIEWS) == 5
     assert np.mean(found) >= 0.95
+    assert min(found) >= least
     assert np.mean(found) > np.mean(bare) + 0.005
 
 

@@ -48,3 +48,11 @@ def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end(
     eight_bit = to_eight_bit(voxels, given)
     padded = np.pad(voxels, APRON, mode="edge")
     np.testing.assert_array_equal(eight_bit, padded[0:12, 10:22, 20:42])
+
+
+def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:
+    given = replace(_given(1.0), step=(1, 3, 3))
+    unwrap = replace(given.settings.unwrap, texel_um=0.02)
+    given = replace(given, settings=replace(given.settings, unwrap=unwrap.resolved(SPACING)))
+    ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
+    assert build_unit(Volume(ball, SPACING), given).lods[1].mesh.uvs is not None

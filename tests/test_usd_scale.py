@@ -1,19 +1,53 @@
 """A stage of 22 x 11 tiles and three channels opens with its payloads unloaded."""
 
+import json
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from pxr import UsdGeom
 
 from stereocell.mesh import Lod, Mesh
 from stereocell.specimen import ChannelContent, Look, TileContent
-from stereocell.write.composed import open_stage
-from stereocell.write.composed_look import read_looks
 from stereocell.write.usd import TileExtent, write_stage, write_tile
 
 COLUMNS, ROWS, CHANNELS = 22, 11, 3
 EDGE = 4  # voxels of a tile
+GROWTH_MIB = 300  # of the memory of a process that opens it
+
+# In a process of its own: the peak of this one's memory tells of the tests before. It prints
+# what it saw as JSON; no peak where /proc has none.
+OPEN = """
+import json, re, sys, time
+from pathlib import Path
+from pxr import UsdGeom
+from stereocell.write.composed import open_stage
+from stereocell.write.composed_look import read_looks
+
+def peak_kib():
+    status = Path("/proc/self/status")
+    found = status.is_file() and re.search(r"VmHWM:\\s+(\\d+) kB", status.read_text())
+    return int(found[1]) if found else None
+
+before, start = peak_kib(), time.perf_counter()
+stage = open_stage(Path(sys.argv[1]))
+tiles = stage.GetPrimAtPath("/Specimen/Tiles").GetAllChildren()
+cache = UsdGeom.BBoxCache(0, ["default"], useExtentsHint=True)
+box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
+looks = len(read_looks(stage))
+seconds, after = time.perf_counter() - start, peak_kib()
+print(json.dumps({
+    "tiles": len(tiles),
+    "loaded": sum(tile.IsLoaded() for tile in tiles),
+    "lods": sorted({t.GetVariantSets().GetAllVariantSelections()["lod"] for t in tiles}),
+    "width_um": box.GetSize()[0],
+    "looks": looks,
+    "seconds": seconds,
+    "growth_kib": None if before is None or after is None else after - before,
+}))
+"""
 
 
 def content(row: int, column: int, looks: list[Look]) -> TileContent:
@@ -29,8 +63,8 @@ def content(row: int, column: int, looks: list[Look]) -> TileContent:
     return TileContent(f"r{row}_c{column}", (1.0, 1.0, 1.0), first, last, (EDGE,) * 3, channels)
 
 
-@pytest.mark.slow
-def test_242_tiles_are_known_without_their_payloads(tmp_path: Path) -> None:
+def write_many(folder: Path) -> Path:
+    """Write the stage; return its root layer."""
     ramp = {"default": ((0.0, 0.0), (1.0, 1.0))}
     looks = [
         Look(f"channel {k}", (0.1 * k, 0.5, 0.5), (0.0, 9.0), 4.0, 1.0, "clear", ramp)
@@ -40,15 +74,37 @@ def test_242_tiles_are_known_without_their_payloads(tmp_path: Path) -> None:
     for row in range(ROWS):
         for column in range(COLUMNS):
             tile = content(row, column, looks)
-            write_tile(tmp_path, tile)
+            write_tile(folder, tile)
             extents.append(TileExtent.of(tile))
-    write_stage(tmp_path, "many", looks, extents, {})
-    stage = open_stage(tmp_path / "stage.usda")
-    tiles = stage.GetPrimAtPath("/Specimen/Tiles").GetAllChildren()
-    assert len(tiles) == COLUMNS * ROWS
-    assert not any(tile.IsLoaded() for tile in tiles)
-    assert {t.GetVariantSets().GetAllVariantSelections()["lod"] for t in tiles} == {"lod1"}
-    cache = UsdGeom.BBoxCache(0, ["default"], useExtentsHint=True)
-    box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
-    assert box.GetSize()[0] == COLUMNS * EDGE
-    assert len(read_looks(stage)) == CHANNELS
+    write_stage(folder, "many", looks, extents, {})
+    return folder / "stage.usda"
+
+
+def open_unloaded(stage: Path) -> dict[str, Any]:
+    """Open a stage in a process of its own; return what it saw, how long it took and held."""
+    run = subprocess.run(
+        [sys.executable, "-c", OPEN, str(stage)], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    seen: dict[str, Any] = json.loads(run.stdout)
+    return seen
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return open_unloaded(write_many(tmp_path_factory.mktemp("many")))
+
+
+@pytest.mark.slow
+def test_242_tiles_are_known_without_their_payloads(seen: dict[str, Any]) -> None:
+    assert (seen["tiles"], seen["loaded"]) == (COLUMNS * ROWS, 0)
+    assert seen["lods"] == ["lod1"]
+    assert seen["width_um"] == COLUMNS * EDGE
+    assert seen["looks"] == CHANNELS
+
+
+@pytest.mark.slow
+def test_242_tiles_open_in_little_memory(seen: dict[str, Any]) -> None:
+    if seen["growth_kib"] is None:
+        pytest.skip("the peak of a process's memory is read from /proc")
+    assert seen["growth_kib"] < GROWTH_MIB * 1024

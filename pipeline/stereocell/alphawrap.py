@@ -24,7 +24,7 @@ def find_wrapper() -> str:
     except (ImportError, OSError) as error:
         raise UsageError(
             f"surface.wrap is 'alpha-wrap', and {LIBRARY} is missing ({error}): expected "
-            "pip install 'stereocell[alpha-wrap]'"
+            "pip install 'pymeshlab>=2025.7'"
         ) from None
 
 

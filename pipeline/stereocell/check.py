@@ -22,10 +22,12 @@ from stereocell.store import Store
 from stereocell.validate_usd import validate_stage, validate_usdz
 from stereocell.write.bundle import FILES, MANIFEST
 from stereocell.write.exr import check_exr
+from stereocell.write.stl import check_stl
+from stereocell.write.usd_tile import closed_file, has_mesh
 from stereocell.write.usdz import USDZ_NAME
 from stereocell.write.vdb import check_vdb
 
-_WHOLE = {".exr": check_exr, ".vdb": check_vdb}
+_WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
 _MOST_SHOWN = 3  # problems in one line
 _NODE_TIMEOUT_S = 1200.0
 _PLAN = "plan.schema.json"
@@ -54,7 +56,7 @@ def check(out: Path) -> Iterator[CheckLine]:
     checks: list[tuple[str, Callable[[], str]]] = [
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
         ("stage", lambda: _check_stage(out)),
-        ("stage files", lambda: _check_stage_files(out / "stage")),
+        ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
         ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
@@ -94,19 +96,40 @@ def _check_usdz(path: Path) -> str:
     return f"{path.name}: nothing found by the validators of usdz and by our own rules"
 
 
-def _check_stage_files(folder: Path) -> str:
-    """Check that the volumes and lookup tables are whole: USD only sees that they exist."""
+def _check_stage_files(out: Path) -> str:
+    """Check that volumes and lookup tables are whole, of which USD only sees that they exist, and
+    the closed copies, of which it sees nothing."""
+    folder = out / "stage"
     paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
     if not paths:
         raise CheckError(f"{folder}: no .exr and no .vdb file, expected those of its volumes")
-    problems = []
+    problems = _lost_copies(out)
     for path in paths:
         try:
             _WHOLE[path.suffix](path)
         except StereoCellError as error:
             problems.append(str(error))
     _raise_on(problems)
-    return f"{len(paths)} volumes and lookup tables are whole"
+    copies = sum(path.suffix == ".stl" for path in paths)
+    closed = f" and {copies} closed .stl" if copies else ""
+    return f"{len(paths) - copies} volumes and lookup tables{closed} are whole"
+
+
+def _lost_copies(out: Path) -> list[str]:
+    """Return what is wrong where the plan asks for closed copies, and surfaces have none."""
+    store = Store(out)
+    if not store.plan_file.is_file():  # the line `plan` says so
+        return []
+    plan = store.plan()
+    if not plan.settings.surface.closed_tiles:
+        return []
+    return [
+        f"{path}: missing, expected as surface.closed_tiles is on: run `stereocell stage OUT`"
+        for tile in plan.tiles
+        for channel in plan.channels
+        for path in [closed_file(store.stage_dir, tile.id, channel.id)]
+        if has_mesh(store.stage_dir, tile.id, channel.id) and not path.is_file()
+    ]
 
 
 def _check_volume_lists(bundle: Path) -> str:

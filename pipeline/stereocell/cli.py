@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +138,13 @@ def _numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
     return values
 
 
+def _once(flag: str, name: str, given: Container[str]) -> None:
+    from stereocell.errors import UsageError
+
+    if name in given:
+        raise UsageError(f"{flag} names channel {name!r} twice, expected once")
+
+
 def _flags(options: argparse.Namespace) -> dict[str, Any]:
     """Return the flags as the TOML's sections and keys."""
     from stereocell.errors import UsageError
@@ -162,16 +169,19 @@ def _flags(options: argparse.Namespace) -> dict[str, Any]:
     for text in options.iso_value or []:
         name, _, value = text.rpartition("=")
         try:
-            iso_values[name] = float(value)
+            number = float(value)
         except ValueError:
             name = ""
         if not name:
             raise UsageError(f"--iso-value is {text!r}, expected CHANNEL=VALUE")
+        _once("--iso-value", name, iso_values)
+        iso_values[name] = number
     paint: dict[str, str] = {}
     for text in options.paint or []:
         name, _, painted = text.rpartition("=")
         if not name or not painted:
             raise UsageError(f"--paint is {text!r}, expected CHANNEL=CHANNEL, as CD31=MART1")
+        _once("--paint", name, paint)
         paint[name] = painted
     isovalue = {} if options.iso_criterion is None else {"criterion": options.iso_criterion}
     surface = {

@@ -2,15 +2,33 @@
 
 The mesh that is drawn is open where another tile follows. A copy ends there in a cap, less than a
 voxel past the cut: neighbours overlap by that, so that a union has no faces that lie on each other.
+
+A copy is certified as every mesh is; one that simplification left with faults stays unsimplified.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.certify import bodies, certify
 from stereocell.mend import simplify_soundly
 from stereocell.mesh import Mesh
 from stereocell.surface import extract_surface
 from stereocell.tiling import Box
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """A closed copy of a tile.
+
+    faults     that are left, by the exact check
+    fallbacks  bodies that simplification left as they were: all, where it left faults
+    """
+
+    mesh: Mesh
+    faults: int
+    fallbacks: int
 
 
 def close_tile(
@@ -20,8 +38,10 @@ def close_tile(
     spacing_um: tuple[float, float, float],
     origin_um: tuple[float, float, float],
     max_error_um: float,
-) -> Mesh:
+) -> Closed | None:
     """Return the closed surface of the solids inside `lattice`, simplified soundly, in world um.
+
+    None where there are no solids.
 
     distance (z, y, x), um, positive inside, covers `window`; the lattice ends what is built, as far
     as the surface knows.
@@ -33,5 +53,10 @@ def close_tile(
     own = distance[tuple(inner)]
     fine = extract_surface(own, lattice, lattice, lattice, spacing_um, origin_um)
     if not len(fine.triangles):
-        return fine
-    return simplify_soundly(fine, (), max_error_um).mesh
+        return None
+    simplified = simplify_soundly(fine, (), max_error_um)
+    faults = certify(simplified.mesh).total
+    if not faults:
+        return Closed(simplified.mesh, 0, simplified.fallbacks)
+    every = int(bodies(fine.triangles, len(fine.positions)).max()) + 1
+    return Closed(fine, certify(fine).total, every)

@@ -123,8 +123,12 @@ class SurfaceOptions:
         }
         if self.wrap not in WRAPS:
             raise UsageError(f"surface.wrap is {self.wrap!r}, expected one of {', '.join(WRAPS)}")
-        for key in ("alpha_um", "offset_um", "grid_um"):
+        for key in ("alpha_um", "offset_um"):
             length_um(f"surface.{key}", getattr(self, key), 0.0)
+        if self.grid_um < 0:
+            raise UsageError(
+                f"surface.grid_um is {self.grid_um:g}, expected a length in um, or 0: all planes"
+            )
         if self.offset_um != AUTO and float(self.offset_um) > coarsest:
             raise UsageError(
                 f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"
@@ -194,7 +198,7 @@ def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings
             settings = replace(settings, **merged)
             continue
         current = getattr(settings, section)
-        types = {f.name: str(f.type) for f in fields(current)}
+        types = {f.name: _annotation(f.type) for f in fields(current)}
         for key in content:
             _known(key, list(types), f"{where}: {section}", "key")
         typed = {k: _typed(f"{where}: {section}.{k}", v, types[k]) for k, v in content.items()}
@@ -266,6 +270,11 @@ def _known(key: str, known: list[str], where: str, what: str) -> None:
     near = get_close_matches(key, known, 1)
     hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
     raise UsageError(f"{where}: unknown {what} {key!r}; {hint}")
+
+
+def _annotation(type_: Any) -> str:
+    """Return a field's type as its annotation is written: `bool`, `float | str`."""
+    return type_.__name__ if isinstance(type_, type) else str(type_)
 
 
 def _typed(where: str, value: Any, expected: str) -> Any:

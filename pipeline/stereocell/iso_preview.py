@@ -1,7 +1,8 @@
 """Look at one tile's iso-value before anything is built: slices with contours, the curve, a table.
 
 Every criterion's level is a candidate, and so is a value that the user gives. The field is the one
-that a build of the same settings would seek the iso-value in.
+that a build of the same settings would seek the iso-value in. What is found is one tile's: a build
+hears the neighbours too and may draw it towards theirs (`agreement`); a given value it takes as is.
 """
 
 from collections.abc import Sequence
@@ -43,7 +44,7 @@ class Candidate:
     level       above the background, in voxel values; `raw`: the background's mean added
     inside      share of the tile's voxels above it
     confidence  of the tile by itself, 0..1; None: nobody judged it
-    is_chosen   whether a build would take it, before the neighbours are heard
+    is_chosen   given, or found by the criterion that the settings name: what a build starts from
     """
 
     name: str
@@ -94,7 +95,7 @@ def preview(
 
 
 def table(candidates: Sequence[Candidate]) -> list[str]:
-    """Return the candidates as lines of text, those that a build takes with a star."""
+    """Return the candidates as lines of text, the one a build starts from with a star."""
     lines = [
         f"{'candidate':<14}{'above background':>17}{'raw':>12}{'inside':>10}{'confidence':>12}"
     ]
@@ -104,7 +105,14 @@ def table(candidates: Sequence[Candidate]) -> list[str]:
             f"{c.name + (' *' if c.is_chosen else ''):<14}{c.level:>17.5g}{c.raw:>12.5g}"
             f"{c.inside:>10.2%}{confidence:>12}"
         )
-    return lines
+    return [*lines, _note(candidates)]
+
+
+def _note(candidates: Sequence[Candidate]) -> str:
+    """Return what the star says: the neighbours, which a build hears too, aren't looked at here."""
+    if any(c.is_chosen and c.name == "given" for c in candidates):
+        return "* given; a build takes it"
+    return "* found; a build may draw it towards its neighbours'"
 
 
 def _find_channel(plan: Plan, name: str) -> Channel:
@@ -174,7 +182,7 @@ def _compose(
 ) -> Image.Image:
     """Return slices, the criterion's curve below them, and a legend."""
     line = round(1.5 * _TEXT_PX)
-    legend = 2 * _MARGIN_PX + line * len(candidates)
+    legend = 2 * _MARGIN_PX + line * (len(candidates) + 1)
     width = max(slices.width, 520) + 2 * _MARGIN_PX
     top = 2 * _MARGIN_PX + line
     height = top + slices.height + _MARGIN_PX + _CHART_PX + legend
@@ -188,13 +196,14 @@ def _compose(
     for candidate in candidates:
         draw.rectangle((_MARGIN_PX, y + 3, _MARGIN_PX + 22, y + 13), fill=COLORS[candidate.name])
         sure = "" if candidate.confidence is None else f", confidence {candidate.confidence:.2f}"
-        taken = " (taken)" if candidate.is_chosen else ""
+        star = " *" if candidate.is_chosen else ""
         words = (
-            f"{candidate.name}{taken}: {candidate.level:.5g} above the background, "
+            f"{candidate.name}{star}: {candidate.level:.5g} above the background, "
             f"{candidate.raw:.5g} raw, {candidate.inside:.2%} inside{sure}"
         )
         draw.text((_MARGIN_PX + 32, y), words, _CURVE, font)
         y += line
+    draw.text((_MARGIN_PX + 32, y), _note(candidates), _CURVE, font)
     return picture
 
 

@@ -45,7 +45,8 @@ class LodOptions:
     """How levels of detail are made."""
 
     errors: tuple[float, ...] = setting(
-        (0.1, 0.5, 0.8, 4.0), "simplification error of lod0, lod1, ..., in finest voxel spacings"
+        (0.1, 0.5, 0.8, 4.0),
+        "aim of simplifying to lod0, lod1, ..., in finest spacings; what comes out is measured",
     )
     samples: int = setting(1000, "points at which distances are measured, each way")
 

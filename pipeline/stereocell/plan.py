@@ -25,6 +25,7 @@ VERSION = 1
 # What a unit may work on, about 30 bytes a voxel: so many voxels, or so many times its tile.
 UNIT_VOXELS = 1 << 27
 UNIT_TILES = 8
+LEAST_PLANES = 4  # of voxels that carry the surface, along each axis of a tile: fewer hold no body
 
 # Colours for channels whose file names none (linear RGB), told apart on a dark ground; the first
 # ones are the usual blue, magenta and green of microscopy.
@@ -178,6 +179,7 @@ def make_plan(
         iso_values=_by_name("--iso-value", settings.iso_values, channels),
         paint=_painted(settings.paint, channels),
     )
+    _require_planes(settings, chosen.spacing_um)
     return Plan(
         source=source,
         name=name,
@@ -271,10 +273,10 @@ def _halo(
             f"{_by(tile_size)}, expected at most {limit:,}: "
             "choose another --preset, smaller lengths or larger tiles"
         )
-    # three more: one voxel for the median, one for the gradient, one because the tile's last plane
-    # is its neighbour's
+    # four more: one voxel for the median, one for the gradient, one because the tile's last plane
+    # is its neighbour's, one past the plane (surface._least_on_plane)
     depth, height, width = (
-        math.ceil(min(reach / step, n)) + 3 * k
+        math.ceil(min(reach / step, n)) + 4 * k
         for n, step, k in zip(region.shape, spacing_um, every, strict=True)
     )
     return depth, height, width
@@ -316,6 +318,20 @@ def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, in
     # a hair more: .42 um are three times .14 um
     z, y, x = (max(1, int(settings.surface.grid_um / h + 0.01)) for h in spacing_um)
     return z, y, x
+
+
+def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
+    """Raise UsageError where planes lie so far apart that a tile keeps hardly any."""
+    size = settings.plan.tile_size
+    steps = _step(settings, spacing_um)
+    for axis, n, k, h in zip("zyx", size, steps, spacing_um, strict=True):
+        planes = -(-n // k)
+        if k > 1 and planes < LEAST_PLANES:
+            raise UsageError(
+                f"surface.grid_um is {settings.surface.grid_um:g}, which leaves {planes} of the "
+                f"{n} planes along {axis} of a tile, {h:g} um apart: expected {LEAST_PLANES} or "
+                "more of them"
+            )
 
 
 def _repair_options(settings: Settings) -> RepairOptions:

@@ -24,8 +24,10 @@ from stereocell.volume import zyx_to_xyz
 # Values nearer to zero than this share of the distance's clip are moved off it: a vertex on a
 # lattice point would make degenerate triangles.
 SNAP = 0.01
-# On a cut plane no simplification and no fairing may move a vertex later: there they are moved off
-# by this share of the finest spacing, or short edges would stay, and sharp triangles on them.
+# On a cut plane neither simplification nor fairing may move a vertex later: crossings stay clear of
+# the ends of their lattice edge by this share of it, or short edges would stay, and sharp triangles
+# on them: the 1st percentile of lod0's smallest angles, on tiles of nuclei and of membranes, is 13
+# and 15 degrees so, 9 and 11 at .05. At .25, 1 % of the cut's places were shaded 3 degrees apart.
 RIM_SNAP = 0.2
 
 
@@ -103,16 +105,17 @@ def extract_surface(
     # where the lattice ends with the region, so does the window: both get the same margin
     margin = np.array([low for low, _ in cap])
     distance = np.pad(distance, cap, constant_values=-limit)
-    values = distance[
-        tuple(
-            slice(part.start, part.stop + low + high)
-            for part, (low, high) in zip(inner, cap, strict=True)
-        )
-    ].copy()
-    _move_off_zero(values, np.float32(SNAP) * limit)
+    box = [
+        (part.start, part.stop + low + high) for part, (low, high) in zip(inner, cap, strict=True)
+    ]
+    values = distance[tuple(slice(*ends) for ends in box)].copy()
+    snap = np.float32(SNAP) * limit
+    _move_off_zero(values, snap)
     for axis, place in _cut_places(cuts or lattice, region):
-        plane = np.moveaxis(values, axis, 0)[place - lattice.start[axis] + cap[axis][0]]
-        _move_off_zero(plane, np.float32(RIM_SNAP * min(spacing_um)))
+        at = place - window.start[axis] + cap[axis][0]
+        plane = np.moveaxis(values, axis, 0)[at - box[axis][0]]
+        least = _least_on_plane(distance, box, axis, at, snap)
+        np.copyto(plane, np.where(plane > 0, least, -least), where=np.abs(plane) < least)
     points, triangles = _flying_edges(values)
     if not len(triangles):
         empty = np.zeros((0, 3), np.float32)
@@ -129,6 +132,36 @@ def extract_surface(
 def _move_off_zero(values: NDArray[np.float32], least: np.float32) -> None:
     near = np.abs(values) < least
     values[near] = np.where(values[near] > 0, least, -least)
+
+
+def _least_on_plane(
+    distance: NDArray[np.float32],
+    box: list[tuple[int, int]],
+    axis: int,
+    at: int,
+    snap: np.float32,
+) -> NDArray[np.float32]:
+    """Return how far off zero the values of a plane of the box must be, for RIM_SNAP.
+
+    It looks one point past the box: all tiles that share a point of the plane see all its edges.
+    """
+    wide = [slice(max(low - 1, 0), high + 1) for low, high in box]
+    wide[axis] = slice(at, at + 1)
+    plane = distance[tuple(wide)].copy()
+    _move_off_zero(plane, snap)
+    size, inside = np.abs(plane), plane > 0
+    least = np.zeros_like(size)
+    ratio = np.float32(RIM_SNAP / (1 - RIM_SNAP))
+    for along in {0, 1, 2} - {axis}:
+        sizes, sign, wanted = (np.moveaxis(a, along, 0) for a in (size, inside, least))
+        crosses = sign[:-1] != sign[1:]
+        np.maximum(wanted[:-1], np.where(crosses, ratio * sizes[1:], 0), out=wanted[:-1])
+        np.maximum(wanted[1:], np.where(crosses, ratio * sizes[:-1], 0), out=wanted[1:])
+    part = [
+        slice(low - cut.start, high - cut.start) for (low, high), cut in zip(box, wide, strict=True)
+    ]
+    part[axis] = slice(0, 1)
+    return np.moveaxis(least[tuple(part)], axis, 0)[0]
 
 
 def cut_planes(

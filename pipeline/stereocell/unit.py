@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from stereocell.alphawrap import alpha_wrap
 from stereocell.bake import FineSurface
 from stereocell.clock import Clock
-from stereocell.closed import close_tile
+from stereocell.closed import Closed, close_tile
 from stereocell.config import Settings
 from stereocell.denoise import denoise
 from stereocell.latticefield import LatticeField
@@ -21,6 +21,7 @@ from stereocell.repair import RepairOptions, repair
 from stereocell.specimen import APRON
 from stereocell.surface import cut_planes, extract_surface, signed_distance
 from stereocell.tiling import Box
+from stereocell.unwrap import UnwrapOptions
 from stereocell.volume import Volume
 
 PAST = 3  # voxels past a cut that maps are baked from: the halo is larger, and texels smaller
@@ -57,14 +58,14 @@ class UnitInput:
 class Unit:
     """What a unit leaves.
 
-    closed   a closed copy of lod0, if that is asked for
+    closed   a closed copy of lod0, if that is asked for and there are solids
     volume   uint8 (z, y, x): the lattice's voxels, window applied, APRON voxels more on every side
     reason   why there is no surface; empty if there is one
     seconds  by step
     """
 
     lods: tuple[Lod, ...]
-    closed: Mesh | None
+    closed: Closed | None
     volume: NDArray[np.uint8]
     reason: str
     fragments_dropped: int
@@ -139,7 +140,7 @@ def _fine_surface(
     iso: LatticeField,
     painted: Volume | None,
     clock: Clock,
-) -> tuple[Mesh, Mesh | None, FineSurface, int, int]:
+) -> tuple[Mesh, Closed | None, FineSurface, int, int]:
     """Return the repaired surface, its closed copy, what maps are baked from, and the numbers of
     fragments dropped and cavities filled.
 
@@ -174,7 +175,8 @@ def _fine_surface(
             error = given.settings.lod.errors[0] * min(volume.spacing_um)
             closed = close_tile(repaired.distance, *boxes, spacing, frame.origin_um, error)
     with clock("occlude"):
-        source = _with_surroundings(fine, repaired.distance, given, frame, painted)
+        unwrapping = given.settings.unwrap.resolved(volume.spacing_um)
+        source = _with_surroundings(fine, repaired.distance, given, frame, unwrapping, painted)
     return fine, closed, source, repaired.fragments_dropped, repaired.cavities_filled
 
 
@@ -183,11 +185,11 @@ def _with_surroundings(
     distance: NDArray[np.float32],
     given: UnitInput,
     frame: _Frame,
+    options: UnwrapOptions,
     painted: Volume | None,
 ) -> FineSurface:
     """Return the surface, some voxels past the cut, with how open it lies and what is painted."""
     origin, spacing = frame.origin_um, frame.spacing_um
-    options = given.settings.unwrap.resolved(spacing)
     lattice = frame.lattice.grown((PAST, PAST, PAST), frame.region)
     mesh = fine
     if lattice != frame.lattice:

@@ -1,4 +1,7 @@
-"""A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail."""
+"""A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail.
+
+Same input, same bytes; but for seconds.json, which lies beside them and which nothing is built of.
+"""
 
 import io
 from collections.abc import Mapping
@@ -10,6 +13,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.closed import Closed
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
 from stereocell.mesh import Baked, Lod, Mesh, Quality, Spread
@@ -17,8 +21,8 @@ from stereocell.unit import Unit
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.stl import write_stl
 
-SCHEMA = "units.schema.json#Unit"
-_RECORD, _VOLUME, _CLOSED = "unit.json", "volume.npy", "closed.stl"
+SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
+_RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
 
 
 def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
@@ -41,17 +45,19 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
         for level, lod in enumerate(unit.lods):
             np.savez(lod_file(folder, level), **_arrays(lod))
         if unit.closed is not None:
-            write_stl(folder / _CLOSED, unit.closed)
+            write_stl(folder / _CLOSED, unit.closed.mesh)
         record = {
             "reason": unit.reason,
             "lods": lods,
+            "closed": _describe_closed(unit.closed),
             "volume": list(unit.volume.shape),
             "fragments_dropped": unit.fragments_dropped,
             "cavities_filled": unit.cavities_filled,
-            "seconds": {step: round(s, 3) for step, s in unit.seconds.items()},
             "files": {file.name: file.stat().st_size for file in sorted(folder.iterdir())},
         }
         write_json(folder / _RECORD, record)
+        # after the files were listed: a unit is whole without
+        write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
     return record
 
 
@@ -68,8 +74,13 @@ def is_whole(directory: Path) -> bool:
 
 
 def load_record(directory: Path) -> dict[str, Any]:
-    """Return what unit.json holds: triangles, distances, seconds, reason. Raises OutputError."""
+    """Return what unit.json holds: triangles, distances, reason. Raises OutputError."""
     return dict(read_json(directory / _RECORD, SCHEMA, _remedy(directory)))
+
+
+def find_seconds(directory: Path) -> dict[str, float]:
+    """Return the seconds of each step of a unit; none where they were lost."""
+    return dict(find_json(directory / _SECONDS, _SECONDS_SCHEMA) or {})
 
 
 def lod_file(directory: Path, level: int) -> Path:
@@ -124,6 +135,17 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
             facts = (maps["texel_um"], maps["charts"], maps["reason"])
             baked = Baked(arrays["openness"], arrays.get("paint"), *facts)
         return Lod(mesh, stored["distance_um"], arrays.get("normal_map"), quality, baked)
+
+
+def _describe_closed(closed: Closed | None) -> dict[str, int] | None:
+    """Return what unit.json says of the closed copy."""
+    if closed is None:
+        return None
+    return {
+        "triangles": len(closed.mesh.triangles),
+        "faults": closed.faults,
+        "fallbacks": closed.fallbacks,
+    }
 
 
 def _describe_maps(lod: Lod) -> dict[str, Any]:

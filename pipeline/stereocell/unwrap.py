@@ -37,6 +37,11 @@ _past_atlases: deque[xatlas.Atlas] = deque()
 TEXTURES = tuple(2**k for k in range(6, 14))  # largest edges that a map may have
 SHARP_DEG = 75.0  # between two triangles; coarse levels turn by 60 everywhere
 MULTIPLE = 8  # of texels, a map's edges: blocks of 4 down to mip level 1
+MOST_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
+# Texels finer than voxels show nothing new; xatlas takes long over a tenth, and far below crashes.
+MOST_TEXELS = 10  # along the finest voxel spacing
+# Of rays into the body and past its ends: all that they cross is held in memory.
+MOST_REACH = 64.0  # coarsest voxel spacings
 COARSENINGS = 3  # of texels, each by the square root of two at least, before a level goes without
 
 
@@ -61,8 +66,8 @@ class UnwrapOptions:
     def __post_init__(self) -> None:
         if self.first_lod < 0:
             raise UsageError(f"unwrap.first_lod is {self.first_lod}, expected 0 or more")
-        if self.padding < 3:
-            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 or more")
+        if not 3 <= self.padding <= MOST_PADDING:
+            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 to {MOST_PADDING}")
         if self.max_triangles < 0:
             raise UsageError(f"unwrap.max_triangles is {self.max_triangles}, expected 0 or more")
         if self.max_texture not in TEXTURES:
@@ -72,17 +77,26 @@ class UnwrapOptions:
             )
 
     def resolved(self, spacing_um: tuple[float, float, float]) -> "UnwrapOptions":
-        """Return the options with every `auto` replaced by a length."""
-        coarsest = max(spacing_um)
+        """Return the options with every `auto` replaced by a length.
+
+        Raises UsageError for a length that suits no such voxels.
+        """
+        finest, coarsest = min(spacing_um), max(spacing_um)
         texel_um = length_um("unwrap.texel_um", self.texel_um, coarsest)
-        if not texel_um > 0:
-            raise UsageError(f"unwrap.texel_um is {texel_um:g}, expected more than 0")
-        return replace(
-            self,
-            texel_um=texel_um,
-            occlusion_um=length_um("unwrap.occlusion_um", self.occlusion_um, 8 * coarsest),
-            paint_um=length_um("unwrap.paint_um", self.paint_um, 2 * coarsest),
-        )
+        if MOST_TEXELS * texel_um < finest * (1 - 1e-9):
+            raise UsageError(
+                f"unwrap.texel_um is {texel_um:g}, expected at least {finest / MOST_TEXELS:g} "
+                f"(the finest voxel spacing / {MOST_TEXELS})"
+            )
+        occlusion_um = length_um("unwrap.occlusion_um", self.occlusion_um, 8 * coarsest)
+        paint_um = length_um("unwrap.paint_um", self.paint_um, 2 * coarsest)
+        for key, length in (("occlusion_um", occlusion_um), ("paint_um", paint_um)):
+            if length > MOST_REACH * coarsest * (1 + 1e-9):
+                raise UsageError(
+                    f"unwrap.{key} is {length:g}, expected at most {MOST_REACH * coarsest:g} "
+                    f"({MOST_REACH:g} times the coarsest voxel spacing)"
+                )
+        return replace(self, texel_um=texel_um, occlusion_um=occlusion_um, paint_um=paint_um)
 
 
 @dataclass(frozen=True, slots=True)

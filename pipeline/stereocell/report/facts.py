@@ -13,7 +13,7 @@ from stereocell.documents import read_json
 from stereocell.plan import Channel, Plan
 from stereocell.store import Store
 from stereocell.tiling import Tile
-from stereocell.unit_files import load_record, lod_file
+from stereocell.unit_files import find_seconds, load_record, lod_file
 
 PHASES = ("plan", "units", "stage", "bundle")
 
@@ -51,7 +51,7 @@ class UnitFacts:
     reason      why there is no surface; empty if there is one
     voxels      (x, y, z) of the stored volume, its apron among them
     volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
-    seconds     by step
+    seconds     by step; empty if they were lost
     """
 
     tile: Tile
@@ -180,7 +180,7 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
         ktx2_bytes=sum(file.stat().st_size for file in ktx2 if file.is_file()),
         fragments_dropped=record["fragments_dropped"],
         cavities_filled=record["cavities_filled"],
-        seconds=record["seconds"],
+        seconds=find_seconds(directory),
     )
 
 

@@ -24,6 +24,7 @@ from stereocell.raster import find_pixels
 VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
 ERROR_PX = 2.0  # as the viewer's target
 LEAST_PX, MOST_PX = 48, 256  # of a picture's edge
+CLOSE_PX = 512  # the same for every level, however far off the viewer shows it
 _FINE = 2  # drawn this many times larger, then averaged down
 _AMBIENT, _GROUND = 0.35, 0.0
 _SIGMA, _TRUNCATE = 1.5, 3.5  # pixels, sigmas: 11 x 11, as in the paper
@@ -40,6 +41,13 @@ def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
         structural_similarity(draw(fine, view, ends, size), draw(coarse, view, ends, size))
         for view in VIEWS
     )
+
+
+def find_close_likeness(fine: Lod, coarse: Lod) -> float:
+    """Return the SSIM of two levels of one surface from the front, in CLOSE_PX."""
+    ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
+    pictures = (draw(lod, VIEWS[0], ends, CLOSE_PX) for lod in (fine, coarse))
+    return structural_similarity(*pictures)
 
 
 def draw(

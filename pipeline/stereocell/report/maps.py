@@ -6,10 +6,10 @@ from typing import Any
 
 from stereocell.report.choice import thin_out
 from stereocell.report.facts import Facts, UnitFacts
-from stereocell.report.likeness import find_likeness
+from stereocell.report.likeness import find_close_likeness, find_likeness
 from stereocell.unit_files import load_lods, load_record
 
-MOST_COMPARED = 3  # units whose levels are drawn and compared: 1 to 6 s each
+MOST_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
 COMPARED = 2  # the level, or the coarsest if there are fewer
 
 
@@ -31,11 +31,12 @@ class LevelMaps:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """How like lod0 a unit looks at a level with its maps: SSIM at each view."""
+    """How like lod0 a unit looks at a level with its maps: SSIM at each view, and close up."""
 
     unit: str
     level: int
     views: tuple[float, ...]
+    close: float
 
     @property
     def mean(self) -> float:
@@ -79,5 +80,7 @@ def compare(facts: Facts) -> list[Likeness]:
         lods = load_lods(units[i].directory)
         level = min(COMPARED, len(lods) - 1)
         if lods[level].normal_map is not None:
-            found.append(Likeness(units[i].name, level, find_likeness(lods[0], lods[level])))
+            views = find_likeness(lods[0], lods[level])
+            close = find_close_likeness(lods[0], lods[level])
+            found.append(Likeness(units[i].name, level, views, close))
     return found

@@ -21,7 +21,7 @@ from stereocell.names import from_identifier
 from stereocell.report import charts
 from stereocell.report.choice import choose_level, choose_units, thin_out
 from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
-from stereocell.report.likeness import ERROR_PX
+from stereocell.report.likeness import CLOSE_PX, ERROR_PX
 from stereocell.report.maps import compare, sum_up_maps
 from stereocell.report.remarks import find_remarks
 from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
@@ -109,6 +109,7 @@ def render(store: Store, facts: Facts) -> str:
         padding=plan.settings.unwrap.padding,
         mips_apart=mip_levels_apart(plan.settings.unwrap.padding),
         error_px=ERROR_PX,
+        close_px=CLOSE_PX,
         has_bundle=any(file.part == "bundle" for file in facts.files),
         parts={
             part: [file for file in facts.files if file.part == part]

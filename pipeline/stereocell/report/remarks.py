@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from stereocell.report.facts import Facts, UnitFacts
 
 LOW_CONFIDENCE = 0.2
+LEAST_ANGLE_DEG = 12.0  # of lod0, 1st percentile: below, renderers shade slivers as streaks
 _MOST_LINES = 30
 
 
@@ -67,10 +68,31 @@ def find_remarks(facts: Facts) -> list[Remark]:
             [f"{u.name}: {u.confidence:.2f} at iso-value {u.iso_value:.5g}" for u in unsure],
         ),
         _remark("without a surface, in channels that have some", bare, is_note=True),
+        _remark(
+            f"with thin triangles in lod0 (1st percentile of their angles below "
+            f"{LEAST_ANGLE_DEG:g}°)",
+            _thin(units),
+            "channel",
+            is_note=True,
+        ),
         _counts("fragments dropped", units, lambda u: u.fragments_dropped),
         _counts("cavities filled", units, lambda u: u.cavities_filled),
     ]
     return [remark for remark in found if remark is not None]
+
+
+def _thin(units: Iterable[UnitFacts]) -> list[str]:
+    """Return a line for each channel whose lod0 has a unit with thin triangles."""
+    thin: dict[str, list[tuple[float, str]]] = {}
+    for unit in units:
+        angle = unit.lods[0].angle_deg if unit.lods else None
+        if angle is not None and angle < LEAST_ANGLE_DEG:
+            thin.setdefault(unit.channel.name, []).append((angle, unit.tile.id))
+    return [
+        f"{channel}: {min(found)[0]:.1f}° in {min(found)[1]}"
+        + (f", {len(found):,} tiles below" if len(found) > 1 else "")
+        for channel, found in thin.items()
+    ]
 
 
 def _remark(

@@ -1,4 +1,4 @@
-"""Write the web bundle of a composed stage: DESIGN section 6; schemas/bundle.schema.json.
+"""Write the web bundle of a composed stage, as schemas/bundle.schema.json describes it.
 
     manifest.json  files.json                      written last: they hash all others
     channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb

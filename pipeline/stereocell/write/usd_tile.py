@@ -22,6 +22,7 @@ from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
 from pxr import Kind as Kinds
 
+from stereocell.errors import StageError
 from stereocell.mesh import Lod
 from stereocell.names import from_identifier
 from stereocell.specimen import APRON, ChannelContent, TileContent, to_srgb8
@@ -58,6 +59,25 @@ def write_tile(stage_dir: Path, tile: TileContent) -> None:
         export(_compose(tile), folder / LAYER_NAME)
 
 
+def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:
+    """Return where `write_tile` puts the closed copy of one channel."""
+    return stage_dir / "tiles" / tile_id / _closed_name(channel_id)
+
+
+def has_mesh(stage_dir: Path, tile_id: str, channel_id: str) -> bool:
+    """Return whether a channel has a surface in a tile. Raises StageError."""
+    path = stage_dir / "tiles" / tile_id / LAYER_NAME
+    layer = Sdf.Layer.FindOrOpen(str(path)) if path.is_file() else None
+    if layer is None:
+        raise StageError(f"{path}: missing or damaged: run `stereocell stage OUT`")
+    prim = f"/{tile_id}/{channel_id}/{channel_id}_{tile_id}"
+    return layer.GetPrimAtPath(prim) is not None
+
+
+def _closed_name(channel_id: str) -> str:
+    return f"{channel_id}_closed.stl"
+
+
 def _compose(tile: TileContent) -> Sdf.Layer:
     """Return the layer tile.usdc."""
     stage = new_stage(".usdc", tile.id)
@@ -88,7 +108,7 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> No
     write_vdb(folder / f"{channel.channel_id}.vdb", own, tile.first_um, tile.spacing_um)
     write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
     if channel.closed is not None:
-        shutil.copyfile(channel.closed, folder / f"{channel.channel_id}_closed.stl")
+        shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
     for level, lod in enumerate(channel.lods):
         for kind, image in _images(channel, lod):
             picture = Image.fromarray(image)
