@@ -257,8 +257,8 @@ def _halo(
     tile_size = settings.plan.tile_size
     limit = max(UNIT_VOXELS, UNIT_TILES * math.prod(tile_size))
     z, y, x = (
-        min(size + 2 * (reach / step + 4), n) + 2 * padding / step
-        for size, n, step in zip(tile_size, region.shape, spacing_um, strict=True)
+        min(size + 2 * (reach / step + 4 * k), n) + 2 * padding / step
+        for size, n, step, k in zip(tile_size, region.shape, spacing_um, every, strict=True)
     )
     if z * y * x > limit:
         lengths = {f.name: getattr(surface, f.name) for f in fields(surface)}
