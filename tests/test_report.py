@@ -1,6 +1,7 @@
 """The report: its cross-sections against geometry, its choices, and the page as a whole."""
 
 import io
+import json
 import re
 import shutil
 import sys
@@ -312,6 +313,26 @@ def test_page_tells_of_each_unit(built: Path) -> None:
     assert "as the test has it" not in html  # it starts a sentence
     assert "As the test has it." in html
     assert "there is no bundle yet" in html
+
+
+@pytest.mark.usefixtures("no_drawing")
+@pytest.mark.parametrize(("factor", "is_drawn"), [(1 + 1e-9, False), (1.1, True)])
+def test_value_is_said_to_be_drawn_if_that_shows(
+    built: Path, tmp_path: Path, factor: float, is_drawn: bool
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    survey = json.loads(Store(out).survey_file.read_text())
+    iso = survey["twin"]["iso"]["r0_c0"]
+    found = json.loads((out / iso["file"]).read_text())["found"]
+    for tile in survey["twin"]["iso"].values():
+        other = json.loads((out / tile["file"]).read_text())["found"]
+        tile["value"] = other * (factor if tile is iso else 1)
+    Store(out).survey_file.write_text(json.dumps(survey))
+    texts = _write(out)[1].texts
+    said = [text for text in texts if "drawn to its neighbours" in text]
+    assert len(said) == is_drawn
+    assert all(f"found {found:.5g}, drawn" in text for text in said)
 
 
 @pytest.mark.usefixtures("no_drawing")
