@@ -12,7 +12,7 @@ from stereocell.levels import sharpest_angle
 from stereocell.mesh import Mesh
 from stereocell.surface import RIM_SNAP, extract_surface
 from stereocell.tiling import Box
-from test_certify import ball, joined, kinds, turned
+from test_certify import ball, joined, kinds, moved, turned
 
 FLAT = np.array([[0, 0, 0], [8, 0, 0], [4, 1, 0], [4, -1, 0], [4, 0, -3]], np.float32)
 # two slivers along the long diagonal 0-1, closed by a point below
@@ -50,8 +50,8 @@ def test_border_and_vertices_stay() -> None:
     keep = (positions[squeezed.triangles][:, :, 0] >= 0).all(axis=1)
     half = replace(squeezed, positions=positions, triangles=squeezed.triangles[keep])
     fair = make_fair(half, ((0, 0.0),), 0.0, 0.5)
-    assert (fair.triangles != half.triangles).any()
-    np.testing.assert_array_equal(fair.positions, half.positions)
+    assert (fair.triangles[: len(half.triangles)] != half.triangles).any()
+    np.testing.assert_array_equal(fair.positions[: len(half.positions)], half.positions)
     np.testing.assert_array_equal(border(fair.triangles), border(half.triangles))
 
 
@@ -137,3 +137,70 @@ def test_slide_that_would_make_a_fault_is_not_made(monkeypatch: pytest.MonkeyPat
     with monkeypatch.context() as patch:
         patch.setattr(fairing, "certify", lambda *_: certify(ball()))  # as if all were well
         assert "crossings" in kinds(certify(make_fair(shell, (), 0.5, 0.05)))
+
+
+LENGTH, SIDES = 32.0, 12
+
+
+def _tube(radius: float, rings: int, apothem: bool = False) -> Mesh:
+    """A prism along x, open at x = 0 and LENGTH; its normals are the cylinder's through its edges.
+
+    `apothem`: the radius is that of its faces, not that of its edges.
+    """
+    if apothem:
+        radius /= np.cos(np.pi / SIDES)
+    ring, side = np.divmod(np.arange(rings * SIDES), SIDES)
+    angle = 2 * np.pi * side / SIDES
+    normals = np.stack([0 * angle, np.cos(angle), np.sin(angle)], axis=1)
+    positions = radius * normals + np.outer(ring * LENGTH / (rings - 1), [1, 0, 0])
+    a = np.arange((rings - 1) * SIDES)
+    b = a - side[a] + (side[a] + 1) % SIDES
+    triangles = np.concatenate(
+        [np.stack([a, b, b + SIDES], 1), np.stack([a, b + SIDES, a + SIDES], 1)]
+    )
+    return Mesh(
+        positions.astype(np.float32), triangles.astype(np.uint32), normals.astype(np.float32)
+    )
+
+
+ENDS = ((0, 0.0), (0, LENGTH))
+
+
+def test_needles_of_a_thin_tube_are_split_and_its_surface_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tube = _tube(2.0, 5)
+    assert kinds(certify(tube, ENDS)) == set()
+    assert sharpest_angle(tube) < 8
+    with monkeypatch.context() as patch:
+        patch.setattr(fairing, "SPLITS", 0)
+        assert sharpest_angle(make_fair(tube, ENDS, 0.5, 0.1)) < 8
+    fair = make_fair(tube, ENDS, 0.5, 0.1)
+    assert kinds(certify(fair, ENDS)) == set()
+    assert sharpest_angle(fair) > 12
+    rim = border(tube.triangles)
+    np.testing.assert_array_equal(border(fair.triangles), rim)
+    np.testing.assert_array_equal(fair.positions[rim], tube.positions[rim])
+    assert ((fair.positions[:, 0] > 0) & (fair.positions[:, 0] < LENGTH)).sum() == len(
+        fair.positions
+    ) - len(np.unique(rim))
+    across = fair.positions[:, 1:]
+    away = np.linalg.norm(across, axis=1)
+    sagitta = 2.0 * (1 - np.cos(np.pi / SIDES))
+    assert np.abs(away - 2.0).max() < sagitta
+    cosine = (fair.normals[:, 1:] * across).sum(axis=1) / away
+    assert cosine.min() > np.cos(np.radians(3))
+
+
+def test_split_that_would_make_a_fault_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """New vertices on the inner tube would rise through the outer one's faces; a third is split."""
+    inner, outer = _tube(2.0, 5), _tube(1.95, 31, apothem=True)
+    nested = joined(outer, turned(inner), moved(inner, (0.0, 9.0, 0.0)))
+    assert kinds(certify(nested, ENDS)) == set()
+    fair = make_fair(nested, ENDS, 0.5, 0.1)
+    assert kinds(certify(fair, ENDS)) == set()
+    new = fair.positions[len(nested.positions) :]
+    assert (new[:, 1] > 5).sum() > 3 * SIDES
+    with monkeypatch.context() as patch:
+        patch.setattr(fairing, "certify", lambda *_: certify(ball()))  # as if all were well
+        assert "crossings" in kinds(certify(make_fair(nested, ENDS, 0.5, 0.1), ENDS))

@@ -1,10 +1,11 @@
-"""Make triangles less sharp: slide vertices along the surface, and turn edges. Borders stay.
+"""Make triangles less sharp: slide vertices along the surface, turn and split edges. Borders stay.
 
 A corner of a sharp triangle goes half-way to the centre of area of the triangles round it, along
 its tangent plane (Botsch & Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004),
 and never further than a bound from where it was. Then the diagonal of two neighbouring triangles
 is turned where that makes their smallest angle larger (Lawson 1972) and moves the surface by less
-than a bound.
+than a bound. What is still sharp lies along thin tubes and at rims, where few vertices are: their
+long edges are split (see `splitting`), so that slides and turns have a vertex to work with.
 """
 
 from dataclasses import replace
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from stereocell.certify import Plane, border, certify, match_edges
 from stereocell.mesh import Mesh
+from stereocell.splitting import split_edges
 
 SLIDES = 3  # rounds; more make no triangle better and cross more of them
 STEP = 0.5  # of the way to the centre
@@ -21,6 +23,8 @@ SLIDE_DEG = 15.0  # smallest angle of triangles whose corners slide: a slide cos
 TURN_DEG = 20.0  # and of those whose edges turn
 TURNS = 8
 TRIES = 6
+SPLITS = 2  # rounds; of triangles that are sharper than this smallest angle
+SPLIT_DEG = 11.0
 GAIN = 1.02  # of the smallest angle: less is not worth a turn
 COSINE = 0.7  # between the new triangles and the old two's mean: no folds
 
@@ -34,19 +38,23 @@ def make_fair(
     """Return the mesh with fairer triangles; where that made a fault, it is done again without.
 
     `planes` are where the mesh may be open. Vertices slide by `max_slide_um` at most, and edges
-    turn where the surface moves by less than `max_turn_um`. The number of triangles stays, and the
-    mesh is as it was if the last of TRIES still makes faults.
+    turn and split where the surface moves by less than `max_turn_um`. New vertices come last, and
+    the mesh is as it was if the last of TRIES still makes faults.
     """
-    held = np.zeros(len(mesh.positions), bool)
+    count = len(mesh.positions)
+    held = np.zeros(count, bool)
     for _ in range(TRIES):
-        fair = _fair(mesh, planes, held, max_slide_um, max_turn_um)
+        fair, ends = _fair(mesh, planes, held, max_slide_um, max_turn_um)
         faults = certify(fair, planes)
         if not faults.total:
             return fair
-        at_fault = np.zeros(len(held), bool)
+        at_fault = np.zeros(len(fair.positions), bool)
         at_fault[faults.vertices(fair.triangles)] = True
         # their neighbours too: a vertex that stays may be crossed by one that slides
-        held[fair.triangles[at_fault[fair.triangles].any(axis=1)]] = True
+        at_fault[fair.triangles[_any(at_fault[fair.triangles])]] = True
+        for _ in range(SPLITS):  # instead of new vertices the ends of their edges, maybe new too
+            at_fault[ends[at_fault[count:]]] = True
+        held |= at_fault[:count]
     return mesh
 
 
@@ -56,27 +64,53 @@ def _fair(
     held: NDArray[np.bool_],
     max_slide_um: float,
     max_turn_um: float,
-) -> Mesh:
+) -> tuple[Mesh, Triangles]:
+    """Return the fairer mesh, and the ends (k, 2) of the edges that its new vertices split."""
     start = mesh.positions.astype(np.float64)
     positions, normals = start.copy(), mesh.normals.astype(np.float64)
     triangles = mesh.triangles.astype(np.int64)
     fixed = held.copy()
     fixed[border(triangles)] = True
-    # no vertex may come to a plane, beyond which lies the neighbour's mesh
-    near = np.zeros(start.shape, bool)
-    for column, value in planes:
-        near[:, column] |= np.abs(start[:, column] - value) <= 1.01 * max_slide_um
+    near = _find_near(start, planes, max_slide_um)
     _turn_edges(positions, triangles, held, max_turn_um)
     for _ in range(SLIDES):
         _slide(positions, normals, triangles, fixed, start, max_slide_um)
         positions[near] = start[near]
         _turn_edges(positions, triangles, held, max_turn_um)
-    return replace(
+    fixed[:] = True  # from here on only new vertices slide: the others have, as far as it pays
+    ends = np.zeros((0, 2), np.int64)
+    for _ in range(SPLITS):
+        sharp = _angle(*positions[triangles].transpose(1, 0, 2)) < np.radians(SPLIT_DEG)
+        sharp &= ~_any(held[triangles])
+        positions, normals, triangles, new = split_edges(
+            positions, normals, triangles, sharp, planes, max_turn_um
+        )
+        ends = np.concatenate([ends, new])
+        start = np.concatenate([start, positions[len(start) :]])
+        held, fixed = (np.append(kept, np.zeros(len(new), bool)) for kept in (held, fixed))
+        near = _find_near(start, planes, max_slide_um)
+        _turn_edges(positions, triangles, held, max_turn_um)
+        _slide(positions, normals, triangles, fixed, start, max_slide_um)
+        positions[near] = start[near]
+        _turn_edges(positions, triangles, held, max_turn_um)
+    fair = replace(
         mesh,
         positions=positions.astype(np.float32),
         normals=normals.astype(np.float32),
         triangles=triangles.astype(np.uint32),
     )
+    return fair, ends
+
+
+def _find_near(
+    positions: Points, planes: tuple[Plane, ...], max_slide_um: float
+) -> NDArray[np.bool_]:
+    """Return which coordinates (n, 3) stay: no vertex may come to a plane, beyond which lies the
+    neighbour's mesh."""
+    near = np.zeros(positions.shape, bool)
+    for column, value in planes:
+        near[:, column] |= np.abs(positions[:, column] - value) <= 1.01 * max_slide_um
+    return near
 
 
 def _slide(
@@ -88,6 +122,7 @@ def _slide(
     max_slide_um: float,
 ) -> None:
     """Move the corners of sharp triangles, in place, and turn their normals as those around."""
+    triangles = triangles[_any(~held[triangles])]
     corners = positions[triangles]
     a, b, c = corners.transpose(1, 0, 2)
     free = np.zeros(len(positions), bool)
@@ -190,9 +225,11 @@ def _any(corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _angle(a: Points, b: Points, c: Points) -> NDArray[np.float64]:
     """Return the smallest angle of each triangle, across from its shortest side."""
-    sides = [np.linalg.norm(x - y, axis=1) for x, y in ((b, c), (c, a), (a, b))]
-    x, y, z = np.sort(np.stack(sides), axis=0)
-    cosine = (y**2 + z**2 - x**2) / np.maximum(2 * y * z, 1e-30)
+    # the sides' squares; no sort, which is slow over three
+    x, y, z = (np.einsum("ij,ij->i", side, side) for side in (b - c, c - a, a - b))
+    shortest = np.minimum(np.minimum(x, y), z)
+    others = np.sqrt(np.maximum(np.maximum(x * y, y * z), z * x))
+    cosine = (x + y + z - 2 * shortest) / np.maximum(2 * others, 1e-30)
     return np.arccos(np.clip(cosine, -1, 1))
 
 
