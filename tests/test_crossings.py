@@ -156,3 +156,19 @@ def test_side_of_a_plane_is_as_in_exact_arithmetic(kind: str, scale: float) -> N
             for i in range(3)
         )
         assert found == (volume > 0) - (volume < 0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
+    """Of triangles in a crowd, some with common corners, every share of which is fresh."""
+    rng = np.random.default_rng(seed)
+    positions = rng.integers(0, 9, (120, 3)).astype(float)
+    triangles = np.array([rng.permutation(120)[:3] for _ in range(250)])
+    flat = are_collinear(*positions[triangles].transpose(1, 0, 2))
+    triangles = np.ascontiguousarray(triangles[~flat])
+    everything = find_crossings(positions, triangles)
+    assert len(everything) > 500
+    for share in (0.0, 0.02, 0.5, 1.0):
+        fresh = rng.random(len(triangles)) < share
+        found = find_crossings(positions, triangles, None, fresh)
+        np.testing.assert_array_equal(found, everything[fresh[everything].any(axis=1)])

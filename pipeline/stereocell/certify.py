@@ -59,11 +59,14 @@ class Faults:
         return np.unique(np.concatenate(parts))
 
 
-def certify(mesh: Mesh, planes: tuple[Plane, ...] = ()) -> Faults:
+def certify(
+    mesh: Mesh, planes: tuple[Plane, ...] = (), fresh: NDArray[np.bool_] | None = None
+) -> Faults:
     """Return the mesh's faults; it may be open on the planes and nowhere else.
 
     A body's winding is the sign of the volume inside it and the planes that cut it; a negative one
-    is a cavity, if it lies in the box of a solid.
+    is a cavity, if it lies in the box of a solid. `fresh`: triangles of which one at least is in
+    each of the crossings that are looked for; all, if it isn't given.
     """
     triangles = mesh.triangles.astype(np.int64)
     repeated = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
@@ -73,12 +76,17 @@ def certify(mesh: Mesh, planes: tuple[Plane, ...] = ()) -> Faults:
     edges, twins, crowded = match_edges(triangles)
     border_edges = np.flatnonzero((twins < 0) & ~crowded)
     lone = border_edges[~_on_planes(mesh.positions, edges[border_edges], planes)]
-    pinched = _pinched(triangles, twins, len(mesh.positions))
+    pinched = find_pinched(triangles, twins, len(mesh.positions))
     one_fan = np.ones(len(mesh.positions), bool)
     one_fan[pinched] = False
     one_fan[edges[twins < 0]] = False
     one_fan[triangles[degenerate]] = False
-    crossings = find_crossings(mesh.positions.astype(np.float64), triangles[used], one_fan)
+    crossings = find_crossings(
+        mesh.positions.astype(np.float64),
+        triangles[used],
+        one_fan,
+        None if fresh is None else fresh[used],
+    )
     return Faults(
         degenerate=np.flatnonzero(degenerate),
         open=edges[lone],
@@ -100,8 +108,21 @@ def bodies(triangles: NDArray[np.integer], vertices: int) -> NDArray[np.int32]:
 
 def border(triangles: NDArray[np.integer]) -> Indices:
     """Return the directed edges (n, 2) that have no triangle on their other side, sorted."""
-    edges, twins, _ = match_edges(triangles.astype(np.int64))
-    lone = edges[twins < 0]
+    start = triangles.astype(np.int64)
+    end = np.roll(start, -1, axis=1)
+    # an edge and its twin differ in the last bit: sorted, they follow each other
+    count = int(start.max(initial=0)) + 1
+    key = (np.minimum(start, end) * count + np.maximum(start, end)) * 2 + (start > end)
+    key = np.sort(key, axis=None)
+    twin = key[:-1] ^ 1 == key[1:]
+    edge, same = key // 2, np.zeros(len(key) + 1, bool)
+    same[1:-1] = edge[:-1] == edge[1:]
+    alone = np.ones(len(key), bool)
+    pairs = np.flatnonzero(twin & ~same[:-2] & ~same[2:])
+    alone[pairs] = alone[pairs + 1] = False
+    low, high = np.divmod(edge[alone], count)
+    turned = (key[alone] & 1).astype(bool)
+    lone = np.stack([np.where(turned, high, low), np.where(turned, low, high)], axis=1)
     return lone[np.lexsort(lone.T[::-1])]
 
 
@@ -138,7 +159,7 @@ def _on_planes(
     return on
 
 
-def _pinched(triangles: Indices, twins: Indices, vertices: int) -> Indices:
+def find_pinched(triangles: Indices, twins: Indices, vertices: int) -> Indices:
     """Return the vertices whose triangles don't make one fan: walk round each, and count."""
     corners = triangles.ravel()
     valence = np.bincount(corners, minlength=vertices)

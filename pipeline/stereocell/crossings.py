@@ -16,32 +16,55 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _BLOCK = 400_000  # pairs at a time
 MARGIN = 1e-6
+TINY = 1e-300  # corners on no line can have an area that floats take for zero
 ERROR_BOUND = (7 + 56 * 2.0**-53) * 2.0**-53
 
 
 def find_crossings(
-    positions: Points, triangles: Indices, one_fan: NDArray[np.bool_] | None = None
+    positions: Points,
+    triangles: Indices,
+    one_fan: NDArray[np.bool_] | None = None,
+    fresh: NDArray[np.bool_] | None = None,
 ) -> Indices:
     """Return the pairs (n, 2) of triangles that meet beside their common corners, sorted.
 
     positions (n, 3) float64, triangles (m, 3) int64, each with three different corners on no line:
     others make no plane, and are not to be handed in. `one_fan`: vertices (n,) known to have one
-    closed fan of triangles, wound alike; most of these need no exact test.
+    closed fan of triangles, wound alike; most of these need no exact test. `fresh`: triangles (m,)
+    of which one at least is in each pair that is asked for; all, if it isn't given.
     """
-    if not len(triangles):
+    if fresh is None:
+        fresh = np.ones(len(triangles), bool)
+    if not fresh.any():
         return np.zeros((0, 2), np.int64)
-    _, found, _ = predicates.find_self_intersections(
-        np.ascontiguousarray(positions), np.ascontiguousarray(triangles)
-    )
-    apart = found[~_share_corners(triangles, found)]
-    doubtful = np.ones(len(positions), bool)
+    doubtful = np.zeros(len(positions), bool)
+    doubtful[triangles[fresh]] = True
     if one_fan is not None:
-        doubtful = ~(one_fan & _spread_out(positions, triangles))
+        whole = doubtful[triangles].any(axis=1)  # all triangles round these vertices
+        doubtful &= ~(one_fan & _spread_out(positions, triangles[whole]))
     near = [
-        _meet(positions, triangles, pairs) for pairs in _gathered(_neighbours(triangles, doubtful))
+        _meet(positions, triangles, pairs[fresh[pairs].any(axis=1)])
+        for pairs in _gathered(_neighbours(triangles, doubtful))
     ]
-    pairs = np.concatenate([apart, *near]).astype(np.int64)
+    pairs = np.concatenate([_apart(positions, triangles, fresh), *near])
     return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def _apart(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> Indices:
+    """Return the pairs (n, 2) without common corners that meet, a fresh triangle in each."""
+    positions = np.ascontiguousarray(positions)
+    new, old = np.flatnonzero(fresh), np.flatnonzero(~fresh)
+    _, found, _ = predicates.find_self_intersections(
+        positions, np.ascontiguousarray(triangles[new])
+    )
+    pairs = new[found.reshape(-1, 2)]
+    if len(old):
+        _, found, _ = predicates.find_intersections(
+            positions, triangles[new], positions, triangles[old]
+        )
+        found = found.reshape(-1, 2)
+        pairs = np.concatenate([pairs, np.stack([new[found[:, 0]], old[found[:, 1]]], axis=1)])
+    return pairs[~_share_corners(triangles, pairs)]
 
 
 def _spread_out(positions: Points, triangles: Indices) -> NDArray[np.bool_]:
@@ -53,7 +76,7 @@ def _spread_out(positions: Points, triangles: Indices) -> NDArray[np.bool_]:
     corners = positions[triangles]
     a, b, c = corners.transpose(1, 0, 2)
     area = np.cross(b - a, c - a)
-    area = area / np.linalg.norm(area, axis=1, keepdims=True)
+    area = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), TINY)
     count = len(positions)
     flat = triangles.ravel()
     each = np.repeat(area, 3, axis=0)

@@ -42,7 +42,7 @@ from stereocell.volume import Volume
 ROUNDS = 5
 SHAPE = (194, 512, 512)
 ALPHA = 7.2  # finest spacings: 1 um on the phantoms
-OFFSET, GRID = 0.1, 0.42  # of alpha
+OFFSET = 0.1  # of alpha
 SAMPLES = 20_000
 
 Triple = tuple[float, float, float]
@@ -54,49 +54,49 @@ class Input:
     field: NDArray[np.float32]  # smoothed, above its background
     spacing: Triple
     iso: float
-    error: float  # of simplification, of alpha: so that faces are no more, and distances no larger
+    # of alpha, both so that faces are no more, and means and 95th percentiles no larger
+    grid: float  # the coarsest spacing that voxels may get by leaving some out
+    error: float  # of simplification
 
 
 def inputs() -> Iterator[Input]:
     """Yield what is wrapped, one after another."""
     size = tuple(n * h for n, h in zip(SHAPE, SPACING_UM, strict=True))
-    for name, stain, seed in (
-        ("nuclei, seed 0", 0, 0),
-        ("nuclei, seed 1", 0, 1),
-        ("nuclei, seed 2", 0, 2),
-        ("membranes", 1, 0),
-        ("vessels", 2, 0),
+    for name, stain, seed, grid, error in (
+        ("nuclei, seed 0", 0, 0, 0.42, 0.1),
+        ("nuclei, seed 1", 0, 1, 0.42, 0.1),
+        ("nuclei, seed 2", 0, 2, 0.42, 0.1),
+        ("membranes", 1, 0, 0.56, 0.25),
+        ("vessels", 2, 0, 0.56, 0.1),
     ):
         tissue = grow_tissue((size[0], size[1], size[2]), seed, 1.0)
         voxels = record(tissue, stain, Box((0, 0, 0), SHAPE), seed)
-        yield prepare(f"{name} ({STAINS[stain].name})", Volume(voxels, SPACING_UM), 0.1)
+        yield prepare(f"{name} ({STAINS[stain].name})", Volume(voxels, SPACING_UM), grid, error)
     folder = os.environ.get("STEREOCELL_DATA", "")
     file = Path(folder) / "brain_cells_2ch" / "brain_cells_2ch.ome.tif"
     if not folder or not file.exists():
         print("real stack                skipped: STEREOCELL_DATA names no folder that holds it")
         return
     source = read.open(str(file))
-    yield prepare(
-        "brain cells, real", source.read(0, Box((0, 0, 0), source.levels[0].shape), 0), 0.15
-    )
+    volume = source.read(0, Box((0, 0, 0), source.levels[0].shape), 0)
+    yield prepare("brain cells, real", volume, 0.42, 0.15)
 
 
-def prepare(name: str, volume: Volume, error: float) -> Input:
+def prepare(name: str, volume: Volume, grid: float, error: float) -> Input:
     """Return a volume as the pipeline smooths it, and the iso-value that it finds."""
     whole = Box((0, 0, 0), volume.voxels.shape)
     spacing = volume.spacing_um
     field = denoise(volume, min(spacing))
     under = find_background(volume.voxels.astype(np.float32), whole, spacing, 64 * min(spacing))
     field -= under.at(whole)
-    return Input(
-        name, field, spacing, find_iso_value(field, spacing, IsoValueOptions()).value, error
-    )
+    iso = find_iso_value(field, spacing, IsoValueOptions()).value
+    return Input(name, field, spacing, iso, grid, error)
 
 
 def wrap(given: Input) -> Mesh:
     """Return the closed mesh of the solids that the rule keeps, as this project makes it."""
     alpha = ALPHA * min(given.spacing)
-    step = [max(1, int(GRID * alpha / h + 0.01)) for h in given.spacing]
+    step = [max(1, int(given.grid * alpha / h + 0.01)) for h in given.spacing]
     z, y, x = (h * k for h, k in zip(given.spacing, step, strict=True))
     field = np.ascontiguousarray(given.field[:: step[0], :: step[1], :: step[2]])
     spacing = (z, y, x)
