@@ -3,9 +3,11 @@
  *
  *   npm run build && npm run screenshot -- BUNDLE OUT.png [options]
  *     --size 1280x720        CSS pixels
- *     --volume one|all       draw the channels of --volumes as volumes, in one tile or in all
- *     --volumes A,B          channel ids (default: all shown ones, at most four)
- *     --tile r0_c0           the tile of --volume one
+ *     --mode MODE            where volumes are drawn: disc, tile, all, stage, off
+ *     --switch 9             switch distance, metres of the room
+ *     --disc 12              radius of the disc, degrees
+ *     --tile r0_c0           the tile of --mode tile
+ *     --surfaces A,B         channel ids that stay surfaces
  *     --only A,B             show these channels only
  *     --transfer NAME        transfer function of the volumes
  *     --stereo               what an emulated headset shows, both eyes
@@ -21,8 +23,10 @@ const { values, positionals } = parseArgs({
   allowPositionals: true,
   options: {
     size: { type: "string", default: "1280x720" },
-    volume: { type: "string" },
-    volumes: { type: "string" },
+    mode: { type: "string" },
+    switch: { type: "string" },
+    disc: { type: "string" },
+    surfaces: { type: "string" },
     tile: { type: "string" },
     only: { type: "string" },
     transfer: { type: "string" },
@@ -50,7 +54,11 @@ try {
   if (values.stereo) await addHeadset(page);
   const viewer = new ViewerPage(page);
   const started = performance.now();
-  await viewer.open(`${host.address}/${values.page ? "" : "?bundle=bundle/"}`);
+  const settings = (["mode", "switch", "disc"] as const).flatMap((name) =>
+    values[name] === undefined ? [] : [`${name}=${values[name]}`],
+  );
+  const query = [...(values.page ? [] : ["bundle=bundle/"]), ...settings].join("&");
+  await viewer.open(`${host.address}/?${query}`);
   const overview_s = (performance.now() - started) / 1000;
   const { state } = await viewer.snapshot();
   const only = values.only?.split(",");
@@ -59,15 +67,11 @@ try {
     const isShown = shown.includes(channel);
     if (isShown !== channel.shown) await viewer.show(channel.id, isShown);
   }
-  if (values.volume !== undefined) {
-    const ids = values.volumes?.split(",") ?? shown.map(({ id }) => id).slice(0, 4);
-    for (const id of ids) {
-      await viewer.drawVolume(id, true);
-      if (values.transfer !== undefined) await viewer.chooseTransferFunction(id, values.transfer);
-    }
-    await viewer.chooseScope(values.volume === "all" ? "all" : "one");
-    if (values.tile !== undefined) await viewer.chooseTile(values.tile);
+  for (const id of values.surfaces?.split(",") ?? []) await viewer.drawVolume(id, false);
+  if (values.transfer !== undefined) {
+    for (const { id } of shown) await viewer.chooseTransferFunction(id, values.transfer);
   }
+  if (values.tile !== undefined) await viewer.chooseTile(values.tile);
   if (values.stereo) await viewer.enterStereo();
   else await viewer.settled();
   const { triangles, volumes } = await viewer.snapshot();

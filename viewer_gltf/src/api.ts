@@ -1,7 +1,7 @@
 /**
  * `window.stereocell`: what automation may read. Nothing in it changes the viewer; a script drives
  * the page as a person does, through its controls (`[data-channel="<id>"] [data-part="shown"]`,
- * `color`, `volume`, `transfer-function`; `[data-scope]`, `[data-tile-choice]`, `[data-action]`).
+ * `color`, `volume`, `transfer-function`; `[data-mode]`, `[data-tile-choice]`, `[data-action]`).
  */
 import type { Progress } from "./mesh/progress";
 import type { ViewerState } from "./state";
@@ -14,6 +14,14 @@ export type Snapshot = Readonly<{
   /** Triangles of the surfaces on screen. */
   triangles: number;
   volumes: readonly VolumeStatus[];
+  /** Of the GPU's memory. */
+  volumeBytes: number;
+  /** The tile in the middle of the view, if it is near. */
+  gazed: string | null;
+  /** Of the disc as it is now; 0: closed. */
+  discRadius_deg: number;
+  /** Between two frames of a moving picture. */
+  frame_ms: number;
   isStereo: boolean;
 }>;
 

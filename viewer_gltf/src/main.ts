@@ -8,6 +8,7 @@ import { bundleAddress } from "./bundle/address";
 import { BundleError } from "./bundle/errors";
 import type { Manifest } from "./bundle/generated/bundle";
 import { loadBundle } from "./bundle/load";
+import { settingsOf } from "./share/settings";
 import { element } from "./ui/dom";
 import { Notices, ProgressBar, showFatal } from "./ui/overlays";
 import { Panel } from "./ui/panel";
@@ -67,9 +68,10 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     viewer.state,
     (action) => viewer.dispatch(action),
     () => void enterStereo(viewer),
-    () => viewer.resetView(),
+    () => viewer.run("reset"),
   );
   parent.append(panel.root);
+  for (const action of settingsOf(location.search)) viewer.dispatch(action);
   panel.setStereo(await findXrSupport(navigator.xr, isSecureContext));
   return viewer;
 }

@@ -1,16 +1,22 @@
 import { describe, expect, it } from "vitest";
 import type { Manifest } from "./bundle/generated/bundle";
 import {
-  CHANNELS_AT_START,
+  drawnAs,
+  isInDisc,
+  type Nearby,
+  NOTHING_NEAR,
+  takenFrom,
+  wantedTiles,
+  wantsSurface,
+} from "./hybrid/who";
+import {
   initialState,
-  isSurfaceShown,
-  MAX_VOLUME_CHANNELS,
+  LIMITS,
+  MAX_CHANNELS,
   type Representation,
   reduce,
   type ViewerState,
   VOLUME_TILES_AT_START,
-  volumeTiles,
-  wantsSurface,
 } from "./state";
 
 const FILE = { path: "x", bytes: 0, sha256: "0".repeat(64) };
@@ -64,18 +70,22 @@ function staged(given: Manifest, representations: Readonly<Record<string, Repres
 }
 
 /** The tiles in which any channel is a volume. */
-function marched(state: ViewerState): readonly string[] {
-  const drawn = state.channels.map((c) => volumeTiles(state, c));
-  return state.tiles.map(({ id }) => id).filter((id) => drawn.some((tiles) => tiles.includes(id)));
+function marched(state: ViewerState, nearby: Nearby = NOTHING_NEAR): readonly string[] {
+  return wantedTiles(state, nearby).map(({ tile: id }) => id);
+}
+
+function find(state: ViewerState, channel: string, id: string) {
+  const c = state.channels.find((each) => each.id === channel);
+  const t = state.tiles.find((each) => each.id === id);
+  if (c === undefined || t === undefined) throw new Error(`no ${channel} in ${id}`);
+  return [c, t] as const;
 }
 
 /** How a channel is drawn in a tile once all has arrived. */
-function looks(state: ViewerState, channel: string, tile: string): string {
-  const hasVolume = state.channels.some(
-    (c) => c.id === channel && volumeTiles(state, c).includes(tile),
-  );
-  const parts = isSurfaceShown(state, channel, tile, hasVolume) ? ["surface"] : [];
-  return [...parts, ...(hasVolume ? ["volume"] : [])].join(" + ");
+function looks(state: ViewerState, channel: string, id: string, nearby = NOTHING_NEAR): string {
+  const [c, t] = find(state, channel, id);
+  const as = drawnAs(state, c, t, nearby);
+  return as === null ? "" : { mesh: "surface", volume: "volume", both: "surface + volume" }[as];
 }
 
 function after(state: ViewerState, ...actions: Parameters<typeof reduce>[1][]): ViewerState {
@@ -83,86 +93,118 @@ function after(state: ViewerState, ...actions: Parameters<typeof reduce>[1][]): 
 }
 
 describe("the viewer's state", () => {
-  it("opens with surfaces of the first channels, no volume, the middle tile chosen", () => {
+  it("opens with surfaces of the first channels, and volumes for what comes near", () => {
     const state = initialState(manifest(70));
-    expect(state.channels.filter((c) => c.shown)).toHaveLength(CHANNELS_AT_START);
+    expect(state.channels.filter((c) => c.shown)).toHaveLength(MAX_CHANNELS);
     expect(state.channels[1].hasSurface).toBe(false);
+    expect(state.mode).toBe("disc");
     expect(marched(state)).toEqual([]);
-    expect(state.tile).toBe("r0_c1");
+    expect(marched(state, { gazed: "r0_c2", disc: ["r0_c2", "r0_c1"] })).toEqual([
+      "r0_c2",
+      "r0_c1",
+    ]);
+    expect(state.middle).toBe("r0_c1");
+  });
+
+  it("lets the channel that was shown longest leave for a fifth, and says so", () => {
+    const state = initialState(manifest(7));
+    const five = reduce(state, { type: "show", channel: "c5", shown: true });
+    const shown = (each: ViewerState) => each.channels.filter((c) => c.shown).map((c) => c.id);
+    expect(shown(five)).toEqual(["c1", "c2", "c3", "c5"]);
+    expect(five.notices).toEqual(["4 channels show at once: channel 0 left for channel 5."]);
+    const back = reduce(five, { type: "show", channel: "c0", shown: true });
+    expect(shown(back)).toEqual(["c0", "c2", "c3", "c5"]);
+    const room = after(
+      back,
+      { type: "show", channel: "c2", shown: false },
+      { type: "show", channel: "c6", shown: true },
+    );
+    expect(shown(room)).toEqual(["c0", "c3", "c5", "c6"]);
+    expect(reduce(state, { type: "show", channel: "c0", shown: true })).toBe(state);
   });
 
   it("opens channels without a clear surface as volumes in all tiles, and loads no surface", () => {
     const state = initialState(unclear(manifest(3), 0));
-    expect(state.channels.map((c) => c.volume)).toEqual([true, false, false]);
     expect(marched(state)).toHaveLength(3);
+    expect(wantedTiles(state, NOTHING_NEAR)[0].channels).toEqual(["c0"]);
     expect(wantsSurface(state, state.channels[0])).toBe(false);
-    expect(isSurfaceShown(state, "c0", "r0_c0", false)).toBe(false);
+    expect(looks(state, "c0", "r0_c0")).toBe("volume");
+    expect(isInDisc(state, state.channels[0])).toBe(false);
+    expect(isInDisc(state, state.channels[2])).toBe(true);
     expect(wantsSurface(state, state.channels[2])).toBe(true);
     const asked = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
-    expect(isSurfaceShown(asked, "c0", "r0_c0", false)).toBe(true);
-  });
-
-  it("opens no more volumes than one march can sample, and leaves the rest off", () => {
-    const state = initialState(unclear(manifest(8), 0, 2, 3, 4, 5, 7));
-    expect(state.channels.filter((c) => c.volume)).toHaveLength(MAX_VOLUME_CHANNELS);
-    expect(state.channels[5].shown).toBe(false);
-    // shown later, it is a volume if there is room
-    const full = reduce(state, { type: "show", channel: "c7", shown: true });
-    expect(full.channels[7].volume).toBe(false);
-    const freed = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
-    expect(reduce(freed, { type: "show", channel: "c7", shown: true }).channels[7].volume).toBe(
-      true,
-    );
+    expect(looks(asked, "c0", "r0_c0")).toBe("surface");
+    const off = reduce(state, { type: "choose-mode", mode: "off" });
+    expect(looks(off, "c0", "r0_c0")).toBe("surface");
+    expect(wantsSurface(off, off.channels[0])).toBe(true);
   });
 
   it("opens a specimen of many tiles with the volumes of one", () => {
     const many = unclear(manifest(1), 0);
     const [first] = many.tiles;
     const others = Array.from({ length: VOLUME_TILES_AT_START }, (_, i) => tile(`r1_c${i}`, i));
-    expect(marched(initialState({ ...many, tiles: [first, ...others] }))).toHaveLength(1);
+    const state = initialState({ ...many, tiles: [first, ...others] });
+    expect(marched(state)).toEqual([state.middle]);
+    expect(marched(state, { gazed: "r1_c0", disc: [] })).toEqual(["r1_c0"]);
+    expect(marched(reduce(state, { type: "select", tile: "r1_c3" }))).toEqual(["r1_c3"]);
   });
 
-  it("shows a volume in the chosen tile, or in all", () => {
-    const on = reduce(initialState(manifest(2)), {
-      type: "draw-volume",
-      channel: "c0",
-      volume: true,
-    });
-    expect(marched(on)).toEqual(["r0_c1"]);
-    expect(marched(reduce(on, { type: "choose-tile", tile: "r0_c2" }))).toEqual(["r0_c2"]);
-    expect(marched(reduce(on, { type: "choose-scope", scope: "all" }))).toHaveLength(3);
-    expect(marched(reduce(on, { type: "show", channel: "c0", shown: false }))).toEqual([]);
-  });
-
-  it("hides a surface only where its volume has arrived", () => {
-    const on = reduce(initialState(manifest(2)), {
-      type: "draw-volume",
-      channel: "c0",
-      volume: true,
-    });
-    expect(isSurfaceShown(on, "c0", "r0_c1", false)).toBe(true);
-    expect(isSurfaceShown(on, "c0", "r0_c1", true)).toBe(false);
-    expect(isSurfaceShown(on, "c0", "r0_c0", true)).toBe(true);
-    expect(isSurfaceShown(on, "c1", "r0_c1", true)).toBe(true);
-  });
-
-  it("refuses more volumes than one march can sample, in words", () => {
-    const full = after(
-      initialState(manifest(6)),
-      ...Array.from(
-        { length: MAX_VOLUME_CHANNELS + 1 },
-        (_, i) => ({ type: "draw-volume", channel: `c${i}`, volume: true }) as const,
-      ),
+  it("shows a volume in the gazed tile, the selected one, or in all", () => {
+    const gaze = { gazed: "r0_c1", disc: ["r0_c1", "r0_c0"] };
+    const state = reduce(initialState(manifest(2)), { type: "choose-mode", mode: "tile" });
+    expect(marched(state)).toEqual([]);
+    expect(marched(state, gaze)).toEqual(["r0_c1"]);
+    expect(marched(reduce(state, { type: "select", tile: "r0_c2" }), gaze)).toEqual(["r0_c2"]);
+    expect(marched(reduce(state, { type: "choose-mode", mode: "all" }))).toHaveLength(3);
+    expect(marched(reduce(state, { type: "choose-mode", mode: "off" }), gaze)).toEqual([]);
+    const none = after(
+      state,
+      { type: "show", channel: "c0", shown: false },
+      { type: "show", channel: "c1", shown: false },
     );
-    expect(full.channels.filter((c) => c.volume)).toHaveLength(MAX_VOLUME_CHANNELS);
-    expect(full.notices).toEqual([
-      "At most 4 channels can be volumes at once: turn one off first.",
-    ]);
+    expect(marched(none, gaze)).toEqual([]);
+  });
+
+  it("shows nothing but the isolated tile", () => {
+    const state = reduce(initialState(manifest(2)), { type: "isolate", tile: "r0_c0" });
+    expect(looks(state, "c0", "r0_c0")).toBe("surface");
+    expect(looks(state, "c0", "r0_c1")).toBe("");
+    const all = reduce(state, { type: "choose-mode", mode: "all" });
+    expect(marched(all)).toEqual(["r0_c0"]);
+  });
+
+  it("takes from a surface what its volume shows, once that has come", () => {
+    const nearby = { gazed: "r0_c1", disc: ["r0_c1"] };
+    const state = initialState(unclear(manifest(3), 2));
+    const taken = (channel: string, id: string, presence: number) =>
+      takenFrom(state, ...find(state, channel, id), nearby, presence);
+    expect(taken("c0", "r0_c1", 0)).toBe(0);
+    expect(taken("c0", "r0_c1", 0.4)).toBe(0.4);
+    expect(taken("c0", "r0_c0", 0)).toBe(0);
+    expect(taken("c0", "r0_c0", 0.7)).toBe(0.7); // it fades out where it is no longer wanted
+    expect(taken("c2", "r0_c1", 0)).toBeNull();
+  });
+
+  it("keeps what is set within its limits", () => {
+    const state = initialState(manifest(1));
+    const far = reduce(state, { type: "set-switch-distance", distance_m: 1e9 });
+    expect(far.switchDistance_m).toBe(LIMITS.switchDistance_m[1]);
+    const wide = reduce(state, { type: "set-disc-radius", radius_deg: -3 });
+    expect(wide.discRadius_deg).toBe(LIMITS.discRadius_deg[0]);
+    const set = after(
+      state,
+      { type: "fade", channel: "c0", opacity: 3 },
+      { type: "window", channel: "c0", window: [0.9, 0.2] },
+    );
+    const [{ opacity, window }] = set.channels;
+    expect(opacity).toBe(1);
+    expect(window[0]).toBe(0.9);
+    expect(window[1]).toBeGreaterThan(0.9);
   });
 
   it("ignores tiles and transfer functions that the bundle does not have", () => {
     const state = initialState(manifest(1));
-    expect(reduce(state, { type: "choose-tile", tile: "r9_c9" })).toBe(state);
+    expect(reduce(state, { type: "select", tile: "r9_c9" })).toBe(state);
     const chosen = reduce(state, {
       type: "choose-transfer-function",
       channel: "c0",
@@ -209,46 +251,16 @@ describe("what the stage draws in a tile", () => {
     expect(wantsSurface(without, without.channels[0])).toBe(false);
   });
 
-  it("shows no surface in a volume tile: what one march has no room for is off", () => {
-    const state = initialState(staged(unclear(manifest(6), 5), { r0_c0: "volume" }));
-    const shown = state.channels.filter((c) => c.shown);
-    expect(shown.map((c) => c.id)).toEqual(["c0", "c1", "c2", "c5"]);
-    for (const { id } of state.channels) expect(looks(state, id, "r0_c0")).not.toMatch("surface");
-    const both = initialState(staged(manifest(6), { r0_c0: "both" }));
-    expect(both.channels.filter((c) => c.shown)).toHaveLength(6);
-    expect(looks(both, "c5", "r0_c0")).toBe("surface");
-  });
-
-  it("holds for a channel that is shown later, if there is room", () => {
-    const state = initialState(staged(manifest(5), { r0_c0: "volume" }));
-    const freed = after(
-      state,
-      { type: "draw-volume", channel: "c0", volume: false },
-      { type: "show", channel: "c4", shown: true },
-    );
-    expect(looks(freed, "c4", "r0_c0")).toBe("volume");
-    expect(looks(freed, "c4", "r0_c1")).toBe("surface");
-  });
-
   it("gives way to what the user chooses", () => {
     const state = initialState(staged(manifest(3), MIXED));
     const off = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
     expect(looks(off, "c0", "r0_c0")).toBe("surface");
     expect(looks(off, "c2", "r0_c0")).toBe("volume");
 
-    const all = reduce(state, { type: "choose-scope", scope: "all" });
+    const all = reduce(state, { type: "choose-mode", mode: "all" });
     for (const { id } of state.tiles) expect(looks(all, "c0", id)).toBe("volume");
-    const back = reduce(all, { type: "choose-scope", scope: "stage" });
+    const back = reduce(all, { type: "choose-mode", mode: "stage" });
     expect(back).toEqual(state);
-
-    for (const { id } of state.tiles) {
-      const chosen = reduce(state, { type: "choose-tile", tile: id });
-      expect(chosen.scope).toBe("one");
-      expect(marched(chosen)).toEqual([id]);
-      expect(looks(chosen, "c0", id)).toBe("volume");
-    }
-    const middle = reduce(state, { type: "choose-tile", tile: "r0_c1" });
-    expect(looks(middle, "c0", "r0_c0")).toBe("surface");
   });
 
   it("opens as volumes only so many tiles, from the middle, and says so", () => {
@@ -259,13 +271,17 @@ describe("what the stage draws in a tile", () => {
     }));
     const [first] = many.tiles;
     const state = initialState({ ...many, tiles: [first, ...tiles] });
-    expect(volumeTiles(state, state.channels[0])).toHaveLength(VOLUME_TILES_AT_START);
-    expect(volumeTiles(state, state.channels[0])).not.toContain("r1_c0");
+    const tilesOf = (channel: string) =>
+      wantedTiles(state, NOTHING_NEAR).filter(({ channels }) => channels.includes(channel));
+    expect(tilesOf("c0")).toHaveLength(VOLUME_TILES_AT_START);
+    expect(tilesOf("c0").map((each) => each.tile)).not.toContain("r1_c0");
     expect(looks(state, "c0", "r1_c0")).toBe("surface");
-    // without a clear surface: there and in the chosen tile
-    expect(volumeTiles(state, state.channels[2])).toHaveLength(VOLUME_TILES_AT_START + 1);
+    // without a clear surface: there and in the middle tile
+    expect(new Set(tilesOf("c2").map((each) => each.tile))).toEqual(
+      new Set([...tilesOf("c0").map((each) => each.tile), state.middle]),
+    );
     expect(state.notices).toEqual([
-      'The stage draws 20 tiles as volumes: the 16 in the middle are, "All tiles" draws the rest.',
+      'The stage draws 20 tiles as volumes: the 16 in the middle are, "All" draws the rest.',
     ]);
   });
 });

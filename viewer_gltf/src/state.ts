@@ -4,20 +4,34 @@
  */
 import type { Manifest } from "./bundle/generated/bundle";
 import type { Rgb } from "./color";
+import type { Vec3 } from "./gaze/pick";
+import type { QualityLevel } from "./quality/controller";
+import type { Clip } from "./view/clip";
 
-/** A bundle may hold 70 channels; the first few are on at the start. */
-export const CHANNELS_AT_START = 6;
-/** One march samples so many channels at once: each costs a texture unit and a lookup a step. */
-export const MAX_VOLUME_CHANNELS = 4;
+/**
+ * So many channels show at once: one march samples as many from one texture. Of more, the one that
+ * has been shown longest leaves.
+ */
+export const MAX_CHANNELS = 4;
 /** So many tiles can open as volumes; of a larger specimen the chosen tile does. */
 export const VOLUME_TILES_AT_START = 16;
+/** Metres of the room: nearer than a headset's specimen is at the start. */
+export const SWITCH_DISTANCE_M = 1.25;
+export const DISC_RADIUS_DEG = 12;
 
 export type ChannelState = Readonly<{
   id: string;
   name: string;
   shown: boolean;
+  /** When it was shown: the lowest leaves first. */
+  turn: number;
   color: Rgb;
   original: Rgb;
+  /** Factor to the opacity of its surface and of its volume, 0..1. */
+  opacity: number;
+  /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
+  window: readonly [number, number];
+  /** Whether it may be drawn as a volume, where volumes are. */
   volume: boolean;
   transferFunction: string;
   transferFunctions: readonly string[];
@@ -31,26 +45,60 @@ export type Representation = Manifest["tiles"][number]["representation"];
 /** `representation`: what the stage draws there, as far as VOLUME_TILES_AT_START lets it. */
 export type TileState = Readonly<{ id: string; representation: Representation }>;
 
-/** `stage`: where the stage draws volumes; there are none of these unless an artist chose it. */
-export type VolumeScope = "one" | "all" | "stage";
+/**
+ * Where volumes are drawn. `disc`: round the gaze, across tiles. `tile`: in the gazed tile. `all`:
+ * in all tiles. `stage`: as the stage has it; there are none of these unless an artist chose it.
+ * `off`: nowhere. The first two hold within the switch distance.
+ */
+export const MODES = ["disc", "tile", "all", "stage", "off"] as const;
+export type Mode = (typeof MODES)[number];
 
 export type ViewerState = Readonly<{
   channels: readonly ChannelState[];
   tiles: readonly TileState[];
-  /** Whether volumes are drawn in the chosen tile, in all tiles, or as the stage has it. */
-  scope: VolumeScope;
-  tile: string;
+  /** The tile nearest to the specimen's centre. */
+  middle: string;
+  mode: Mode;
+  /** The tile that was chosen; null: the gaze chooses. */
+  selected: string | null;
+  /** The only tile that is shown; null: all are. */
+  isolated: string | null;
+  switchDistance_m: number;
+  /** Angle between the gaze and the disc's rim. */
+  discRadius_deg: number;
+  /** What is left of the specimen, um. */
+  clip: Clip;
+  /** What a tap or a dwell on the specimen does. */
+  tool: Tool;
+  /** The measured points, um: none, one, or two. */
+  measured: readonly Vec3[];
+  /** Whether looking at something for long is as good as pressing the button. */
+  isDwellOn: boolean;
+  quality: QualityLevel;
   /** Faults that leave the rest usable, newest last. */
   notices: readonly string[];
 }>;
 
+/** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
+export type Tool = "select" | "measure";
+
 export type Action =
   | Readonly<{ type: "show"; channel: string; shown: boolean }>
   | Readonly<{ type: "recolor"; channel: string; color: Rgb }>
+  | Readonly<{ type: "fade"; channel: string; opacity: number }>
+  | Readonly<{ type: "window"; channel: string; window: readonly [number, number] }>
   | Readonly<{ type: "draw-volume"; channel: string; volume: boolean }>
   | Readonly<{ type: "choose-transfer-function"; channel: string; name: string }>
-  | Readonly<{ type: "choose-tile"; tile: string }>
-  | Readonly<{ type: "choose-scope"; scope: VolumeScope }>
+  | Readonly<{ type: "select"; tile: string | null }>
+  | Readonly<{ type: "isolate"; tile: string | null }>
+  | Readonly<{ type: "choose-mode"; mode: Mode }>
+  | Readonly<{ type: "set-switch-distance"; distance_m: number }>
+  | Readonly<{ type: "set-disc-radius"; radius_deg: number }>
+  | Readonly<{ type: "set-clip"; clip: Clip }>
+  | Readonly<{ type: "choose-tool"; tool: Tool }>
+  | Readonly<{ type: "measure"; points: readonly Vec3[] }>
+  | Readonly<{ type: "set-dwell"; isOn: boolean }>
+  | Readonly<{ type: "choose-quality"; level: QualityLevel }>
   | Readonly<{ type: "notify"; text: string }>
   | Readonly<{ type: "dismiss"; text: string }>;
 
@@ -65,49 +113,50 @@ function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number]
 }
 
 /**
- * The state in which a bundle opens: surfaces, but volumes of the channels without a clear one, and
- * of all shown channels in the tiles that the stage draws as volumes. Channels that would find no
- * room there as volumes are off. The other volumes are off, ready in the middle tile.
+ * The state in which a bundle opens: the first channels, as surfaces from afar and as volumes in
+ * the disc when near; in the tiles that the stage draws as volumes, as those.
  */
 export function initialState(manifest: Manifest): ViewerState {
   const ordered = fromTheMiddle(manifest);
   const staged = ordered.filter((tile) => tile.representation !== "mesh");
   const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
-  const tiles = manifest.tiles.map((tile) => ({
-    id: tile.id,
-    representation: asStaged.has(tile) ? tile.representation : "mesh",
-  }));
-  const lacksSurface = tiles.some((tile) => tile.representation === "volume");
-  const first = manifest.channels.slice(0, CHANNELS_AT_START);
-  const unclear = first.filter((channel) => channel.surface === "unclear");
-  const wanted = new Set(staged.length > 0 ? [...unclear, ...first] : unclear);
-  const asVolumes = new Set([...wanted].slice(0, MAX_VOLUME_CHANNELS).map(({ id }) => id));
-  const isSmall = tiles.length <= VOLUME_TILES_AT_START;
+  const shown = new Set(manifest.channels.slice(0, MAX_CHANNELS).map(({ id }) => id));
   return {
-    channels: manifest.channels.map((channel, index) => {
-      const prefersVolume = channel.surface === "unclear";
-      const volume = asVolumes.has(channel.id);
-      return {
-        id: channel.id,
-        name: channel.name,
-        shown: index < CHANNELS_AT_START && (volume || !(prefersVolume || lacksSurface)),
-        color: channel.color,
-        original: channel.color,
-        volume,
-        transferFunction: channel.transfer_function,
-        transferFunctions: channel.transfer_functions,
-        hasSurface: channel.tileset !== null,
-        prefersVolume,
-      };
-    }),
-    tiles,
-    scope: staged.length > 0 ? "stage" : asVolumes.size > 0 && isSmall ? "all" : "one",
-    tile: ordered[0].id,
+    channels: manifest.channels.map((channel, index) => ({
+      id: channel.id,
+      name: channel.name,
+      shown: shown.has(channel.id),
+      turn: index - manifest.channels.length, // before all that is shown later
+      color: channel.color,
+      original: channel.color,
+      opacity: 1,
+      window: [0, 1],
+      volume: true,
+      transferFunction: channel.transfer_function,
+      transferFunctions: channel.transfer_functions,
+      hasSurface: channel.tileset !== null,
+      prefersVolume: channel.surface === "unclear",
+    })),
+    tiles: manifest.tiles.map((tile) => ({
+      id: tile.id,
+      representation: asStaged.has(tile) ? tile.representation : "mesh",
+    })),
+    middle: ordered[0].id,
+    mode: staged.length > 0 ? "stage" : "disc",
+    selected: null,
+    isolated: null,
+    switchDistance_m: SWITCH_DISTANCE_M,
+    discRadius_deg: DISC_RADIUS_DEG,
+    clip: { box: null, plane: null },
+    tool: "select",
+    measured: [],
+    isDwellOn: true,
+    quality: "auto",
     notices:
       staged.length > VOLUME_TILES_AT_START
         ? [
             `The stage draws ${staged.length} tiles as volumes: ` +
-              `the ${VOLUME_TILES_AT_START} in the middle are, "All tiles" draws the rest.`,
+              `the ${VOLUME_TILES_AT_START} in the middle are, "All" draws the rest.`,
           ]
         : [],
   };
@@ -125,42 +174,75 @@ function withNotice(state: ViewerState, text: string): ViewerState {
   return { ...state, notices: [...state.notices.filter((n) => n !== text), text] };
 }
 
-function otherVolumes(state: ViewerState, id: string): number {
-  return state.channels.filter((c) => c.volume && c.id !== id).length;
+/** Show a channel; if there is no room, the one that has been shown longest leaves. */
+function withShown(state: ViewerState, id: string): ViewerState {
+  const channel = state.channels.find((c) => c.id === id);
+  if (channel === undefined || channel.shown) return state;
+  const turn = Math.max(0, ...state.channels.map((c) => c.turn + 1));
+  const shown = state.channels.filter((c) => c.shown).sort((a, b) => a.turn - b.turn);
+  const next = withChannel(state, id, (c) => ({ ...c, shown: true, turn }));
+  const [leaves] = shown;
+  if (shown.length < MAX_CHANNELS) return next;
+  return withNotice(
+    withChannel(next, leaves.id, (c) => ({ ...c, shown: false })),
+    `${MAX_CHANNELS} channels show at once: ${leaves.name} left for ${channel.name}.`,
+  );
 }
+
+const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
+
+/** The limits of what a user can set. */
+export const LIMITS = {
+  switchDistance_m: [0.1, 10],
+  discRadius_deg: [2, 40],
+} as const;
+/** Narrower, a window would be one step of the 8 bits. */
+const NARROWEST_WINDOW = 1 / 128;
 
 /** The next state. Returns the same object if the action changes nothing. */
 export function reduce(state: ViewerState, action: Action): ViewerState {
   switch (action.type) {
-    case "show": {
-      const hasRoom = otherVolumes(state, action.channel) < MAX_VOLUME_CHANNELS;
-      return withChannel(state, action.channel, (c) => ({
-        ...c,
-        shown: action.shown,
-        volume:
-          c.volume || (action.shown && hasRoom && (c.prefersVolume || state.scope === "stage")),
-      }));
-    }
+    case "show":
+      if (action.shown) return withShown(state, action.channel);
+      return withChannel(state, action.channel, (c) => ({ ...c, shown: false }));
     case "recolor":
       return withChannel(state, action.channel, (c) => ({ ...c, color: action.color }));
+    case "fade":
+      return withChannel(state, action.channel, (c) => ({
+        ...c,
+        opacity: clamp(action.opacity, 0, 1),
+      }));
+    case "window": {
+      const low = clamp(action.window[0], 0, 1 - NARROWEST_WINDOW);
+      const high = clamp(action.window[1], low + NARROWEST_WINDOW, 1);
+      return withChannel(state, action.channel, (c) => ({ ...c, window: [low, high] }));
+    }
     case "draw-volume":
-      if (action.volume && otherVolumes(state, action.channel) >= MAX_VOLUME_CHANNELS) {
-        return withNotice(
-          state,
-          `At most ${MAX_VOLUME_CHANNELS} channels can be volumes at once: turn one off first.`,
-        );
-      }
       return withChannel(state, action.channel, (c) => ({ ...c, volume: action.volume }));
     case "choose-transfer-function":
       return withChannel(state, action.channel, (c) =>
         c.transferFunctions.includes(action.name) ? { ...c, transferFunction: action.name } : c,
       );
-    case "choose-tile":
-      if (!state.tiles.some(({ id }) => id === action.tile)) return state;
-      if (action.tile === state.tile && state.scope !== "stage") return state;
-      return { ...state, tile: action.tile, scope: state.scope === "stage" ? "one" : state.scope };
-    case "choose-scope":
-      return action.scope === state.scope ? state : { ...state, scope: action.scope };
+    case "select":
+      return withTile(state, "selected", action.tile);
+    case "isolate":
+      return withTile(state, "isolated", action.tile);
+    case "choose-mode":
+      return action.mode === state.mode ? state : { ...state, mode: action.mode };
+    case "set-switch-distance":
+      return { ...state, switchDistance_m: clamp(action.distance_m, ...LIMITS.switchDistance_m) };
+    case "set-disc-radius":
+      return { ...state, discRadius_deg: clamp(action.radius_deg, ...LIMITS.discRadius_deg) };
+    case "set-clip":
+      return { ...state, clip: action.clip };
+    case "choose-tool":
+      return action.tool === state.tool ? state : { ...state, tool: action.tool };
+    case "measure":
+      return { ...state, measured: action.points.slice(-2) };
+    case "set-dwell":
+      return action.isOn === state.isDwellOn ? state : { ...state, isDwellOn: action.isOn };
+    case "choose-quality":
+      return action.level === state.quality ? state : { ...state, quality: action.level };
     case "notify":
       return withNotice(state, action.text);
     case "dismiss":
@@ -168,53 +250,17 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
   }
 }
 
-/** The channels that are marched, in the bundle's order. */
+function withTile(
+  state: ViewerState,
+  key: "selected" | "isolated",
+  tile: string | null,
+): ViewerState {
+  const isThere = tile === null || state.tiles.some(({ id }) => id === tile);
+  if (!isThere || state[key] === tile) return state;
+  return { ...state, [key]: tile };
+}
+
+/** The channels that may be marched, in the bundle's order. */
 export function volumeChannels(state: ViewerState): readonly ChannelState[] {
   return state.channels.filter((c) => c.shown && c.volume);
-}
-
-/** How a channel is drawn in a tile, once all has arrived; null: not at all. */
-function drawnAs(
-  state: ViewerState,
-  { shown, volume, prefersVolume }: ChannelState,
-  { id, representation }: TileState,
-): Representation | null {
-  if (!shown) return null;
-  if (!volume) return "mesh";
-  const isChosen = state.scope === "all" || id === state.tile;
-  const otherwise = prefersVolume ? null : "mesh";
-  if (state.scope !== "stage") return isChosen ? "volume" : otherwise;
-  if (representation !== "mesh") return representation;
-  const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
-  return prefersVolume && (isSmall || isChosen) ? "volume" : otherwise;
-}
-
-/** The tiles in which a channel's volumes are drawn. */
-export function volumeTiles(state: ViewerState, channel: ChannelState): readonly string[] {
-  const drawn = state.tiles.filter((tile) => {
-    const as = drawnAs(state, channel, tile);
-    return as === "volume" || as === "both";
-  });
-  return drawn.map(({ id }) => id);
-}
-
-/** Whether a channel's surfaces, if it has any, are drawn anywhere: else they aren't loaded. */
-export function wantsSurface(state: ViewerState, channel: ChannelState): boolean {
-  if (!channel.shown) return false;
-  if (!channel.volume || !channel.prefersVolume) return true;
-  return state.tiles.some((tile) => drawnAs(state, channel, tile) === "both");
-}
-
-/** Whether a tile's surface is drawn. It stays until the volume that replaces it has arrived. */
-export function isSurfaceShown(
-  state: ViewerState,
-  channel: string,
-  tile: string,
-  hasVolume: boolean,
-): boolean {
-  const found = state.channels.find((c) => c.id === channel);
-  const place = state.tiles.find((t) => t.id === tile);
-  if (found === undefined || place === undefined) return false;
-  const as = drawnAs(state, found, place);
-  return as === "mesh" || as === "both" || (as === "volume" && !found.prefersVolume && !hasVolume);
 }

@@ -1,44 +1,61 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Camera, Matrix4, PerspectiveCamera, Vector2, Vector3, WebGLRenderer } from "three";
-import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { type Camera, Matrix4, Vector3, WebGLRenderer } from "three";
 import type { Snapshot } from "./api";
 import { BundleError } from "./bundle/errors";
 import type { Bundle } from "./bundle/load";
 import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
 import { pickTile, type Ray } from "./gaze/pick";
+import { Hybrid } from "./hybrid/hybrid";
+import { wantedTiles } from "./hybrid/who";
+import { makeSurfaceFrame } from "./mesh/blend";
 import { SurfaceLoader } from "./mesh/loader";
 import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX, SurfaceSet } from "./mesh/surface_set";
-import { type Action, initialState, reduce, type ViewerState, volumeChannels } from "./state";
+import { Pace } from "./quality/pace";
+import { type Action, initialState, reduce, type ViewerState } from "./state";
+import type { Command } from "./ui/commands";
+import { Cuts } from "./view/cuts";
 import { DepthPass } from "./view/depth_pass";
-import { framingDistance, place, XR_DISTANCE_M } from "./view/placement";
+import { Eyes } from "./view/eyes";
+import { MarchPass } from "./view/march_pass";
+import { type Look, Navigation } from "./view/navigation";
+import { place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
+import { volumeBudget } from "./volume/levels";
+import { makeFrame } from "./volume/tile_march";
 import { VolumeSet } from "./volume/volume_set";
 import { XrSession } from "./xr/session";
 
-const FIELD_OF_VIEW_DEG = 40;
 /** A phone's third pixel in each direction costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
+/** A page that slept has not been looked at for as long. */
+const LONGEST_FRAME_S = 0.1;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
   readonly xr: XrSession;
+  readonly navigation: Navigation;
   state: ViewerState;
   frames = 0;
-  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
-  private readonly controls: OrbitControls;
   private readonly room: Room;
-  private readonly depth = new DepthPass();
+  private readonly eyes = new Eyes();
+  private readonly cuts = new Cuts();
+  private readonly depth: DepthPass;
+  private readonly marchFrame;
+  private readonly march: MarchPass;
+  private readonly surfaceFrame;
+  private readonly hybrid: Hybrid;
+  private readonly pace: Pace;
   private readonly surfaceLoader: SurfaceLoader;
   private readonly surfaces: SurfaceSet;
   private readonly volumes: VolumeSet;
   private readonly resize: ResizeObserver;
   private readonly disposed = new AbortController();
-  private readonly size = new Vector2();
   private readonly point = new Vector3();
   private readonly toSpecimen = new Matrix4();
+  private last_ms = 0;
   private isStale = true;
-  /** Whether the start view still holds: then it follows the window's shape. */
-  private isHome = true;
+  /** Whether the frame before was one of a moving picture, drawn in its budget. */
+  private wasMoving = false;
   private waiting: (() => void)[] = [];
 
   /**
@@ -56,53 +73,54 @@ export class Viewer {
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
     this.renderer.info.autoReset = false;
     stage.append(this.renderer.domElement);
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    const canvas = this.renderer.domElement;
 
     const refresh = () => {
       this.isStale = true;
     };
     const fail = (error: unknown) => this.report(error);
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.room = new Room(manifest);
+    this.depth = new DepthPass(this.cuts);
+    this.marchFrame = makeFrame(this.depth.texture);
+    this.march = new MarchPass(this.marchFrame);
+    this.surfaceFrame = makeSurfaceFrame(this.marchFrame.uDisc, this.cuts);
+    this.hybrid = new Hybrid(manifest);
+    this.pace = new Pace(gl);
     this.surfaceLoader = new SurfaceLoader(this.renderer);
     this.volumes = new VolumeSet(
       bundle,
-      this.depth.texture,
-      gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
-      () => {
-        this.surfaces.follow(this.state); // a surface goes when its volume has come
-        refresh();
+      this.marchFrame,
+      {
+        bytes: volumeBudget(navigator),
+        side: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
       },
+      refresh,
       fail,
     );
     this.surfaces = new SurfaceSet(
       bundle,
       this.surfaceLoader,
-      (tile, channel) => this.volumes.has(tile, channel),
+      this.surfaceFrame,
+      (tile, channel) => this.volumes.presence(tile, channel),
       refresh,
       fail,
     );
-    this.room.specimen.add(this.surfaces.group, this.volumes.group);
+    this.room.specimen.group.add(this.surfaces.group);
+    this.room.scene.add(this.march.overlay);
 
-    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.12;
-    this.controls.minDistance = 0.05;
-    this.controls.maxDistance = 8;
-    this.controls.addEventListener("change", refresh);
-    this.controls.addEventListener("start", () => {
-      this.isHome = false;
-    });
+    this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), refresh);
     this.xr = new XrSession(
       this.renderer,
       () => this.enterStereo(),
       () => this.leaveStereo(),
-      () => this.chooseTile(rayAhead(this.renderer.xr.getCamera().matrixWorld, this.room.specimen)),
+      () => this.choose(rayAhead(this.head, this.room.specimen.group)),
     );
-    listenForClicks(this.renderer.domElement, (point) => {
+    listenForClicks(canvas, (point) => {
       if (this.xr.isRunning) return;
-      this.chooseTile(rayUnder(point, this.camera, this.room.specimen));
+      this.choose(rayUnder(point, this.navigation.camera, this.room.specimen.group));
     });
-    this.renderer.domElement.addEventListener("webglcontextlost", () => {
+    canvas.addEventListener("webglcontextlost", () => {
       const text = "The graphics driver has dropped the picture: reload the page.";
       this.dispatch({ type: "notify", text });
     });
@@ -111,7 +129,7 @@ export class Viewer {
     this.followPixelRatio();
     this.fit();
     this.follow();
-    this.renderer.setAnimationLoop(() => this.frame());
+    this.renderer.setAnimationLoop((time_ms) => this.frame(time_ms));
   }
 
   dispatch(action: Action): void {
@@ -122,6 +140,34 @@ export class Viewer {
     this.onState(next);
   }
 
+  /** Do what is no change of the state; whether this was one of the viewer's commands. */
+  run(command: Command): boolean {
+    switch (command) {
+      case "reset":
+        this.dispatch({ type: "isolate", tile: null });
+        this.room.specimen.goHome();
+        this.navigation.reset();
+        break;
+      case "back":
+        if (this.state.isolated !== null) this.dispatch({ type: "isolate", tile: null });
+        else this.dispatch({ type: "select", tile: null });
+        break;
+      default:
+        if (!this.navigation.run(command)) return false;
+    }
+    this.isStale = true;
+    return true;
+  }
+
+  get look(): Look {
+    return this.navigation.look;
+  }
+
+  lookFrom(look: Look): void {
+    this.navigation.lookFrom(look);
+    this.isStale = true;
+  }
+
   snapshot(): Snapshot {
     return {
       state: this.state,
@@ -129,6 +175,10 @@ export class Viewer {
       isLoading: this.isLoading,
       triangles: this.surfaces.triangles,
       volumes: this.volumes.status(),
+      volumeBytes: this.volumes.bytes,
+      gazed: this.hybrid.nearby.gazed,
+      discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
+      frame_ms: this.pace.frame_ms,
       isStereo: this.xr.isRunning,
     };
   }
@@ -137,18 +187,6 @@ export class Viewer {
   settled(): Promise<void> {
     this.isStale = true;
     return new Promise((resolve) => this.waiting.push(resolve));
-  }
-
-  /** The whole specimen from the front: x to the right, y up. */
-  resetView(): void {
-    const { size } = place(this.bundle.manifest.specimen.bounds_um);
-    const fov = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
-    this.controls.target.set(0, 0, 0);
-    this.camera.position.set(0, 0, framingDistance(size, fov, this.camera.aspect));
-    this.camera.up.set(0, 1, 0);
-    this.controls.update();
-    this.isHome = true;
-    this.isStale = true;
   }
 
   report(error: unknown): void {
@@ -161,74 +199,110 @@ export class Viewer {
   }
 
   private follow(): void {
-    this.volumes.follow(this.state);
-    this.surfaces.follow(this.state);
-    const { scope, tile } = this.state;
-    const isMarked = scope === "one" && volumeChannels(this.state).length > 0;
-    this.room.mark(isMarked ? tile : null);
+    const { nearby, mayRefine } = this.hybrid;
+    const { isolated, selected, quality } = this.state;
+    const tile = this.bundle.manifest.tiles.find(({ id }) => id === isolated);
+    this.room.specimen.show(tile?.bounds_um ?? null);
+    this.volumes.follow(this.state, wantedTiles(this.state, nearby), mayRefine);
+    this.surfaces.follow(this.state, nearby);
+    this.room.mark(isolated === null ? selected : null);
+    this.pace.setLevel(quality);
     this.isStale = true;
   }
 
-  private frame(): void {
+  private frame(time_ms: number): void {
+    const interval_ms = time_ms - this.last_ms;
+    const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
+    this.last_ms = time_ms;
     const isStereo = this.renderer.xr.isPresenting;
-    if (!isStereo) this.controls.update();
     const wasLoading = this.isLoading;
-    if (!isStereo && !this.isStale && !wasLoading) return;
-    this.updateSurfaces();
-    if (isStereo || this.isStale) {
-      this.isStale = false;
-      this.draw(isStereo ? this.xr.camera : this.camera);
+    this.pose(isStereo);
+    const isChanging = this.advance(dt_s);
+    if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving) return;
+    // a picture that came to rest is drawn once more, as well as can be
+    const isMoving = isStereo || this.isStale;
+    const settings = this.pace.begin(isMoving, interval_ms, this.xr.rate_hz);
+    const target_px = isStereo ? ERROR_TARGET_XR_PX : ERROR_TARGET_PX;
+    this.surfaces.setErrorTarget(target_px * settings.errorFactor);
+    this.marchFrame.uSteps.value = settings.steps;
+    this.hybrid.radiusShare = settings.discShare;
+    this.updateSurfaces(isStereo);
+    if (isMoving || this.wasMoving) {
+      this.isStale = isChanging;
+      this.draw(isStereo ? this.xr.camera : this.navigation.camera, settings.resolution);
       this.frames++;
       this.onFrame();
     }
-    if (this.waiting.length > 0 && !this.isLoading && !this.isStale) {
+    this.pace.end();
+    this.wasMoving = isMoving;
+    const isAtRest = isStereo || !isMoving;
+    if (this.waiting.length > 0 && !this.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
   }
 
-  private updateSurfaces(): void {
-    if (!this.renderer.xr.isPresenting) {
-      this.renderer.getDrawingBufferSize(this.size);
-      this.camera.updateMatrixWorld();
-      this.surfaces.update(this.camera, this.size.x, this.size.y);
+  /** Where the eyes are in this frame. */
+  private pose(isStereo: boolean): void {
+    if (isStereo) {
+      this.eyes.followHeadset(this.renderer, this.xr.camera);
       return;
     }
-    const both = this.renderer.xr.getCamera();
-    const viewport = both.cameras[0]?.viewport;
-    if (viewport) this.surfaces.update(both, viewport.z, viewport.w);
+    this.navigation.update();
+    this.eyes.followScreen(this.renderer, this.navigation.camera);
   }
 
-  private draw(camera: Camera): void {
-    const { scene } = this.room;
-    this.renderer.info.reset();
-    const eye = this.eye(camera);
-    this.room.light(eye);
-    if (!this.volumes.isEmpty) {
-      const toSpecimen = this.toSpecimen.copy(this.room.specimen.matrixWorld).invert();
-      this.volumes.sortBy(this.point.setFromMatrixPosition(eye).applyMatrix4(toSpecimen));
-      this.measureFrameBuffer();
-      const hidden = [...this.room.overlays, this.volumes.group];
-      this.depth.render(this.renderer, scene, camera, hidden, this.size.x, this.size.y);
+  /** Follow the gaze, and go on with what moves or fades; whether the next frame differs by itself. */
+  private advance(dt_s: number): boolean {
+    const { hybrid, volumes, state } = this;
+    const { specimen } = this.room;
+    const isMoving = specimen.advance(dt_s);
+    const isReady = (tile: string) => volumes.isReady(tile);
+    if (hybrid.look(state, this.head, specimen.group.matrixWorld, isReady, dt_s)) this.follow();
+    const isFading = volumes.advance(dt_s);
+    const isChanging = isMoving || isFading || hybrid.isChanging(state);
+    if (isChanging) this.isStale = true;
+    if (this.isStale) this.surfaces.dressAll();
+    return isChanging;
+  }
+
+  private updateSurfaces(isStereo: boolean): void {
+    if (!isStereo) {
+      this.surfaces.update(this.navigation.camera, this.eyes.width_px, this.eyes.height_px);
+      return;
     }
+    const viewport = this.eyes.all[0]?.viewport;
+    if (viewport) this.surfaces.update(this.renderer.xr.getCamera(), viewport.z, viewport.w);
+  }
+
+  private draw(camera: Camera, resolution: number): void {
+    const { scene, specimen } = this.room;
+    this.renderer.info.reset();
+    this.room.light(this.head);
+    this.cuts.follow(this.state.clip, specimen.group.matrixWorld);
+    this.surfaceFrame.uApex.value.copy(this.hybrid.apex);
+    this.surfaceFrame.uAxis.value.copy(this.hybrid.axis);
+    this.surfaceFrame.uDisc.value.set(...this.hybrid.cosines);
+    this.march.overlay.visible = !this.volumes.isEmpty;
+    if (!this.volumes.isEmpty) this.drawVolumes(specimen.group.matrixWorld, resolution);
     this.renderer.render(scene, camera);
   }
 
-  /** A headset's frame buffer is as large as its eyes' viewports reach, whatever the canvas is. */
-  private measureFrameBuffer(): void {
-    this.renderer.getDrawingBufferSize(this.size);
-    if (!this.renderer.xr.isPresenting) return;
-    for (const { viewport } of this.renderer.xr.getCamera().cameras) {
-      if (!viewport) continue;
-      this.size.x = Math.max(this.size.x, viewport.x + viewport.z);
-      this.size.y = Math.max(this.size.y, viewport.y + viewport.w);
-    }
+  private drawVolumes(specimen: Matrix4, resolution: number): void {
+    const { hybrid, volumes } = this;
+    const toSpecimen = this.toSpecimen.copy(specimen).invert();
+    const eye = this.point.setFromMatrixPosition(this.head).applyMatrix4(toSpecimen);
+    volumes.placeAs(specimen);
+    volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
+    const hidden = [...this.room.overlays, this.march.overlay, ...this.surfaces.blended];
+    this.depth.render(this.renderer, this.room.scene, this.eyes, hidden);
+    this.march.render(this.renderer, volumes.scene, this.eyes, resolution);
   }
 
   /** Pose of the head, or of the mono camera. */
-  private eye(camera: Camera): Matrix4 {
+  private get head(): Matrix4 {
     return this.renderer.xr.isPresenting
       ? this.renderer.xr.getCamera().matrixWorld
-      : camera.matrixWorld;
+      : this.navigation.camera.matrixWorld;
   }
 
   private fit(): void {
@@ -237,9 +311,7 @@ export class Viewer {
     if (clientWidth === 0 || clientHeight === 0) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setSize(clientWidth, clientHeight);
-    this.camera.aspect = clientWidth / clientHeight;
-    this.camera.updateProjectionMatrix();
-    if (this.isHome) this.resetView();
+    this.navigation.fit(clientWidth / clientHeight);
     this.isStale = true;
   }
 
@@ -259,35 +331,39 @@ export class Viewer {
   }
 
   private enterStereo(): void {
-    this.controls.enabled = false;
-    this.room.moveTo(new Vector3(0, 0, -XR_DISTANCE_M));
-    this.surfaces.setErrorTarget(ERROR_TARGET_XR_PX);
+    this.navigation.controls.enabled = false;
+    this.room.specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
     this.onState(this.state);
   }
 
   private leaveStereo(): void {
-    this.controls.enabled = true;
-    this.room.moveTo(new Vector3());
-    this.surfaces.setErrorTarget(ERROR_TARGET_PX);
+    this.navigation.controls.enabled = true;
+    this.room.specimen.anchorAt(new Vector3());
     this.fit();
-    this.isStale = true;
     this.onState(this.state);
   }
 
-  private chooseTile(ray: Ray): void {
+  /** Select what the ray meets first; what is selected already is isolated. */
+  private choose(ray: Ray): void {
+    const { isolated, selected } = this.state;
+    if (isolated !== null) return;
     const tile = pickTile(ray, this.bundle.manifest.tiles);
-    if (tile !== null) this.dispatch({ type: "choose-tile", tile });
+    if (tile === null) return;
+    if (tile === selected) this.dispatch({ type: "isolate", tile });
+    else this.dispatch({ type: "select", tile });
   }
 
   dispose(): void {
     this.renderer.setAnimationLoop(null);
     this.resize.disconnect();
     this.disposed.abort();
-    this.controls.dispose();
+    this.navigation.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
     this.surfaceLoader.dispose();
     this.depth.dispose();
+    this.march.dispose();
+    this.pace.dispose();
     this.renderer.dispose();
     this.renderer.domElement.remove();
   }

@@ -118,7 +118,7 @@ describeInChromium("a faulty bundle", () => {
     await stand.open();
     for (const id of ["F_x20_body", "Balls"]) await stand.viewer.show(id, false);
     await stand.viewer.drawVolume("Block", true);
-    await stand.viewer.chooseScope("all");
+    await stand.viewer.chooseMode("all");
     await stand.viewer.enterStereo();
     for (const x of [0, 320]) {
       const eye = await takePicture(stand.viewer.page, { x, y: 0, width: 320, height: 360 });

@@ -57,7 +57,7 @@ describeInChromium("the picture of the fixture", () => {
   });
 
   it("lets surfaces hide volumes behind them, and volumes veil surfaces", async () => {
-    await stand.viewer.show("Balls", true);
+    await stand.viewer.showAs("Balls", "surface");
     const inFront = at(await takePicture(stand.viewer.page), BALLS[2].center);
     const behind = at(await takePicture(stand.viewer.page), BALLS[3].center);
     await showAsVolume("Block");

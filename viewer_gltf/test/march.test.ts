@@ -58,7 +58,8 @@ describeInChromium("the ray-march", () => {
   it("finds where a ray enters and leaves a box", async () => {
     const chunks = await readChunks("intersect_box");
     const intersect = async (eye: string, dir: string) => {
-      const call = `intersectBox(vec3(${eye}), 1.0 / vec3(${dir}), vec3(4.0, 2.0, 8.0))`;
+      const box = "vec3(0.0), vec3(4.0, 2.0, 8.0)";
+      const call = `intersectBox(vec3(${eye}), 1.0 / vec3(${dir}), ${box})`;
       const head = "#include <chunks/intersect_box>";
       return (await runProgram(page, chunks, head, `oColor = ${call}.xyxy;`)).slice(0, 2);
     };
@@ -111,7 +112,7 @@ describeInChromium("the ray-march", () => {
         page,
         chunks,
         head,
-        `oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, ${voxels});`,
+        `oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, vec4(${voxels}));`,
         { uLut: { ...uLut, texels: [...uLut.texels] } },
       );
     const one = await classify("200.0, 0.0", "3.0");

@@ -24,7 +24,10 @@ export function distanceToBox(ray: Ray, min: Vec3, max: Vec3): number | null {
 }
 
 /** The id of the first tile along the ray (um, world), or null. */
-export function pickTile(ray: Ray, tiles: Manifest["tiles"]): string | null {
+export function pickTile(
+  ray: Ray,
+  tiles: readonly Pick<Manifest["tiles"][number], "id" | "bounds_um">[],
+): string | null {
   let nearest = Number.POSITIVE_INFINITY;
   let picked: string | null = null;
   for (const { id, bounds_um } of tiles) {

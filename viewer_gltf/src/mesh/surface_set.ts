@@ -1,8 +1,10 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
-import { type Camera, Group } from "three";
+import { type Camera, Group, type Object3D } from "three";
 import type { Bundle } from "../bundle/load";
 import { surfaceColor } from "../color";
-import { isSurfaceShown, type ViewerState, wantsSurface } from "../state";
+import { isInDisc, type Nearby, NOTHING_NEAR, takenFrom, wantsSurface } from "../hybrid/who";
+import type { ViewerState } from "../state";
+import type { SurfaceFrame } from "./blend";
 import type { SurfaceLoader } from "./loader";
 import { overview, type Progress } from "./progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
@@ -16,12 +18,15 @@ export class SurfaceSet {
   readonly group = new Group();
   private readonly tilesets = new Map<string, SurfaceTileset>();
   private state: ViewerState | null = null;
+  private nearby: Nearby = NOTHING_NEAR;
   private errorTarget_px = ERROR_TARGET_PX;
 
   constructor(
     private readonly bundle: Bundle,
     private readonly loader: SurfaceLoader,
-    private readonly hasVolume: (tile: string, channel: string) => boolean,
+    private readonly frame: SurfaceFrame,
+    /** How far the volume of a tile and channel has faded in, 0..1. */
+    private readonly presence: (tile: string, channel: string) => number,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {}
@@ -42,8 +47,23 @@ export class SurfaceSet {
     this.errorTarget_px = pixels;
   }
 
-  follow(state: ViewerState): void {
+  /** Those that are not opaque now. */
+  get blended(): readonly Object3D[] {
+    return this.shown().flatMap(([, { surfaces }]) =>
+      [...surfaces.values()].flatMap(({ scene, blend }) => (blend.isBlended ? [scene] : [])),
+    );
+  }
+
+  /** Volumes came, went, or fade. */
+  dressAll(): void {
+    for (const [id, { surfaces }] of this.shown()) {
+      for (const surface of surfaces.values()) this.dress(id, surface);
+    }
+  }
+
+  follow(state: ViewerState, nearby: Nearby): void {
     this.state = state;
+    this.nearby = nearby;
     for (const channel of state.channels) {
       const isWanted = wantsSurface(state, channel);
       if (isWanted && channel.hasSurface && !this.tilesets.has(channel.id)) this.add(channel.id);
@@ -73,6 +93,7 @@ export class SurfaceSet {
       this.bundle.base,
       channel,
       this.loader,
+      this.frame,
       (surface) => this.dress(id, surface),
       this.onChange,
       this.onError,
@@ -85,13 +106,15 @@ export class SurfaceSet {
   private dress(id: string, surface: Surface): void {
     const { state } = this;
     const channel = state?.channels.find((c) => c.id === id);
-    if (state === null || channel === undefined) return;
-    surface.scene.visible = isSurfaceShown(
-      state,
-      id,
-      surface.tile,
-      this.hasVolume(surface.tile, id),
-    );
+    const tile = state?.tiles.find((each) => each.id === surface.tile);
+    if (state === null || channel === undefined || tile === undefined) return;
+    const presence = this.presence(tile.id, id);
+    const taken = takenFrom(state, channel, tile, this.nearby, presence);
+    surface.blend.set({
+      opacity: taken === null ? 0 : channel.opacity,
+      taken: taken ?? 0,
+      isInDisc: isInDisc(state, channel),
+    });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
   }
 

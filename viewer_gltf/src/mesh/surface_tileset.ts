@@ -20,6 +20,7 @@ import {
 import { BundleError } from "../bundle/errors";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Rgb } from "../color";
+import { BlendedSurface, type SurfaceFrame } from "./blend";
 import { fetchGlb, fetchTileset } from "./content";
 import type { SurfaceLoader } from "./loader";
 import type { TileProgress } from "./progress";
@@ -39,6 +40,7 @@ export type Surface = Readonly<{
   /** Linear, as the glb has it. */
   colors: readonly Rgb[];
   triangles: number;
+  blend: BlendedSurface;
 }>;
 
 export class SurfaceTileset {
@@ -54,6 +56,7 @@ export class SurfaceTileset {
     base: string,
     channel: Channel,
     loader: SurfaceLoader,
+    private readonly frame: SurfaceFrame,
     private readonly onSurface: (surface: Surface) => void,
     private readonly onChange: () => void,
     onError: (error: unknown) => void,
@@ -93,7 +96,10 @@ export class SurfaceTileset {
             }),
       );
     });
-    this.tiles.addEventListener("dispose-model", ({ scene }) => this.surfaces.delete(scene));
+    this.tiles.addEventListener("dispose-model", ({ scene }) => {
+      this.surfaces.get(scene)?.blend.dispose();
+      this.surfaces.delete(scene);
+    });
     this.tiles.addEventListener("needs-update", this.onChange);
     this.tiles.addEventListener("tile-visibility-change", this.onChange);
 
@@ -211,6 +217,7 @@ export class SurfaceTileset {
       materials: list,
       colors: list.map(({ color }) => [color.r, color.g, color.b] as const),
       triangles,
+      blend: new BlendedSurface(scene, list, this.frame),
     };
     this.surfaces.set(scene, surface);
     this.onSurface(surface);

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { includeChunks } from "./include";
-import { RAYMARCH_FRAGMENT } from "./raymarch";
+import { RAYMARCH_FRAGMENT } from "./texts";
 
 describe("a shader's chunks", () => {
   it("stand in place of their include lines", () => {

@@ -1,6 +1,6 @@
 /** The panel: shows the state and turns what the user does into actions. Keeps no state of its own. */
 import { fromHex, toHex } from "../color";
-import type { Action, ChannelState, ViewerState, VolumeScope } from "../state";
+import { type Action, type ChannelState, MODES, type Mode, type ViewerState } from "../state";
 import type { XrSupport } from "../xr/support";
 import { element } from "./dom";
 
@@ -12,6 +12,14 @@ type Row = Readonly<{
   transferFunction: HTMLSelectElement;
 }>;
 
+const MODE_NAMES: Readonly<Record<Mode, string>> = {
+  disc: "Disc",
+  tile: "Tile",
+  all: "All",
+  stage: "Staged",
+  off: "Off",
+};
+
 function tagsOf({ hasSurface, prefersVolume }: ChannelState): string[] {
   if (!hasSurface) return ["no surface"];
   return prefersVolume ? ["no clear surface"] : [];
@@ -21,7 +29,7 @@ export class Panel {
   readonly root: HTMLElement;
   private readonly rows = new Map<string, Row>();
   private readonly tile: HTMLSelectElement;
-  private readonly scopes: Readonly<Record<VolumeScope, HTMLInputElement>>;
+  private readonly modes = new Map<Mode, HTMLInputElement>();
   private readonly volumeSection: HTMLElement;
   private readonly stereo: HTMLButtonElement;
   private readonly reason: HTMLElement;
@@ -42,45 +50,42 @@ export class Panel {
       list.append(row.root);
     }
 
-    const scope = (value: VolumeScope) =>
-      element(
+    const isStaged = state.tiles.some((tile) => tile.representation !== "mesh");
+    const modes = MODES.filter((mode) => mode !== "stage" || isStaged);
+    for (const mode of modes) {
+      const input = element(
         "input",
         {
           type: "radio",
-          name: "scope",
-          value,
-          onchange: () => dispatch({ type: "choose-scope", scope: value }),
+          name: "mode",
+          value: mode,
+          onchange: () => dispatch({ type: "choose-mode", mode }),
         },
-        { scope: value },
+        { mode },
       );
-    this.scopes = { one: scope("one"), all: scope("all"), stage: scope("stage") };
-    const names: [VolumeScope, string][] = [
-      ["one", "One tile"],
-      ["all", "All tiles"],
-    ];
-    if (state.tiles.some((tile) => tile.representation !== "mesh")) {
-      names.push(["stage", "Staged"]);
+      this.modes.set(mode, input);
     }
     this.tile = element(
       "select",
       {
         ariaLabel: "Tile drawn as a volume",
-        onchange: () => dispatch({ type: "choose-tile", tile: this.tile.value }),
+        onchange: () => dispatch({ type: "select", tile: this.tile.value || null }),
       },
       { tileChoice: "" },
+      element("option", { value: "", textContent: "by gaze" }),
       ...state.tiles.map(({ id }) => element("option", { value: id, textContent: id })),
     );
     this.volumeSection = element(
       "section",
       { className: "volumes" },
       {},
-      element("h2", { textContent: "Volumes in" }),
+      element("h2", { textContent: "Volumes" }),
       element(
         "div",
         { className: "segmented" },
         {},
-        ...names.map(([value, textContent]) =>
-          element("label", {}, {}, this.scopes[value], element("span", { textContent })),
+        ...[...this.modes].map(([mode, input]) =>
+          element("label", {}, {}, input, element("span", { textContent: MODE_NAMES[mode] })),
         ),
       ),
       element(
@@ -90,7 +95,10 @@ export class Panel {
         element("span", { textContent: "Tile" }),
         this.tile,
       ),
-      element("p", { className: "hint", textContent: "Click the specimen to choose its tile." }),
+      element("p", {
+        className: "hint",
+        textContent: "Come near: volumes show round the middle of the view.",
+      }),
     );
 
     this.stereo = element(
@@ -223,9 +231,9 @@ export class Panel {
       row.transferFunction.value = channel.transferFunction;
     }
     this.volumeSection.hidden = !state.channels.some((c) => c.shown && c.volume);
-    this.scopes[state.scope].checked = true;
-    this.tile.value = state.tile;
-    this.tile.disabled = state.scope === "all";
+    const mode = this.modes.get(state.mode);
+    if (mode !== undefined) mode.checked = true;
+    this.tile.value = state.selected ?? "";
   }
 
   setStereo({ isAvailable, reason }: XrSupport): void {

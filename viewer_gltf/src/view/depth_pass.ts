@@ -5,10 +5,8 @@
  * its frame buffer can't be read.
  */
 import {
-  type Camera,
   DepthTexture,
-  DoubleSide,
-  MeshBasicMaterial,
+  type Material,
   NearestFilter,
   type Object3D,
   type Scene,
@@ -16,13 +14,18 @@ import {
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
+import { depthMaterial } from "../mesh/blend";
+import type { Cuts } from "./cuts";
+import type { Eyes } from "./eyes";
+import { drawEyes } from "./offscreen";
 
 export class DepthPass {
   readonly texture = new DepthTexture(1, 1, UnsignedIntType);
   private readonly target: WebGLRenderTarget;
-  private readonly material = new MeshBasicMaterial({ colorWrite: false, side: DoubleSide });
+  private readonly material: Material;
 
-  constructor() {
+  constructor({ uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">) {
+    this.material = depthMaterial({ uCuts, uCutCount });
     this.target = new WebGLRenderTarget(1, 1, {
       depthTexture: this.texture,
       minFilter: NearestFilter,
@@ -30,26 +33,14 @@ export class DepthPass {
     });
   }
 
-  /** `hidden` are the objects that are not opaque. Size in pixels of the frame buffer. */
-  render(
-    renderer: WebGLRenderer,
-    scene: Scene,
-    camera: Camera,
-    hidden: readonly Object3D[],
-    width: number,
-    height: number,
-  ): void {
-    this.target.setSize(width, height);
+  /** `hidden` are the objects that are not opaque. */
+  render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, hidden: readonly Object3D[]): void {
     const visibility = hidden.map((object) => object.visible);
     for (const object of hidden) object.visible = false;
     const { background } = scene;
-    const target = renderer.getRenderTarget();
     scene.background = null;
     scene.overrideMaterial = this.material;
-    renderer.setRenderTarget(this.target);
-    renderer.clear();
-    renderer.render(scene, camera);
-    renderer.setRenderTarget(target);
+    drawEyes(renderer, scene, eyes, this.target, 1);
     scene.overrideMaterial = null;
     scene.background = background;
     hidden.forEach((object, i) => {

@@ -4,47 +4,37 @@ import {
   Box3Helper,
   Color,
   DirectionalLight,
-  Group,
   HemisphereLight,
   type LineBasicMaterial,
   type Matrix4,
   type Object3D,
   Scene,
-  Vector3,
 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
-import { place } from "./placement";
+import { Specimen } from "./specimen";
 
 const BACKGROUND = 0x0b0d12;
 const OUTLINE = 0x5b6678;
 
 export class Room {
   readonly scene = new Scene();
-  /** Its children are in um, world. */
-  readonly specimen = new Group();
+  readonly specimen: Specimen;
   private readonly key = new DirectionalLight(0xfff4e6, 2.2);
   private readonly fill = new DirectionalLight(0xbfd4ff, 0.5);
   private readonly outline: Box3Helper;
 
   constructor(private readonly manifest: Manifest) {
+    this.specimen = new Specimen(manifest.specimen.bounds_um);
+    const { group } = this.specimen;
     this.scene.background = new Color(BACKGROUND);
     this.scene.add(new HemisphereLight(0xe8eefc, 0x2a2c33, 0.9));
-    this.scene.add(this.key, this.key.target, this.fill, this.fill.target, this.specimen);
+    this.scene.add(this.key, this.key.target, this.fill, this.fill.target, group);
     this.outline = new Box3Helper(new Box3(), OUTLINE);
     const material = this.outline.material as LineBasicMaterial;
     material.transparent = true;
     material.opacity = 0.6;
     this.outline.visible = false;
-    this.specimen.add(this.outline);
-    this.moveTo(new Vector3());
-  }
-
-  /** Put the specimen's centre at a point of the room. */
-  moveTo(point: Vector3): void {
-    const { scale, center } = place(this.manifest.specimen.bounds_um);
-    this.specimen.scale.setScalar(scale);
-    this.specimen.position.copy(point).addScaledVector(new Vector3(...center), -scale);
-    this.specimen.updateMatrixWorld(true);
+    group.add(this.outline);
   }
 
   /** The lamp hangs over the viewer's left shoulder, wherever the viewer goes. */

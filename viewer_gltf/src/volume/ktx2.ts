@@ -9,7 +9,7 @@ import {
   VK_FORMAT_R8G8B8A8_UNORM,
 } from "ktx-parse";
 import { BundleError } from "../bundle/errors";
-import { unzstd } from "./zstd";
+import { decodeTexels } from "./decode";
 
 export type Size3 = readonly [number, number, number];
 
@@ -68,7 +68,7 @@ export async function readLevel(
     FORMATS[format].bytes;
   switch (texture.supercompressionScheme) {
     case KHR_SUPERCOMPRESSION_ZSTD:
-      return unzstd(level.levelData, size, path);
+      return decodeTexels([{ bytes: level.levelData, name: path }], size);
     case KHR_SUPERCOMPRESSION_NONE:
       if (level.levelData.length !== size) {
         throw new BundleError(
@@ -81,4 +81,19 @@ export async function readLevel(
         `${path}: supercompression: expected zstd or none, found scheme ${texture.supercompressionScheme}`,
       );
   }
+}
+
+/** The zstd frame of one level; of an uncompressed texture, null. Throws BundleError. */
+export function compressedLevel(
+  texture: KTX2Container,
+  path: string,
+  index: number,
+): Uint8Array | null {
+  const level = texture.levels[index];
+  if (level === undefined) {
+    throw new BundleError(
+      `${path}: expected mip level ${index}, found ${texture.levels.length} levels`,
+    );
+  }
+  return texture.supercompressionScheme === KHR_SUPERCOMPRESSION_ZSTD ? level.levelData : null;
 }

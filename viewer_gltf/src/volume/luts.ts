@@ -1,18 +1,13 @@
-/** A channel's baked transfer functions, and what of a brick they make visible. */
+/** A channel's baked transfer functions, and the table that a choice among them makes. */
 import { BundleError } from "../bundle/errors";
 import { fetchFile } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
 import { readLevel, readTexture } from "./ktx2";
-import { opacityRanges } from "./occupancy";
 
-const ENTRIES = 256;
+export const ENTRIES = 256;
 
-export type TransferFunction = Readonly<{
-  /** RGBA, one entry for each intensity; RGB is a factor to the channel's colour. */
-  entries: Uint8Array<ArrayBuffer>;
-  /** See `opacityRanges`. */
-  ranges: Uint8Array;
-}>;
+/** RGBA, one entry for each intensity; RGB is a factor to the channel's colour. */
+export type TransferFunction = Uint8Array<ArrayBuffer>;
 
 /** The channel's transfer functions by name. Throws BundleError. */
 export async function loadTransferFunctions(
@@ -31,10 +26,36 @@ export async function loadTransferFunctions(
     );
   }
   return new Map(
-    names.map((name, row) => {
-      const entries = texels.slice(row * ENTRIES * 4, (row + 1) * ENTRIES * 4);
-      const alpha = Uint8Array.from({ length: ENTRIES }, (_, i) => entries[4 * i + 3]);
-      return [name, { entries, ranges: opacityRanges(alpha) }];
-    }),
+    names.map((name, row) => [name, texels.slice(row * ENTRIES * 4, (row + 1) * ENTRIES * 4)]),
   );
+}
+
+/**
+ * The function stretched over a window of the intensities, its opacity times a factor. Pure.
+ *
+ * @param window low and high end, 0..1 of the intensities
+ */
+export function lookUpTable(
+  entries: TransferFunction,
+  window: readonly [number, number],
+  opacity: number,
+): Uint8Array<ArrayBuffer> {
+  const [low, high] = window;
+  const table = new Uint8Array(ENTRIES * 4);
+  for (let i = 0; i < ENTRIES; i++) {
+    const part = (i / (ENTRIES - 1) - low) / (high - low);
+    const at = Math.min(1, Math.max(0, part)) * (ENTRIES - 1);
+    const left = Math.min(ENTRIES - 2, Math.floor(at));
+    for (let k = 0; k < 4; k++) {
+      const [a, b] = [entries[4 * left + k], entries[4 * left + 4 + k]];
+      const value = a + (b - a) * (at - left);
+      table[4 * i + k] = Math.round(k === 3 ? value * opacity : value);
+    }
+  }
+  return table;
+}
+
+/** The opacities of a table, 0..255. */
+export function opacities(table: Uint8Array): Uint8Array<ArrayBuffer> {
+  return Uint8Array.from({ length: ENTRIES }, (_, i) => table[4 * i + 3]);
 }

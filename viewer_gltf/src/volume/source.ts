@@ -1,40 +1,72 @@
 /**
- * Mip levels of one volume file by HTTP range. A host that knows no ranges answers the first
- * request with the whole file, which then serves every level.
+ * Mip levels of one volume file by HTTP range, still compressed, and its bricks. A host that knows
+ * no ranges answers the first request with the whole file, which then serves every level.
  */
 import { BundleError } from "../bundle/errors";
-import { checkFile, fileAddress, readBody, request } from "../bundle/fetch";
-import type { TileVolume } from "../bundle/generated/volumes";
-import { readLevel, readTexture } from "./ktx2";
-import { texels } from "./levels";
-import { unzstd } from "./zstd";
+import { checkFile, fetchFile, fileAddress, readBody, request } from "../bundle/fetch";
+import type { MipLevel, TileVolume } from "../bundle/generated/volumes";
+import { brickCounts } from "./brick_counts";
+import { compressedLevel, readLevel, readTexture } from "./ktx2";
 
 export class VolumeSource {
   private whole: Uint8Array<ArrayBuffer> | null = null;
+  /** What has come of a volume stays while it is wanted: another set of channels packs it anew. */
+  private readonly levels = new Map<number, Uint8Array>();
+  private ranges: Uint8Array | null = null;
 
   constructor(
     private readonly base: string,
     readonly volume: TileVolume,
   ) {}
 
-  /** The texels of level `index`, x fastest. Throws BundleError, or AbortError. */
-  async fetchLevel(index: number, signal: AbortSignal): Promise<Uint8Array<ArrayBuffer>> {
-    const { file, levels, size } = this.volume;
-    const level = levels[index];
-    const part = this.whole === null ? await this.fetchRange(level, signal) : null;
-    if (part !== null) {
-      return unzstd(part, texels(level), `${file.path}: level ${index}`);
+  /** Whether a level needs no fetching. */
+  has(index: number): boolean {
+    return this.levels.has(index);
+  }
+
+  /** Smallest and largest intensity of every brick, interleaved. Throws BundleError, AbortError. */
+  async bricks(signal: AbortSignal): Promise<Uint8Array> {
+    if (this.ranges === null) {
+      const { bricks, size } = this.volume;
+      const file = await fetchFile(this.base, bricks, signal);
+      const texture = readTexture(file, bricks.path, "R8G8", brickCounts(size));
+      this.ranges = await readLevel(texture, bricks.path, "R8G8", 0);
     }
+    return this.ranges;
+  }
+
+  /** The zstd frame of level `index`. Throws BundleError, or AbortError. */
+  async level(index: number, signal: AbortSignal): Promise<Uint8Array> {
+    let bytes = this.levels.get(index);
+    if (bytes === undefined) {
+      bytes = await this.fetchLevel(index, signal);
+      this.levels.set(index, bytes);
+    }
+    return bytes;
+  }
+
+  /** Forget what was fetched. */
+  release(): void {
+    this.levels.clear();
+    this.ranges = null;
+    this.whole = null;
+  }
+
+  private async fetchLevel(index: number, signal: AbortSignal): Promise<Uint8Array> {
+    const { file, levels, size } = this.volume;
+    const part = this.whole === null ? await this.fetchRange(levels[index], signal) : null;
+    if (part !== null) return part;
     if (this.whole === null) throw new Error("a whole file was promised");
     const texture = readTexture(this.whole, file.path, "R8", size);
-    return readLevel(texture, file.path, "R8", index);
+    const frame = compressedLevel(texture, file.path, index);
+    if (frame === null) {
+      throw new BundleError(`${file.path}: supercompression: expected zstd, found none`);
+    }
+    return frame;
   }
 
   /** The compressed bytes of a level, or null if the host sent the whole file (then it is kept). */
-  private async fetchRange(
-    level: { offset: number; length: number },
-    signal: AbortSignal,
-  ): Promise<Uint8Array | null> {
+  private async fetchRange(level: MipLevel, signal: AbortSignal): Promise<Uint8Array | null> {
     const { file } = this.volume;
     const last = level.offset + level.length - 1;
     const response = await request(fileAddress(this.base, file.path), file.path, {

@@ -11,35 +11,90 @@ import {
   Mesh,
   NearestFilter,
   RedFormat,
+  RepeatWrapping,
   RGBAFormat,
   ShaderMaterial,
+  type Texture,
   UnsignedByteType,
+  Vector2,
   Vector3,
+  Vector4,
 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Rgb } from "../color";
-import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "../shaders/raymarch";
-import { MAX_VOLUME_CHANNELS } from "../state";
-import type { TransferFunction } from "./luts";
-import { brickDistances, markVisible } from "./occupancy";
+import { blueNoise, NOISE_SIZE } from "../shaders/blue_noise";
+import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "../shaders/texts";
+import { brickCounts } from "./brick_counts";
+import { ENTRIES } from "./luts";
 import { distanceInGrid } from "./order";
-import type { VolumeTexture } from "./volume_texture";
+import type { Packed } from "./tile_texture";
 
-/** Hard limit of a ray, whatever the volume's size. */
+/** Hard limit of a ray, whatever the volume's size and through however many tiles it goes. */
 export const MAX_STEPS = 100;
 /** A ray that is this opaque goes no further. */
-const OPAQUE = 0.98;
+const OPAQUE = 0.99;
 /** Steps are not shorter than this share of a voxel. */
 const STEP_VOXELS = 0.7;
 
-export type Part = Readonly<{
-  channel: string;
-  volume: Pick<VolumeTexture, "texture" | "level" | "bricks" | "brickCount">;
-  transferFunction: TransferFunction;
-  color: Rgb;
+/** What all tiles share in a frame: uniforms by reference. */
+export type MarchFrame = Readonly<{
+  uSceneDepth: { value: DepthTexture };
+  uNoise: { value: Texture };
+  /** Pixels of the march to one of the picture. */
+  uScale: { value: number };
+  /** Corner of the eye's picture, in pixels of the march. */
+  uOrigin: { value: Vector2 };
+  /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
+  uDisc: { value: Vector2 };
+  uSteps: { value: number };
 }>;
 
+export function makeFrame(depth: DepthTexture): MarchFrame {
+  const noise = new DataTexture(blueNoise(), NOISE_SIZE, NOISE_SIZE, RedFormat, UnsignedByteType);
+  noise.wrapS = noise.wrapT = RepeatWrapping;
+  noise.minFilter = noise.magFilter = NearestFilter;
+  noise.needsUpdate = true;
+  return {
+    uSceneDepth: { value: depth },
+    uNoise: { value: noise },
+    uScale: { value: 1 },
+    uOrigin: { value: new Vector2() },
+    uDisc: { value: new Vector2(-2, -3) },
+    uSteps: { value: MAX_STEPS },
+  };
+}
+
+/** How one channel of a tile looks. */
+export type Look = Readonly<{
+  color: Rgb;
+  /** 256 RGBA entries, of `lookUpTable`. */
+  table: Uint8Array;
+  isInDisc: boolean;
+}>;
+
+/** Of the specimen, um: what is left of it. `plane`: unit normal and offset. */
+export type Clip = Readonly<{ min: Vector3; max: Vector3; plane: Vector4 }>;
+
+/** Nothing is cut off. Tiles that were moved by an artist may lie outside the specimen. */
+export function wholeSpecimen(): Clip {
+  const far = 1e9;
+  const max = new Vector3(far, far, far);
+  return { min: max.clone().negate(), max, plane: new Vector4(0, 0, 0, 1) };
+}
+
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
+/** Nothing may be leapt over until the table of leaps is there. */
+const NO_LEAPS = nearest3D(new Uint8Array(1), [1, 1, 1]);
+
+function nearest3D(data: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
+  const texture = new Data3DTexture(data, ...size);
+  texture.format = RedFormat;
+  texture.type = UnsignedByteType;
+  texture.minFilter = texture.magFilter = NearestFilter;
+  texture.unpackAlignment = 1;
+  texture.needsUpdate = true;
+  return texture;
+}
 
 /** Texture coordinates at the low and high corner of the box; image rows run against world y. */
 export function textureCorners(volume: TileVolume): { low: Vector3; high: Vector3 } {
@@ -54,21 +109,25 @@ export function textureCorners(volume: TileVolume): { low: Vector3; high: Vector
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
   private occupancy: Data3DTexture | null = null;
-  private lut: DataTexture | null = null;
-  private looks = "";
+  private readonly lut: DataTexture;
+  private readonly low: Vector3;
   private readonly toTile: Matrix4;
+  private readonly box = new Matrix4();
 
   constructor(
-    private readonly volume: TileVolume,
+    readonly volume: TileVolume,
     readonly channelCount: number,
-    depth: DepthTexture,
+    frame: MarchFrame,
   ) {
     const { min, max } = volume.bounds_um;
-    const size = new Vector3(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
-    const center = new Vector3(...min).addScaledVector(size, 0.5);
+    this.low = new Vector3(...min);
+    const size = new Vector3(...max).sub(this.low);
     const { low, high } = textureCorners(volume);
     const intervals = volume.size.map((n) => n - 1 - 2 * volume.apron);
     const voxel = Math.min(...size.toArray().map((edge, i) => edge / Math.max(1, intervals[i])));
+    const rows = new Uint8Array(channelCount * ENTRIES * 4);
+    this.lut = new DataTexture(rows, ENTRIES, channelCount, RGBAFormat, UnsignedByteType);
+    this.lut.minFilter = this.lut.magFilter = LinearFilter;
     const material = new ShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
@@ -80,6 +139,7 @@ export class TileMarch {
       depthTest: false, // the march ends at the scene's depth itself
       depthWrite: false,
       uniforms: {
+        ...frame,
         uSize: { value: size },
         uTexLow: { value: low },
         uTexHigh: { value: high },
@@ -89,22 +149,31 @@ export class TileMarch {
         uBrickSlack: { value: 0 },
         uLight: { value: new Vector3(-0.35, 0.5, 0.8).normalize() },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
-        uVolume0: { value: null },
-        uVolume1: { value: null },
-        uVolume2: { value: null },
-        uVolume3: { value: null },
-        uOccupancy: { value: null },
-        uLut: { value: null },
-        uSceneDepth: { value: depth },
+        uInDisc: { value: [false, false, false, false] },
+        uApex: { value: new Vector3() },
+        uAxis: { value: new Vector3(0, 0, -1) },
+        uPresence: { value: 1 },
+        uAllLow: { value: new Vector3() },
+        uAllHigh: { value: size.clone() },
+        uSpare: { value: 0 },
+        uClipLow: { value: new Vector3() },
+        uClipHigh: { value: size.clone() },
+        uClipPlane: { value: new Vector4(0, 0, 0, 1) },
+        uVolume: { value: null },
+        uOldVolume: { value: null },
+        uFresh: { value: 1 },
+        uOccupancy: { value: NO_LEAPS },
+        uLut: { value: this.lut },
       },
     });
     this.toTile = new Matrix4().fromArray(volume.matrix).invert();
     this.mesh = new Mesh(UNIT_CUBE, material);
     this.mesh.name = `volume of ${volume.tile}`;
+    this.mesh.frustumCulled = false;
     this.mesh.matrixAutoUpdate = false;
     this.mesh.matrix
       .fromArray(volume.matrix)
-      .multiply(new Matrix4().makeTranslation(center))
+      .multiply(new Matrix4().makeTranslation(this.low.clone().addScaledVector(size, 0.5)))
       .multiply(new Matrix4().makeScale(size.x, size.y, size.z));
   }
 
@@ -115,72 +184,98 @@ export class TileMarch {
     this.mesh.renderOrder = -distanceInGrid(local, min, max);
   }
 
-  /** Follow colours, levels and transfer functions. Every part's texture has arrived. */
-  update(parts: readonly Part[]): void {
-    if (parts.length !== this.channelCount || parts.length > MAX_VOLUME_CHANNELS) {
-      throw new RangeError(`expected ${this.channelCount} parts, found ${parts.length}`);
-    }
-    const { uniforms } = this.mesh.material;
-    parts.forEach((part, i) => {
-      uniforms[`uVolume${i}`].value = part.volume.texture;
-      (uniforms.uColor.value as Vector3[])[i].set(...part.color);
-    });
-    const coarsest = Math.max(...parts.map((part) => part.volume.level));
-    const finest = Math.min(...parts.map((part) => part.volume.level));
-    uniforms.uBrickSlack.value = coarsest === 0 ? 0 : Math.ceil(2 ** coarsest / 8);
-    uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** finest;
-    this.updateLooks(parts);
+  /** Where the disc's cone comes from and where to; um, world. */
+  aim(apex: Vector3, axis: Vector3): void {
+    const { uApex, uAxis } = this.mesh.material.uniforms;
+    uApex.value.copy(apex).applyMatrix4(this.toTile).sub(this.low);
+    uAxis.value.copy(axis).transformDirection(this.toTile);
   }
 
-  /** Only a new choice of channels or transfer functions needs a new table of leaps. */
-  private updateLooks(parts: readonly Part[]): void {
-    const looks = parts.map((p) => `${p.channel}:${lookId(p.transferFunction)}`).join(" ");
-    if (looks === this.looks) return;
-    this.looks = looks;
+  /** The box, um, world, round all tiles that are marched: they share a ray's steps by length. */
+  shareWith(min: Vector3, max: Vector3, tiles: number): void {
     const { uniforms } = this.mesh.material;
+    toBox(min, max, this.toTile, this.low, uniforms.uAllLow.value, uniforms.uAllHigh.value);
+    // each tile takes a step at least, however short the ray's way through it
+    uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
+  }
 
-    const rows = new Uint8Array(parts.length * 1024);
-    parts.forEach((part, i) => {
-      rows.set(part.transferFunction.entries, i * 1024);
-    });
-    this.lut?.dispose();
-    this.lut = new DataTexture(rows, 256, parts.length, RGBAFormat, UnsignedByteType);
-    this.lut.minFilter = this.lut.magFilter = LinearFilter;
-    this.lut.needsUpdate = true;
-    uniforms.uLut.value = this.lut;
+  clip({ min, max, plane }: Clip): void {
+    const { uniforms } = this.mesh.material;
+    toBox(min, max, this.toTile, this.low, uniforms.uClipLow.value, uniforms.uClipHigh.value);
+    // a plane n . p <= w of the world is n' . p' <= w' of the box
+    this.box.fromArray(this.volume.matrix).multiply(new Matrix4().makeTranslation(this.low));
+    const value: Vector4 = uniforms.uClipPlane.value;
+    value.set(plane.x, plane.y, plane.z, -plane.w).applyMatrix4(this.box.transpose());
+    value.w *= -1;
+  }
 
-    const count = parts[0].volume.brickCount;
-    const visible = new Uint8Array(count[0] * count[1] * count[2]);
-    for (const { volume, transferFunction } of parts) {
-      if (volume.bricks === null) throw new Error("a texture came before its bricks");
-      markVisible(visible, volume.bricks, transferFunction.ranges);
+  /** Show what has come. `presence` 0..1: how far it has faded in. */
+  show(shown: Packed, old: Packed | null, fresh: number, presence: number): void {
+    if (shown.channels.length !== this.channelCount) {
+      throw new RangeError(
+        `expected ${this.channelCount} channels, found ${shown.channels.length}`,
+      );
     }
+    const { uniforms } = this.mesh.material;
+    uniforms.uVolume.value = shown.texture;
+    uniforms.uOldVolume.value = (old ?? shown).texture;
+    uniforms.uFresh.value = fresh;
+    uniforms.uPresence.value = presence;
+    const coarsest = Math.max(shown.level, old?.level ?? 0);
+    uniforms.uBrickSlack.value = coarsest === 0 ? 0 : Math.ceil(2 ** coarsest / 8);
+    uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
+  }
+
+  /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
+  dress(looks: readonly Look[]): boolean {
+    const { uniforms } = this.mesh.material;
+    const rows = this.lut.image.data as Uint8Array;
+    let differs = false;
+    looks.forEach(({ color, table, isInDisc }, c) => {
+      (uniforms.uColor.value as Vector3[])[c].set(...color);
+      uniforms.uInDisc.value[c] = isInDisc;
+      const row = rows.subarray(c * table.length, (c + 1) * table.length);
+      if (table.every((value, i) => value === row[i])) return;
+      row.set(table);
+      differs = true;
+    });
+    if (differs) this.lut.needsUpdate = true;
+    return differs;
+  }
+
+  /** Where rays may leap, one byte a brick, of `brickDistances`; null: nowhere, for now. */
+  leapBy(distances: Uint8Array<ArrayBuffer> | null): void {
     this.occupancy?.dispose();
-    this.occupancy = new Data3DTexture(brickDistances(visible, count), ...count);
-    this.occupancy.format = RedFormat;
-    this.occupancy.type = UnsignedByteType;
-    this.occupancy.minFilter = this.occupancy.magFilter = NearestFilter;
-    this.occupancy.unpackAlignment = 1;
-    this.occupancy.needsUpdate = true;
-    uniforms.uOccupancy.value = this.occupancy;
+    this.occupancy =
+      distances === null ? null : nearest3D(distances, brickCounts(this.volume.size));
+    this.mesh.material.uniforms.uOccupancy.value = this.occupancy ?? NO_LEAPS;
   }
 
   dispose(): void {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
-    this.lut?.dispose();
+    this.lut.dispose();
     this.occupancy?.dispose();
   }
 }
 
-const ids = new WeakMap<TransferFunction, number>();
-let nextId = 0;
+const corner = new Vector3();
 
-function lookId(look: TransferFunction): number {
-  let id = ids.get(look);
-  if (id === undefined) {
-    id = nextId++;
-    ids.set(look, id);
+/** The box of the tile's own space, from its low corner, round one of the world. */
+function toBox(
+  min: Vector3,
+  max: Vector3,
+  toTile: Matrix4,
+  low: Vector3,
+  intoMin: Vector3,
+  intoMax: Vector3,
+): void {
+  intoMin.setScalar(Number.POSITIVE_INFINITY);
+  intoMax.setScalar(Number.NEGATIVE_INFINITY);
+  for (let i = 0; i < 8; i++) {
+    corner.set(i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z);
+    corner.applyMatrix4(toTile).sub(low);
+    intoMin.min(corner);
+    intoMax.max(corner);
   }
-  return id;
 }

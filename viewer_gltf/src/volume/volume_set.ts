@@ -1,17 +1,23 @@
-/** All volumes on screen: follows the state, loads what is missing, drops what is gone. */
-import { type DepthTexture, Group, type Vector3 } from "three";
-import type { TileVolume } from "../bundle/generated/volumes";
+/** All volumes on screen: follows who is drawn how, loads what is missing, drops what is gone. */
+import { Group, Matrix4, Scene, Vector3 } from "three";
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
-import { type ViewerState, volumeChannels, volumeTiles } from "../state";
-import { levelsToFetch, VOLUME_BUDGET_BYTES } from "./levels";
-import { loadTransferFunctions, type TransferFunction } from "./luts";
+import { isInDisc, type WantedTile } from "../hybrid/who";
+import type { ViewerState } from "../state";
+import { brickCounts } from "./brick_counts";
+import { levelsToFetch } from "./levels";
+import { loadTransferFunctions, lookUpTable, opacities, type TransferFunction } from "./luts";
+import { OccupancyClient } from "./occupancy_client";
 import { LoadQueue } from "./queue";
 import { VolumeSource } from "./source";
-import { type Part, TileMarch } from "./tile_march";
-import { VolumeTexture } from "./volume_texture";
+import { type Clip, type Look, type MarchFrame, TileMarch } from "./tile_march";
+import { type Packed, stride, TileTexture } from "./tile_texture";
 
 const PARALLEL_LOADS = 4;
+/** A volume that has come fades in, one that goes fades out. */
+export const PRESENCE_S = 0.25;
+/** So many tiles that are no longer looked at stay for a while: the gaze often comes back. */
+const KEPT_TILES = 2;
 
 type ChannelVolumes = Readonly<{
   sources: ReadonlyMap<string, VolumeSource>;
@@ -25,97 +31,199 @@ export type VolumeStatus = Readonly<{
   level: number | null;
 }>;
 
+type Resident = {
+  readonly texture: TileTexture;
+  march: TileMarch | null;
+  /** What the march's tables were made of. */
+  packed: Packed | null;
+  wanted: WantedTile | null;
+  /** 0..1 */
+  presence: number;
+  /** When it was last wanted. */
+  turn: number;
+};
+
 export class VolumeSet {
-  /** In um, world. */
-  readonly group = new Group();
+  readonly scene = new Scene();
+  private readonly group = new Group();
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
+  private readonly occupancy = new OccupancyClient();
   private readonly channels = new Map<string, ChannelVolumes | "loading" | "failed">();
-  private readonly textures = new Map<string, VolumeTexture>();
-  private readonly marches = new Map<string, { looks: string; march: TileMarch }>();
+  private readonly residents = new Map<string, Resident>();
   private state: ViewerState | null = null;
+  private wanted: readonly WantedTile[] = [];
+  private mayRefine = true;
+  private turn = 0;
 
   constructor(
     private readonly bundle: Bundle,
-    private readonly depth: DepthTexture,
-    private readonly maxSide: number,
+    private readonly frame: MarchFrame,
+    private readonly limits: Readonly<{ bytes: number; side: number }>,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
-  ) {}
+  ) {
+    this.group.matrixAutoUpdate = false;
+    this.scene.add(this.group);
+  }
 
   get isLoading(): boolean {
     return (
       [...this.channels.values()].includes("loading") ||
-      [...this.textures.values()].some((texture) => texture.isLoading)
+      [...this.residents.values()].some(({ texture }) => texture.isLoading)
     );
   }
 
+  /** Whether anything is to be marched. */
   get isEmpty(): boolean {
-    return this.marches.size === 0;
+    return !this.group.children.some(({ visible }) => visible);
+  }
+
+  /** Bytes on the GPU. */
+  get bytes(): number {
+    return [...this.residents.values()].reduce((sum, { texture }) => sum + texture.bytes, 0);
   }
 
   status(): readonly VolumeStatus[] {
-    return [...this.textures].map(([key, { level }]) => {
-      const [tile, channel] = key.split("/");
-      return { tile, channel, level: Number.isFinite(level) ? level : null };
-    });
+    return [...this.residents].flatMap(([tile, { texture, wanted }]) =>
+      (wanted?.channels ?? []).map((id) => ({
+        tile,
+        channel: id,
+        level: texture.shown?.channels.includes(id) ? texture.shown.level : null,
+      })),
+    );
   }
 
-  /** Whether the volume is on screen, so that the surface can go. */
-  has(tile: string, channel: string): boolean {
-    return this.marches.has(tile) && this.textures.get(`${tile}/${channel}`)?.texture != null;
+  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  presence(tile: string, channel: string): number {
+    const resident = this.residents.get(tile);
+    if (resident === undefined || resident.march === null) return 0;
+    return resident.packed?.channels.includes(channel) ? resident.presence : 0;
   }
 
-  /** Far tiles first, before every frame. `eye` in um, world. */
-  sortBy(eye: Vector3): void {
-    for (const { march } of this.marches.values()) march.sortBy(eye);
+  /** Whether all that is wanted of a tile is there, at some level. */
+  isReady(tile: string): boolean {
+    const resident = this.residents.get(tile);
+    const shown = resident?.texture.shown;
+    if (resident?.wanted == null || shown == null) return false;
+    return resident.wanted.channels.every(
+      (id) => shown.channels.includes(id) || !this.canCome(id, tile),
+    );
   }
 
-  follow(state: ViewerState): void {
+  /** Volumes lie in the world of the specimen, whose place in the room this is. */
+  placeAs(specimen: Matrix4): void {
+    this.group.matrix.copy(specimen);
+    this.group.matrixWorldNeedsUpdate = true;
+  }
+
+  /** Before every frame. `eye` and the disc's cone in um, world. */
+  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: Clip): void {
+    const boxes = new Bounds();
+    for (const { march } of this.drawn()) boxes.add(march);
+    for (const { march } of this.drawn()) {
+      march.sortBy(eye);
+      march.aim(apex, axis);
+      march.clip(clip);
+      march.shareWith(boxes.min, boxes.max, boxes.count);
+    }
+  }
+
+  /** Go on with all fades; whether any is still under way. */
+  advance(dt_s: number): boolean {
+    let isFading = false;
+    for (const resident of this.residents.values()) {
+      isFading = resident.texture.advance(dt_s) || isFading;
+      const goal = resident.wanted !== null && resident.march !== null ? 1 : 0;
+      const step = dt_s / PRESENCE_S;
+      const { presence } = resident;
+      resident.presence =
+        goal > presence ? Math.min(1, presence + step) : Math.max(goal, presence - step);
+      if (resident.presence !== goal) isFading = true;
+      else if (presence !== goal && goal === 0) this.evict();
+      this.show(resident);
+    }
+    return isFading;
+  }
+
+  /**
+   * @param mayRefine false while the gaze wanders: then nothing finer is begun
+   */
+  follow(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
     this.state = state;
-    const channels = volumeChannels(state).map((channel) => ({
-      id: channel.id,
-      tiles: volumeTiles(state, channel),
-    }));
-    const count = channels.reduce((sum, { tiles }) => sum + tiles.length, 0);
-    const budget = VOLUME_BUDGET_BYTES / Math.max(1, count);
-    const wanted = new Set<string>();
-    for (const { id, tiles } of channels) {
+    this.wanted = wanted;
+    this.mayRefine = mayRefine;
+    this.turn++;
+    for (const resident of this.residents.values()) resident.wanted = null;
+    for (const each of wanted) this.want(each);
+    for (const [id, volumes] of this.channels) {
+      const isUsed = wanted.some(({ channels }) => channels.includes(id));
+      if (volumes === "failed" && !isUsed) this.channels.delete(id);
+    }
+    this.evict();
+    for (const resident of this.residents.values()) this.dress(resident);
+  }
+
+  private want(wanted: WantedTile): void {
+    const sources = new Map<string, VolumeSource>();
+    for (const id of wanted.channels) {
       const volumes = this.channels.get(id);
       if (volumes === undefined) void this.loadChannel(id);
       if (volumes === undefined || typeof volumes === "string") continue;
-      for (const tile of tiles) {
-        const source = volumes.sources.get(tile);
-        if (source === undefined) continue;
-        const key = `${tile}/${id}`;
-        wanted.add(key);
-        let texture = this.textures.get(key);
-        if (texture === undefined) {
-          texture = new VolumeTexture(
-            source,
-            this.bundle.base,
-            this.queue,
-            () => this.refresh(),
-            this.onError,
-          );
-          this.textures.set(key, texture);
-        }
-        texture.want(levelsToFetch(source.volume.levels, budget, this.maxSide));
-      }
+      const source = volumes.sources.get(wanted.tile);
+      if (source !== undefined) sources.set(id, source);
     }
-    for (const [key, texture] of this.textures) {
-      if (wanted.has(key)) continue;
-      texture.dispose();
-      this.textures.delete(key);
+    let resident = this.residents.get(wanted.tile);
+    if (resident === undefined) {
+      if (sources.size === 0) return;
+      resident = this.addTile(wanted.tile);
     }
-    for (const [id, volumes] of this.channels) {
-      if (volumes === "failed" && !channels.some((c) => c.id === id)) this.channels.delete(id);
-    }
-    this.updateMarches(state);
+    resident.wanted = wanted;
+    resident.turn = this.turn;
+    const [first] = sources.values();
+    if (first === undefined) return;
+    const share = this.limits.bytes / Math.max(this.wanted.length + KEPT_TILES, 1);
+    const levels = levelsToFetch(
+      first.volume.levels,
+      share / stride(sources.size),
+      this.limits.side,
+    );
+    resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1));
   }
 
-  private refresh(): void {
-    if (this.state !== null) this.updateMarches(this.state);
-    this.onChange();
+  private addTile(tile: string): Resident {
+    const texture = new TileTexture(
+      this.queue,
+      () => {
+        const resident = this.residents.get(tile);
+        if (resident !== undefined) this.dress(resident);
+        this.onChange();
+      },
+      this.onError,
+    );
+    const resident = { texture, march: null, packed: null, wanted: null, presence: 0, turn: 0 };
+    this.residents.set(tile, resident);
+    return resident;
+  }
+
+  /** Drop what is no longer wanted and has faded out, but for the few that were wanted last. */
+  private evict(): void {
+    const idle = [...this.residents].filter(
+      ([, { wanted, presence }]) => !wanted && presence === 0,
+    );
+    idle.sort(([, a], [, b]) => b.turn - a.turn);
+    for (const [, resident] of idle) resident.texture.want(new Map(resident.texture.kept), []);
+    for (const [tile, resident] of idle.slice(KEPT_TILES)) {
+      resident.march?.dispose();
+      resident.texture.dispose();
+      this.residents.delete(tile);
+    }
+  }
+
+  private canCome(channel: string, tile: string): boolean {
+    const volumes = this.channels.get(channel);
+    if (volumes === "failed") return false;
+    if (volumes === undefined || volumes === "loading") return true;
+    return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
   }
 
   private async loadChannel(id: string): Promise<void> {
@@ -136,53 +244,109 @@ export class VolumeSet {
       this.channels.set(id, "failed");
       this.onError(error);
     }
-    if (this.state !== null) this.follow(this.state);
+    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
     this.onChange();
   }
 
-  private updateMarches(state: ViewerState): void {
-    const tiles = new Set(volumeChannels(state).flatMap((c) => volumeTiles(state, c)));
-    for (const [tile, { march }] of this.marches) {
-      if (tiles.has(tile)) continue;
-      march.dispose();
-      this.marches.delete(tile);
+  /** A march for what has come, in the colours of the state. */
+  private dress(resident: Resident): void {
+    const { state } = this;
+    const { shown } = resident.texture;
+    if (state === null) return;
+    if (shown === null) {
+      resident.march?.dispose();
+      resident.march = null;
+      resident.packed = null;
+      return;
     }
-    for (const tile of tiles) this.updateMarch(state, tile);
-  }
-
-  private updateMarch(state: ViewerState, tile: string): void {
-    const parts: Part[] = [];
-    let box: TileVolume | null = null; // the same for all channels of a tile
-    for (const channel of volumeChannels(state)) {
-      const volumes = this.channels.get(channel.id);
-      const volume = this.textures.get(`${tile}/${channel.id}`);
-      if (volumes === undefined || typeof volumes === "string") continue;
-      const transferFunction = volumes.transferFunctions.get(channel.transferFunction);
-      if (volume?.texture == null || transferFunction === undefined) continue;
-      box ??= volume.source.volume;
-      parts.push({ channel: channel.id, volume, transferFunction, color: channel.color });
-    }
-    const looks = parts.map((part) => part.channel).join(" ");
-    let found = this.marches.get(tile);
-    if (found !== undefined && found.looks !== looks) {
-      found.march.dispose();
-      this.marches.delete(tile);
-      found = undefined;
-    }
-    if (box === null) return;
-    if (found === undefined) {
-      const march = new TileMarch(box, parts.length, this.depth);
-      found = { looks, march };
-      this.marches.set(tile, found);
+    const looks = shown.channels.map((id) => this.look(state, id));
+    const isNewSet = resident.packed?.channels.join() !== shown.channels.join();
+    const { march: before } = resident;
+    let march = before;
+    if (march === null || march.channelCount !== shown.channels.length) {
+      before?.dispose();
+      const volume = this.volumeOf(shown.channels[0], resident);
+      march = new TileMarch(volume, shown.channels.length, this.frame);
+      resident.march = march;
       this.group.add(march.mesh);
     }
-    found.march.update(parts);
+    resident.packed = shown;
+    const differs = march.dress(looks);
+    if (differs || isNewSet || march !== before) void this.findLeaps(march, shown, looks);
+  }
+
+  private volumeOf(channel: string, { texture }: Resident) {
+    const source = texture.kept.get(channel);
+    if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
+    return source.volume;
+  }
+
+  private look(state: ViewerState, id: string): Look {
+    const channel = state.channels.find((c) => c.id === id);
+    const volumes = this.channels.get(id);
+    if (channel === undefined || volumes === undefined || typeof volumes === "string") {
+      throw new Error(`channel ${id} has come without a look`);
+    }
+    const entries = volumes.transferFunctions.get(channel.transferFunction);
+    if (entries === undefined) throw new Error(`no transfer function ${channel.transferFunction}`);
+    return {
+      color: channel.color,
+      table: lookUpTable(entries, channel.window, channel.opacity),
+      isInDisc: isInDisc(state, channel),
+    };
+  }
+
+  private async findLeaps(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
+    march.leapBy(null); // what the old table leaps over may show now
+    const distances = await this.occupancy.computeDistances(march.volume.tile, {
+      bricks: shown.bricks,
+      alphas: looks.map(({ table }) => opacities(table)),
+      count: brickCounts(march.volume.size),
+    });
+    if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
+    march.leapBy(distances);
+    this.onChange();
+  }
+
+  private show({ march, texture, packed, presence }: Resident): void {
+    if (march === null || packed === null) return;
+    march.mesh.visible = presence > 0;
+    march.show(packed, texture.old, texture.fresh, presence);
+  }
+
+  private drawn(): { march: TileMarch }[] {
+    return [...this.residents.values()].flatMap(({ march }) =>
+      march?.mesh.visible ? [{ march }] : [],
+    );
   }
 
   dispose(): void {
-    for (const texture of this.textures.values()) texture.dispose();
-    for (const { march } of this.marches.values()) march.dispose();
-    this.textures.clear();
-    this.marches.clear();
+    for (const { march, texture } of this.residents.values()) {
+      march?.dispose();
+      texture.dispose();
+    }
+    this.residents.clear();
+    this.occupancy.dispose();
+  }
+}
+
+/** The box round several marched tiles, um, world. */
+class Bounds {
+  readonly min = new Vector3().setScalar(Number.POSITIVE_INFINITY);
+  readonly max = new Vector3().setScalar(Number.NEGATIVE_INFINITY);
+  count = 0;
+
+  add({ volume }: TileMarch): void {
+    const matrix = new Matrix4().fromArray(volume.matrix);
+    const { min, max } = volume.bounds_um;
+    for (let i = 0; i < 8; i++) {
+      const x = i & 1 ? max[0] : min[0];
+      const y = i & 2 ? max[1] : min[1];
+      const z = i & 4 ? max[2] : min[2];
+      const at = new Vector3(x, y, z).applyMatrix4(matrix);
+      this.min.min(at);
+      this.max.max(at);
+    }
+    this.count++;
   }
 }

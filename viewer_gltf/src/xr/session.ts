@@ -21,6 +21,11 @@ export class XrSession {
     return this.session !== null;
   }
 
+  /** Frames a second, where the headset tells. */
+  get rate_hz(): number | undefined {
+    return this.session?.frameRate;
+  }
+
   /** Must be called from a click or a tap. Rejects if the browser or the user refuses. */
   async start(xr: XRSystem): Promise<void> {
     if (this.session !== null) return;

@@ -1,6 +1,7 @@
 /** Drive the viewer's page as a person does: by its controls. */
 import type { Page } from "playwright-core";
 import type { Snapshot } from "../../src/api";
+import type { Mode } from "../../src/state";
 
 export class ViewerPage {
   constructor(readonly page: Page) {}
@@ -42,7 +43,7 @@ export class ViewerPage {
   async showAs(channel: string, as: "surface" | "volume"): Promise<void> {
     await this.show(channel, true);
     await this.drawVolume(channel, as === "volume");
-    if (as === "volume") await this.chooseScope("all");
+    if (as === "volume") await this.chooseMode("all");
   }
 
   async recolor(channel: string, hex: string): Promise<void> {
@@ -60,8 +61,8 @@ export class ViewerPage {
     await this.settled();
   }
 
-  async chooseScope(scope: "one" | "all" | "stage"): Promise<void> {
-    await this.page.locator(`[data-scope="${scope}"]`).setChecked(true, { force: true });
+  async chooseMode(mode: Mode): Promise<void> {
+    await this.page.locator(`[data-mode="${mode}"]`).setChecked(true, { force: true });
     await this.settled();
   }
 

@@ -11,9 +11,13 @@ import {
   WebGLRenderTarget,
 } from "three";
 import type { TileVolume } from "../../src/bundle/generated/volumes";
+import { Cuts } from "../../src/view/cuts";
 import { DepthPass } from "../../src/view/depth_pass";
-import { opacityRanges } from "../../src/volume/occupancy";
-import { TileMarch } from "../../src/volume/tile_march";
+import { Eyes } from "../../src/view/eyes";
+import { brickCounts } from "../../src/volume/brick_counts";
+import { opacities } from "../../src/volume/luts";
+import { occupancyDistances } from "../../src/volume/occupancy";
+import { makeFrame, TileMarch, wholeSpecimen } from "../../src/volume/tile_march";
 
 export type Run = Readonly<{
   /** Texels along each edge of the cube. */
@@ -42,7 +46,7 @@ function makeMarch({ side, opacity, bricks }: Run, depth: DepthPass): TileMarch 
     matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
     levels: [{ size: [side, side, side], offset: 0, length: 1 }],
   };
-  const count = Math.ceil(side / 8);
+  const [count] = brickCounts(volume.size);
   const ranges = new Uint8Array(2 * count ** 3);
   const holds = (x: number, y: number, z: number) =>
     bricks === "all" || (bricks === "checkerboard" && (x + y + z) % 2 === 0);
@@ -60,16 +64,17 @@ function makeMarch({ side, opacity, bricks }: Run, depth: DepthPass): TileMarch 
 
   const entries = new Uint8Array(1024).fill(255);
   for (let i = 0; i < 256; i++) entries[4 * i + 3] = i === 0 ? 0 : opacity;
-  const alpha = Uint8Array.from({ length: 256 }, (_, i) => entries[4 * i + 3]);
-  const march = new TileMarch(volume, 1, depth.texture);
-  march.update([
-    {
-      channel: "A",
-      volume: { texture, level: 0, bricks: ranges, brickCount: [count, count, count] },
-      transferFunction: { entries, ranges: opacityRanges(alpha) },
-      color: [1, 1, 1],
-    },
-  ]);
+  const march = new TileMarch(volume, 1, makeFrame(depth.texture));
+  march.clip(wholeSpecimen());
+  march.show({ channels: ["A"], level: 0, texture, bricks: [ranges] }, null, 1, 1);
+  march.dress([{ color: [1, 1, 1], table: entries, isInDisc: false }]);
+  march.leapBy(
+    occupancyDistances({
+      bricks: [ranges],
+      alphas: [opacities(entries)],
+      count: brickCounts(volume.size),
+    }),
+  );
   march.mesh.material.defines.COUNT_STEPS = 1;
   return march;
 }
@@ -77,7 +82,7 @@ function makeMarch({ side, opacity, bricks }: Run, depth: DepthPass): TileMarch 
 /** Look along the cube's space diagonal, its longest ray, and count. */
 function countSteps(run: Run): Counts {
   const renderer = new WebGLRenderer();
-  const depth = new DepthPass();
+  const depth = new DepthPass(new Cuts());
   const march = makeMarch(run, depth);
   const scene = new Scene();
   scene.add(march.mesh);
@@ -86,7 +91,11 @@ function countSteps(run: Run): Counts {
   const away = 6 * edge;
   camera.position.set(edge / 2 + away, -edge / 2 + away, edge / 2 + away);
   camera.lookAt(edge / 2, -edge / 2, edge / 2);
-  depth.render(renderer, scene, camera, [march.mesh], PIXELS, PIXELS);
+  camera.updateMatrixWorld();
+  renderer.setSize(PIXELS, PIXELS, false);
+  const eyes = new Eyes();
+  eyes.followScreen(renderer, camera);
+  depth.render(renderer, scene, eyes, [march.mesh]);
   const target = new WebGLRenderTarget(PIXELS, PIXELS);
   renderer.setRenderTarget(target);
   renderer.setClearColor(0, 0);

@@ -1,13 +1,13 @@
-// Colour (not premultiplied) and opacity of a step that is `voxels` long. Channels that overlap
-// absorb together and share the colour by their opacities.
-vec4 classify(vec4 intensity, float voxels) {
+// Colour (not premultiplied) and opacity of a step that is so many voxels long for each channel.
+// Channels that overlap absorb together and share the colour by their opacities.
+vec4 classify(vec4 intensity, vec4 voxels) {
   vec3 color = vec3(0.0);
   float weight = 0.0;
   float clear = 1.0;
   for (int c = 0; c < CHANNELS; c++) {
     vec2 at = vec2((intensity[c] * 255.0 + 0.5) / 256.0, (float(c) + 0.5) / float(CHANNELS));
     vec4 look = texture(uLut, at);
-    float a = 1.0 - pow(1.0 - min(look.a, 0.999), voxels);
+    float a = 1.0 - pow(1.0 - min(look.a, 0.999), voxels[c]);
     color += look.rgb * uColor[c] * a;
     weight += a;
     clear *= 1.0 - a;

@@ -1,5 +1,6 @@
-// A fixed offset in 0..1 for each pixel, which turns bands into fine grain: interleaved gradient
-// noise (Jimenez, Next Generation Post Processing in Call of Duty, SIGGRAPH 2014).
+// A fixed offset in 0..1 for each pixel, which turns bands into fine grain: blue noise, in tiles.
+// Counted from the eye's own corner, so that both eyes see the same grain at the same place.
 float jitter(vec2 pixel) {
-  return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
+  ivec2 size = textureSize(uNoise, 0);
+  return texelFetch(uNoise, ivec2(pixel) % size, 0).r;
 }

@@ -1,0 +1,33 @@
+bool all4(bvec4 each) {
+  return each.x && each.y && each.z && each.w;
+}
+
+// The part of a ray's span inside the cone of the disc's outer radius, which is less than 90
+// degrees: there f(t) = (axis . q)^2 - cos^2 |q|^2 >= 0 for q = eye + t dir - apex, on the side
+// that the axis points to.
+vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
+  if (uDisc.y <= -1.0) return span;  // the disc is all there is
+  vec3 m = eye - uApex;
+  float square = uDisc.y * uDisc.y;
+  float dg = dot(dir, uAxis);
+  float mg = dot(m, uAxis);
+  float a = dg * dg - square;
+  float b = dg * mg - square * dot(dir, m);
+  float c = mg * mg - square * dot(m, m);
+  float root = b * b - a * c;
+  if (root < 0.0) return a > 0.0 && dg > 0.0 ? span : vec2(1.0, 0.0);
+  root = sqrt(root);
+  float near = (-b - root) / a;
+  float far = (-b + root) / a;
+  if (a > 0.0) return dg > 0.0 ? vec2(max(span.x, far), span.y) : vec2(span.x, min(span.y, near));
+  // a < 0: near > far, and the ray is inside between them, in front of the apex or behind it
+  if (mg + 0.5 * (near + far) * dg < 0.0) return vec2(1.0, 0.0);
+  return vec2(max(span.x, far), min(span.y, near));
+}
+
+// By how much each channel's opacity counts at a point: extinction grows with the cube of the
+// disc's weight, as a dense volume would else be opaque all over the feather.
+vec4 weights(vec3 p) {
+  float w = discWeight(p, uApex, uAxis, uDisc);
+  return uPresence * uPresence * uPresence * mix(vec4(1.0), vec4(w * w * w), vec4(uInDisc));
+}

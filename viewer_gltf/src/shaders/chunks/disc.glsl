@@ -1,0 +1,6 @@
+// How much of the volume shows at a point, 0..1: 1 within the disc's inner radius, 0 beyond its
+// outer one. `disc`: cosines of both radii, as seen from `apex` along `axis`.
+float discWeight(vec3 p, vec3 apex, vec3 axis, vec2 disc) {
+  vec3 ray = p - apex;
+  return smoothstep(disc.y, disc.x, dot(ray, axis) / max(length(ray), 1e-9));
+}

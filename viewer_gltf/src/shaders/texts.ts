@@ -1,0 +1,21 @@
+/** The text of shaders, their chunks put in. */
+
+import composite from "./composite.frag.glsl?raw";
+import triangle from "./composite.vert.glsl?raw";
+import { includeChunks } from "./include";
+import fragment from "./raymarch.frag.glsl?raw";
+import vertex from "./raymarch.vert.glsl?raw";
+
+const files: Record<string, string> = import.meta.glob("./chunks/*.glsl", {
+  query: "?raw",
+  import: "default",
+  eager: true,
+});
+export const CHUNKS = Object.fromEntries(
+  Object.entries(files).map(([path, text]) => [path.slice(2, -".glsl".length), text]),
+);
+
+export const RAYMARCH_VERTEX = includeChunks(vertex, CHUNKS);
+export const RAYMARCH_FRAGMENT = includeChunks(fragment, CHUNKS);
+export const COMPOSITE_VERTEX = triangle;
+export const COMPOSITE_FRAGMENT = composite;

@@ -1,0 +1,21 @@
+/** What a panel or a key can ask for that is no change of the state. */
+export type Command =
+  /** The whole specimen from the front again, and no tile isolated. */
+  | "reset"
+  /** One step out: from an isolated tile to all, from a selected one to none. */
+  | "back"
+  | "stereo"
+  /** Split screen for a phone in a viewer without WebXR. */
+  | "split"
+  | "share"
+  /** What a tap does, in the middle of the view: for hands that have only keys. */
+  | "press"
+  | "front"
+  | "side"
+  | "top"
+  | "zoom-in"
+  | "zoom-out"
+  | "turn-left"
+  | "turn-right"
+  | "turn-up"
+  | "turn-down";

@@ -1,0 +1,146 @@
+/**
+ * The mono camera: it goes round the specimen by mouse, touch and key. One finger or the left button
+ * turns, two fingers or the wheel zoom about the point that is looked at, two fingers or the right
+ * button move. Nobody loses the specimen: the point that is looked at stays in its box, the eye
+ * within limits of it.
+ */
+import { PerspectiveCamera, Spherical, Vector3 } from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Command } from "../ui/commands";
+import { framingDistance, type Placement } from "./placement";
+
+const FIELD_OF_VIEW_DEG = 40;
+const NEAREST_M = 0.05;
+const FARTHEST_M = 8;
+/** A key turns by this. */
+const TURN_RAD = Math.PI / 12;
+const ZOOM = 0.8;
+
+/** Metres of the room. */
+export type Look = Readonly<{
+  position: readonly [number, number, number];
+  target: readonly [number, number, number];
+}>;
+
+export class Navigation {
+  readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
+  readonly controls: OrbitControls;
+  /** Whether the start view still holds: then it follows the window's shape. */
+  private isHome = true;
+  private readonly reach: Vector3;
+
+  constructor(
+    canvas: HTMLElement,
+    private readonly placement: Placement,
+    onChange: () => void,
+  ) {
+    this.reach = new Vector3(...placement.size).multiplyScalar(0.5);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    this.controls.minDistance = NEAREST_M;
+    this.controls.maxDistance = FARTHEST_M;
+    this.controls.addEventListener("change", () => {
+      this.controls.target.clamp(this.reach.clone().negate(), this.reach);
+      onChange();
+    });
+    this.controls.addEventListener("start", () => {
+      this.isHome = false;
+    });
+  }
+
+  update(): void {
+    this.controls.update();
+    this.camera.updateMatrixWorld();
+  }
+
+  /** The window has this shape now. */
+  fit(aspect: number): void {
+    this.camera.aspect = aspect;
+    this.camera.updateProjectionMatrix();
+    if (this.isHome) this.reset();
+  }
+
+  /** The whole specimen from the front: x to the right, y up. */
+  reset(): void {
+    this.lookFrom({ position: [0, 0, this.framing(2)], target: [0, 0, 0] });
+    this.isHome = true;
+  }
+
+  get look(): Look {
+    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
+  }
+
+  lookFrom({ position, target }: Look): void {
+    this.isHome = false;
+    this.controls.target.fromArray(target).clamp(this.reach.clone().negate(), this.reach);
+    this.camera.position.fromArray(position);
+    this.camera.up.set(0, 1, 0);
+    this.controls.update();
+  }
+
+  /** Whether the command was one of the camera's. */
+  run(command: Command): boolean {
+    switch (command) {
+      case "front":
+        this.reset();
+        return true;
+      case "side":
+        this.lookFrom({ position: [this.framing(0), 0, 0], target: [0, 0, 0] });
+        return true;
+      case "top":
+        this.lookFrom({ position: [0, this.framing(1), 1e-4], target: [0, 0, 0] });
+        return true;
+      case "zoom-in":
+        this.move(0, 0, ZOOM);
+        return true;
+      case "zoom-out":
+        this.move(0, 0, 1 / ZOOM);
+        return true;
+      case "turn-left":
+        this.move(-TURN_RAD, 0, 1);
+        return true;
+      case "turn-right":
+        this.move(TURN_RAD, 0, 1);
+        return true;
+      case "turn-up":
+        this.move(0, -TURN_RAD, 1);
+        return true;
+      case "turn-down":
+        this.move(0, TURN_RAD, 1);
+        return true;
+      default:
+        return false;
+    }
+  }
+
+  private framing(axis: 0 | 1 | 2): number {
+    const [x, y, z] = this.placement.size;
+    const seen = (
+      [
+        [z, y, x],
+        [x, z, y],
+        [x, y, z],
+      ] as const
+    )[axis];
+    return framingDistance(seen, (FIELD_OF_VIEW_DEG * Math.PI) / 180, this.camera.aspect);
+  }
+
+  private move(turn_rad: number, tilt_rad: number, zoom: number): void {
+    const { target } = this.controls;
+    const offset = this.camera.position.clone().sub(target);
+    const at = new Spherical().setFromVector3(offset);
+    at.theta += turn_rad;
+    at.phi += tilt_rad;
+    at.radius = Math.min(FARTHEST_M, Math.max(NEAREST_M, at.radius * zoom));
+    at.makeSafe();
+    this.lookFrom({
+      position: offset.setFromSpherical(at).add(target).toArray(),
+      target: target.toArray(),
+    });
+  }
+
+  dispose(): void {
+    this.controls.dispose();
+  }
+}

@@ -1,0 +1,47 @@
+/** A scale bar: a round length that is neither too short nor too long on the screen. Pure. */
+
+/** The longest and the shortest bar differ by more than 2 to 5, so one always fits. */
+export const SHORTEST_PX = 60;
+export const LONGEST_PX = 160;
+
+export type ScaleBar = Readonly<{ length_um: number; length_px: number; label: string }>;
+
+/**
+ * How much of the specimen one pixel shows at a distance from the eye, straight ahead.
+ *
+ * @param fov_rad vertical field of view
+ * @param m_per_um metres of the room per um of the specimen
+ */
+export function umPerPixel(
+  distance_m: number,
+  fov_rad: number,
+  height_px: number,
+  m_per_um: number,
+): number {
+  return (2 * distance_m * Math.tan(fov_rad / 2)) / height_px / m_per_um;
+}
+
+/** 1, 2 or 5 times a power of ten; null if the size of a pixel makes no sense (eye at the point). */
+export function chooseScaleBar(um_per_px: number): ScaleBar | null {
+  if (!(um_per_px > 0) || !Number.isFinite(um_per_px)) return null;
+  const longest_um = LONGEST_PX * um_per_px;
+  // A tie, such as 1000 um at 6.25 um a pixel, must not be lost to rounding.
+  const fits = (length_um: number) => length_um <= longest_um * (1 + 1e-9);
+  let exponent = Math.floor(Math.log10(longest_um));
+  while (fits(tenTo(exponent + 1))) exponent++;
+  while (!fits(tenTo(exponent))) exponent--;
+  const mantissa = [5, 2, 1].find((m) => fits(m * tenTo(exponent))) ?? 1;
+  const length_um = mantissa * tenTo(exponent);
+  return { length_um, length_px: length_um / um_per_px, label: labelOf(mantissa, exponent) };
+}
+
+/** 10 ** -3 is not the double nearest to 0.001, 1 / 1000 is. */
+function tenTo(exponent: number): number {
+  return exponent < 0 ? 1 / 10 ** -exponent : 10 ** exponent;
+}
+
+/** mm from 1000 um on, nm below 1 um. */
+function labelOf(mantissa: number, exponent: number): string {
+  const [unit, shift] = exponent >= 3 ? ["mm", -3] : exponent < 0 ? ["nm", 3] : ["µm", 0];
+  return `${mantissa * tenTo(exponent + shift)} ${unit}`;
+}

@@ -1,0 +1,50 @@
+/** In a worker: decompress the textures of up to four channels and put them side by side. */
+import { ZSTDDecoder } from "zstddec";
+import type { DecodeAnswer, DecodeRequest } from "./decode";
+
+const decoder = new ZSTDDecoder();
+const ready = decoder.init();
+
+class PartFault extends Error {
+  constructor(
+    readonly part: number,
+    text: string,
+  ) {
+    super(text);
+  }
+}
+
+function unzstd(frame: Uint8Array, bytes: number, part: number): Uint8Array {
+  let decoded: Uint8Array;
+  try {
+    decoded = decoder.decode(frame, bytes);
+  } catch {
+    throw new PartFault(part, "the zstd stream is broken");
+  }
+  if (decoded.length === bytes) return decoded;
+  throw new PartFault(part, `expected ${bytes} texel bytes, found ${decoded.length}`);
+}
+
+async function decode({ parts, bytes }: DecodeRequest): Promise<Uint8Array<ArrayBuffer>> {
+  await ready;
+  const decoded = parts.map((part, i) => unzstd(part, bytes, i));
+  if (decoded.length === 1) return decoded[0] as Uint8Array<ArrayBuffer>; // a copy of its own
+  // three channels take four bytes: no texture format of three is drawn fast everywhere
+  const stride = decoded.length === 2 ? 2 : 4;
+  const packed = new Uint8Array(bytes * stride);
+  decoded.forEach((each, c) => {
+    for (let i = 0, at = c; i < bytes; i++, at += stride) packed[at] = each[i];
+  });
+  return packed;
+}
+
+addEventListener("message", async ({ data }: MessageEvent<DecodeRequest>) => {
+  let answer: DecodeAnswer;
+  try {
+    answer = { id: data.id, texels: await decode(data) };
+  } catch (error) {
+    const part = error instanceof PartFault ? error.part : 0;
+    answer = { id: data.id, fault: error instanceof Error ? error.message : String(error), part };
+  }
+  postMessage(answer, { transfer: answer.texels === undefined ? [] : [answer.texels.buffer] });
+});

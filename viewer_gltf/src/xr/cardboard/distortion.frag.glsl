@@ -1,0 +1,12 @@
+uniform sampler2D uEyes;  // encoded colours, as the canvas has them
+
+in vec2 vUv;
+in vec2 vPicture;
+out vec4 oColor;
+
+const float EDGE = 0.02;  // of the picture's width and height, over which it fades to black
+
+void main() {
+  vec2 inside = smoothstep(0.0, EDGE, min(vPicture, 1.0 - vPicture));
+  oColor = vec4(texture(uEyes, vUv).rgb * inside.x * inside.y, 1.0);
+}

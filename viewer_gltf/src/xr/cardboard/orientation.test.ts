@@ -1,0 +1,119 @@
+import { Euler, type Quaternion, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import {
+  askOrientation,
+  FREE_HEADING,
+  followHeading,
+  headPose,
+  type Reading,
+  toQuaternion,
+} from "./orientation";
+
+const reading = (alpha_deg: number, beta_deg: number, gamma_deg: number): Reading => ({
+  alpha_deg,
+  beta_deg,
+  gamma_deg,
+});
+const ahead = (q: Quaternion) => new Vector3(0, 0, -1).applyQuaternion(q).toArray();
+const up = (q: Quaternion) => new Vector3(0, 1, 0).applyQuaternion(q).toArray();
+
+function expectVector(found: readonly number[], wanted: readonly number[]): void {
+  wanted.forEach((v, i) => {
+    expect(found[i]).toBeCloseTo(v, 9);
+  });
+}
+
+describe("the phone's turn", () => {
+  it("held across, its top to the left, upright and to the north, is none", () => {
+    const q = toQuaternion(reading(90, 0, -90), 90);
+    expectVector(ahead(q), [0, 0, -1]);
+    expectVector(up(q), [0, 1, 0]);
+  });
+
+  it("held across the other way, its top to the right, is none too", () => {
+    const q = toQuaternion(reading(270, 0, 90), 270);
+    expectVector(ahead(q), [0, 0, -1]);
+    expectVector(up(q), [0, 1, 0]);
+  });
+
+  it("held upright is none with the screen at 0", () => {
+    const q = toQuaternion(reading(0, 90, 0), 0);
+    expectVector(ahead(q), [0, 0, -1]);
+    expectVector(up(q), [0, 1, 0]);
+  });
+
+  it("flat on a table looks at the floor", () => {
+    const q = toQuaternion(reading(0, 0, 0), 0);
+    expectVector(ahead(q), [0, -1, 0]);
+    expectVector(up(q), [0, 0, -1]); // its upper edge to the north
+  });
+
+  it("to the left is counterclockwise from above: from north to west", () => {
+    const q = toQuaternion(reading(180, 0, -90), 90);
+    expectVector(ahead(q), [-1, 0, 0]);
+    expectVector(up(q), [0, 1, 0]);
+  });
+
+  it("upwards raises the view", () => {
+    // Across, the screen tilted to the floor by 30 degrees: its back looks up.
+    const half = Math.sqrt(3) / 2;
+    const q = toQuaternion(reading(270, 180, 60), 90);
+    expectVector(ahead(q), [0, 0.5, -half]);
+    expectVector(up(q), [0, half, 0.5]);
+  });
+
+  it("is smooth where the angles jump, at the horizon", () => {
+    const below = toQuaternion(reading(90, 0, -89.9), 90);
+    const above = toQuaternion(reading(270, 180, 89.9), 90);
+    expect((below.angleTo(above) * 180) / Math.PI).toBeCloseTo(0.2, 6);
+  });
+});
+
+describe("the way ahead", () => {
+  const turned = (yaw_deg: number) => toQuaternion(reading(90 + yaw_deg, 0, -90), 90);
+
+  it("is where the phone looks when it is level and across, and stays there", () => {
+    const heading = followHeading(FREE_HEADING, turned(70), true);
+    expect(heading.isHeld).toBe(true);
+    expectVector(headPose(turned(70), heading).toArray(), [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+    expect(followHeading(heading, turned(120), true)).toBe(heading);
+    const left = new Vector3(0, 0, -1).transformDirection(headPose(turned(160), heading));
+    expectVector(left.toArray(), [-1, 0, 0]);
+  });
+
+  it("goes along as long as the phone is in a hand", () => {
+    expect(followHeading(FREE_HEADING, turned(10), false).isHeld).toBe(false);
+    const flat = toQuaternion(reading(30, 0, 0), 0);
+    const heading = followHeading(FREE_HEADING, flat, true);
+    expect(heading.isHeld).toBe(false);
+    expect((heading.yaw_rad * 180) / Math.PI).toBeCloseTo(30, 9);
+  });
+
+  it("keeps the horizon: only the heading is taken out", () => {
+    const tilted = toQuaternion(reading(270 + 50, 180, 60), 90); // 30 degrees up
+    const heading = followHeading(FREE_HEADING, tilted, true);
+    const pose = new Euler().setFromRotationMatrix(headPose(tilted, heading), "YXZ");
+    expect((pose.x * 180) / Math.PI).toBeCloseTo(30, 9);
+    expect(pose.y).toBeCloseTo(0, 9);
+    expect(pose.z).toBeCloseTo(0, 9);
+  });
+
+  it("turns about the neck: the eyes go where the nose goes", () => {
+    const heading = followHeading(FREE_HEADING, turned(0), true);
+    const eyes = new Vector3().setFromMatrixPosition(headPose(turned(90), heading));
+    expectVector(eyes.toArray(), [-0.08, 0, 0.08]); // from before the neck to left of it
+  });
+});
+
+describe("asking for the orientation", () => {
+  it("has three answers", async () => {
+    expect(await askOrientation({})).toBe("absent");
+    expect(await askOrientation({ DeviceOrientationEvent: {} })).toBe("granted");
+    const asking = (requestPermission: () => Promise<string>) =>
+      askOrientation({ DeviceOrientationEvent: { requestPermission } });
+    expect(await asking(async () => "granted")).toBe("granted");
+    expect(await asking(async () => "denied")).toBe("refused");
+    const late = () => Promise.reject(new DOMException("not in a tap", "NotAllowedError"));
+    expect(await asking(late)).toBe("refused");
+  });
+});

@@ -1,0 +1,133 @@
+/**
+ * How the head is turned, from what the phone says of itself: `deviceorientation` events and the
+ * angle at which the screen is held. Only turning is known, not moving; a neck that the eyes lie
+ * before makes up for the most noticed part of that.
+ *
+ * The angles are those of the W3C's DeviceOrientation Event: intrinsic turns about z, x' and y''
+ * that take the earth's axes (x east, y north, z up) to the phone's (x to the right of its upright
+ * screen, y to its top, z out of it). The room has y up, so that north becomes -z.
+ */
+import { Matrix4, Quaternion, Vector3 } from "three";
+
+/** Degrees, as the event has them. */
+export type Reading = Readonly<{ alpha_deg: number; beta_deg: number; gamma_deg: number }>;
+
+/** Which way of the earth is ahead in the room, as a turn about the vertical. */
+export type Heading = Readonly<{ yaw_rad: number; isHeld: boolean }>;
+export const FREE_HEADING: Heading = { yaw_rad: 0, isHeld: false };
+
+const X = new Vector3(1, 0, 0);
+const Y = new Vector3(0, 1, 0);
+const Z = new Vector3(0, 0, 1);
+/** From where the neck turns to between the eyes: mean of adults, as in Google's SDK. */
+const NECK_TO_EYES_M = new Vector3(0, 0.075, -0.08);
+/** Beyond this the phone looks at floor or ceiling, and lies in a hand rather than in a viewer. */
+const STEEP = Math.SQRT1_2;
+
+const turn = new Quaternion();
+const vector = new Vector3();
+const unit = new Vector3();
+
+/** The camera's turn. @param screen_deg `screen.orientation.angle`; 0 is the phone's upright way */
+export function toQuaternion(
+  { alpha_deg, beta_deg, gamma_deg }: Reading,
+  screen_deg: number,
+  out = new Quaternion(),
+): Quaternion {
+  const rad = Math.PI / 180;
+  out.setFromAxisAngle(X, -Math.PI / 2); // the earth's axes to the room's
+  out.multiply(turn.setFromAxisAngle(Z, alpha_deg * rad));
+  out.multiply(turn.setFromAxisAngle(X, beta_deg * rad));
+  out.multiply(turn.setFromAxisAngle(Y, gamma_deg * rad));
+  return out.multiply(turn.setFromAxisAngle(Z, -screen_deg * rad));
+}
+
+/**
+ * Ahead is where the phone looks when it first looks about level and is held across: then it is in
+ * the viewer. Until then ahead goes along, since the button is tapped with the phone in a hand.
+ */
+export function followHeading(heading: Heading, head: Quaternion, isAcross: boolean): Heading {
+  if (heading.isHeld) return heading;
+  const ahead = vector.set(0, 0, -1).applyQuaternion(head);
+  const isLevel = Math.abs(ahead.y) < STEEP;
+  // On a table, the screen up, the way ahead is that of the screen's upper edge.
+  if (!isLevel) ahead.set(0, ahead.y < 0 ? 1 : -1, 0).applyQuaternion(head);
+  return { yaw_rad: Math.atan2(-ahead.x, -ahead.z), isHeld: isLevel && isAcross };
+}
+
+/** The head's pose in the room, metres: the origin is where the eyes are looking ahead, -z. */
+export function headPose(head: Quaternion, heading: Heading, out = new Matrix4()): Matrix4 {
+  turn.setFromAxisAngle(Y, -heading.yaw_rad).multiply(head);
+  vector.copy(NECK_TO_EYES_M).applyQuaternion(turn).sub(NECK_TO_EYES_M);
+  return out.compose(vector, turn, unit.setScalar(1));
+}
+
+export type OrientationAnswer = "granted" | "refused" | "absent";
+
+export const ORIENTATION_REFUSED =
+  "This browser was not allowed to tell how the phone is turned, so the picture can't follow your " +
+  "head. Close this tab, open the page again, and allow motion and orientation when asked.";
+export const ORIENTATION_ABSENT =
+  "This device doesn't tell how it is turned: the picture doesn't follow your head.";
+
+type AskingEvent = { requestPermission?: () => Promise<PermissionState> };
+
+/** Ask to read the orientation. Safari asks the user, and only within a tap's own call. */
+export async function askOrientation(scope: object = globalThis): Promise<OrientationAnswer> {
+  const { DeviceOrientationEvent } = scope as { DeviceOrientationEvent?: AskingEvent };
+  if (DeviceOrientationEvent === undefined) return "absent";
+  if (DeviceOrientationEvent.requestPermission === undefined) return "granted";
+  try {
+    return (await DeviceOrientationEvent.requestPermission()) === "granted" ? "granted" : "refused";
+  } catch (error) {
+    if (!(error instanceof Error)) throw error;
+    return "refused"; // NotAllowedError: not called within a tap
+  }
+}
+
+/** Listens to the phone, and knows which way is ahead. */
+export class HeadSensor {
+  private reading: Reading | null = null;
+  private heading = FREE_HEADING;
+  private readonly head = new Quaternion();
+  private readonly stopped = new AbortController();
+
+  constructor() {
+    addEventListener(
+      "deviceorientation",
+      ({ alpha, beta, gamma }) => {
+        // A device without sensors sends one event of nothing.
+        if (alpha === null || beta === null || gamma === null) return;
+        this.reading = { alpha_deg: alpha, beta_deg: beta, gamma_deg: gamma };
+      },
+      { signal: this.stopped.signal },
+    );
+  }
+
+  get hasReading(): boolean {
+    return this.reading !== null;
+  }
+
+  /** Ahead is where the phone looks now, or as soon as it is level. */
+  recentre(): void {
+    this.heading = FREE_HEADING;
+  }
+
+  /** The head's pose; the identity as long as nothing is known. */
+  pose(out: Matrix4): Matrix4 {
+    if (this.reading === null) return out.identity();
+    toQuaternion(this.reading, screenAngle_deg(), this.head);
+    this.heading = followHeading(this.heading, this.head, innerWidth > innerHeight);
+    return headPose(this.head, this.heading, out);
+  }
+
+  dispose(): void {
+    this.stopped.abort();
+  }
+}
+
+function screenAngle_deg(): number {
+  // Safari before 16.4 has only the old property, with the same sign.
+  const old = (window as { orientation?: number }).orientation ?? 0;
+  return (screen.orientation as ScreenOrientation | undefined)?.angle ?? old;
+}

@@ -1,0 +1,222 @@
+/**
+ * Stereo without WebXR, for a phone in a Cardboard whose browser has none (Safari on an iPhone):
+ * split screen, lens distortion, the head's turn.
+ *
+ * Why not a polyfill. webxr-polyfill 2.0.3 with cardboard-vr-display 1.0.19 (both Apache-2.0) were
+ * run with three 0.187 on WebGL 2, the browser's own WebXR removed. three has its XRWebGLLayer path
+ * still (it takes layers only where XRWebGLBinding exists), so a session starts and two eyes are
+ * drawn. But:
+ * - Its distorter draws with vertexAttribPointer into whatever vertex array is bound (submitFrame
+ *   in cardboard-distorter.js restores program, buffers and texture only), and in WebGL 2 that is
+ *   three's of the mesh drawn last. That mesh is gone from then on, in stereo and after it: 65
+ *   "no buffer is bound to enabled attribute" in the second after the end. Reported to both
+ *   projects in 2023 (webxr-polyfill 170, three 26166); open in one, declined by the other.
+ * - It patches enable, viewport, bindFramebuffer... of the context whose state three caches, and
+ *   gives a frame buffer without anti-aliasing and with 16 bits of depth.
+ * - It never asks Safari for the orientation, so that the head stands still since iOS 13; it knows
+ *   the two viewers of 2014 and 2015, and reads no code; it fetches its table of phones from
+ *   another host, which our Content-Security-Policy forbids, and that table ends in 2020.
+ * - 51 kB gzip; this folder, which draws through three alone, is 7.
+ */
+import {
+  type ArrayCamera,
+  Matrix4,
+  SRGBColorSpace,
+  Vector2,
+  type WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import { BundleError } from "../../bundle/errors";
+import { DistortionPass } from "./distortion_pass";
+import { type Eye, EyeCameras } from "./eyes";
+import { cssPixelsPerInch, screenOf } from "./lens";
+import { askOrientation, HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
+import { CARDBOARD_V2, type Profile } from "./profile";
+import { holdScreen, type ScreenHold } from "./screen";
+
+const SAMPLES = 4;
+
+export type SplitOptions = Readonly<{
+  /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
+  cssPixelsPerInch: number | null;
+}>;
+
+export class SplitSession {
+  /** Between the eyes: the pose in the room, metres; at first at the origin, looking along -z. */
+  readonly head = new Matrix4();
+  /** The undistorted pictures, the left eye's on the left, as large as the canvas's buffer. */
+  readonly target: WebGLRenderTarget;
+  private readonly cameras = new EyeCameras();
+  private readonly pass = new DistortionPass();
+  private readonly size = new Vector2();
+  private profile = CARDBOARD_V2;
+  private running: Running | null = null;
+  private layout = "";
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly onStart: () => void,
+    private readonly onEnd: () => void,
+    private readonly onSelect: () => void,
+    private options: SplitOptions = { cssPixelsPerInch: null },
+  ) {
+    const { stencil = false } = renderer.getContext().getContextAttributes() ?? {};
+    this.target = new WebGLRenderTarget(1, 1, {
+      samples: SAMPLES,
+      stencilBuffer: stencil,
+      colorSpace: SRGBColorSpace,
+      internalFormat: "RGBA8",
+    });
+    // three's mark of a headset's frame buffer: colours are encoded before they are blended, as on
+    // the canvas, so that a volume looks the same in both. RGBA8 keeps the GPU from doing so again.
+    Object.assign(this.target, { isXRRenderTarget: true });
+  }
+
+  /** Both eyes in one, as in WebXR: render with it into `target`. */
+  get camera(): ArrayCamera {
+    return this.cameras.both;
+  }
+
+  get eyes(): readonly Eye[] {
+    return this.cameras.eyes;
+  }
+
+  get isRunning(): boolean {
+    return this.running?.hasStarted ?? false;
+  }
+
+  /** What this browser could not give, in words; empty if all is as it should be. */
+  get problems(): readonly string[] {
+    return this.running?.problems ?? [];
+  }
+
+  /** Whether the head is followed by now: false too while the first reading is awaited. */
+  get hasOrientation(): boolean {
+    return this.running?.sensor.hasReading ?? false;
+  }
+
+  /** Must be called from a click or a tap. Throws BundleError if the orientation is refused. */
+  async start(profile: Profile): Promise<void> {
+    if (this.running !== null) return;
+    this.profile = profile;
+    this.layout = "";
+    const stage = this.renderer.domElement.parentElement ?? this.renderer.domElement;
+    const running = new Running(stage, () => this.end(), this.onSelect);
+    this.running = running;
+    // Both are asked within the tap; Safari's question comes first, since a tap is used up.
+    const answer = askOrientation();
+    const hold = holdScreen(stage, () => this.end());
+    running.hold = hold;
+    const [found, { problems }] = await Promise.all([answer, hold]);
+    if (this.running !== running) return; // ended while the browser asked
+    if (found === "refused") {
+      this.running = null;
+      running.dispose();
+      throw new BundleError(ORIENTATION_REFUSED);
+    }
+    running.problems = found === "absent" ? [...problems, ORIENTATION_ABSENT] : problems;
+    this.update();
+    running.hasStarted = true;
+    this.onStart();
+  }
+
+  end(): void {
+    const { running } = this;
+    if (running === null) return;
+    this.running = null;
+    running.dispose();
+    if (running.hasStarted) this.onEnd();
+  }
+
+  /** Look along -z again, wherever the head is. */
+  recentre(): void {
+    this.running?.sensor.recentre();
+  }
+
+  /** Other lenses, or another size of the screen, from the next frame on. */
+  setLens(profile: Profile, options: SplitOptions): void {
+    this.profile = profile;
+    this.options = options;
+    this.layout = "";
+  }
+
+  /** Read the head's turn, and move the eyes with it. Once a frame, before anything is drawn. */
+  update(): void {
+    this.fit();
+    this.running?.sensor.pose(this.head);
+    this.cameras.follow(this.head);
+  }
+
+  /** Show `target` on the canvas, as the lenses need it. */
+  present(): void {
+    this.pass.render(this.renderer, this.target);
+  }
+
+  dispose(): void {
+    this.end();
+    this.target.dispose();
+    this.pass.dispose();
+  }
+
+  /** Lay the pictures out anew if the canvas has another size, or other lenses came. */
+  private fit(): void {
+    const { width, height } = this.renderer.getDrawingBufferSize(this.size);
+    const layout = `${width} ${height} ${this.renderer.getPixelRatio()}`;
+    if (layout === this.layout) return;
+    this.layout = layout;
+    const perInch =
+      this.options.cssPixelsPerInch ?? cssPixelsPerInch(navigator.userAgent, devicePixelRatio);
+    const css = this.renderer.getSize(this.size);
+    const screen = screenOf(css.x, css.y, perInch);
+    this.target.setSize(width, height);
+    this.pass.setLens(this.profile, screen);
+    this.cameras.fit(this.profile, screen, width, height);
+  }
+}
+
+/** What lasts as long as one session, and is undone with it. */
+class Running {
+  readonly sensor = new HeadSensor();
+  problems: readonly string[] = [];
+  /** False while the browser asks the user for the orientation. */
+  hasStarted = false;
+  hold: Promise<ScreenHold> | null = null;
+  private readonly stopped = new AbortController();
+  private readonly style: string;
+  /** Its own number, since a page that was loaded again keeps the state of its last session. */
+  private readonly step = Math.random();
+
+  constructor(
+    private readonly stage: HTMLElement,
+    end: () => void,
+    select: () => void,
+  ) {
+    const { signal } = this.stopped;
+    this.style = stage.style.cssText;
+    // Over the whole page, where a browser has no full screen.
+    const zIndex = "2147483647";
+    Object.assign(stage.style, {
+      position: "fixed",
+      inset: 0,
+      width: "100%",
+      height: "100%",
+      zIndex,
+    });
+    stage.addEventListener("pointerdown", select, { signal });
+    const onKey = ({ key }: KeyboardEvent) => key === "Escape" && end();
+    addEventListener("keydown", onKey, { signal });
+    // A step in the history, so that the back gesture leaves the viewer and not the page.
+    history.pushState({ split: this.step }, "");
+    addEventListener("popstate", end, { signal });
+  }
+
+  dispose(): void {
+    if (this.stopped.signal.aborted) return;
+    this.stopped.abort();
+    this.sensor.dispose();
+    this.stage.style.cssText = this.style;
+    void this.hold?.then(({ release }) => release());
+    // Not if the user went back, nor if the page has written another address over the step.
+    if ((history.state as { split?: number } | null)?.split === this.step) history.back();
+  }
+}
