@@ -35,7 +35,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view report check lint test test-fast test-blender bench bench-iso bench-wrap lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view report check lint test test-fast test-blender bench bench-iso bench-wrap bench-viewer lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -156,6 +156,16 @@ bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids
 
 bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
 	$(BIN)/python tests/bench/wrap.py
+
+BENCH_VIEWER := tests/bench/viewer
+bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, and against float64
+	@if ! command -v npm >/dev/null; then echo "bench-viewer: skipped: no node and npm"; \
+	elif [ -z "$(CHROMIUM)" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
+	else \
+	  cd $(BENCH_VIEWER) && { test node_modules/.ready -nt package-lock.json \
+	    || { npm ci --ignore-scripts --no-audit --no-fund --loglevel=error && touch node_modules/.ready; }; } \
+	  && $(abspath $(BIN))/python bench.py $(abspath out/bench-viewer); \
+	fi
 
 lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

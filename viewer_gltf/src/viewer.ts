@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Camera, Matrix4, Vector3, WebGLRenderer } from "three";
+import { type Camera, type Matrix4, Vector3, WebGLRenderer } from "three";
 import type { Snapshot } from "./api";
 import { BundleError } from "./bundle/errors";
 import type { Bundle } from "./bundle/load";
@@ -7,22 +7,20 @@ import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
 import { pickTile, type Ray } from "./gaze/pick";
 import { Hybrid } from "./hybrid/hybrid";
 import { wantedTiles } from "./hybrid/who";
-import { makeSurfaceFrame } from "./mesh/blend";
 import { SurfaceLoader } from "./mesh/loader";
 import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX, SurfaceSet } from "./mesh/surface_set";
 import { Pace } from "./quality/pace";
 import { type Action, initialState, reduce, type ViewerState } from "./state";
 import type { Command } from "./ui/commands";
-import { Cuts } from "./view/cuts";
-import { DepthPass } from "./view/depth_pass";
-import { Eyes } from "./view/eyes";
-import { MarchPass } from "./view/march_pass";
 import { type Look, Navigation } from "./view/navigation";
+import { Picture } from "./view/picture";
 import { place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
+import { StageSize } from "./view/stage_size";
 import { volumeBudget } from "./volume/levels";
-import { makeFrame } from "./volume/tile_march";
 import { VolumeSet } from "./volume/volume_set";
+import type { Profile } from "./xr/cardboard/profile";
+import type { SplitSession } from "./xr/cardboard/split_session";
 import { XrSession } from "./xr/session";
 
 /** A phone's third pixel in each direction costs more than it shows. */
@@ -36,22 +34,15 @@ export class Viewer {
   readonly navigation: Navigation;
   state: ViewerState;
   frames = 0;
+  private split: SplitSession | null = null;
   private readonly room: Room;
-  private readonly eyes = new Eyes();
-  private readonly cuts = new Cuts();
-  private readonly depth: DepthPass;
-  private readonly marchFrame;
-  private readonly march: MarchPass;
-  private readonly surfaceFrame;
+  private readonly picture: Picture;
   private readonly hybrid: Hybrid;
   private readonly pace: Pace;
   private readonly surfaceLoader: SurfaceLoader;
   private readonly surfaces: SurfaceSet;
   private readonly volumes: VolumeSet;
-  private readonly resize: ResizeObserver;
-  private readonly disposed = new AbortController();
-  private readonly point = new Vector3();
-  private readonly toSpecimen = new Matrix4();
+  private readonly size: StageSize;
   private last_ms = 0;
   private isStale = true;
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
@@ -81,16 +72,13 @@ export class Viewer {
     };
     const fail = (error: unknown) => this.report(error);
     this.room = new Room(manifest);
-    this.depth = new DepthPass(this.cuts);
-    this.marchFrame = makeFrame(this.depth.texture);
-    this.march = new MarchPass(this.marchFrame);
-    this.surfaceFrame = makeSurfaceFrame(this.marchFrame.uDisc, this.cuts);
     this.hybrid = new Hybrid(manifest);
+    this.picture = new Picture(this.renderer, this.room, this.hybrid);
     this.pace = new Pace(gl);
     this.surfaceLoader = new SurfaceLoader(this.renderer);
     this.volumes = new VolumeSet(
       bundle,
-      this.marchFrame,
+      this.picture.marchFrame,
       {
         bytes: volumeBudget(navigator),
         side: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
@@ -101,13 +89,12 @@ export class Viewer {
     this.surfaces = new SurfaceSet(
       bundle,
       this.surfaceLoader,
-      this.surfaceFrame,
+      this.picture.surfaceFrame,
       (tile, channel) => this.volumes.presence(tile, channel),
       refresh,
       fail,
     );
     this.room.specimen.group.add(this.surfaces.group);
-    this.room.scene.add(this.march.overlay);
 
     this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), refresh);
     this.xr = new XrSession(
@@ -117,16 +104,19 @@ export class Viewer {
       () => this.choose(rayAhead(this.head, this.room.specimen.group)),
     );
     listenForClicks(canvas, (point) => {
-      if (this.xr.isRunning) return;
+      if (this.stereo !== null) return;
       this.choose(rayUnder(point, this.navigation.camera, this.room.specimen.group));
     });
-    canvas.addEventListener("webglcontextlost", () => {
-      const text = "The graphics driver has dropped the picture: reload the page.";
-      this.dispatch({ type: "notify", text });
+    const lost = "The graphics driver has dropped the picture: it is drawn anew.";
+    canvas.addEventListener("webglcontextlost", () =>
+      this.dispatch({ type: "notify", text: lost }),
+    );
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.volumes.forget(); // their texels went with the context
+      this.follow();
+      this.dispatch({ type: "dismiss", text: lost });
     });
-    this.resize = new ResizeObserver(() => this.fit());
-    this.resize.observe(stage);
-    this.followPixelRatio();
+    this.size = new StageSize(stage, () => this.fit());
     this.fit();
     this.follow();
     this.renderer.setAnimationLoop((time_ms) => this.frame(time_ms));
@@ -179,7 +169,7 @@ export class Viewer {
       gazed: this.hybrid.nearby.gazed,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.pace.frame_ms,
-      isStereo: this.xr.isRunning,
+      isStereo: this.stereo !== null,
     };
   }
 
@@ -192,6 +182,29 @@ export class Viewer {
   report(error: unknown): void {
     if (!(error instanceof BundleError)) throw error;
     this.dispatch({ type: "notify", text: error.message });
+  }
+
+  private get stereo(): "headset" | "split" | null {
+    if (this.renderer.xr.isPresenting) return "headset";
+    return this.split?.isRunning ? "split" : null;
+  }
+
+  /**
+   * Split screen for a phone in a viewer without WebXR. Must be called from a tap. Throws
+   * BundleError in words if the browser or the user refuses.
+   */
+  async startSplit(profile: Profile): Promise<void> {
+    if (this.split === null) {
+      const { SplitSession } = await import("./xr/cardboard/split_session");
+      this.split ??= new SplitSession(
+        this.renderer,
+        () => this.enterStereo(),
+        () => this.leaveStereo(),
+        () => this.choose(rayAhead(this.head, this.room.specimen.group)),
+      );
+    }
+    await this.split.start(profile);
+    for (const text of this.split.problems) this.dispatch({ type: "notify", text });
   }
 
   private get isLoading(): boolean {
@@ -214,41 +227,48 @@ export class Viewer {
     const interval_ms = time_ms - this.last_ms;
     const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
     this.last_ms = time_ms;
-    const isStereo = this.renderer.xr.isPresenting;
+    const { stereo } = this;
     const wasLoading = this.isLoading;
-    this.pose(isStereo);
+    const camera = this.pose(stereo);
     const isChanging = this.advance(dt_s);
-    if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving) return;
+    if (stereo === null && !this.isStale && !wasLoading && !this.wasMoving) return;
     // a picture that came to rest is drawn once more, as well as can be
-    const isMoving = isStereo || this.isStale;
+    const isMoving = stereo !== null || this.isStale;
     const settings = this.pace.begin(isMoving, interval_ms, this.xr.rate_hz);
-    const target_px = isStereo ? ERROR_TARGET_XR_PX : ERROR_TARGET_PX;
+    const target_px = stereo === null ? ERROR_TARGET_PX : ERROR_TARGET_XR_PX;
     this.surfaces.setErrorTarget(target_px * settings.errorFactor);
-    this.marchFrame.uSteps.value = settings.steps;
+    this.picture.marchFrame.uSteps.value = settings.steps;
     this.hybrid.radiusShare = settings.discShare;
-    this.updateSurfaces(isStereo);
+    this.updateSurfaces(camera);
     if (isMoving || this.wasMoving) {
       this.isStale = isChanging;
-      this.draw(isStereo ? this.xr.camera : this.navigation.camera, settings.resolution);
+      this.draw(camera, settings.resolution);
       this.frames++;
       this.onFrame();
     }
     this.pace.end();
     this.wasMoving = isMoving;
-    const isAtRest = isStereo || !isMoving;
+    const isAtRest = stereo !== null || !isMoving;
     if (this.waiting.length > 0 && !this.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
   }
 
-  /** Where the eyes are in this frame. */
-  private pose(isStereo: boolean): void {
-    if (isStereo) {
-      this.eyes.followHeadset(this.renderer, this.xr.camera);
-      return;
+  /** Where the eyes are in this frame; returns the camera to draw with. */
+  private pose(stereo: "headset" | "split" | null): Camera {
+    const { eyes } = this.picture;
+    if (stereo === "headset") {
+      eyes.followHeadset(this.renderer, this.xr.camera);
+      return this.xr.camera;
+    }
+    if (stereo === "split" && this.split !== null) {
+      this.split.update();
+      eyes.follow(this.split.eyes.map(({ camera, viewport }) => [camera, viewport]));
+      return this.split.camera;
     }
     this.navigation.update();
-    this.eyes.followScreen(this.renderer, this.navigation.camera);
+    eyes.followScreen(this.renderer, this.navigation.camera);
+    return this.navigation.camera;
   }
 
   /** Follow the gaze, and go on with what moves or fades; whether the next frame differs by itself. */
@@ -265,44 +285,28 @@ export class Viewer {
     return isChanging;
   }
 
-  private updateSurfaces(isStereo: boolean): void {
-    if (!isStereo) {
-      this.surfaces.update(this.navigation.camera, this.eyes.width_px, this.eyes.height_px);
-      return;
-    }
-    const viewport = this.eyes.all[0]?.viewport;
-    if (viewport) this.surfaces.update(this.renderer.xr.getCamera(), viewport.z, viewport.w);
+  private updateSurfaces(camera: Camera): void {
+    const { viewport } = this.picture.eyes.all[0] ?? {};
+    // three moves the headset's cameras, not the one that it is given
+    const seen = this.renderer.xr.isPresenting ? this.renderer.xr.getCamera() : camera;
+    if (viewport) this.surfaces.update(seen, viewport.z, viewport.w);
   }
 
   private draw(camera: Camera, resolution: number): void {
-    const { scene, specimen } = this.room;
-    this.renderer.info.reset();
-    this.room.light(this.head);
-    this.cuts.follow(this.state.clip, specimen.group.matrixWorld);
-    this.surfaceFrame.uApex.value.copy(this.hybrid.apex);
-    this.surfaceFrame.uAxis.value.copy(this.hybrid.axis);
-    this.surfaceFrame.uDisc.value.set(...this.hybrid.cosines);
-    this.march.overlay.visible = !this.volumes.isEmpty;
-    if (!this.volumes.isEmpty) this.drawVolumes(specimen.group.matrixWorld, resolution);
-    this.renderer.render(scene, camera);
-  }
-
-  private drawVolumes(specimen: Matrix4, resolution: number): void {
-    const { hybrid, volumes } = this;
-    const toSpecimen = this.toSpecimen.copy(specimen).invert();
-    const eye = this.point.setFromMatrixPosition(this.head).applyMatrix4(toSpecimen);
-    volumes.placeAs(specimen);
-    volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
-    const hidden = [...this.room.overlays, this.march.overlay, ...this.surfaces.blended];
-    this.depth.render(this.renderer, this.room.scene, this.eyes, hidden);
-    this.march.render(this.renderer, volumes.scene, this.eyes, resolution);
+    const { split, volumes, state } = this;
+    const isSplit = this.stereo === "split" && split !== null;
+    if (isSplit) this.renderer.setRenderTarget(split.target);
+    this.picture.draw(camera, this.head, volumes, this.surfaces.blended, state.clip, resolution);
+    if (!isSplit) return;
+    this.renderer.setRenderTarget(null);
+    split.present();
   }
 
   /** Pose of the head, or of the mono camera. */
   private get head(): Matrix4 {
-    return this.renderer.xr.isPresenting
-      ? this.renderer.xr.getCamera().matrixWorld
-      : this.navigation.camera.matrixWorld;
+    if (this.renderer.xr.isPresenting) return this.renderer.xr.getCamera().matrixWorld;
+    if (this.split?.isRunning) return this.split.camera.matrixWorld;
+    return this.navigation.camera.matrixWorld;
   }
 
   private fit(): void {
@@ -313,21 +317,6 @@ export class Viewer {
     this.renderer.setSize(clientWidth, clientHeight);
     this.navigation.fit(clientWidth / clientHeight);
     this.isStale = true;
-  }
-
-  /** A window may go to another screen, or be zoomed, at the same size. */
-  private followPixelRatio(): void {
-    const { signal } = this.disposed;
-    const listen = () =>
-      matchMedia(`(resolution: ${devicePixelRatio}dppx)`).addEventListener("change", follow, {
-        once: true,
-        signal,
-      });
-    const follow = () => {
-      this.fit();
-      listen();
-    };
-    listen();
   }
 
   private enterStereo(): void {
@@ -355,14 +344,13 @@ export class Viewer {
 
   dispose(): void {
     this.renderer.setAnimationLoop(null);
-    this.resize.disconnect();
-    this.disposed.abort();
+    this.size.dispose();
+    this.split?.dispose();
     this.navigation.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
     this.surfaceLoader.dispose();
-    this.depth.dispose();
-    this.march.dispose();
+    this.picture.dispose();
     this.pace.dispose();
     this.renderer.dispose();
     this.renderer.domElement.remove();

@@ -73,29 +73,36 @@ describeInChromium("the ray-march", () => {
     expect(enters).toBeGreaterThan(leaves); // a miss
   });
 
-  it("leaps to the wall of the empty block, and not from a visible brick", async () => {
+  it("finds the end of the empty block, and of a visible brick", async () => {
     const chunks = await readChunks("leap");
     const head = `uniform sampler3D uOccupancy;
-      const vec3 uTexels = vec3(64.0, 8.0, 8.0);  // 8 bricks in a row, the last one visible
       const float uVoxel = 1.0;
       const float uBrickSlack = 0.0;
       #include <chunks/leap>`;
+    // 8 bricks in a row, the last one visible
     const uOccupancy = { size: [8, 1, 1], channels: 1, texels: [7, 6, 5, 4, 3, 2, 1, 0] } as const;
-    const leap = async (x: number, dir: string) =>
+    const ahead = async (start: number, dir: number, t: number) =>
       (
         await runProgram(
           page,
           chunks,
           head,
-          `oColor = vec4(leapLength(vec3(${x / 64}, 0.5, 0.5), vec3(${dir}) / 64.0));`,
+          `vec3 dir = vec3(${dir.toFixed(3)}, 1e-9, 1e-9);
+           oColor = blockAhead(vec3(${start.toFixed(3)}, 0.5, 0.5), dir, 1.0 / dir,
+                               ${t.toFixed(3)}).xyxy;`,
           { uOccupancy: { ...uOccupancy, texels: [...uOccupancy.texels] } },
         )
-      )[0];
-    expect(await leap(4, "1.0, 0.0, 0.0")).toBeCloseTo(52 + 1e-3, 3); // from voxel 4 to 56
-    expect(await leap(20, "1.0, 0.0, 0.0")).toBeCloseTo(36 + 1e-3, 3); // from voxel 20 to 56
-    expect(await leap(60, "1.0, 0.0, 0.0")).toBe(0);
-    // Back from brick 6, whose block is that brick alone: from voxel 52 to 48.
-    expect(await leap(52, "-1.0, 0.0, 0.0")).toBeCloseTo(4 + 1e-3, 3);
+      ).slice(0, 2);
+    const expectBlock = async (found: Promise<readonly number[]>, exit: number, empty: number) => {
+      const [x, y] = await found;
+      expect(x).toBeCloseTo(exit + 1e-3, 4);
+      expect(y).toBe(empty);
+    };
+    await expectBlock(ahead(0.5, 1, 0), 6.5, 1); // from brick 0 to the wall of brick 7
+    await expectBlock(ahead(0.5, 1, 2), 6.5, 1); // t counts from the start
+    await expectBlock(ahead(0.5, 0.5, 0), 13, 1);
+    await expectBlock(ahead(7.5, 1, 0), 0.5, 0); // the visible brick's own end
+    await expectBlock(ahead(6.5, -1, 0), 0.5, 1); // back from brick 6, whose block is that brick
   });
 
   it("classifies by the table, with the opacity of the step's length", async () => {

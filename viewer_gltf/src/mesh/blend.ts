@@ -114,9 +114,11 @@ export class BlendedSurface {
     };
     for (const material of materials) this.patch(material);
     this.depth = depthMaterial(this.uniforms, "if (shareLeft() <= 0.0) discard;");
-    // a hair behind the colour that follows, whatever its rounding
+    // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
+    // what lies behind a rim through.
     this.depth.polygonOffset = true;
-    this.depth.polygonOffsetFactor = this.depth.polygonOffsetUnits = 1;
+    this.depth.polygonOffsetFactor = 0;
+    this.depth.polygonOffsetUnits = 2;
     const meshes: Mesh[] = [];
     scene.traverse((object) => {
       if (object instanceof Mesh) meshes.push(object);

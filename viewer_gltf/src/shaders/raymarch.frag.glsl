@@ -10,16 +10,20 @@ uniform vec3 uTexHigh;  // ... and at its high corner
 uniform vec3 uTexels;  // of mip level 0
 uniform float uVoxel;  // um: the opacities of the transfer functions hold for a path this long
 uniform float uMinStep;  // um
+uniform vec4 uFloor;  // intensities of each channel up to which its table shows nothing
 uniform int uSteps;  // for the whole ray, at most MAX_STEPS
 uniform int uSpare;  // of these, one for each other tile
 uniform vec3 uAllLow;  // um, the same space: the box around all tiles that are marched ...
 uniform vec3 uAllHigh;  // ... which share the ray's steps by length
 uniform float uBrickSlack;  // bricks by which a coarse mip level smears beyond its brick
 uniform vec3 uColor[CHANNELS];  // linear RGB
+#ifdef DISC
 uniform bvec4 uInDisc;  // which channels show in the disc alone
+uniform bool uAllInDisc;
 uniform vec3 uApex;  // um: the disc is a cone from here ...
 uniform vec3 uAxis;  // ... along this unit vector
 uniform vec2 uDisc;  // cosines of its inner and outer radius
+#endif
 uniform float uPresence;  // 0..1: volumes fade in once they have come
 uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
@@ -45,8 +49,11 @@ out vec4 oColor;  // premultiplied
 
 #include <chunks/intersect_box>
 #include <chunks/clip_span>
+#ifdef DISC
 #include <chunks/disc>
 #include <chunks/cone_span>
+#include <chunks/weights>
+#endif
 #include <chunks/scene_distance>
 #include <chunks/leap>
 #include <chunks/intensities>
@@ -66,39 +73,58 @@ void main() {
   float share = (span.y - span.x) / max(all.y - max(all.x, 0.0), 1e-6);
   int steps = max(1, int(min(1.0, share) * float(uSteps - uSpare) + 1e-3));
   span = clipSpan(span, vEye, dir, invDir);
-  bvec4 unused = bvec4(CHANNELS < 1, CHANNELS < 2, CHANNELS < 3, CHANNELS < 4);
-  bvec4 bound = bvec4(uInDisc.x || unused.x, uInDisc.y || unused.y,
-                      uInDisc.z || unused.z, uInDisc.w || unused.w);
-  if (all4(bound)) span = coneSpan(span, vEye, dir);
+#ifdef DISC
+  if (uAllInDisc) span = coneSpan(span, vEye, dir);
+#endif
   vec3 scene = sceneDistances(back);
-  float edge = min(span.y, scene.x);
-  float end = min(span.y, scene.y);
-  float t = span.x;
-  if (t >= end) discard;
+  // From here on t counts from where the ray comes in: far from the eye, floats would be too coarse.
+  vec3 start = vEye + span.x * dir;
+  float edge = min(span.y, scene.x) - span.x;
+  float end = min(span.y, scene.y) - span.x;
+  if (end <= 0.0) discard;
 
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
-  vec3 texEye = uTexLow + vEye * texPerUm;
+  vec3 texStart = uTexLow + start * texPerUm;
   vec3 texDir = dir * texPerUm;
+  vec3 brickStart = texStart * uTexels / 8.0;  // the same ray in bricks
+  vec3 brickDir = texDir * uTexels / 8.0;
+  brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
+  vec3 invBrickDir = 1.0 / brickDir;
   vec4 sum = vec4(0.0);
   vec4 veil = vec4(0.0);  // the sum in front of the edge
   float shift = jitter(gl_FragCoord.xy - uOrigin);
+  float t = 0.0;
+  float exit = 0.0;  // of the bricks that are known
   int i = 0;
   for (; i < MAX_STEPS && i < steps && t < end && sum.a < OPAQUE; i++) {
     // What remains of the ray over what remains of the budget: it always reaches the end.
     float dt = max(uMinStep, (end - t) / float(steps - i));
-    float leap = leapLength(texEye + t * texDir, texDir);
-    if (leap > 0.0) {
-      t += leap;
-      continue;
+    if (t >= exit) {
+      vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
+      exit = block.x;
+      // By whole steps, so that samples lie where they would without leaps.
+      float leap = floor((exit - t) / dt) * dt;
+      if (block.y > 0.0 && leap > 0.0) {
+        t += leap;
+        exit = t;
+        continue;
+      }
     }
     bool isInFront = t < edge;
     float here = min(dt, (isInFront ? edge : end) - t);  // the last step may be shorter
     float at = t + shift * here;
-    vec3 p = texEye + at * texDir;
-    vec4 s = classify(sampleIntensities(p), here / uVoxel * weights(vEye + at * dir));
-    if (s.a > 0.0) {
-      s.rgb *= shade(p, texPerUm, dir);
-      sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
+    vec3 p = texStart + at * texDir;
+    vec4 v = sampleIntensities(p);
+    if (any(greaterThan(v, uFloor))) {
+#ifdef DISC
+      vec4 s = classify(v, here / uVoxel * weights(start + at * dir));
+#else
+      vec4 s = classify(v, vec4(here / uVoxel * uPresence));
+#endif
+      if (s.a > 0.0) {
+        s.rgb *= shade(p, texPerUm, dir);
+        sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
+      }
     }
     if (isInFront) veil = sum;
     t += here;
@@ -108,6 +134,7 @@ void main() {
   return;
 #endif
   sum = mix(veil, sum, scene.z);
+  if (sum.a >= OPAQUE) sum /= sum.a;  // what was left out behind looks as what is in front
   if (sum.a <= 0.0) discard;
   // Blending happens on encoded colours, as for every other surface of the page.
   oColor = vec4(encoded(sum.rgb / sum.a) * sum.a, sum.a);

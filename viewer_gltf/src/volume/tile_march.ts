@@ -34,7 +34,7 @@ export const MAX_STEPS = 100;
 /** A ray that is this opaque goes no further. */
 const OPAQUE = 0.99;
 /** Steps are not shorter than this share of a voxel. */
-const STEP_VOXELS = 0.7;
+const STEP_VOXELS = 1;
 
 /** What all tiles share in a frame: uniforms by reference. */
 export type MarchFrame = Readonly<{
@@ -146,10 +146,12 @@ export class TileMarch {
         uTexels: { value: new Vector3(...volume.size) },
         uVoxel: { value: voxel },
         uMinStep: { value: voxel },
+        uFloor: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
         uLight: { value: new Vector3(-0.35, 0.5, 0.8).normalize() },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
         uInDisc: { value: [false, false, false, false] },
+        uAllInDisc: { value: false },
         uApex: { value: new Vector3() },
         uAxis: { value: new Vector3(0, 0, -1) },
         uPresence: { value: 1 },
@@ -234,12 +236,18 @@ export class TileMarch {
     looks.forEach(({ color, table, isInDisc }, c) => {
       (uniforms.uColor.value as Vector3[])[c].set(...color);
       uniforms.uInDisc.value[c] = isInDisc;
+      uniforms.uFloor.value.setComponent(c, floorOf(table));
       const row = rows.subarray(c * table.length, (c + 1) * table.length);
       if (table.every((value, i) => value === row[i])) return;
       row.set(table);
       differs = true;
     });
     if (differs) this.lut.needsUpdate = true;
+    uniforms.uAllInDisc.value = looks.every((look) => look.isInDisc);
+    this.define(
+      "DISC",
+      looks.some((look) => look.isInDisc),
+    );
     return differs;
   }
 
@@ -251,12 +259,26 @@ export class TileMarch {
     this.mesh.material.uniforms.uOccupancy.value = this.occupancy ?? NO_LEAPS;
   }
 
+  private define(name: string, isOn: boolean): void {
+    const { material } = this.mesh;
+    if (name in material.defines === isOn) return;
+    if (isOn) material.defines[name] = 1;
+    else delete material.defines[name];
+    material.needsUpdate = true;
+  }
+
   dispose(): void {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
     this.lut.dispose();
     this.occupancy?.dispose();
   }
+}
+
+/** The intensity 0..1 up to which a table shows nothing; it is linear between its entries. */
+function floorOf(table: Uint8Array): number {
+  for (let i = 0; i < ENTRIES; i++) if (table[4 * i + 3] > 0) return (i - 1) / (ENTRIES - 1);
+  return 1;
 }
 
 const corner = new Vector3();

@@ -44,7 +44,13 @@ export class TileTexture {
   private levels: readonly number[] = [];
   /** After a fault, which was told, a channel is not tried again until it is turned on anew. */
   private readonly failed = new Set<string>();
-  private readonly abort = new AbortController();
+  private isDisposed = false;
+  /** What is being loaded now; aborted when it is no longer wanted. */
+  private loading: Readonly<{
+    channels: readonly string[];
+    level: number;
+    abort: AbortController;
+  }> | null = null;
 
   constructor(
     private readonly queue: LoadQueue,
@@ -73,6 +79,10 @@ export class TileTexture {
     }
     this.sources = sources;
     this.levels = levels;
+    if (this.loading !== null) {
+      const { channels, level, abort } = this.loading;
+      if (!same(channels, this.wanted) || !levels.includes(level)) abort.abort();
+    }
     if (!this.isLoading) void this.run();
   }
 
@@ -95,12 +105,15 @@ export class TileTexture {
       if (channels.length === 0) this.replace(null);
       const level = this.nextLevel(channels);
       if (level === null) break;
-      const packed = await this.load(channels, level);
-      if (this.abort.signal.aborted) {
+      const abort = new AbortController();
+      this.loading = { channels, level, abort };
+      const packed = await this.load(channels, level, abort.signal);
+      this.loading = null;
+      if (this.isDisposed) {
         packed?.texture.dispose();
         return;
       }
-      if (packed === null) continue; // a channel failed: without it
+      if (packed === null) continue; // aborted, or a channel failed: without it
       if (same(channels, this.wanted)) {
         this.replace(packed);
         this.onChange();
@@ -125,8 +138,11 @@ export class TileTexture {
   }
 
   /** The level of all channels; null if one of them failed, which was told. */
-  private async load(channels: readonly string[], level: number): Promise<Packed | null> {
-    const { signal } = this.abort;
+  private async load(
+    channels: readonly string[],
+    level: number,
+    signal: AbortSignal,
+  ): Promise<Packed | null> {
     const parts = await Promise.all(channels.map((id) => this.fetch(id, level, signal)));
     if (signal.aborted || parts.includes(null)) return null;
     const whole = parts.flatMap((part) => (part === null ? [] : [part]));
@@ -196,7 +212,8 @@ export class TileTexture {
   }
 
   dispose(): void {
-    this.abort.abort();
+    this.isDisposed = true;
+    this.loading?.abort.abort();
     this.forgetOld();
     this.shown?.texture.dispose();
     this.shown = null;

@@ -320,12 +320,17 @@ export class VolumeSet {
     );
   }
 
-  dispose(): void {
+  /** Drop all that is on the GPU; what is wanted comes anew. */
+  forget(): void {
     for (const { march, texture } of this.residents.values()) {
       march?.dispose();
       texture.dispose();
     }
     this.residents.clear();
+  }
+
+  dispose(): void {
+    this.forget();
     this.occupancy.dispose();
   }
 }

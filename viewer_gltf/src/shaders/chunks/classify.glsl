@@ -1,5 +1,11 @@
 // Colour (not premultiplied) and opacity of a step that is so many voxels long for each channel.
 // Channels that overlap absorb together and share the colour by their opacities.
+#if CHANNELS == 1
+vec4 classify(vec4 intensity, vec4 voxels) {
+  vec4 look = texture(uLut, vec2(intensity.x * (255.0 / 256.0) + 0.5 / 256.0, 0.5));
+  return vec4(look.rgb * uColor[0], 1.0 - pow(1.0 - min(look.a, 0.999), voxels.x));
+}
+#else
 vec4 classify(vec4 intensity, vec4 voxels) {
   vec3 color = vec3(0.0);
   float weight = 0.0;
@@ -14,3 +20,4 @@ vec4 classify(vec4 intensity, vec4 voxels) {
   }
   return weight > 0.0 ? vec4(color / weight, 1.0 - clear) : vec4(0.0);
 }
+#endif

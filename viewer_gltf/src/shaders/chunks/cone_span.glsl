@@ -1,12 +1,7 @@
-bool all4(bvec4 each) {
-  return each.x && each.y && each.z && each.w;
-}
-
 // The part of a ray's span inside the cone of the disc's outer radius, which is less than 90
 // degrees: there f(t) = (axis . q)^2 - cos^2 |q|^2 >= 0 for q = eye + t dir - apex, on the side
 // that the axis points to.
 vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
-  if (uDisc.y <= -1.0) return span;  // the disc is all there is
   vec3 m = eye - uApex;
   float square = uDisc.y * uDisc.y;
   float dg = dot(dir, uAxis);
@@ -23,11 +18,4 @@ vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
   // a < 0: near > far, and the ray is inside between them, in front of the apex or behind it
   if (mg + 0.5 * (near + far) * dg < 0.0) return vec2(1.0, 0.0);
   return vec2(max(span.x, far), min(span.y, near));
-}
-
-// By how much each channel's opacity counts at a point: extinction grows with the cube of the
-// disc's weight, as a dense volume would else be opaque all over the feather.
-vec4 weights(vec3 p) {
-  float w = discWeight(p, uApex, uAxis, uDisc);
-  return uPresence * uPresence * uPresence * mix(vec4(1.0), vec4(w * w * w), vec4(uInDisc));
 }

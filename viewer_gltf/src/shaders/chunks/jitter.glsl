@@ -2,5 +2,5 @@
 // Counted from the eye's own corner, so that both eyes see the same grain at the same place.
 float jitter(vec2 pixel) {
   ivec2 size = textureSize(uNoise, 0);
-  return texelFetch(uNoise, ivec2(pixel) % size, 0).r;
+  return (texelFetch(uNoise, ivec2(pixel) % size, 0).r * 255.0 + 0.5) / 256.0;
 }

@@ -1,17 +1,15 @@
-// How far a ray may go from texture coordinate `p` before it can meet a visible brick; 0 inside
-// one. A distance of d bricks means that the block of bricks up to d - 1 around is empty.
-float leapLength(vec3 p, vec3 texDir) {
-  vec3 q = p * uTexels / 8.0;  // in bricks
-  vec3 brick = floor(q);
+// The block of bricks round the ray's point t that is alike: x is where the ray leaves it, a little
+// beyond the wall, so that what lies there is another brick; y is 1 if nothing in it is visible. A
+// stored distance of d bricks means that the block of bricks up to d - 1 around is empty; a visible
+// brick is a block by itself. `start` and `dir` in bricks, no part of `dir` is 0.
+vec2 blockAhead(vec3 start, vec3 dir, vec3 invDir, float t) {
+  vec3 brick = floor(start + t * dir);
   ivec3 last = textureSize(uOccupancy, 0) - 1;
   float stored = texelFetch(uOccupancy, clamp(ivec3(brick), ivec3(0), last), 0).r;
-  float d = floor(stored * 255.0 + 0.5);
-  d -= uBrickSlack;
-  if (d < 1.0) return 0.0;
-  vec3 dq = texDir * uTexels / 8.0;  // bricks per unit of the ray
-  vec3 wall = mix(brick - (d - 1.0), brick + d, vec3(greaterThan(dq, vec3(0.0))));
-  vec3 exits = (wall - q) / (dq + 1e-9 * vec3(equal(dq, vec3(0.0))));
-  exits = mix(exits, vec3(1e30), lessThan(abs(dq), vec3(1e-9)));
-  // A little beyond the wall, so that the next brick is another one.
-  return min(min(exits.x, exits.y), exits.z) + 1e-3 * uVoxel;
+  float d = floor(stored * 255.0 + 0.5) - uBrickSlack;
+  float around = max(d, 1.0);
+  vec3 wall = brick + mix(vec3(1.0 - around), vec3(around), step(0.0, dir));
+  vec3 exits = (wall - start) * invDir;
+  float exit = min(min(exits.x, exits.y), exits.z);
+  return vec2(max(exit, t) + 1e-3 * uVoxel, step(1.0, d));
 }

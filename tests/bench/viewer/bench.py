@@ -1,0 +1,166 @@
+"""What `make bench-viewer` prints: our march against those that a user would pick instead.
+
+The same volume, transfer function, camera and 512 x 512 picture in one headless Chromium: vtk.js,
+NiiVue, three's own example and ours, ROUNDS rounds of each in turn. Given are the median time, and
+the median of the rounds' ratios to ours. Software draws it unless STEREOCELL_GPU_FLAGS holds
+Chromium's flags for a GPU: only ratios mean anything. PSNR is against the float64 reference, of the
+whole picture and of the pixels where the reference shows something. The pictures stay in OUT.
+
+Light is off where peers are compared: each has its own. No peer lets its settings be matched more
+closely than scene.py and src/*.ts say.
+"""
+
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from scene import SIZE_PX, Scene, brain_cells, nuclei, reference
+
+from reference_march import encode, path_voxels, psnr
+
+HERE = Path(__file__).parent
+ROUNDS = int(os.environ.get("ROUNDS", "15"))
+RIVALS = {"parallel": "narrow"}  # the camera of ours that a peer's is compared with
+HEAD = (
+    ("scene", "camera", "ms", "of ours", "samples", "PSNR", "where"),
+    ("", "", "", "", "a ray", "dB", "drawn"),
+)
+NIIVUE_OPAQUE = 0.95  # its rays end here, and are scaled to 1
+
+
+@dataclass(frozen=True)
+class Run:
+    name: str
+    renderer: str
+    scene: str
+    camera: str
+    setting: float
+    says: str  # in the table
+    voxels: float | None  # a step's length, where the renderer doesn't count its steps
+    shading: bool = False
+
+
+class Timing(TypedDict):
+    """What run.ts measured of a run."""
+
+    name: str
+    ms: list[float]
+    steps: float | None
+
+
+def runs_on(scene: str) -> list[Run]:
+    """Return what is timed on a scene."""
+
+    def run(renderer: str, camera: str, setting: float, says: str, step: float | None) -> Run:
+        name = f"{scene}-{renderer}-{camera}-{setting:g}"
+        return Run(name, renderer, scene, camera, setting, says, step)
+
+    peers = [
+        *(run("vtk", "perspective", h, f"vtk.js, step {h:g}", h) for h in (1, 0.5, 0.25)),
+        *(run("three", "perspective", h, f"three's example, step {h:g}", h) for h in (1, 0.5)),
+        run("three", "perspective", 0, "three's example untouched: MIP", 1),
+        run("niivue", "parallel", 0, "NiiVue", 1),
+    ]
+    ours = [run("ours", camera, 0, "ours", None) for camera in ("perspective", "narrow")]
+    return peers + ours + [lit(scene)]
+
+
+def lit(scene: str) -> Run:
+    """Return the run of ours as the viewer shows it."""
+    return Run(
+        f"{scene}-ours-lit", "ours", scene, "perspective", 1, "ours, with its light", None, True
+    )
+
+
+def missing() -> str | None:
+    """Return why nothing can be measured here."""
+    if shutil.which("node") is None:
+        return "no node"
+    chromium = os.environ.get("CHROMIUM") or "/usr/bin/chromium"
+    return None if Path(chromium).exists() else f"no Chromium at {chromium}: set CHROMIUM"
+
+
+def picture_of(run: Run, folder: Path) -> NDArray[np.uint8]:
+    """Return what a run drew, (height, width, 3), top row first."""
+    width, height = SIZE_PX
+    rgba = np.frombuffer((folder / f"{run.name}.rgba").read_bytes(), np.uint8)
+    return rgba.reshape(height, width, 4)[::-1, :, :3]
+
+
+def unblended(picture: NDArray[np.uint8], color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return NiiVue's picture as it was before its opacity was multiplied in twice."""
+    share = np.sqrt(NIIVUE_OPAQUE * picture / color)
+    pixels: NDArray[np.uint8] = np.rint(color * np.clip(share, 0, 1)).astype(np.uint8)
+    return pixels
+
+
+def row(run: Run, scene: Scene, timings: dict[str, Timing], folder: Path) -> str:
+    """Return a run's line of the table."""
+    timing = timings[run.name]
+    ideal = reference(scene, run.camera, run.shading, folder)
+    there = ideal[..., 3] > 0
+    Image.fromarray(picture_of(run, folder)).save(folder / f"{run.name}.png")
+    expected, found = encode(ideal), picture_of(run, folder)
+    ms, steps = statistics.median(timing["ms"]), timing["steps"]
+    path = path_voxels(scene.block, scene.cameras[run.camera])
+    most = float(path[path > 0].mean())
+    samples = f"{steps:.0f}" if run.voxels is None else f"<= {most / run.voxels:.0f}"
+    rival = timings.get(f"{run.scene}-ours-{RIVALS.get(run.camera, run.camera)}-0")
+    ratio = ""
+    if rival is not None:
+        pairs = zip(timing["ms"], rival["ms"], strict=True)
+        ratio = f"{statistics.median(its / ours for its, ours in pairs):.2f}"
+    text = (
+        f"{run.scene:15} {run.says:32} {run.camera:12} {ms:7.0f} {ratio:>7} {samples:>8} "
+        f"{psnr(found, expected):7.1f} {psnr(found, expected, there):7.1f}"
+    )
+    if run.renderer != "niivue":
+        return text
+    color = encode(np.array([[[*scene.block.colors[0], 1.0]]]))
+    undone = unblended(found, color)
+    return (
+        f"{text}\n{'':15} {'  its blending undone':32} {'':12} {'':7} {'':7} {'':>8} "
+        f"{psnr(undone, expected):7.1f} {psnr(undone, expected, there):7.1f}"
+    )
+
+
+def main(folder: Path) -> None:
+    """Measure, and print the table."""
+    reason = missing()
+    if reason is not None:
+        print(f"bench-viewer: skipped: {reason}")
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    scenes = {scene.name: scene for scene in (*nuclei(), brain_cells())}
+    for scene in scenes.values():
+        scene.write(folder)
+    runs = [run for name in ("nuclei_soft", "nuclei_default") for run in runs_on(name)]
+    runs += [Run("brain_cells-ours", "ours", "brain_cells", "perspective", 0, "ours", None)]
+    runs += [lit("brain_cells")]
+    job = folder / "job.json"
+    job.write_text(json.dumps({"rounds": ROUNDS, "runs": [asdict(run) for run in runs]}))
+    tsx = HERE / "node_modules" / ".bin" / "tsx"
+    subprocess.run([tsx, HERE / "run.ts", job, folder], check=True)
+    measured: list[Timing] = json.loads((folder / "timings.json").read_text())
+    timings = {timing["name"]: timing for timing in measured}
+    for line in HEAD:
+        print(f"{line[0]:15} {'':32} {line[1]:12}", *(f"{text:>7}" for text in line[2:4]), end=" ")
+        print(f"{line[4]:>8}", *(f"{text:>7}" for text in line[5:]))
+    for run in runs:
+        print(row(run, scenes[run.scene], timings, folder))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,142 @@
+/** Ours: the viewer's own march. Setting: 1 with its light, 0 without. */
+import {
+  ClampToEdgeWrapping,
+  Data3DTexture,
+  LinearFilter,
+  PerspectiveCamera,
+  RedFormat,
+  Scene as Room,
+  WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import type { TileVolume } from "viewer/bundle/generated/volumes";
+import { Cuts } from "viewer/view/cuts";
+import { DepthPass } from "viewer/view/depth_pass";
+import { Eyes } from "viewer/view/eyes";
+import { MarchPass } from "viewer/view/march_pass";
+import { brickCounts } from "viewer/volume/brick_counts";
+import { opacities } from "viewer/volume/luts";
+import { occupancyDistances } from "viewer/volume/occupancy";
+import { makeFrame, TileMarch, wholeSpecimen } from "viewer/volume/tile_march";
+import { serve } from "./page";
+import type { About, Camera, Renderer, Scene } from "./scene";
+
+class Ours implements Renderer {
+  private readonly renderer = new WebGLRenderer({ antialias: false });
+  private readonly depth = new DepthPass(new Cuts());
+  private readonly frame = makeFrame(this.depth.texture);
+  private readonly pass = new MarchPass(this.frame);
+  private readonly eyes = new Eyes();
+  private readonly camera = new PerspectiveCamera();
+  /** What is marched, and what it is laid over: a room that is empty but for that. */
+  private readonly marched = new Room();
+  private readonly room = new Room();
+  private march: TileMarch | null = null;
+
+  get gl(): WebGL2RenderingContext {
+    return this.renderer.getContext() as WebGL2RenderingContext;
+  }
+
+  async setup(scene: Scene, camera: Camera, setting: number, parent: HTMLElement): Promise<void> {
+    const [width, height] = scene.about.size_px;
+    this.renderer.setPixelRatio(1);
+    this.renderer.setSize(width, height);
+    parent.append(this.renderer.domElement);
+    this.march = marchOf(scene, this.frame);
+    const { material } = this.march.mesh;
+    if (setting === 0) material.fragmentShader = unlit(material.fragmentShader);
+    this.marched.add(this.march.mesh);
+    this.room.add(this.pass.overlay);
+    this.aim(camera, width / height);
+  }
+
+  private aim({ eye_um, target_um, fov_deg }: Camera, aspect: number): void {
+    if (fov_deg === null) throw new Error("the viewer has no parallel projection");
+    const away = Math.hypot(...eye_um.map((v, i) => v - target_um[i]));
+    this.camera.fov = fov_deg;
+    this.camera.aspect = aspect;
+    this.camera.near = away / 10;
+    this.camera.far = away * 4;
+    this.camera.position.set(...eye_um);
+    this.camera.lookAt(...target_um);
+    this.camera.updateProjectionMatrix();
+    this.camera.updateMatrixWorld();
+  }
+
+  /** All that the viewer does in a frame that has a volume. */
+  draw(): void {
+    this.eyes.followScreen(this.renderer, this.camera);
+    this.depth.render(this.renderer, this.room, this.eyes, [this.pass.overlay]);
+    this.pass.render(this.renderer, this.marched, this.eyes, 1);
+    this.renderer.render(this.room, this.camera);
+  }
+
+  countSteps(): number {
+    if (this.march === null) throw new Error("countSteps before setup");
+    const { width, height } = this.renderer.domElement;
+    const { material } = this.march.mesh;
+    const target = new WebGLRenderTarget(width, height);
+    material.defines.COUNT_STEPS = 1;
+    material.needsUpdate = true;
+    this.renderer.setRenderTarget(target);
+    this.renderer.setClearColor(0, 0);
+    this.renderer.clear();
+    this.renderer.render(this.marched, this.camera);
+    const rgba = new Uint8Array(4 * width * height);
+    this.renderer.readRenderTargetPixels(target, 0, 0, width, height, rgba);
+    this.renderer.setRenderTarget(null);
+    target.dispose();
+    delete material.defines.COUNT_STEPS;
+    material.needsUpdate = true;
+    this.draw();
+    let [steps, rays] = [0, 0];
+    for (let i = 0; i < rgba.length; i += 4) {
+      if (rgba[i + 3] === 0) continue;
+      steps += rgba[i] + 256 * rgba[i + 1];
+      rays++;
+    }
+    return steps / rays;
+  }
+}
+
+function marchOf({ about, voxels, bricks }: Scene, frame: ReturnType<typeof makeFrame>): TileMarch {
+  const volume = volumeOf(about);
+  const table = Uint8Array.from(about.table);
+  const texture = new Data3DTexture(voxels, ...about.size);
+  texture.format = RedFormat;
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
+  texture.unpackAlignment = 1;
+  texture.needsUpdate = true;
+  const march = new TileMarch(volume, 1, frame);
+  march.clip(wholeSpecimen());
+  march.show({ channels: ["A"], level: 0, texture, bricks: [bricks] }, null, 1, 1);
+  march.dress([{ color: about.color, table, isInDisc: false }]);
+  const count = brickCounts(volume.size);
+  march.leapBy(occupancyDistances({ bricks: [bricks], alphas: [opacities(table)], count }));
+  return march;
+}
+
+function volumeOf(about: About): TileVolume {
+  const file = { path: "", bytes: 0, sha256: "" };
+  const size: TileVolume["size"] = [...about.size];
+  return {
+    tile: "r0_c0",
+    file,
+    bricks: file,
+    size,
+    apron: 1,
+    bounds_um: { min: [...about.low_um], max: [...about.high_um] },
+    matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    levels: [{ size, offset: 0, length: 1 }],
+  };
+}
+
+/** The march without light: for the peers, which are timed without theirs. */
+function unlit(text: string): string {
+  const line = "s.rgb *= shade(p, texPerUm, dir);";
+  if (!text.includes(line)) throw new Error("the march shades in another line than it did");
+  return text.replace(line, "");
+}
+
+serve(() => new Ours());

@@ -1,0 +1,74 @@
+/** One frame: depth of what is opaque, volumes marched up to it, the scene, the volumes over it. */
+import { type Camera, Matrix4, type Object3D, Vector3, type WebGLRenderer } from "three";
+import type { Hybrid } from "../hybrid/hybrid";
+import { makeSurfaceFrame } from "../mesh/blend";
+import { makeFrame } from "../volume/tile_march";
+import type { VolumeSet } from "../volume/volume_set";
+import type { Clip } from "./clip";
+import { Cuts } from "./cuts";
+import { DepthPass } from "./depth_pass";
+import { Eyes } from "./eyes";
+import { MarchPass } from "./march_pass";
+import type { Room } from "./room";
+
+export class Picture {
+  /** Where they are in this frame. */
+  readonly eyes = new Eyes();
+  private readonly cuts = new Cuts();
+  private readonly depth = new DepthPass(this.cuts);
+  /** What all volumes share. */
+  readonly marchFrame = makeFrame(this.depth.texture);
+  /** What all surfaces share. */
+  readonly surfaceFrame = makeSurfaceFrame(this.marchFrame.uDisc, this.cuts);
+  private readonly march = new MarchPass(this.marchFrame);
+  private readonly point = new Vector3();
+  private readonly toSpecimen = new Matrix4();
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly room: Room,
+    private readonly hybrid: Hybrid,
+  ) {
+    room.scene.add(this.march.overlay);
+  }
+
+  /**
+   * @param head its pose in the room
+   * @param translucent what is not opaque now, besides the room's overlays
+   * @param resolution pixels of the march to one of the picture, 0..1
+   */
+  draw(
+    camera: Camera,
+    head: Matrix4,
+    volumes: VolumeSet,
+    translucent: readonly Object3D[],
+    clip: Clip,
+    resolution: number,
+  ): void {
+    const { renderer, room, hybrid } = this;
+    const specimen = room.specimen.group.matrixWorld;
+    renderer.info.reset();
+    room.light(head);
+    this.cuts.follow(clip, specimen);
+    this.surfaceFrame.uApex.value.copy(hybrid.apex);
+    this.surfaceFrame.uAxis.value.copy(hybrid.axis);
+    this.surfaceFrame.uDisc.value.set(...hybrid.cosines);
+    this.march.overlay.visible = !volumes.isEmpty;
+    if (!volumes.isEmpty) {
+      const toSpecimen = this.toSpecimen.copy(specimen).invert();
+      const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
+      volumes.placeAs(specimen);
+      volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
+      const hidden = [...room.overlays, this.march.overlay, ...translucent];
+      this.depth.render(renderer, room.scene, this.eyes, hidden);
+      this.march.render(renderer, volumes.scene, this.eyes, resolution);
+    }
+    renderer.render(room.scene, camera);
+  }
+
+  dispose(): void {
+    this.depth.dispose();
+    this.march.dispose();
+    this.marchFrame.uNoise.value.dispose();
+  }
+}
