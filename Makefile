@@ -124,6 +124,7 @@ test: setup browser ## All tests, in headless Chromium too
 	$(BIN)/pytest
 	cd $(VIEWER) && npm run --silent test
 	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
+	$(MAKE) --no-print-directory demo SAMPLE=brain-cells OUT=out/brain-cells
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
 	for kind in tif zarr; do $(RUN) build out/f/f.ome.$$kind -o out/f/$$kind --workers 0 || exit 1; done
 	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit
@@ -132,6 +133,7 @@ test: setup browser ## All tests, in headless Chromium too
 	$(BIN)/python tests/edits.py layer out/edit
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) \
+	  STEREOCELL_REAL_BUNDLE=$(abspath out/brain-cells/bundle) \
 	  STEREOCELL_F_BUNDLES=$(abspath out/f/tif/bundle):$(abspath out/f/zarr/bundle) \
 	  STEREOCELL_EDIT_BUNDLES=$(abspath out/edit/before):$(abspath out/edit/built/bundle) \
 	  npm run --silent test:browser

@@ -6,7 +6,7 @@ import { type Browser, launch } from "./driver/chromium";
 import { describeInChromium } from "./driver/skip";
 import { bundled } from "./march/bundled";
 import { readChunks, runProgram } from "./march/chunk";
-import type { Counts, Run } from "./march/harness";
+import type { Counts, Harness, Run } from "./march/harness";
 
 describeInChromium("the ray-march", () => {
   let browser: Browser;
@@ -22,9 +22,20 @@ describeInChromium("the ray-march", () => {
 
   afterAll(() => browser?.close());
 
+  async function inPage<K extends keyof Harness>(
+    name: K,
+    ...given: Parameters<Harness[K]>
+  ): Promise<ReturnType<Harness[K]>> {
+    const answer = await page.evaluate(
+      ([name, given]) => (window.march?.[name] as (...each: unknown[]) => unknown)?.(...given),
+      [name, given] as const,
+    );
+    if (answer === undefined) throw new Error("the page has no harness");
+    return answer as ReturnType<Harness[K]>;
+  }
+
   async function count(run: Run): Promise<Counts> {
-    const counts = await page.evaluate((each) => window.countSteps?.(each), run);
-    if (counts === undefined) throw new Error("the page has no harness");
+    const counts = await inPage("countSteps", run);
     expect(counts.pixels).toBeGreaterThan(300);
     return counts;
   }
@@ -53,6 +64,35 @@ describeInChromium("the ray-march", () => {
     const { most, covered } = await count({ side: 198, opacity: 255, bricks: "none" });
     expect(most).toBeLessThanOrEqual(5);
     expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("takes no more steps where a ray goes through several tiles", async () => {
+    for (const cubes of [2, 3, 7]) {
+      const most = await inPage("countThrough", { side: 51, opacity: 1, bricks: "all" }, cubes);
+      expect(most).toBeLessThanOrEqual(MAX_STEPS);
+      expect(most).toBeGreaterThan(0.8 * MAX_STEPS);
+    }
+  });
+
+  it("shows the same with leaps and without, whatever is drawn", async () => {
+    let drawn = 0;
+    for (let seed = 0; seed < 30; seed++) {
+      const found = await inPage("compareLeaps", seed);
+      expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
+      drawn += found.drawn;
+    }
+    expect(drawn).toBeGreaterThan(30 * 100);
+  });
+
+  it("makes a ramp as opaque as its integral", async () => {
+    const [side, opacity] = [67, 20];
+    // transmittance is the product of (1 - a)^length: its logarithm is an integral along the ray
+    let log = 0;
+    for (let i = 0; i < 10_000; i++) {
+      log += Math.log(1 - ((opacity / 255) * (i + 0.5)) / 10_000);
+    }
+    const expected = 1 - Math.exp((log / 10_000) * (side - 3));
+    expect(Math.abs((await inPage("rampOpacity", side, opacity)) - expected)).toBeLessThan(2 / 255);
   });
 
   it("finds where a ray enters and leaves a box", async () => {
