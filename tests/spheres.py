@@ -82,7 +82,7 @@ def tile(column: int, looks: tuple[Look, ...] = (RED, BLUE)) -> TileContent:
     for level, (rings, distance) in enumerate(LEVELS):
         # longitude 0 points to +z at x = 10: the first half of the longitudes lies left of it
         keep = slice(0, rings + 1) if column == 0 else slice(rings, None)
-        lods.append(Lod(sphere(rings, keep), distance, flat if level == 2 else None))
+        lods.append(Lod(sphere(rings, keep), distance, flat if level else None))
     contents = tuple(
         ChannelContent(look.id, tuple(lods) if look.iso_value else (), volume) for look in looks
     )

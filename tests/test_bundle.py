@@ -109,13 +109,15 @@ def test_meshes_lie_where_the_stage_has_them_and_meet_without_a_crack(bundle):
     assert all(edges)
 
 
-def test_coarsest_lod_has_the_baked_normal_map(bundle):
-    document, _ = read((bundle / "channels/CD31/r0_c0/lod2.glb").read_bytes())
+def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
+    document, _ = read((bundle / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     primitive = document["meshes"][0]["primitives"][0]
     assert {"TEXCOORD_0", "TANGENT"} <= primitive["attributes"].keys()
     assert document["materials"][0]["normalTexture"] == {"index": 0}
-    finest, _ = read((bundle / "channels/CD31/r0_c0/lod0.glb").read_bytes())
-    assert "images" not in finest
+    for level in (0, 2):
+        bare, _ = read((bundle / f"channels/CD31/r0_c0/lod{level}.glb").read_bytes())
+        assert "images" not in bare
+        assert "TEXCOORD_0" not in bare["meshes"][0]["primitives"][0]["attributes"]
 
 
 def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):

@@ -116,14 +116,14 @@ def test_broken_json_is_found(out):
 def test_level_that_lies_elsewhere_is_found(out):
     path = out / "bundle" / "channels/CD31/volumes.json"
     text = path.read_text()
-    offset = text.split('"offset": ')[1].split(",")[0]
-    path.write_text(text.replace(f'"offset": {offset}', f'"offset": {int(offset) + 1}', 1))
+    offset = text.split('"offset":')[1].split(",")[0]
+    path.write_text(text.replace(f'"offset":{offset}', f'"offset":{int(offset) + 1}', 1))
     assert "lie elsewhere" in lines(out)["volume lists"].detail
 
 
 def test_tileset_whose_errors_grow_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
-    path.write_text(path.read_text().replace('"geometricError": 0.0', '"geometricError": 9.0'))
+    path.write_text(path.read_text().replace('"geometricError":0.0', '"geometricError":9.0'))
     assert "larger geometricError" in lines(out)["tilesets"].detail
 
 

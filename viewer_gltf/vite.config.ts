@@ -1,11 +1,55 @@
+import { readdir, readFile, writeFile } from "node:fs/promises";
+import { join } from "node:path";
+import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+
+const SERVICE_WORKER = "sw.js";
+const PLACEHOLDER = /(["'`])__VIEWER_FILES__\1/;
+
+/** Tell the service worker, which has a fixed name, what the viewer of this build consists of. */
+function listViewerFiles(): Plugin {
+  let folder = "";
+  return {
+    name: "list-viewer-files",
+    apply: "build",
+    configResolved(config) {
+      folder = join(config.root, config.build.outDir);
+    },
+    async writeBundle(_, bundle) {
+      if (!(SERVICE_WORKER in bundle)) return; // the tests' own small pages have none
+      const path = join(folder, SERVICE_WORKER);
+      const code = await readFile(path, "utf8");
+      if (!PLACEHOLDER.test(code)) this.error(`${path}: no place for the list of files`);
+      const entries = await readdir(folder, { recursive: true, withFileTypes: true });
+      const names = entries
+        .filter((entry) => entry.isFile())
+        .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1))
+        .filter((name) => name !== SERVICE_WORKER && name !== "index.html")
+        .sort();
+      const list = JSON.stringify(JSON.stringify(names));
+      await writeFile(
+        path,
+        code.replace(PLACEHOLDER, () => list),
+      );
+    },
+  };
+}
 
 export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
+  plugins: [listViewerFiles()],
   build: { target: "es2022", outDir: "dist", emptyOutDir: true, chunkSizeWarningLimit: 1500 },
   server: { fs: { allow: [".."] } }, // the schemas lie beside this folder
-  worker: { format: "es" },
+  worker: {
+    format: "es",
+    rolldownOptions: {
+      output: {
+        // Its folder is what a service worker may serve: beside index.html, not in assets/.
+        entryFileNames: ({ name }) => (name === "sw" ? SERVICE_WORKER : "assets/[name]-[hash].js"),
+      },
+    },
+  },
   test: {
     projects: [
       { extends: true, test: { name: "unit", include: ["src/**/*.test.ts"], environment: "node" } },

@@ -4,6 +4,7 @@
  * `color`, `volume`, `transfer-function`; `[data-mode]`, `[data-tile-choice]`, `[data-action]`).
  */
 import type { Progress } from "./mesh/progress";
+import type { QualitySettings } from "./quality/controller";
 import type { ViewerState } from "./state";
 import type { VolumeStatus } from "./volume/volume_set";
 
@@ -22,6 +23,10 @@ export type Snapshot = Readonly<{
   discRadius_deg: number;
   /** Between two frames of a moving picture. */
   frame_ms: number;
+  /** What the last frame was drawn with. */
+  settings: QualitySettings;
+  /** Of three's own count. */
+  gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;
 }>;
 

@@ -1,17 +1,20 @@
 /** Start: find the bundle, show it, or say on the page why not. */
 import "./ui/page.css";
 import "./ui/panel.css";
+import "./ui/widgets.css";
 import "./ui/controls.css";
 import "./ui/overlays.css";
+import "./marks/marks.css";
 import type { StereoCellApi } from "./api";
 import { bundleAddress } from "./bundle/address";
 import { BundleError } from "./bundle/errors";
 import type { Manifest } from "./bundle/generated/bundle";
 import { loadBundle } from "./bundle/load";
-import { settingsOf } from "./share/settings";
+import { watchWaiting } from "./bundle/retry";
+import { keepOffline } from "./offline/register";
+import { Desk } from "./ui/desk";
 import { element } from "./ui/dom";
-import { Notices, ProgressBar, showFatal } from "./ui/overlays";
-import { Panel } from "./ui/panel";
+import { Notices, ProgressBar, Said, showFatal } from "./ui/overlays";
 import { Viewer } from "./viewer";
 import { findXrSupport } from "./xr/support";
 
@@ -30,15 +33,6 @@ function describeSize({ specimen, tiles }: Manifest): string {
   return `${edges.join(" × ")} µm · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
 }
 
-function describeStatus(viewer: Viewer): string {
-  const { triangles, volumes, isLoading } = viewer.snapshot();
-  const parts = [`${Math.round(triangles / 1000).toLocaleString("en")} k triangles`];
-  const levels = volumes.flatMap(({ level }) => (level === null ? [] : [level]));
-  if (levels.length > 0) parts.push(`volume level ${Math.min(...levels)}`);
-  if (isLoading) parts.push("refining …");
-  return parts.join(" · ");
-}
-
 async function open(parent: HTMLElement): Promise<Viewer> {
   checkWebGl2();
   const bundle = await loadBundle(bundleAddress(location.href));
@@ -46,40 +40,43 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   document.title = `${manifest.specimen.name} · StereoCell`;
 
   const stage = element("div", { className: "stage" });
+  stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
+  stage.role = "img";
   const progress = new ProgressBar();
   const notices = new Notices((text) => viewer.dispatch({ type: "dismiss", text }));
-  const view = element("div", { className: "view" }, {}, stage, progress.root, notices.root);
-  parent.replaceChildren(view);
+  const said = new Said();
+  const over = [progress.root, said.root, notices.root];
+  parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
+  let desk: Desk | null = null;
   const viewer: Viewer = new Viewer(
     bundle,
     stage,
     (state) => {
-      panel.update(state);
+      desk?.refresh();
       notices.update(state.notices);
     },
     () => {
       progress.update(viewer.snapshot().overview);
-      panel.setStatus(describeStatus(viewer));
+      desk?.refreshSoon();
     },
   );
-  const panel = new Panel(
-    manifest.specimen.name,
-    describeSize(manifest),
-    viewer.state,
-    (action) => viewer.dispatch(action),
-    () => void enterStereo(viewer),
-    () => viewer.run("reset"),
-  );
-  parent.append(panel.root);
-  for (const action of settingsOf(location.search)) viewer.dispatch(action);
-  panel.setStereo(await findXrSupport(navigator.xr, isSecureContext));
+  desk = new Desk(viewer, parent, said, {
+    subtitle: describeSize(manifest),
+    onStereo: () => void enterStereo(viewer),
+    onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
+  });
+  const { layOut } = desk;
+  viewer.layOut = layOut.bind(desk);
+  notices.update(viewer.state.notices);
+  desk.followAddress(location.search, location.hash);
+  desk.setStereo(await findXrSupport(navigator.xr, isSecureContext));
   return viewer;
 }
 
 async function enterStereo(viewer: Viewer): Promise<void> {
   if (navigator.xr === undefined) return;
   try {
-    await viewer.xr.start(navigator.xr);
+    await viewer.stereo.headset.start(navigator.xr);
   } catch (error) {
     if (!(error instanceof DOMException)) throw error;
     viewer.dispatch({ type: "notify", text: `Stereo could not start: ${error.message}` });
@@ -112,6 +109,11 @@ void opened.then(
     viewer = made;
   },
   () => undefined, // told above
+);
+void ready.then(keepOffline, () => undefined);
+const WAITING = "The host does not answer: trying again. What has come stays on screen.";
+watchWaiting((isWaiting) =>
+  viewer?.dispatch({ type: isWaiting ? "notify" : "dismiss", text: WAITING }),
 );
 ready.catch(() => undefined); // told above; whoever awaits `ready` still sees it
 

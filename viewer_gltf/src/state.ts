@@ -226,7 +226,12 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "select":
       return withTile(state, "selected", action.tile);
     case "isolate":
-      return withTile(state, "isolated", action.tile);
+      // the isolated tile is the selected one: `back` leads from one to the other
+      return withTile(
+        action.tile === null ? state : withTile(state, "selected", action.tile),
+        "isolated",
+        action.tile,
+      );
     case "choose-mode":
       return action.mode === state.mode ? state : { ...state, mode: action.mode };
     case "set-switch-distance":

@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Camera, type Matrix4, Vector3, WebGLRenderer } from "three";
+import { type Camera, type Matrix4, Quaternion, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { Snapshot } from "./api";
 import { BundleError } from "./bundle/errors";
 import type { Bundle } from "./bundle/load";
@@ -7,12 +7,16 @@ import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
 import { pickTile, type Ray } from "./gaze/pick";
 import { Hybrid } from "./hybrid/hybrid";
 import { wantedTiles } from "./hybrid/who";
+import { Marks } from "./marks/marks";
+import { listenForHandles } from "./marks/pointer";
 import { SurfaceLoader } from "./mesh/loader";
 import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX, SurfaceSet } from "./mesh/surface_set";
 import { Pace } from "./quality/pace";
+import type { Look } from "./share/look";
 import { type Action, initialState, reduce, type ViewerState } from "./state";
 import type { Command } from "./ui/commands";
-import { type Look, Navigation } from "./view/navigation";
+import type { Layout, PanelView } from "./ui/controls";
+import { Navigation } from "./view/navigation";
 import { Picture } from "./view/picture";
 import { place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
@@ -20,21 +24,23 @@ import { StageSize } from "./view/stage_size";
 import { volumeBudget } from "./volume/levels";
 import { VolumeSet } from "./volume/volume_set";
 import type { Profile } from "./xr/cardboard/profile";
-import type { SplitSession } from "./xr/cardboard/split_session";
-import { XrSession } from "./xr/session";
+import { Stereo } from "./xr/stereo";
 
 /** A phone's third pixel in each direction costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
 /** A page that slept has not been looked at for as long. */
 const LONGEST_FRAME_S = 0.1;
 
+const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
+
 export class Viewer {
   readonly renderer: WebGLRenderer;
-  readonly xr: XrSession;
+  readonly stereo: Stereo;
   readonly navigation: Navigation;
   state: ViewerState;
   frames = 0;
-  private split: SplitSession | null = null;
+  /** What a panel in the room shows; whoever has the panel says. */
+  layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
   private readonly room: Room;
   private readonly picture: Picture;
   private readonly hybrid: Hybrid;
@@ -42,11 +48,15 @@ export class Viewer {
   private readonly surfaceLoader: SurfaceLoader;
   private readonly surfaces: SurfaceSet;
   private readonly volumes: VolumeSet;
+  private readonly marks: Marks;
   private readonly size: StageSize;
+  private readonly disposed = new AbortController();
   private last_ms = 0;
   private isStale = true;
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
+  /** Volumes come after the first picture of all tiles. */
+  private hasOverview = false;
   private waiting: (() => void)[] = [];
 
   /**
@@ -94,18 +104,49 @@ export class Viewer {
       refresh,
       fail,
     );
-    this.room.specimen.group.add(this.surfaces.group);
+    const marked = {
+      manifest,
+      base: bundle.base,
+      surfaces: () => this.surfaces.meshes,
+      volumes: () => this.volumes.shown(),
+      source: (tile: string, channel: string) => this.volumes.source(tile, channel),
+      dispatch: (action: Action) => this.dispatch(action),
+      onChange: refresh,
+      onError: fail,
+    };
+    this.marks = new Marks(marked, this.state);
+    stage.append(...this.marks.overlayElements);
+    this.room.specimen.group.add(this.surfaces.group, this.marks.group);
 
     this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), refresh);
-    this.xr = new XrSession(
-      this.renderer,
-      () => this.enterStereo(),
-      () => this.leaveStereo(),
-      () => this.choose(rayAhead(this.head, this.room.specimen.group)),
+    this.stereo = new Stereo(this.renderer, {
+      scene: this.room.scene,
+      specimen: this.room.specimen,
+      tiles: manifest.tiles,
+      handles: [this.marks.target],
+      layOut: (view) => this.layOut(view),
+      onAction: (action) => this.dispatch(action),
+      onCommand: (command) => void this.run(command),
+      onChoose: (ray, tile) => this.choose(ray, tile),
+      onStart: () => this.enterStereo(),
+      onEnd: () => this.leaveStereo(),
+    });
+    const rayAt = (point: Vector2) =>
+      rayUnder(point, this.navigation.camera, this.room.specimen.group);
+    const { signal } = this.disposed;
+    listenForHandles(
+      stage,
+      canvas,
+      {
+        pick: (point, pointing) =>
+          this.stereo.kind === null ? this.marks.pick(rayAt(point), pointing) : null,
+        drag: (id, point) => this.marks.drag(id, rayAt(point)),
+        mean: (id) => this.marks.mean(id),
+      },
+      signal,
     );
     listenForClicks(canvas, (point) => {
-      if (this.stereo !== null) return;
-      this.choose(rayUnder(point, this.navigation.camera, this.room.specimen.group));
+      if (this.stereo.kind === null) this.tap(rayAt(point));
     });
     const lost = "The graphics driver has dropped the picture: it is drawn anew.";
     canvas.addEventListener("webglcontextlost", () =>
@@ -127,6 +168,7 @@ export class Viewer {
     if (next === this.state) return;
     this.state = next;
     this.follow();
+    this.marks.follow(next);
     this.onState(next);
   }
 
@@ -142,19 +184,42 @@ export class Viewer {
         if (this.state.isolated !== null) this.dispatch({ type: "isolate", tile: null });
         else this.dispatch({ type: "select", tile: null });
         break;
-      default:
-        if (!this.navigation.run(command)) return false;
+      case "press":
+        if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
+        this.tap(rayAhead(this.head, this.room.specimen.group));
+        break;
+      default: {
+        const isInRoom = this.stereo.kind !== null;
+        const isDone = isInRoom
+          ? this.stereo.run(command, this.state)
+          : this.navigation.run(command);
+        if (!isDone) return false;
+      }
     }
     this.isStale = true;
     return true;
   }
 
-  get look(): Look {
-    return this.navigation.look;
+  /** From where the specimen is seen; null: as it opens. */
+  get look(): Look | null {
+    const { isMoved, pose } = this.room.specimen;
+    const eye = isMoved ? this.navigation.lookNow : this.navigation.look;
+    if (eye === null || !isMoved) return eye && { ...eye, specimen: null };
+    const { position, orientation, scale } = pose;
+    const specimen = { position: position.toArray(), orientation: orientation.toArray(), scale };
+    return { ...eye, specimen };
   }
 
-  lookFrom(look: Look): void {
-    this.navigation.lookFrom(look);
+  lookFrom({ position, target, specimen }: Look): void {
+    this.navigation.lookFrom({ position, target });
+    if (specimen !== null) {
+      const pose = {
+        position: new Vector3(...specimen.position),
+        orientation: new Quaternion(...specimen.orientation),
+        scale: specimen.scale,
+      };
+      this.room.specimen.moveTo(pose, this.navigation.camera.position);
+    }
     this.isStale = true;
   }
 
@@ -169,7 +234,12 @@ export class Viewer {
       gazed: this.hybrid.nearby.gazed,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.pace.frame_ms,
-      isStereo: this.stereo !== null,
+      settings: this.pace.settings,
+      gpuObjects: {
+        ...this.renderer.info.memory,
+        programs: this.renderer.info.programs?.length ?? 0,
+      },
+      isStereo: this.stereo.kind !== null,
     };
   }
 
@@ -184,27 +254,10 @@ export class Viewer {
     this.dispatch({ type: "notify", text: error.message });
   }
 
-  private get stereo(): "headset" | "split" | null {
-    if (this.renderer.xr.isPresenting) return "headset";
-    return this.split?.isRunning ? "split" : null;
-  }
-
-  /**
-   * Split screen for a phone in a viewer without WebXR. Must be called from a tap. Throws
-   * BundleError in words if the browser or the user refuses.
-   */
+  /** Must be called from a tap. Throws BundleError in words if the browser or the user refuses. */
   async startSplit(profile: Profile): Promise<void> {
-    if (this.split === null) {
-      const { SplitSession } = await import("./xr/cardboard/split_session");
-      this.split ??= new SplitSession(
-        this.renderer,
-        () => this.enterStereo(),
-        () => this.leaveStereo(),
-        () => this.choose(rayAhead(this.head, this.room.specimen.group)),
-      );
-    }
-    await this.split.start(profile);
-    for (const text of this.split.problems) this.dispatch({ type: "notify", text });
+    const problems = await this.stereo.startSplit(profile);
+    for (const text of problems) this.dispatch({ type: "notify", text });
   }
 
   private get isLoading(): boolean {
@@ -216,7 +269,8 @@ export class Viewer {
     const { isolated, selected, quality } = this.state;
     const tile = this.bundle.manifest.tiles.find(({ id }) => id === isolated);
     this.room.specimen.show(tile?.bounds_um ?? null);
-    this.volumes.follow(this.state, wantedTiles(this.state, nearby), mayRefine);
+    const wanted = this.hasOverview ? wantedTiles(this.state, nearby) : [];
+    this.volumes.follow(this.state, wanted, mayRefine);
     this.surfaces.follow(this.state, nearby);
     this.room.mark(isolated === null ? selected : null);
     this.pace.setLevel(quality);
@@ -227,15 +281,21 @@ export class Viewer {
     const interval_ms = time_ms - this.last_ms;
     const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
     this.last_ms = time_ms;
-    const { stereo } = this;
     const wasLoading = this.isLoading;
-    const camera = this.pose(stereo);
+    if (!this.hasOverview && this.surfaces.overview.isComplete) {
+      this.hasOverview = true;
+      this.follow();
+    }
+    const seen = this.stereo.pose(this.picture.eyes);
+    const isStereo = seen !== null;
+    const camera = seen ?? this.poseMono();
+    if (isStereo) this.stereo.hands.update(dt_s, this.head, this.state);
     const isChanging = this.advance(dt_s);
-    if (stereo === null && !this.isStale && !wasLoading && !this.wasMoving) return;
+    if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving) return;
     // a picture that came to rest is drawn once more, as well as can be
-    const isMoving = stereo !== null || this.isStale;
-    const settings = this.pace.begin(isMoving, interval_ms, this.xr.rate_hz);
-    const target_px = stereo === null ? ERROR_TARGET_PX : ERROR_TARGET_XR_PX;
+    const isMoving = isStereo || this.isStale;
+    const settings = this.pace.begin(isMoving, interval_ms, this.stereo.headset.rate_hz);
+    const target_px = isStereo ? ERROR_TARGET_XR_PX : ERROR_TARGET_PX;
     this.surfaces.setErrorTarget(target_px * settings.errorFactor);
     this.picture.marchFrame.uSteps.value = settings.steps;
     this.hybrid.radiusShare = settings.discShare;
@@ -248,26 +308,15 @@ export class Viewer {
     }
     this.pace.end();
     this.wasMoving = isMoving;
-    const isAtRest = stereo !== null || !isMoving;
+    const isAtRest = isStereo || !isMoving;
     if (this.waiting.length > 0 && !this.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
   }
 
-  /** Where the eyes are in this frame; returns the camera to draw with. */
-  private pose(stereo: "headset" | "split" | null): Camera {
-    const { eyes } = this.picture;
-    if (stereo === "headset") {
-      eyes.followHeadset(this.renderer, this.xr.camera);
-      return this.xr.camera;
-    }
-    if (stereo === "split" && this.split !== null) {
-      this.split.update();
-      eyes.follow(this.split.eyes.map(({ camera, viewport }) => [camera, viewport]));
-      return this.split.camera;
-    }
+  private poseMono(): Camera {
     this.navigation.update();
-    eyes.followScreen(this.renderer, this.navigation.camera);
+    this.picture.eyes.followScreen(this.renderer, this.navigation.camera);
     return this.navigation.camera;
   }
 
@@ -279,34 +328,47 @@ export class Viewer {
     const isReady = (tile: string) => volumes.isReady(tile);
     if (hybrid.look(state, this.head, specimen.group.matrixWorld, isReady, dt_s)) this.follow();
     const isFading = volumes.advance(dt_s);
+    this.mark(dt_s);
     const isChanging = isMoving || isFading || hybrid.isChanging(state);
     if (isChanging) this.isStale = true;
     if (this.isStale) this.surfaces.dressAll();
     return isChanging;
   }
 
+  private mark(dt_s: number): void {
+    const { head, hybrid, navigation, stage } = this;
+    const { group } = this.room.specimen;
+    const screen = {
+      camera: navigation.camera,
+      width_px: stage.clientWidth,
+      height_px: stage.clientHeight,
+      focus: navigation.controls.target,
+    };
+    this.marks.update({
+      head,
+      specimen: group.matrixWorld,
+      screen: this.stereo.kind === null ? screen : null,
+      gaze: rayAhead(head, group),
+      disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
+      dt_s,
+    });
+  }
+
   private updateSurfaces(camera: Camera): void {
     const { viewport } = this.picture.eyes.all[0] ?? {};
-    // three moves the headset's cameras, not the one that it is given
-    const seen = this.renderer.xr.isPresenting ? this.renderer.xr.getCamera() : camera;
-    if (viewport) this.surfaces.update(seen, viewport.z, viewport.w);
+    if (viewport) this.surfaces.update(this.stereo.seenBy(camera), viewport.z, viewport.w);
   }
 
   private draw(camera: Camera, resolution: number): void {
-    const { split, volumes, state } = this;
-    const isSplit = this.stereo === "split" && split !== null;
-    if (isSplit) this.renderer.setRenderTarget(split.target);
-    this.picture.draw(camera, this.head, volumes, this.surfaces.blended, state.clip, resolution);
-    if (!isSplit) return;
-    this.renderer.setRenderTarget(null);
-    split.present();
+    const { surfaces, marks, stereo, volumes, head } = this;
+    const translucent = [...surfaces.blended, ...marks.overlays, ...stereo.hands.overlays];
+    const { clip } = this.state;
+    stereo.present(() => this.picture.draw(camera, head, volumes, translucent, clip, resolution));
   }
 
   /** Pose of the head, or of the mono camera. */
   private get head(): Matrix4 {
-    if (this.renderer.xr.isPresenting) return this.renderer.xr.getCamera().matrixWorld;
-    if (this.split?.isRunning) return this.split.camera.matrixWorld;
-    return this.navigation.camera.matrixWorld;
+    return this.stereo.head ?? this.navigation.camera.matrixWorld;
   }
 
   private fit(): void {
@@ -332,20 +394,25 @@ export class Viewer {
     this.onState(this.state);
   }
 
-  /** Select what the ray meets first; what is selected already is isolated. */
-  private choose(ray: Ray): void {
-    const { isolated, selected } = this.state;
-    if (isolated !== null) return;
-    const tile = pickTile(ray, this.bundle.manifest.tiles);
-    if (tile === null) return;
-    if (tile === selected) this.dispatch({ type: "isolate", tile });
+  private tap(ray: Ray): void {
+    this.choose(ray, pickTile(ray, this.bundle.manifest.tiles));
+  }
+
+  /** Measure, or select the tile; what is selected already is isolated. */
+  private choose(ray: Ray, tile: string | null): void {
+    const { isolated, selected, tool } = this.state;
+    if (tool === "measure") void this.marks.measure(ray);
+    else if (isolated !== null || tile === null) return;
+    else if (tile === selected) this.dispatch({ type: "isolate", tile });
     else this.dispatch({ type: "select", tile });
   }
 
   dispose(): void {
     this.renderer.setAnimationLoop(null);
     this.size.dispose();
-    this.split?.dispose();
+    this.disposed.abort();
+    this.marks.dispose();
+    this.stereo.dispose();
     this.navigation.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();

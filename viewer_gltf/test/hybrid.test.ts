@@ -137,8 +137,7 @@ describeInChromium("surface or volume", () => {
     const [one, other] = stand.manifest.tiles.map(({ id }) => id);
     const { gazed } = await stand.viewer.snapshot();
     const next = gazed === one ? other : one;
-    const choice = stand.viewer.page.locator("[data-tile-choice]");
-    await choice.selectOption(next);
+    await stand.viewer.page.locator(`[data-tile-choice="${next}"]`).click();
     await stand.viewer.page.waitForTimeout(500);
     await stand.viewer.page.locator('[data-mode="off"]').setChecked(true, { force: true });
     await expect.poll(() => aborted.some((url) => url.includes(`/volumes/${next}/`))).toBe(true);

@@ -10,6 +10,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { describe, expect, it } from "vitest";
 import { framingDistance, place } from "../src/view/placement";
+import { withoutMarks } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
 import { prepareStand, type Stand } from "./driver/stand";
 
@@ -41,7 +42,7 @@ async function hold(stand: Stand, channels: readonly string[]) {
   const stage = stand.viewer.page.locator(".stage canvas");
   const box = await stage.boundingBox();
   if (box === null) throw new Error("no canvas");
-  await stage.screenshot({ path: picture });
+  await withoutMarks(stand.viewer.page, () => stage.screenshot({ path: picture }));
   const { scale, center, size } = place(stand.manifest.specimen.bounds_um);
   const fov_rad = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
   const away = framingDistance(size, fov_rad, box.width / box.height) / scale;

@@ -104,9 +104,9 @@ def _write_channel(
     drawn = [channel.lods for _, channel in tiles if channel.lods]
     tileset = None
     if drawn:
-        tileset = write_file(root, f"{folder}/tileset.json", _json(make_tileset(drawn)))
+        tileset = write_file(root, f"{folder}/tileset.json", _compact(make_tileset(drawn)))
     entries = [channel.volume for _, channel in tiles if channel.volume is not None]
-    volumes = write_file(root, f"{folder}/volumes.json", _json({"volumes": entries}))
+    volumes = write_file(root, f"{folder}/volumes.json", _compact({"volumes": entries}))
     lut = write_file(root, f"luts/{look.id}.ktx2", encode_2d(_bake(look)).data)
     entry = {
         "id": look.id,
@@ -163,6 +163,11 @@ def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
 
 def _json(content: object) -> bytes:
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def _compact(content: object) -> bytes:
+    """Return JSON for what a phone waits for: half the bytes."""
+    return (json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n").encode()
 
 
 def _holds(folder: Path) -> bool:

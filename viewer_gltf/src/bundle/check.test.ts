@@ -55,6 +55,12 @@ describe("the manifest's check", () => {
     expect(() => checkManifest(rest)).toThrow(/^manifest\.json: .*"tiles"/);
   });
 
+  it("refuses a bundle without channels, in one line", () => {
+    expect(() => checkManifest({ ...MANIFEST, channels: [] })).toThrow(
+      /^manifest\.json: channels: the bundle holds none, so nothing can be shown$/,
+    );
+  });
+
   it("refuses paths that leave the bundle", () => {
     const files = { ...FILE, path: "../secret" };
     expect(() => checkManifest({ ...MANIFEST, files })).toThrow("manifest.json: files.path");
@@ -71,6 +77,13 @@ describe("other JSON", () => {
   it("that is a host's error page is told as such", () => {
     expect(() => parseJson("<!doctype html><title>Oops</title>", "manifest.json")).toThrow(
       'manifest.json: expected JSON, found "<!doctype html>',
+    );
+  });
+
+  it("that is cut short is told as such", () => {
+    const text = JSON.stringify(MANIFEST).slice(0, 200);
+    expect(() => parseJson(text, "manifest.json")).toThrow(
+      /^manifest\.json: the JSON is broken or cut short \(/,
     );
   });
 });

@@ -43,7 +43,13 @@ export function checkManifest(value: unknown): Manifest {
     );
   }
   checkSchema(bundleSchema, value, "manifest.json");
-  return value as Manifest;
+  const manifest = value as Manifest;
+  if (manifest.channels.length === 0) {
+    throw new BundleError(
+      "manifest.json: channels: the bundle holds none, so nothing can be shown",
+    );
+  }
+  return manifest;
 }
 
 /** A channel's volumes.json, once its shape is right. Throws BundleError. */

@@ -1,6 +1,7 @@
 /** Fetch files of a bundle. Every fault becomes a BundleError that names the file. */
 import { BundleError, TemporaryError } from "./errors";
 import type { FileRef } from "./generated/bundle";
+import { noteAsked } from "./log";
 import { withRetries } from "./retry";
 
 /** The address of a path that a manifest names; the bundle's query, if any, goes with it. */
@@ -9,16 +10,26 @@ export function fileAddress(base: string, path: string): string {
   return new URL(path + url.search, base).href;
 }
 
+/** Of a range. */
+const PART = 206;
+
 /** Answers of a host that may be better a moment later. */
 const BUSY = 429;
 const FIRST_SERVER_FAULT = 500;
 
 /**
- * The response of `url`, if its status says success. `path` is the file's name in messages. Faults
- * of the network and of the host are tried again before they are thrown.
+ * The response of `url`, if its status says success, with all of its body here already. `path` is
+ * the file's name in messages. Faults of the network and of the host, also in the middle of the
+ * body, are tried again before they are thrown.
  */
 export function request(url: string, path: string, options: RequestInit = {}): Promise<Response> {
-  return withRetries(() => requestOnce(url, path, options), options.signal);
+  noteAsked(url, options.headers);
+  const whole = async () => {
+    const response = await requestOnce(url, path, options);
+    const status = response.status === PART ? PART : 200;
+    return new Response(await readBody(response, path), { status, headers: response.headers });
+  };
+  return withRetries(whole, options.signal);
 }
 
 async function requestOnce(url: string, path: string, options: RequestInit): Promise<Response> {
@@ -40,13 +51,15 @@ async function requestOnce(url: string, path: string, options: RequestInit): Pro
   return response;
 }
 
-/** The response's bytes. Throws BundleError if the connection breaks before the last one. */
+/** The response's bytes. Throws TemporaryError if the connection breaks before the last one. */
 export async function readBody(response: Response, path: string): Promise<Uint8Array<ArrayBuffer>> {
   try {
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new BundleError(`${path}: the connection broke before the file's end`, { cause: error });
+    throw new TemporaryError(`${path}: the connection broke before the file's end`, {
+      cause: error,
+    });
   }
 }
 
@@ -78,12 +91,17 @@ export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): 
   }
 }
 
-/** The parsed text. Throws BundleError if it is no JSON, as a host's own error page is. */
+/** The parsed text. Throws BundleError if it is no JSON, as a host's own error page, or cut short. */
 export function parseJson(text: string, path: string): unknown {
   try {
     return JSON.parse(text);
   } catch (error) {
     if (!(error instanceof SyntaxError)) throw error;
+    if (/^\s*[{[]/.test(text)) {
+      throw new BundleError(`${path}: the JSON is broken or cut short (${error.message})`, {
+        cause: error,
+      });
+    }
     const start = text.trim().slice(0, 40).replace(/\s+/g, " ");
     throw new BundleError(`${path}: expected JSON, found "${start}"`, { cause: error });
   }

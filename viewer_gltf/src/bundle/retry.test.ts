@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { BundleError, TemporaryError } from "./errors";
-import { withRetries } from "./retry";
+import { watchWaiting, withRetries } from "./retry";
 
 describe("a job that may be tried again", () => {
   const failing = (times: number, error: Error) => {
@@ -25,6 +25,25 @@ describe("a job that may be tried again", () => {
   it("fails at once where another try can't help", async () => {
     const job = failing(1, new BundleError("not found"));
     await expect(withRetries(job, null, [0, 0])).rejects.toThrow("not found");
+  });
+
+  it("is told once as waiting, and once as done, however many wait", async () => {
+    const told: boolean[] = [];
+    watchWaiting((isWaiting) => told.push(isWaiting));
+    const jobs = [1, 2, 3].map((n) => failing(n, new TemporaryError("busy")));
+    await Promise.all(jobs.map((job) => withRetries(job, null, [5, 5, 5])));
+    expect(told).toEqual([true, false]);
+    await expect(withRetries(failing(9, new TemporaryError("busy")), null, [0])).rejects.toThrow();
+    expect(told).toEqual([true, false, true, false]);
+    await withRetries(async () => 1, null, [0]);
+    expect(told).toHaveLength(4);
+  });
+
+  it("stops at once when it is no longer wanted while it rests", async () => {
+    const stop = new AbortController();
+    const waiting = withRetries(failing(1, new TemporaryError("busy")), stop.signal, [60_000]);
+    setTimeout(() => stop.abort(), 5);
+    await expect(waiting).rejects.toThrow(/abort/i);
   });
 
   it("stops when it is no longer wanted", async () => {

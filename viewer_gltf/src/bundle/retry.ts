@@ -1,8 +1,42 @@
-/** Try again what may succeed a moment later. */
+/** Try again what may succeed a moment later, and say meanwhile that the network is awaited. */
 import { TemporaryError } from "./errors";
 
-/** Before the second and third try. */
-export const PAUSES_MS: readonly number[] = [300, 1200];
+/** Before the second, third and fourth try. */
+export const PAUSES_MS: readonly number[] = [300, 1200, 4000];
+/** A device that knows that it has no network is given this long to find one, at each pause. */
+const OFFLINE_MS = 30_000;
+
+/** Told when jobs begin to wait for another try, and when none waits any more. */
+export type WaitListener = (isWaiting: boolean) => void;
+
+let listener: WaitListener = () => undefined;
+let waiting = 0;
+
+export function watchWaiting(told: WaitListener): void {
+  listener = told;
+}
+
+function count(change: 1 | -1): void {
+  const before = waiting;
+  waiting += change;
+  if (before === 0 || waiting === 0) listener(waiting > 0);
+}
+
+/** The pause, or less where the network comes back or the job is no longer wanted. */
+function rest(pause_ms: number, signal: AbortSignal | null | undefined): Promise<void> {
+  const isOffline = globalThis.navigator?.onLine === false;
+  return new Promise((resolve) => {
+    const over = () => {
+      clearTimeout(timer);
+      globalThis.removeEventListener?.("online", over);
+      signal?.removeEventListener("abort", over);
+      resolve();
+    };
+    const timer = setTimeout(over, isOffline ? OFFLINE_MS : pause_ms);
+    globalThis.addEventListener?.("online", over);
+    signal?.addEventListener("abort", over);
+  });
+}
 
 /** The job's result. A TemporaryError is thrown only once the pauses are used up. */
 export async function withRetries<T>(
@@ -10,14 +44,22 @@ export async function withRetries<T>(
   signal?: AbortSignal | null,
   pauses_ms = PAUSES_MS,
 ): Promise<T> {
-  for (const pause_ms of pauses_ms) {
-    try {
-      return await job();
-    } catch (error) {
-      if (!(error instanceof TemporaryError)) throw error;
+  let isWaiting = false;
+  try {
+    for (const pause_ms of pauses_ms) {
+      try {
+        return await job();
+      } catch (error) {
+        if (!(error instanceof TemporaryError)) throw error;
+      }
+      if (!isWaiting) count(1);
+      isWaiting = true;
+      signal?.throwIfAborted();
+      await rest(pause_ms, signal);
+      signal?.throwIfAborted();
     }
-    await new Promise((resolve) => setTimeout(resolve, pause_ms));
-    signal?.throwIfAborted();
+    return await job();
+  } finally {
+    if (isWaiting) count(-1);
   }
-  return job();
 }

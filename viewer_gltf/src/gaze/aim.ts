@@ -1,6 +1,7 @@
 /** Rays into the specimen: from a click on the picture, or from the head. */
 import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from "three";
 import type { Ray } from "./pick";
+import type { RoomRay } from "./pointer";
 
 /** A pointer that moves less than this between down and up is a click, not an orbit. */
 const CLICK_PX = 5;
@@ -24,6 +25,13 @@ export function rayUnder(point: Vector2, camera: PerspectiveCamera, specimen: Ob
 export function rayAhead(head: Matrix4, specimen: Object3D): Ray {
   const eye = new Vector3().setFromMatrixPosition(head);
   return rayInto(specimen, eye, new Vector3(0, 0, -1).applyMatrix4(head));
+}
+
+/** A ray of the room in the specimen's own space; its direction stays one metre long. */
+export function rayAlong({ origin, direction }: RoomRay, toSpecimen: Matrix4): Ray {
+  const from = origin.clone().applyMatrix4(toSpecimen);
+  const to = origin.clone().add(direction).applyMatrix4(toSpecimen);
+  return { origin: from.toArray(), direction: to.sub(from).toArray() };
 }
 
 /** Calls `onClick` with the place in -1..1, y up, of every click or tap that does not drag. */

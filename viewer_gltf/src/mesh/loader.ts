@@ -1,21 +1,65 @@
-/** The glTF loader of all tilesets: meshopt and Basis Universal decoders come with the page. */
+/** The glTF loader of all tilesets. A decoder is fetched when the first surface needs it. */
 import type { WebGLRenderer } from "three";
-import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
-import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { KTX2Loader } from "three/examples/jsm/loaders/KTX2Loader.js";
+import { type GLTF, GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
+import type { KTX2Loader } from "three/examples/jsm/loaders/KTX2Loader.js";
+import { needsOf } from "./needs";
+
+class LazyGltfLoader extends GLTFLoader {
+  constructor(private readonly textures: () => Promise<KTX2Loader>) {
+    super();
+  }
+
+  override parse(
+    data: ArrayBuffer | string,
+    path: string,
+    onLoad: (gltf: GLTF) => void,
+    onError?: (event: ErrorEvent) => void,
+  ): void {
+    // three types what it hands on as an event; it is the Error itself
+    const fail = (error: unknown) => onError?.(error as ErrorEvent);
+    this.prepare(data).then(() => super.parse(data, path, onLoad, onError), fail);
+  }
+
+  private async prepare(data: ArrayBuffer | string): Promise<void> {
+    const { meshopt, basis } = needsOf(data);
+    const [decoder, textures] = await Promise.all([
+      meshopt ? import("three/examples/jsm/libs/meshopt_decoder.module.js") : null,
+      basis ? this.textures() : null,
+    ]);
+    if (decoder !== null) this.setMeshoptDecoder(decoder.MeshoptDecoder);
+    if (textures !== null) this.setKTX2Loader(textures);
+  }
+}
 
 export class SurfaceLoader {
-  private readonly ktx2: KTX2Loader;
-  readonly gltf = new GLTFLoader();
+  readonly gltf = new LazyGltfLoader(() => this.textures());
+  private ktx2: Promise<KTX2Loader> | null = null;
+  private isDisposed = false;
 
-  constructor(renderer: WebGLRenderer) {
-    // Without a transcoder path three's loader takes the files that the bundler has put beside it.
-    this.ktx2 = new KTX2Loader().detectSupport(renderer);
-    this.gltf.setKTX2Loader(this.ktx2);
-    this.gltf.setMeshoptDecoder(MeshoptDecoder);
+  constructor(private readonly renderer: WebGLRenderer) {}
+
+  private textures(): Promise<KTX2Loader> {
+    if (this.ktx2 === null) {
+      this.ktx2 = this.loadTextures();
+      this.ktx2.catch(() => {
+        this.ktx2 = null; // the next surface tries again
+      });
+    }
+    return this.ktx2;
+  }
+
+  private async loadTextures(): Promise<KTX2Loader> {
+    const { makeTextureLoader } = await import("./basis");
+    const loader = await makeTextureLoader(this.renderer);
+    if (this.isDisposed) loader.dispose();
+    return loader;
   }
 
   dispose(): void {
-    this.ktx2.dispose();
+    this.isDisposed = true;
+    this.ktx2?.then(
+      (loader) => loader.dispose(),
+      () => undefined, // told where it was wanted
+    );
   }
 }

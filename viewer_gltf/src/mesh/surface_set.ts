@@ -1,8 +1,9 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
-import { type Camera, Group, type Object3D } from "three";
+import { type Camera, Group, Mesh, type Object3D, ShaderMaterial } from "three";
 import type { Bundle } from "../bundle/load";
 import { surfaceColor } from "../color";
 import { isInDisc, type Nearby, NOTHING_NEAR, takenFrom, wantsSurface } from "../hybrid/who";
+import type { ShownSurface } from "../marks/probe";
 import type { ViewerState } from "../state";
 import type { SurfaceFrame } from "./blend";
 import type { SurfaceLoader } from "./loader";
@@ -52,6 +53,20 @@ export class SurfaceSet {
     return this.shown().flatMap(([, { surfaces }]) =>
       [...surfaces.values()].flatMap(({ scene, blend }) => (blend.isBlended ? [scene] : [])),
     );
+  }
+
+  /** The meshes on screen, but for those that write depth alone. */
+  get meshes(): readonly ShownSurface[] {
+    const found: ShownSurface[] = [];
+    for (const [channel, { drawn }] of this.shown()) {
+      for (const { scene, tile } of drawn) {
+        scene.traverse((object) => {
+          if (!(object instanceof Mesh) || object.material instanceof ShaderMaterial) return;
+          found.push({ mesh: object, tile, channel });
+        });
+      }
+    }
+    return found;
   }
 
   /** Volumes came, went, or fade. */

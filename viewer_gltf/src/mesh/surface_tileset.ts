@@ -141,13 +141,16 @@ export class SurfaceTileset {
     );
   }
 
+  /** Those on screen. */
+  get drawn(): readonly Surface[] {
+    return [...this.surfaces.values()].filter(
+      ({ scene }) => scene.visible && this.tiles.group.children.includes(scene),
+    );
+  }
+
   /** Triangles on screen. */
   get triangles(): number {
-    let sum = 0;
-    for (const { scene, triangles } of this.surfaces.values()) {
-      if (scene.visible && this.tiles.group.children.includes(scene)) sum += triangles;
-    }
-    return sum;
+    return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
   }
 
   /** Go on to finer LODs, by screen-space error: `errorTarget_px` pixels. */

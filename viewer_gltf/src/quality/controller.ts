@@ -44,7 +44,8 @@ export const LADDER: readonly QualitySettings[] = [
 ];
 const LAST = LADDER.length - 1;
 
-export type QualityLevel = "auto" | "low" | "high";
+export const QUALITY_LEVELS = ["auto", "low", "high"] as const;
+export type QualityLevel = (typeof QUALITY_LEVELS)[number];
 /** Whether frame_ms is what a frame cost (GPU timer) or the time since the frame before. */
 export type Timing = "work" | "interval";
 

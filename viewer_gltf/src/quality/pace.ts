@@ -16,6 +16,8 @@ const RATE_HZ = 60;
 export class Pace {
   /** Between the last two frames, smoothed. */
   frame_ms = 0;
+  /** What the last frame was drawn with. */
+  settings: QualitySettings;
   private readonly timer: GpuTimer | null;
   private quality: Quality;
   private wasMoving = false;
@@ -23,6 +25,7 @@ export class Pace {
   constructor(gl: TimedContext) {
     this.timer = GpuTimer.create(gl);
     this.quality = initialQuality(this.timer === null ? "interval" : "work");
+    this.settings = qualitySettings(this.quality);
   }
 
   setLevel(level: QualityLevel): void {
@@ -47,7 +50,8 @@ export class Pace {
     this.wasMoving = isMoving;
     this.timer?.begin();
     const still: QualityLevel = this.quality.level === "low" ? "low" : "high";
-    return qualitySettings(isMoving ? this.quality : { ...this.quality, level: still });
+    this.settings = qualitySettings(isMoving ? this.quality : { ...this.quality, level: still });
+    return this.settings;
   }
 
   end(): void {

@@ -5,33 +5,38 @@ precision highp float;
 
 uniform sampler2D uMarched;  // premultiplied, encoded
 uniform sampler2D uSceneDepth;
-uniform float uScale;  // pixels of uMarched to one of the picture
+uniform int uEyeCount;
+uniform vec4 uEyes[2];  // each eye's part of the picture: x, y, width, height, pixels ...
+uniform vec4 uParts[2];  // ... and of uMarched
 
 out vec4 oColor;
 
 const float ALIKE = 0.02;  // of the depth's distance to the far plane
 
 void main() {
-  if (uScale >= 1.0) {
-    oColor = texelFetch(uMarched, ivec2(gl_FragCoord.xy), 0);
+  int i = uEyeCount > 1 && gl_FragCoord.x >= uEyes[1].x ? 1 : 0;
+  vec4 eye = uEyes[i];
+  vec4 part = uParts[i];
+  vec2 scale = part.zw / eye.zw;
+  if (scale == vec2(1.0)) {
+    oColor = texelFetch(uMarched, ivec2(gl_FragCoord.xy - eye.xy + part.xy), 0);
     return;
   }
-  ivec2 lastDepth = textureSize(uSceneDepth, 0) - 1;
-  ivec2 last = textureSize(uMarched, 0) - 1;
   float here = 1.0 - texelFetch(uSceneDepth, ivec2(gl_FragCoord.xy), 0).r;
-  vec2 at = gl_FragCoord.xy * uScale - 0.5;
+  vec2 at = (gl_FragCoord.xy - eye.xy) * scale - 0.5;
   vec2 corner = floor(at);
-  vec2 part = at - corner;
+  vec2 share = at - corner;
   vec4 sum = vec4(0.0);
   float total = 0.0;
-  for (int i = 0; i < 4; i++) {
-    vec2 tap = corner + vec2(i & 1, i >> 1);
-    ivec2 source = ivec2((tap + 0.5) / uScale);
-    float there = 1.0 - texelFetch(uSceneDepth, clamp(source, ivec2(0), lastDepth), 0).r;
-    vec2 near = mix(1.0 - part, part, vec2(i & 1, i >> 1));
+  for (int k = 0; k < 4; k++) {
+    vec2 side = vec2(k & 1, k >> 1);
+    vec2 tap = clamp(corner + side, vec2(0.0), part.zw - 1.0);  // never the other eye's
+    vec2 source = (tap + 0.5) / scale + eye.xy;
+    float there = 1.0 - texelFetch(uSceneDepth, ivec2(source), 0).r;
+    vec2 near = mix(1.0 - share, share, side);
     float alike = abs(there - here) <= ALIKE * max(there, here) ? 1.0 : 1e-3;
     float weight = (near.x * near.y + 1e-4) * alike;
-    sum += weight * texelFetch(uMarched, clamp(ivec2(tap), ivec2(0), last), 0);
+    sum += weight * texelFetch(uMarched, ivec2(tap + part.xy), 0);
     total += weight;
   }
   oColor = sum / total;

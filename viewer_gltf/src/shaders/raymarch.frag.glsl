@@ -35,8 +35,8 @@ uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
 uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
 uniform sampler2D uSceneDepth;
 uniform sampler2D uNoise;  // blue noise
-uniform float uScale;  // pixels here to one of the picture
-uniform vec2 uOrigin;  // of the eye's picture, in these pixels
+uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
+uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
 
 // At a sample that is covered: else rays at a tile's rim would miss the tile and leave a seam.
 centroid in vec3 vPosition;
@@ -92,7 +92,7 @@ void main() {
   vec3 invBrickDir = 1.0 / brickDir;
   vec4 sum = vec4(0.0);
   vec4 veil = vec4(0.0);  // the sum in front of the edge
-  float shift = jitter(gl_FragCoord.xy - uOrigin);
+  float shift = jitter(gl_FragCoord.xy - uPart.xy);
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
   int i = 0;

@@ -3,8 +3,9 @@ import { settingsOf } from "./settings";
 
 describe("the page's address", () => {
   it("sets mode, switch distance and disc", () => {
-    expect(settingsOf("?bundle=x&mode=tile&switch=2.5&disc=20")).toEqual([
+    expect(settingsOf("?bundle=x&mode=tile&quality=high&switch=2.5&disc=20")).toEqual([
       { type: "choose-mode", mode: "tile" },
+      { type: "choose-quality", level: "high" },
       { type: "set-switch-distance", distance_m: 2.5 },
       { type: "set-disc-radius", radius_deg: 20 },
     ]);

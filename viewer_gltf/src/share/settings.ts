@@ -1,10 +1,12 @@
 /**
- * What the page's address asks for: `mode` (disc, tile, all, stage, off), `switch` (metres of the
- * room), `disc` (degrees). Pure.
+ * What the page's address asks for: `mode` (disc, tile, all, stage, off), `quality` (auto, low,
+ * high), `switch` (metres of the room), `disc` (degrees). Pure.
  */
-import { type Action, MODES, type Mode } from "../state";
+import { QUALITY_LEVELS } from "../quality/controller";
+import { type Action, MODES } from "../state";
 
-const isMode = (text: string): text is Mode => (MODES as readonly string[]).includes(text);
+/** Their names: a link to a view leaves them out, it has them itself. */
+export const SETTINGS = ["mode", "quality", "switch", "disc"] as const;
 
 /** The actions that bring a state there; what can't be read is told by one more. */
 export function settingsOf(search: string): readonly Action[] {
@@ -12,11 +14,17 @@ export function settingsOf(search: string): readonly Action[] {
   const actions: Action[] = [];
   const refuse = (name: string, text: string, expected: string) =>
     actions.push({ type: "notify", text: `address: ${name}: expected ${expected}, found ${text}` });
-  const mode = asked.get("mode");
-  if (mode !== null) {
-    if (isMode(mode)) actions.push({ type: "choose-mode", mode });
-    else refuse("mode", mode, `one of ${MODES.join(", ")}`);
-  }
+  const choice = <T extends string>(
+    name: string,
+    values: readonly T[],
+    action: (value: T) => Action,
+  ) => {
+    const text = asked.get(name);
+    if (text === null) return;
+    const value = values.find((each) => each === text);
+    if (value !== undefined) actions.push(action(value));
+    else refuse(name, text, `one of ${values.join(", ")}`);
+  };
   const number = (name: string, action: (value: number) => Action) => {
     const text = asked.get(name);
     if (text === null) return;
@@ -24,6 +32,8 @@ export function settingsOf(search: string): readonly Action[] {
     if (text.trim() !== "" && Number.isFinite(value)) actions.push(action(value));
     else refuse(name, text, "a number");
   };
+  choice("mode", MODES, (mode) => ({ type: "choose-mode", mode }));
+  choice("quality", QUALITY_LEVELS, (level) => ({ type: "choose-quality", level }));
   number("switch", (distance_m) => ({ type: "set-switch-distance", distance_m }));
   number("disc", (radius_deg) => ({ type: "set-disc-radius", radius_deg }));
   return actions;

@@ -1,6 +1,9 @@
 /** What lies over the picture: the progress bar, notices, and the page of a fatal error. */
 import type { Progress } from "../mesh/progress";
-import { element } from "./dom";
+import { element, setText } from "./dom";
+
+/** What is said stays for as long; a screen reader reads it at once. */
+const SAID_MS = 4000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
 export class ProgressBar {
@@ -8,7 +11,7 @@ export class ProgressBar {
   private readonly label = element("span");
   readonly root = element(
     "div",
-    { className: "progress", role: "progressbar" },
+    { className: "progress", role: "progressbar", ariaLabel: "The overview" },
     { progress: "" },
     element("div", { className: "track" }, {}, this.fill),
     this.label,
@@ -17,7 +20,7 @@ export class ProgressBar {
   update({ done, total, isComplete }: Progress): void {
     this.root.hidden = isComplete;
     this.fill.style.width = `${(100 * done) / Math.max(1, total)}%`;
-    this.label.textContent = `Loading the overview: ${done} of ${total} surfaces`;
+    setText(this.label, `Loading the overview: ${done} of ${total} surfaces`);
     this.root.ariaValueNow = String(done);
     this.root.ariaValueMax = String(total);
   }
@@ -27,9 +30,13 @@ export class ProgressBar {
 export class Notices {
   readonly root = element("div", { className: "notices", role: "status" }, { notices: "" });
 
+  private told: readonly string[] = [];
+
   constructor(private readonly onDismiss: (text: string) => void) {}
 
   update(notices: readonly string[]): void {
+    if (notices === this.told) return; // what is written anew is read out anew
+    this.told = notices;
     // A broken host fails for every file: the newest few say what is wrong.
     const shown = notices.slice(-3);
     const hidden = notices.length - shown.length;
@@ -43,12 +50,24 @@ export class Notices {
           element("span", { textContent: text }),
           element("button", {
             textContent: "×",
-            ariaLabel: "Dismiss",
+            ariaLabel: `Dismiss: ${text}`,
             onclick: () => this.onDismiss(text),
           }),
         ),
       ),
     );
+  }
+}
+
+/** What a key or a button has just done, where nothing else shows it; it goes by itself. */
+export class Said {
+  readonly root = element("p", { className: "said", role: "status" }, { said: "" });
+  private timer = 0;
+
+  say(text: string): void {
+    setText(this.root, text);
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => setText(this.root, ""), SAID_MS);
   }
 }
 

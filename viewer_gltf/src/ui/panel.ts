@@ -1,248 +1,168 @@
-/** The panel: shows the state and turns what the user does into actions. Keeps no state of its own. */
-import { fromHex, toHex } from "../color";
-import { type Action, type ChannelState, MODES, type Mode, type ViewerState } from "../state";
-import type { XrSupport } from "../xr/support";
-import { element } from "./dom";
+/** The panel in HTML: draws a layout, hands back wishes. Keeps no state of its own. */
+import type { Control, Group, Layout, Section } from "./controls";
+import { arrange, element, setText } from "./dom";
+import type { Send, Widget } from "./widget";
+import { makeWidget } from "./widgets";
 
-type Row = Readonly<{
-  root: HTMLElement;
-  shown: HTMLInputElement;
-  color: HTMLInputElement;
-  volume: HTMLInputElement;
-  transferFunction: HTMLSelectElement;
-}>;
+type Item = Control | Group;
 
-const MODE_NAMES: Readonly<Record<Mode, string>> = {
-  disc: "Disc",
-  tile: "Tile",
-  all: "All",
-  stage: "Staged",
-  off: "Off",
-};
+/** An item of another shape needs another element. */
+function shapeOf(item: Item): string {
+  return item.kind === "group" ? `${item.id}, group of ${item.controls.length}` : item.id;
+}
 
-function tagsOf({ hasSurface, prefersVolume }: ChannelState): string[] {
-  if (!hasSurface) return ["no surface"];
-  return prefersVolume ? ["no clear surface"] : [];
+class Items {
+  private readonly made = new Map<string, Widget<Item>>();
+
+  constructor(
+    readonly root: HTMLElement,
+    private readonly send: Send,
+  ) {}
+
+  update(items: readonly Item[]): void {
+    const roots = items.map((item) => {
+      const shape = shapeOf(item);
+      let widget = this.made.get(shape);
+      if (widget === undefined) {
+        widget = (
+          item.kind === "group" ? makeGroup(item, this.send) : makeWidget(item, this.send)
+        ) as Widget<Item>;
+        widget.root.classList.add(`item-${item.id.slice(item.id.indexOf("/") + 1)}`);
+        this.made.set(shape, widget);
+      }
+      widget.update(item);
+      return widget.root;
+    });
+    arrange(this.root, roots);
+    const listed = new Set(items.map(shapeOf));
+    for (const shape of this.made.keys()) if (!listed.has(shape)) this.made.delete(shape);
+  }
+}
+
+/** A channel: those that are shown can be opened. */
+function makeGroup(first: Group, send: Send): Widget<Group> {
+  let now = first;
+  const canOpen = first.more.length > 0;
+  const name = canOpen
+    ? element(
+        "button",
+        { type: "button", className: "name opener", onclick: () => send(now.opener) },
+        { opener: first.id },
+      )
+    : element("span", { className: "name" });
+  const tags = element("span", { className: "tags" });
+  const always = new Items(element("div", { className: "always" }), send);
+  const more = new Items(element("div", { className: "more" }), send);
+  const root = element(
+    "div",
+    { className: canOpen ? "channel" : "channel off", role: "group", ariaLabel: first.label },
+    { channel: first.id },
+    name,
+    always.root,
+    tags,
+    more.root,
+  );
+  return {
+    root,
+    update(group) {
+      now = group;
+      setText(name, group.label);
+      name.title = group.label;
+      if (canOpen) name.ariaExpanded = String(group.isOpen);
+      setText(tags, group.tags.join(", "));
+      always.update(group.controls);
+      more.root.hidden = !group.isOpen;
+      more.update(group.isOpen ? group.more : []);
+    },
+  };
+}
+
+function makeSection(first: Section, send: Send): Widget<Section> {
+  let now = first;
+  const opener = element(
+    "button",
+    {
+      type: "button",
+      className: "opener",
+      textContent: first.label,
+      onclick: () => send(now.opener),
+    },
+    { opener: first.id },
+  );
+  const items = new Items(element("div", { className: "items", id: `items-${first.id}` }), send);
+  opener.setAttribute("aria-controls", items.root.id);
+  return {
+    root: element(
+      "section",
+      { ariaLabel: first.label },
+      { section: first.id },
+      element("h2", {}, {}, opener),
+      items.root,
+    ),
+    update(section) {
+      now = section;
+      opener.ariaExpanded = String(section.isOpen);
+      items.root.hidden = !section.isOpen;
+      items.update(section.isOpen ? section.items : []);
+    },
+  };
 }
 
 export class Panel {
   readonly root: HTMLElement;
-  private readonly rows = new Map<string, Row>();
-  private readonly tile: HTMLSelectElement;
-  private readonly modes = new Map<Mode, HTMLInputElement>();
-  private readonly volumeSection: HTMLElement;
-  private readonly stereo: HTMLButtonElement;
-  private readonly reason: HTMLElement;
-  private readonly status: HTMLElement;
+  private readonly title = element("h1");
+  private readonly subtitle = element("p", { className: "hint" });
+  private readonly body = element("div", { className: "body", id: "panel-body" });
+  private readonly status = element("p", { className: "status" }, { status: "" });
+  private readonly fold: HTMLButtonElement;
+  private readonly sections = new Map<string, Widget<Section>>();
 
-  constructor(
-    title: string,
-    subtitle: string,
-    state: ViewerState,
-    private readonly dispatch: (action: Action) => void,
-    onStereo: () => void,
-    onReset: () => void,
-  ) {
-    const list = element("div", { className: "channels" });
-    for (const channel of state.channels) {
-      const row = this.makeRow(channel);
-      this.rows.set(channel.id, row);
-      list.append(row.root);
-    }
-
-    const isStaged = state.tiles.some((tile) => tile.representation !== "mesh");
-    const modes = MODES.filter((mode) => mode !== "stage" || isStaged);
-    for (const mode of modes) {
-      const input = element(
-        "input",
-        {
-          type: "radio",
-          name: "mode",
-          value: mode,
-          onchange: () => dispatch({ type: "choose-mode", mode }),
-        },
-        { mode },
-      );
-      this.modes.set(mode, input);
-    }
-    this.tile = element(
-      "select",
-      {
-        ariaLabel: "Tile drawn as a volume",
-        onchange: () => dispatch({ type: "select", tile: this.tile.value || null }),
-      },
-      { tileChoice: "" },
-      element("option", { value: "", textContent: "by gaze" }),
-      ...state.tiles.map(({ id }) => element("option", { value: id, textContent: id })),
-    );
-    this.volumeSection = element(
-      "section",
-      { className: "volumes" },
-      {},
-      element("h2", { textContent: "Volumes" }),
-      element(
-        "div",
-        { className: "segmented" },
-        {},
-        ...[...this.modes].map(([mode, input]) =>
-          element("label", {}, {}, input, element("span", { textContent: MODE_NAMES[mode] })),
-        ),
-      ),
-      element(
-        "label",
-        { className: "field" },
-        {},
-        element("span", { textContent: "Tile" }),
-        this.tile,
-      ),
-      element("p", {
-        className: "hint",
-        textContent: "Come near: volumes show round the middle of the view.",
-      }),
-    );
-
-    this.stereo = element(
-      "button",
-      { className: "primary", disabled: true, textContent: "Enter stereo (VR)", onclick: onStereo },
-      { action: "stereo" },
-    );
-    this.reason = element("p", { className: "hint" }, { stereoReason: "" });
-    this.status = element("p", { className: "status" }, { status: "" });
-    const body = element(
-      "div",
-      { className: "body" },
-      {},
-      element("section", {}, {}, element("h2", { textContent: "Channels" }), list),
-      this.volumeSection,
-      element(
-        "section",
-        { className: "actions" },
-        {},
-        this.stereo,
-        this.reason,
-        element("button", { textContent: "Reset view", onclick: onReset }, { action: "reset" }),
-      ),
-      this.status,
-    );
-    const fold = element("button", { className: "fold", ariaLabel: "Fold the panel" });
-    fold.onclick = () => {
-      const isFolded = this.root.classList.toggle("folded");
-      fold.ariaExpanded = String(!isFolded);
-    };
+  constructor(private readonly send: Send) {
+    this.fold = element("button", {
+      type: "button",
+      className: "fold",
+      ariaLabel: "Panel",
+      title: "Hide or show the panel (h)",
+      onclick: () => send({ panel: "hide" }),
+    });
+    this.fold.setAttribute("aria-controls", this.body.id);
     this.root = element(
       "aside",
-      { className: "panel" },
+      { className: "panel", ariaLabel: "Controls" },
       {},
-      element(
-        "header",
-        {},
-        {},
-        element(
-          "div",
-          {},
-          {},
-          element("h1", { textContent: title, title }),
-          element("p", { className: "hint", textContent: subtitle }),
-        ),
-        fold,
-      ),
-      body,
+      element("header", {}, {}, element("div", {}, {}, this.title, this.subtitle), this.fold),
+      this.body,
+      this.status,
     );
-    this.update(state);
   }
 
-  private makeRow(channel: ChannelState): Row {
-    const { dispatch } = this;
-    const { id, name } = channel;
-    const shown = element("input", {
-      type: "checkbox",
-      className: "switch",
-      ariaLabel: `Show ${name}`,
-      onchange: () => dispatch({ type: "show", channel: id, shown: shown.checked }),
+  update(layout: Layout): void {
+    const { activeElement } = document;
+    const focused =
+      activeElement instanceof HTMLElement ? activeElement.dataset.control : undefined;
+    setText(this.title, layout.title);
+    this.title.title = layout.title;
+    setText(this.subtitle, layout.subtitle);
+    setText(this.status, layout.status);
+    this.root.classList.toggle("folded", layout.isHidden);
+    this.fold.ariaExpanded = String(!layout.isHidden);
+    const roots = layout.sections.map((section) => {
+      let widget = this.sections.get(section.id);
+      if (widget === undefined) {
+        widget = makeSection(section, this.send);
+        this.sections.set(section.id, widget);
+      }
+      widget.update(section);
+      return widget.root;
     });
-    const color = element("input", {
-      type: "color",
-      ariaLabel: `Colour of ${name}`,
-      oninput: () => dispatch({ type: "recolor", channel: id, color: fromHex(color.value) }),
-    });
-    const volume = element("input", {
-      type: "checkbox",
-      ariaLabel: `Draw ${name} as a volume`,
-      onchange: () => dispatch({ type: "draw-volume", channel: id, volume: volume.checked }),
-    });
-    const transferFunction = element(
-      "select",
-      {
-        ariaLabel: `Transfer function of ${name}`,
-        onchange: () =>
-          dispatch({
-            type: "choose-transfer-function",
-            channel: id,
-            name: transferFunction.value,
-          }),
-      },
-      {},
-      ...channel.transferFunctions.map((each) =>
-        element("option", { value: each, textContent: each }),
-      ),
-    );
-    for (const [input, part] of [
-      [shown, "shown"],
-      [color, "color"],
-      [volume, "volume"],
-      [transferFunction, "transfer-function"],
-    ] as const) {
-      input.dataset.part = part;
-    }
-    const root = element(
-      "div",
-      { className: "channel" },
-      { channel: id },
-      color,
-      element("span", { className: "name", textContent: name, title: name }),
-      shown,
-      element(
-        "div",
-        { className: "look" },
-        {},
-        element(
-          "label",
-          { className: "chip" },
-          {},
-          volume,
-          element("span", { textContent: "Volume" }),
-        ),
-        transferFunction,
-        ...tagsOf(channel).map((text) => element("span", { className: "tag", textContent: text })),
-      ),
-    );
-    return { root, shown, color, volume, transferFunction };
+    arrange(this.body, roots);
+    // A channel that comes or goes moves in the list: the focus goes with it.
+    if (focused !== undefined && document.activeElement !== activeElement) this.focus(focused);
   }
 
-  update(state: ViewerState): void {
-    for (const channel of state.channels) {
-      const row = this.rows.get(channel.id);
-      if (row === undefined) continue;
-      row.root.classList.toggle("off", !channel.shown);
-      row.root.classList.toggle("as-volume", channel.volume);
-      row.shown.checked = channel.shown;
-      row.volume.checked = channel.volume;
-      row.color.value = toHex(channel.color);
-      row.transferFunction.value = channel.transferFunction;
-    }
-    this.volumeSection.hidden = !state.channels.some((c) => c.shown && c.volume);
-    const mode = this.modes.get(state.mode);
-    if (mode !== undefined) mode.checked = true;
-    this.tile.value = state.selected ?? "";
-  }
-
-  setStereo({ isAvailable, reason }: XrSupport): void {
-    this.stereo.disabled = !isAvailable;
-    this.reason.textContent = reason;
-    this.reason.hidden = reason === "";
-  }
-
-  setStatus(text: string): void {
-    if (this.status.textContent !== text) this.status.textContent = text;
+  /** Bring the keyboard to a control, by its id. */
+  focus(id: string): void {
+    const selector = `[data-control="${CSS.escape(id)}"]:not([tabindex="-1"])`;
+    this.root.querySelector<HTMLElement>(selector)?.focus();
   }
 }

@@ -13,6 +13,7 @@ import {
   OneMinusSrcAlphaFactor,
   type Scene,
   ShaderMaterial,
+  Vector4,
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
@@ -50,7 +51,9 @@ export class MarchPass {
       uniforms: {
         uMarched: { value: this.target.texture },
         uSceneDepth: frame.uSceneDepth,
-        uScale: frame.uScale,
+        uEyes: { value: [new Vector4(), new Vector4()] },
+        uParts: { value: [new Vector4(), new Vector4()] },
+        uEyeCount: { value: 1 },
       },
     });
     this.overlay = new Mesh(triangle, material);
@@ -62,9 +65,13 @@ export class MarchPass {
 
   /** March what is in `scene`, at `scale` pixels to one of the picture, 0..1. */
   render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, scale: number): void {
-    this.frame.uScale.value = scale;
-    drawEyes(renderer, scene, eyes, this.target, scale, (_eye, x_px, y_px) => {
-      this.frame.uOrigin.value.set(x_px, y_px);
+    const { uEyes, uParts, uEyeCount } = this.overlay.material.uniforms;
+    uEyeCount.value = 0;
+    drawEyes(renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
+      this.frame.uEye.value.copy(viewport);
+      this.frame.uPart.value.copy(part);
+      uEyes.value[uEyeCount.value].copy(viewport);
+      uParts.value[uEyeCount.value++].copy(part);
     });
     this.overlay.visible = true;
   }

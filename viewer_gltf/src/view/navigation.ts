@@ -67,7 +67,12 @@ export class Navigation {
     this.isHome = true;
   }
 
-  get look(): Look {
+  /** null: the start view, which follows the window's shape. */
+  get look(): Look | null {
+    return this.isHome ? null : this.lookNow;
+  }
+
+  get lookNow(): Look {
     return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
   }
 

@@ -1,11 +1,17 @@
 /** Draw a scene into a texture, for each eye in its part of it. */
-import type { Scene, WebGLRenderer, WebGLRenderTarget } from "three";
+import { type Scene, Vector4, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import type { Eye, Eyes } from "./eyes";
+
+/** An eye's part of a target that is `scale` times as large as the frame buffer: whole pixels. */
+export function partOf({ viewport }: Eye, scale: number, into = new Vector4()): Vector4 {
+  into.copy(viewport).multiplyScalar(scale).round();
+  return into.setZ(Math.max(1, into.z)).setW(Math.max(1, into.w));
+}
 
 /**
  * `target` becomes as large as the frame buffer times `scale`, and is cleared.
  *
- * @param onEye called before each eye is drawn, with the corner of its part in pixels of the target
+ * @param onEye called before each eye is drawn, with its part of the target
  */
 export function drawEyes(
   renderer: WebGLRenderer,
@@ -13,7 +19,7 @@ export function drawEyes(
   eyes: Eyes,
   target: WebGLRenderTarget,
   scale: number,
-  onEye?: (eye: Eye, x_px: number, y_px: number) => void,
+  onEye?: (eye: Eye, part: Vector4) => void,
 ): void {
   const before = renderer.getRenderTarget();
   const { autoClear } = renderer;
@@ -30,10 +36,9 @@ export function drawEyes(
   renderer.clear();
   renderer.setClearAlpha(clearAlpha);
   for (const eye of eyes.all) {
-    const { x, y, z, w } = eye.viewport;
-    target.viewport.set(x * scale, y * scale, z * scale, w * scale);
+    partOf(eye, scale, target.viewport);
     renderer.setRenderTarget(target);
-    onEye?.(eye, x * scale, y * scale);
+    onEye?.(eye, target.viewport);
     renderer.render(scene, eye.camera);
   }
   renderer.xr.enabled = enabled;

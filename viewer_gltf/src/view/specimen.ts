@@ -15,6 +15,8 @@ export class Specimen {
   /** Its children are in um, world. */
   readonly group = new Group();
   pose: SpecimenPose;
+  /** Whether hands put it where it is. */
+  isMoved = false;
   private goal: SpecimenPose;
   private start: SpecimenPose;
   /** 0..1: of the way from start to goal. */
@@ -48,6 +50,7 @@ export class Specimen {
   show(tile: Bounds | null): void {
     if (tile === this.focus) return;
     this.focus = tile;
+    this.isMoved = false;
     this.start = this.pose;
     this.goal = this.home;
     this.way = 0;
@@ -73,6 +76,7 @@ export class Specimen {
   moveTo(pose: SpecimenPose, viewer: Vector3): void {
     const farthest_m = FARTHEST_M + (LONGEST_EDGE_M * pose.scale) / 2;
     this.settle(limitPlacement(pose, viewer, farthest_m, this.home));
+    this.isMoved = true;
   }
 
   /** Go on with a move; whether it is still under way. */
@@ -91,6 +95,7 @@ export class Specimen {
   }
 
   private settle(pose: SpecimenPose): void {
+    this.isMoved = false;
     this.pose = this.start = this.goal = pose;
     this.way = 1;
     this.apply();

@@ -40,10 +40,9 @@ const STEP_VOXELS = 1;
 export type MarchFrame = Readonly<{
   uSceneDepth: { value: DepthTexture };
   uNoise: { value: Texture };
-  /** Pixels of the march to one of the picture. */
-  uScale: { value: number };
-  /** Corner of the eye's picture, in pixels of the march. */
-  uOrigin: { value: Vector2 };
+  /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
+  uEye: { value: Vector4 };
+  uPart: { value: Vector4 };
   /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
   uDisc: { value: Vector2 };
   uSteps: { value: number };
@@ -57,8 +56,8 @@ export function makeFrame(depth: DepthTexture): MarchFrame {
   return {
     uSceneDepth: { value: depth },
     uNoise: { value: noise },
-    uScale: { value: 1 },
-    uOrigin: { value: new Vector2() },
+    uEye: { value: new Vector4(0, 0, 1, 1) },
+    uPart: { value: new Vector4(0, 0, 1, 1) },
     uDisc: { value: new Vector2(-2, -3) },
     uSteps: { value: MAX_STEPS },
   };

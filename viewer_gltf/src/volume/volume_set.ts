@@ -3,6 +3,7 @@ import { Group, Matrix4, Scene, Vector3 } from "three";
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
 import { isInDisc, type WantedTile } from "../hybrid/who";
+import type { ShownVolume } from "../marks/reading";
 import type { ViewerState } from "../state";
 import { brickCounts } from "./brick_counts";
 import { levelsToFetch } from "./levels";
@@ -98,6 +99,27 @@ export class VolumeSet {
     const resident = this.residents.get(tile);
     if (resident === undefined || resident.march === null) return 0;
     return resident.packed?.channels.includes(channel) ? resident.presence : 0;
+  }
+
+  /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
+  source(tile: string, channel: string): VolumeSource | null {
+    const volumes = this.channels.get(channel);
+    if (volumes === undefined || typeof volumes === "string") return null;
+    return volumes.sources.get(tile) ?? null;
+  }
+
+  /** The channels of the tiles that are on screen. */
+  shown(): readonly ShownVolume[] {
+    const { state } = this;
+    return [...this.residents].flatMap(([tile, { march, packed, texture }]) => {
+      if (state === null || packed === null || !march?.mesh.visible) return [];
+      return packed.channels.flatMap((channel) => {
+        const source = texture.kept.get(channel);
+        if (source === undefined) return [];
+        const { table, isInDisc } = this.look(state, channel);
+        return [{ tile, channel, source, table, isInDisc }];
+      });
+    });
   }
 
   /** Whether all that is wanted of a tile is there, at some level. */

@@ -28,4 +28,34 @@ describe("a stereo session", () => {
     expect(stereo.isRunning).toBe(true);
     expect(started).toBe(1);
   });
+
+  it("asks for an even rate and for foveation only where they are offered", async () => {
+    const wishes: string[] = [];
+    const makeSession = (rates: number[] | undefined) =>
+      Object.assign(new EventTarget(), {
+        end: async () => undefined,
+        supportedFrameRates: rates && new Float32Array(rates),
+        updateTargetFrameRate: async (rate: number) => {
+          wishes.push(`${rate} Hz`);
+          throw new DOMException("not now", "InvalidStateError");
+        },
+      });
+    const xr = {
+      enabled: false,
+      setReferenceSpaceType: () => undefined,
+      setSession: async () => undefined,
+      setFoveation: (share: number) => wishes.push(`foveation ${share}`),
+    };
+    for (const rates of [[72, 90, 120], [60], undefined]) {
+      const stereo = new XrSession(
+        { xr } as unknown as WebGLRenderer,
+        () => wishes.push("started"),
+        () => undefined,
+      );
+      const requestSession = async () => makeSession(rates);
+      await stereo.start({ requestSession } as unknown as XRSystem);
+    }
+    const plain = ["foveation 0.67", "started"];
+    expect(wishes).toEqual(["foveation 0.67", "72 Hz", "started", ...plain, ...plain]);
+  });
 });

@@ -1,16 +1,22 @@
 /** The immersive session: two eyes, the specimen in front of them. */
 import { PerspectiveCamera, type WebGLRenderer } from "three";
 
+/** Even motion is worth more than 90 or 120 pictures of which some come late. */
+const RATE_HZ = 72;
+/** 0..1, where the layer offers it: the panel's text stays legible beside the middle. */
+const FOVEATION = 0.67;
+
 export class XrSession {
   /** three moves it with the head; its clip planes hold for both eyes. Metres. */
   readonly camera = new PerspectiveCamera(70, 1, 0.05, 20);
   private session: XRSession | null = null;
 
+  /** @param onSelect any button at all; hands.ts knows which ray it belongs to */
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly onStart: () => void,
     private readonly onEnd: () => void,
-    private readonly onSelect: () => void,
+    private readonly onSelect: () => void = () => undefined,
   ) {
     renderer.xr.enabled = true;
     // The origin is where the eyes are when the session starts, whatever the body's height.
@@ -19,6 +25,11 @@ export class XrSession {
 
   get isRunning(): boolean {
     return this.session !== null;
+  }
+
+  /** The session that runs, for its input sources. */
+  get current(): XRSession | null {
+    return this.session;
   }
 
   /** Frames a second, where the headset tells. */
@@ -45,10 +56,21 @@ export class XrSession {
       void session.end().catch(() => undefined); // it may have ended by itself: that was the fault
       throw error;
     }
+    this.tune(session);
     this.onStart();
   }
 
   async end(): Promise<void> {
     await this.session?.end();
+  }
+
+  /** What only some headsets offer. */
+  private tune(session: XRSession): void {
+    const { xr } = this.renderer;
+    if (typeof xr.setFoveation === "function") xr.setFoveation(FOVEATION);
+    if (!session.supportedFrameRates?.includes(RATE_HZ)) return;
+    if (typeof session.updateTargetFrameRate !== "function") return;
+    // A wish: whatever the headset says, it goes on at its own rate.
+    void session.updateTargetFrameRate(RATE_HZ).catch(() => undefined);
   }
 }

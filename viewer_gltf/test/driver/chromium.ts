@@ -29,7 +29,11 @@ export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<v
 /** @param viewport CSS pixels; small ones, since software draws them */
 export async function launch(
   viewport: { width: number; height: number },
-  { hasTouch = false, flags = [] as readonly string[] } = {},
+  {
+    hasTouch = false,
+    flags = [] as readonly string[],
+    serviceWorkers = "allow" as "allow" | "block",
+  } = {},
 ): Promise<Browser> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
   const profile = await mkdtemp(join(tmpdir(), "stereocell-chromium-"));
@@ -40,6 +44,7 @@ export async function launch(
     viewport,
     deviceScaleFactor: 1,
     hasTouch,
+    serviceWorkers,
   });
   return {
     context,
@@ -61,10 +66,11 @@ export async function addHeadset(page: Page): Promise<void> {
     device.position.set(0, 1.6, 0);
     // The emulator gives the canvas the window's size; the page's own style would squash it.
     document.addEventListener("DOMContentLoaded", () => {
-      const style = document.createElement("style");
-      style.textContent =
-        "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }";
-      document.head.append(style);
+      const sheet = new CSSStyleSheet(); // the page's policy allows no other
+      sheet.replaceSync(
+        "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }",
+      );
+      document.adoptedStyleSheets.push(sheet);
     });
   });
 }

@@ -12,6 +12,9 @@ const TYPES: Readonly<Record<string, string>> = {
   ".wasm": "application/wasm",
   ".glb": "model/gltf-binary",
   ".ktx2": "image/ktx2",
+  ".png": "image/png",
+  ".svg": "image/svg+xml",
+  ".webmanifest": "application/manifest+json",
 };
 
 export type Request = Readonly<{ path: string; query: string; range: string | null }>;

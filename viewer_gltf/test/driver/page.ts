@@ -28,7 +28,30 @@ export class ViewerPage {
     return this.page.locator(`[data-channel="${channel}"] [data-part="${name}"]`);
   }
 
+  /** Open a section of the panel, such as `measure`. */
+  async unfold(section: string): Promise<void> {
+    const opener = this.page.locator(`h2 [data-opener="${section}"]`);
+    if ((await opener.getAttribute("aria-expanded")) === "false") await opener.click();
+  }
+
+  /** Open a channel's card: its opacity, window and palettes. */
+  async openCard(channel: string): Promise<void> {
+    const opener = this.page.locator(`[data-channel="${channel}"] [data-opener]`);
+    if ((await opener.getAttribute("aria-expanded")) === "false") await opener.click();
+  }
+
+  /** Drag a slider to a share of its length. */
+  async slide(control: string, share: number): Promise<void> {
+    const slider = this.page.locator(`[data-control="${control}"]`);
+    const most = Number(await slider.getAttribute("max"));
+    await slider.fill(String(Math.round(share * most)));
+    await this.settled();
+  }
+
   async show(channel: string, isShown: boolean): Promise<void> {
+    if ((await this.part(channel, "shown").count()) === 0) {
+      await this.page.locator('[data-control="find-channel"]').fill(channel); // one of many
+    }
     await this.part(channel, "shown").setChecked(isShown);
     await this.settled();
   }
@@ -56,8 +79,13 @@ export class ViewerPage {
     await this.settled();
   }
 
+  /** Choose a tile, which then stays chosen; by the map, or by the list where there is none. */
   async chooseTile(tile: string): Promise<void> {
-    await this.page.locator("[data-tile-choice]").selectOption(tile);
+    const { selected } = (await this.snapshot()).state;
+    const onMap = this.page.locator(`[data-tile-choice="${tile}"]`);
+    if ((await onMap.count()) === 0) {
+      await this.page.locator("select[data-tile-choice]").selectOption(tile);
+    } else if (selected !== tile) await onMap.click();
     await this.settled();
   }
 

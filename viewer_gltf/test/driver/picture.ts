@@ -44,10 +44,27 @@ export function difference(a: Picture, b: Picture): number {
   return differing / (a.width * a.height);
 }
 
+/** Scale bar, axes and names lie over the picture: they are no part of what is measured. */
+export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promise<T> {
+  const show = (visibility: string) =>
+    page.evaluate((value) => {
+      const marks = ".scale-bar, .orientation-mark, .name-mark";
+      for (const mark of document.querySelectorAll<HTMLElement | SVGElement>(marks)) {
+        mark.style.visibility = value;
+      }
+    }, visibility);
+  await show("hidden");
+  try {
+    return await job();
+  } finally {
+    await show("");
+  }
+}
+
 /** What the page shows in the stage (or in `area`), without what lies over it. */
 export async function takePicture(page: Page, area?: Area): Promise<Picture> {
   const clip = area ?? (await page.locator(".stage").boundingBox()) ?? undefined;
-  const png = await page.screenshot({ clip });
+  const png = await withoutMarks(page, () => page.screenshot({ clip }));
   const { width, height, data } = await page.evaluate(async (base64) => {
     const blob = await (await fetch(`data:image/png;base64,${base64}`)).blob();
     const bitmap = await createImageBitmap(blob);

@@ -49,7 +49,8 @@ export function prepareStand({ bundle: given, viewport, hasTouch, mounts }: Stan
     bundle = given ?? folder;
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
-    browser = await launch(viewport, { hasTouch });
+    // its own requests would be counted with the page's
+    browser = await launch(viewport, { hasTouch, serviceWorkers: "block" });
   });
 
   afterAll(async () => {

@@ -73,7 +73,10 @@ function marchOf(
   depth: DepthPass,
 ): TileMarch {
   const [side] = volume.size;
-  const march = new TileMarch(volume, 1, makeFrame(depth.texture));
+  const frame = makeFrame(depth.texture);
+  frame.uEye.value.set(0, 0, PIXELS, PIXELS);
+  frame.uPart.value.set(0, 0, PIXELS, PIXELS);
+  const march = new TileMarch(volume, 1, frame);
   const texture = texture3D(texels, side);
   march.clip(wholeSpecimen());
   march.show({ channels: ["A"], level: 0, texture, bricks: [bricks] }, null, 1, 1);

@@ -12,7 +12,7 @@ float distanceOf(float depth, float back) {
 // through the pixel, z the share of the pixel that sees past it. The picture is multisampled and
 // its depth is not, so a pixel at a silhouette would else show the room between mesh and volume.
 vec3 sceneDistances(float back) {
-  ivec2 pixel = ivec2(gl_FragCoord.xy / uScale);
+  ivec2 pixel = ivec2((gl_FragCoord.xy - uPart.xy) * uEye.zw / uPart.zw + uEye.xy);
   ivec2 last = textureSize(uSceneDepth, 0) - 1;
   float near = distanceOf(texelFetch(uSceneDepth, pixel, 0).r, back);
   float far = near;

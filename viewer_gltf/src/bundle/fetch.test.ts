@@ -1,0 +1,61 @@
+import { afterEach, describe, expect, it, vi } from "vitest";
+import { TemporaryError } from "./errors";
+import { readBody, request } from "./fetch";
+
+const text = (response: Response) => response.text();
+
+/** A body that breaks after its first byte. */
+function broken(): Response {
+  const body = new ReadableStream({
+    pull(controller) {
+      controller.enqueue(new Uint8Array([65]));
+      controller.error(new TypeError("network error"));
+    },
+  });
+  return new Response(body, { status: 206, headers: { "Content-Range": "bytes 0-1/9" } });
+}
+
+const whole = () =>
+  new Response("AB", { status: 206, headers: { "Content-Range": "bytes 0-1/9" } });
+
+describe("a request", () => {
+  afterEach(() => vi.unstubAllGlobals());
+
+  it("whose connection breaks within the file is tried again", async () => {
+    const answers = [broken(), whole()];
+    const fetched = vi.fn(async () => answers.shift());
+    vi.stubGlobal("fetch", fetched);
+    const response = await request("https://host/a", "a");
+    expect(response.status).toBe(206);
+    expect(response.headers.get("Content-Range")).toBe("bytes 0-1/9");
+    expect(await text(response)).toBe("AB");
+    expect(fetched).toHaveBeenCalledTimes(2);
+  });
+
+  it("that is no longer wanted is not tried again", async () => {
+    const stop = new AbortController();
+    const fetched = vi.fn(async () => {
+      stop.abort();
+      throw new DOMException("stopped", "AbortError");
+    });
+    vi.stubGlobal("fetch", fetched);
+    await expect(request("https://host/a", "a", { signal: stop.signal })).rejects.toThrow(
+      "stopped",
+    );
+    expect(fetched).toHaveBeenCalledTimes(1);
+  });
+
+  it("of a file that isn't there fails at once", async () => {
+    const fetched = vi.fn(async () => new Response("", { status: 404 }));
+    vi.stubGlobal("fetch", fetched);
+    await expect(request("https://host/a", "a")).rejects.toThrow("a: not found (404)");
+    expect(fetched).toHaveBeenCalledTimes(1);
+  });
+});
+
+it("a body that breaks is a fault that may be gone a moment later", async () => {
+  await expect(readBody(broken(), "a")).rejects.toThrow(TemporaryError);
+  await expect(readBody(broken(), "a")).rejects.toThrow(
+    "a: the connection broke before the file's end",
+  );
+});

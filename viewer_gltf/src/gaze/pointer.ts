@@ -1,0 +1,101 @@
+/**
+ * What a ray of the gaze or of a hand meets in the room, and what looking at it for long chooses.
+ * Metres of the room.
+ */
+import { type Matrix4, Vector3 } from "three";
+import { advanceDwell, type Dwell, dwellProgress, fire, NO_DWELL } from "./dwell";
+
+/** `direction` has unit length. */
+export type RoomRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
+
+export type Hit = Readonly<{
+  /** What was met, unique among all targets; null: nothing that can be chosen. */
+  key: string | null;
+  distance_m: number;
+  /**
+   * What holding the button does: `slide` follows the ray as long as it is held; `carry` does so
+   * too, and where there is no button to hold, from one choice to the next.
+   */
+  hold?: "slide" | "carry";
+}>;
+
+/** Something that rays meet: the panel, handles, the specimen's tiles. */
+export interface Target {
+  /** Drawn over what is nearer, so that it is met before it. */
+  readonly isOnTop: boolean;
+  meet(ray: RoomRay): Hit | null;
+  /** Chosen by dwell or button; what holds on to the ray is chosen before it is dragged. */
+  choose(hit: Hit, ray: RoomRay): void;
+  /** What holds on to the ray follows it, frame by frame; `key` is the hit's that was chosen. */
+  drag?(key: string, ray: RoomRay): void;
+}
+
+export type Met = Hit & Readonly<{ target: Target; ray: RoomRay }>;
+
+/** Straight ahead of the head. */
+export function gazeOf(head: Matrix4): RoomRay {
+  return {
+    origin: new Vector3().setFromMatrixPosition(head),
+    direction: new Vector3(0, 0, -1).transformDirection(head),
+  };
+}
+
+/** The nearest of the targets; of those on top, the first. */
+export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null {
+  let first: Met | null = null;
+  for (const target of targets) {
+    if (first?.target.isOnTop) break;
+    const hit = target.meet(ray);
+    if (hit === null || !(hit.distance_m < (first?.distance_m ?? Infinity) || target.isOnTop)) {
+      continue;
+    }
+    first = { ...hit, target, ray };
+  }
+  return first;
+}
+
+export class Pointer {
+  /** What the gaze meets. */
+  gaze: Met | null = null;
+  /** What each hand's ray meets, in the order given. */
+  hands: readonly (Met | null)[] = [];
+  private dwell: Dwell = NO_DWELL;
+
+  /** Of the dwell, 0..1. */
+  get progress(): number {
+    return dwellProgress(this.dwell);
+  }
+
+  /** Where the ring is: at what a hand points at; if none does, at what is gazed at. */
+  get leading(): Met | null {
+    return this.hands.find((met) => met !== null) ?? this.gaze;
+  }
+
+  /** @returns what the dwell chooses in this frame; the gaze chooses nothing while a hand points */
+  advance(
+    gaze: RoomRay,
+    hands: readonly (RoomRay | null)[],
+    targets: readonly Target[],
+    dt_s: number,
+    isDwellOn: boolean,
+  ): Met | null {
+    this.gaze = meetFirst(gaze, targets);
+    this.hands = hands.map((ray) => ray && meetFirst(ray, targets));
+    const isGazing = this.hands.every((met) => met === null);
+    const key = isGazing ? (this.gaze?.key ?? null) : null;
+    const [dwell, fires] = advanceDwell(this.dwell, key, dt_s, isDwellOn);
+    this.dwell = dwell;
+    return fires ? this.gaze : null;
+  }
+
+  /** The button was pressed on something: looking at it on does not choose it again. */
+  press(key: string): void {
+    if (this.dwell.target === key) [this.dwell] = fire(this.dwell);
+  }
+
+  reset(): void {
+    this.gaze = null;
+    this.hands = [];
+    this.dwell = NO_DWELL;
+  }
+}

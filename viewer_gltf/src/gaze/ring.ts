@@ -1,0 +1,101 @@
+/**
+ * The ring where a ray ends: it fills clockwise from the top while a dwell goes on. Of constant
+ * size to the eye, over everything, and as far away as what is pointed at, so that both eyes see it
+ * there and not twice.
+ */
+import {
+  type BufferGeometry,
+  CircleGeometry,
+  DoubleSide,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  RingGeometry,
+  type Vector3,
+} from "three";
+
+const DIAMETER_DEG = 1.5;
+const DOT_DEG = 0.3;
+/** Inner radius as a share of the outer. */
+const HOLE = 0.72;
+/** A dark rim, by so much of the radius: white is seen on anything then. */
+const RIM = 0.1;
+const WHITE = 0xffffff;
+const DARK = 0x0b0d12;
+const PARTS = 72;
+const INDICES_PER_PART = 6;
+/** After the volumes' picture, which covers all that is drawn before it. */
+const OVER_ALL = 2000;
+const RADIANS = Math.PI / 180;
+
+export class Ring {
+  readonly group = new Group();
+  private readonly track = flat(new RingGeometry(HOLE - RIM, 1 + RIM, PARTS), DARK, 0.6);
+  /** Clockwise from the top, as a clock fills. */
+  private readonly fill = flat(
+    new RingGeometry(HOLE, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),
+    WHITE,
+    1,
+  );
+  private readonly rim = flat(new CircleGeometry(DOT_DEG / DIAMETER_DEG + RIM, 24), DARK, 0.6);
+  private readonly dot = flat(new CircleGeometry(DOT_DEG / DIAMETER_DEG, 24), WHITE, 1);
+
+  constructor() {
+    this.group.name = "ring";
+    this.group.add(...this.parts);
+    // the dark ones first: they lie in one plane, so that nothing else tells their order
+    this.parts.forEach((part, i) => {
+      part.renderOrder = OVER_ALL + i;
+    });
+    this.hide();
+  }
+
+  private get parts() {
+    return [this.track, this.rim, this.fill, this.dot];
+  }
+
+  get isShown(): boolean {
+    return this.group.visible;
+  }
+
+  /** @param progress 0..1; at 0 there is the dot alone, unless something can be chosen */
+  show(at: Vector3, eye: Vector3, progress: number, canChoose: boolean): void {
+    const radius_m = at.distanceTo(eye) * Math.tan((DIAMETER_DEG / 2) * RADIANS);
+    this.group.position.copy(at);
+    this.group.scale.setScalar(radius_m);
+    this.group.lookAt(eye);
+    this.group.visible = true;
+    this.track.visible = canChoose;
+    const parts = Math.round(progress * PARTS);
+    this.fill.visible = parts > 0;
+    this.fill.geometry.setDrawRange(0, INDICES_PER_PART * parts);
+  }
+
+  hide(): void {
+    this.group.visible = false;
+  }
+
+  dispose(): void {
+    for (const { geometry, material } of this.parts) {
+      geometry.dispose();
+      material.dispose();
+    }
+  }
+}
+
+function flat(
+  geometry: BufferGeometry,
+  color: number,
+  opacity: number,
+): Mesh<BufferGeometry, MeshBasicMaterial> {
+  const material = new MeshBasicMaterial({
+    color,
+    opacity,
+    transparent: true,
+    depthTest: false,
+    depthWrite: false,
+    side: DoubleSide,
+    toneMapped: false,
+  });
+  return new Mesh(geometry, material);
+}

@@ -1,0 +1,92 @@
+/**
+ * The name of what is looked at: the tile, and the channel where a surface is met. It comes once the
+ * gaze has rested, beside the point and not on it.
+ */
+import { Object3D, Vector3 } from "three";
+import type { Ray } from "../gaze/pick";
+import { element } from "../ui/dom";
+import { Label } from "./label";
+import type { Sight } from "./look";
+import type { Probed } from "./probe";
+import { advanceRest, type Rest } from "./rest";
+
+/** The gaze has to rest for so long. */
+export const NAME_S = 0.4;
+
+export type Named = Readonly<{ probed: Probed; text: string }>;
+
+export class NameMark {
+  /** um, world. */
+  readonly group = new Object3D();
+  readonly root = element("div", { className: "name-mark", hidden: true });
+  private readonly label = new Label("aside");
+  private readonly at = new Vector3();
+  private rest: Rest | null = null;
+  private isNamed = false;
+
+  constructor() {
+    this.group.add(this.label.sprite);
+  }
+
+  get text(): string {
+    return this.root.textContent ?? "";
+  }
+
+  /** What is looked at may have got another name. */
+  ask(): void {
+    this.isNamed = false;
+  }
+
+  /** What is looked at may have changed: wait anew. */
+  forget(): void {
+    this.rest = null;
+    this.isNamed = false;
+    this.write("");
+  }
+
+  /**
+   * @param name called once, when the gaze has come to rest; null: nothing is there
+   */
+  follow(ray: Ray, tremble_um: number, dt_s: number, name: () => Named | null): void {
+    this.rest = advanceRest(this.rest, ray, tremble_um, dt_s);
+    if (this.rest.elapsed_s < NAME_S) {
+      this.isNamed = false;
+      this.write("");
+      return;
+    }
+    if (this.isNamed) return;
+    this.isNamed = true;
+    const found = name();
+    if (found === null) {
+      this.write("");
+      return;
+    }
+    this.at.set(...found.probed.point);
+    this.write(found.text);
+  }
+
+  /** On a flat screen, at a point of the picture, CSS pixels. */
+  placeOnScreen(x_px: number, y_px: number): void {
+    this.label.sprite.visible = false;
+    this.root.hidden = this.text === "";
+    if (this.root.hidden) return;
+    this.root.style.left = `${x_px}px`;
+    this.root.style.top = `${y_px}px`;
+  }
+
+  placeInRoom(sight: Sight): void {
+    this.root.hidden = true;
+    this.label.write(this.text);
+    this.label.place(this.at, sight);
+  }
+
+  private write(text: string): void {
+    if (text !== this.text) this.root.textContent = text;
+  }
+
+  dispose(): void {
+    this.root.remove();
+    this.group.removeFromParent();
+    this.label.dispose();
+  }
+}

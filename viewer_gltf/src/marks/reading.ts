@@ -1,0 +1,146 @@
+/** What the specimen is where a ray meets it: surface, volume or tile, and the channels' values. */
+import type { Matrix4 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
+import { pickTile, type Ray, type Vec3 } from "../gaze/pick";
+import { valueAt, valueText } from "../measure/measure";
+import type { ViewerState } from "../state";
+import { isKept } from "../view/clip";
+import { VolumeSource } from "../volume/source";
+import {
+  type Cone,
+  type Probed,
+  type ProbedVolume,
+  probeBoxes,
+  probeSurfaces,
+  probeVolumes,
+  type ShownSurface,
+  unitRay,
+} from "./probe";
+import { type LevelSource, levelAtHand, TexelCache } from "./texels";
+
+/** Where a ray meets a volume is looked for in a level of at most so many texels. */
+const PROBED_TEXELS = 2 * 1024 * 1024;
+
+/** A channel of a tile on screen as a volume. */
+export type ShownVolume = Pick<ProbedVolume, "tile" | "channel" | "table" | "isInDisc"> &
+  Readonly<{ source: LevelSource }>;
+
+export type ReadingOptions = Readonly<{
+  manifest: Manifest;
+  /** Address of the bundle's manifest. */
+  base: string;
+  /** On screen now. */
+  surfaces: () => readonly ShownSurface[];
+  volumes: () => readonly ShownVolume[];
+  /** null: not known yet, or there is none. */
+  source: (tile: string, channel: string) => LevelSource | null;
+  onError: (error: unknown) => void;
+}>;
+
+export class Reading {
+  state: ViewerState;
+  /** From um to the room, in which the surfaces are; null before the first frame. */
+  specimen: Matrix4 | null = null;
+  /** Where volumes show in disc mode. */
+  disc: Cone | null = null;
+  private readonly cache: TexelCache;
+  private isDisposed = false;
+
+  constructor(
+    private readonly options: ReadingOptions,
+    state: ViewerState,
+  ) {
+    this.state = state;
+    this.cache = new TexelCache((volume) => new VolumeSource(options.base, volume));
+  }
+
+  /** What a ray (um) means; null: it meets nothing. */
+  async probe(ray: Ray): Promise<Probed | null> {
+    const along = unitRay(ray);
+    const surface = this.probeSurfaces(along);
+    const { clip, mode } = this.state;
+    const disc = mode === "disc" ? this.disc : null;
+    const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
+    if (surface !== null && volume !== null) {
+      return surface.distance_um <= volume.distance_um ? surface : volume;
+    }
+    return surface ?? volume ?? probeBoxes(along, this.tiles, clip);
+  }
+
+  /** The same, but at once and without volumes. */
+  glance(ray: Ray): Probed | null {
+    const along = unitRay(ray);
+    if (pickTile(along, this.tiles) === null) return null;
+    return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, this.state.clip);
+  }
+
+  /** A line for each shown channel: its name and its value at a point, on the source's scale. */
+  async valuesAt(point: Vec3): Promise<readonly string[]> {
+    const lines: string[] = [];
+    for (const { channel, source } of this.sourcesAt(point)) {
+      const level = await this.orReport(this.cache.best(source));
+      const value = level && valueAt(source.volume, level, channel.window, point);
+      if (value !== null) lines.push(`${channel.name} ${valueText(value, channel.window)}`);
+    }
+    return lines;
+  }
+
+  /** What these values depend on: they may differ only if this does. */
+  sourcesKey(points: readonly Vec3[]): string {
+    const known = points.flatMap((point) =>
+      this.sourcesAt(point).map(({ channel, source }) => `${channel.id} ${levelAtHand(source)}`),
+    );
+    return known.join();
+  }
+
+  private get tiles() {
+    const { isolated } = this.state;
+    return this.options.manifest.tiles.filter(({ id }) => isolated === null || id === isolated);
+  }
+
+  private probeSurfaces(along: Ray): Probed | null {
+    if (this.specimen === null) return null;
+    const { clip } = this.state;
+    return probeSurfaces(along, this.options.surfaces(), this.specimen, clip, this.tiles);
+  }
+
+  private async volumesAlong(along: Ray): Promise<readonly ProbedVolume[]> {
+    const met = this.tiles.filter((tile) => pickTile(along, [tile]) !== null);
+    const found: ProbedVolume[] = [];
+    for (const { source, ...shown } of this.options.volumes()) {
+      if (!met.some(({ id }) => id === shown.tile)) continue;
+      const level = await this.orReport(this.cache.atHand(source, PROBED_TEXELS));
+      if (level !== null) found.push({ ...shown, volume: source.volume, level });
+    }
+    return found;
+  }
+
+  /** The volumes of the shown channels at a point. */
+  private sourcesAt(point: Vec3) {
+    const { manifest, source } = this.options;
+    const tile = manifest.tiles.find(({ bounds_um }) =>
+      isKept(point, { box: bounds_um, plane: null }),
+    );
+    if (tile === undefined) return [];
+    const shown = new Set(this.state.channels.flatMap((c) => (c.shown ? [c.id] : [])));
+    return manifest.channels.flatMap((channel) => {
+      const found = shown.has(channel.id) ? source(tile.id, channel.id) : null;
+      return found === null ? [] : [{ channel, source: found }];
+    });
+  }
+
+  /** null after a fault, which was told. */
+  private async orReport<T>(promise: Promise<T>): Promise<T | null> {
+    try {
+      return await promise;
+    } catch (error) {
+      if (!this.isDisposed) this.options.onError(error);
+      return null;
+    }
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    this.cache.dispose();
+  }
+}

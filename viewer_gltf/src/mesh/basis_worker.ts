@@ -1,0 +1,25 @@
+/**
+ * Transcodes Basis Universal textures. three's own worker function runs here, with what it expects
+ * to find around it.
+ */
+import BASIS from "three/examples/jsm/libs/basis/basis_transcoder.js";
+import { KTX2Loader } from "three/examples/jsm/loaders/KTX2Loader.js";
+
+/** Static parts of three's loader that its types leave out. */
+type WorkerParts = Readonly<{
+  BasisWorker: () => void;
+  EngineFormat: object;
+  EngineType: object;
+  TranscoderFormat: object;
+  BasisFormat: object;
+}>;
+
+const parts = KTX2Loader as unknown as WorkerParts;
+Object.assign(globalThis, {
+  BASIS,
+  _EngineFormat: parts.EngineFormat,
+  _EngineType: parts.EngineType,
+  _TranscoderFormat: parts.TranscoderFormat,
+  _BasisFormat: parts.BasisFormat,
+});
+parts.BasisWorker();

@@ -1,0 +1,216 @@
+/**
+ * Answers requests from the network and the store, so that what was seen once shows without a
+ * network. Files of a bundle are kept under the SHA-256 that its files.json gives them, parts of
+ * them under their range too: a file that changes on the host is another entry, and never a wrong
+ * picture.
+ */
+import { checkFile, fileAddress } from "../bundle/fetch";
+import type { FileRef } from "../bundle/generated/bundle";
+import type { Asked } from "../bundle/log";
+import { type Keys, ownBundle, type Plan, planFor } from "./plan";
+import type { Store } from "./store";
+
+/** A network that takes longer than this to answer counts as none where a copy is kept. */
+const PATIENCE_MS = 5000;
+const FIRST_SERVER_FAULT = 500;
+
+type Listed = Readonly<Record<string, Omit<FileRef, "path">>>;
+/** Work that goes on after the answer was given. */
+export type Later = (work: Promise<unknown>) => void;
+
+export class Keeper {
+  /** The files of each bundle, as the manifest that was last seen has them; null: unknown. */
+  private readonly listed = new Map<string, Promise<Listed | null>>();
+
+  constructor(
+    private readonly store: Store,
+    private readonly keys: Keys,
+    private readonly folder: string,
+    private readonly fixed: readonly string[],
+  ) {}
+
+  plan(address: string, page: string | null): Plan {
+    return planFor(address, this.folder, page, this.fixed);
+  }
+
+  answer(plan: Plan, request: Request, later: Later): Promise<Response> {
+    switch (plan.kind) {
+      case "page":
+        return this.networkFirst(this.keys.page, request, later);
+      case "fixed":
+        return this.networkFirst(this.keys.asset(plan.name), request, later);
+      case "asset":
+        return this.asset(this.keys.asset(plan.name), request, later);
+      case "manifest":
+        return this.manifest(plan.base, request, later);
+      case "file":
+        return this.file(plan.base, plan.path, request, later);
+      case "none":
+        return fetch(request);
+    }
+  }
+
+  /** Keep the viewer's own files, and drop those of an older one. */
+  async keepViewer(names: readonly string[]): Promise<void> {
+    const keepOne = async (name: string) => {
+      const key = this.keys.asset(name);
+      if (this.store.has(key) && !this.fixed.includes(name)) return;
+      await this.keep(key, await fetch(this.folder + name));
+    };
+    await Promise.allSettled(names.map(keepOne));
+  }
+
+  async dropOldViewer(names: readonly string[]): Promise<void> {
+    const wanted = new Set(names.map((name) => this.keys.asset(name)));
+    await this.store.retain(this.keys.asset(""), (key) => wanted.has(key));
+  }
+
+  /** Keep what a page has loaded before this worker began to serve it. */
+  async adopt(page: string, asked: readonly Asked[]): Promise<void> {
+    const works: Promise<unknown>[] = [];
+    const later: Later = (work) => works.push(work.catch(() => undefined));
+    const seen = { cache: "force-cache" } as const; // it may still be in the browser's own cache
+    const bare = page.split(/[?#]/)[0];
+    if (!this.store.has(this.keys.page)) {
+      later(fetch(bare, seen).then((response) => this.keep(this.keys.page, response)));
+    }
+    const base = ownBundle(page);
+    if (base !== null && !this.listed.has(base)) {
+      const request = new Request(fileAddress(base, "manifest.json"), { cache: "no-cache" });
+      await this.manifest(base, request, later);
+    }
+    for (const { url, range } of asked) {
+      const plan = this.plan(url, page);
+      if (plan.kind !== "file") continue;
+      const headers: HeadersInit = range === null ? {} : { Range: range };
+      // One after another: the page may still be loading.
+      const answer = this.answer(plan, new Request(url, { ...seen, headers }), later);
+      await answer.then((response) => response.body?.cancel()).catch(() => undefined);
+    }
+    await Promise.all(works);
+  }
+
+  /** Whether the page would open without a network. */
+  get hasPage(): boolean {
+    return this.store.has(this.keys.page);
+  }
+
+  /** Resolves once what was used and kept is written down. */
+  save(): Promise<void> {
+    return this.store.save();
+  }
+
+  private async networkFirst(key: string, request: Request, later: Later): Promise<Response> {
+    const kept = await this.store.get(key);
+    const coming = fetch(request).then((response) => {
+      if (response.ok) later(this.keep(key, response.clone()));
+      return response;
+    });
+    if (kept === null) return coming;
+    later(coming.catch(() => undefined)); // may come after the answer, for the next time
+    const orKept = coming.then(
+      (response) => (response.status >= FIRST_SERVER_FAULT ? kept : response),
+      () => kept,
+    );
+    const impatience = new Promise<Response>((resolve) => {
+      setTimeout(() => resolve(kept), PATIENCE_MS);
+    });
+    return Promise.race([orKept, impatience]);
+  }
+
+  private async asset(key: string, request: Request, later: Later): Promise<Response> {
+    const kept = await this.store.get(key);
+    if (kept !== null) return kept;
+    const response = await fetch(request);
+    if (response.ok) later(this.keep(key, response.clone()));
+    return response;
+  }
+
+  private async keep(key: string, response: Response): Promise<void> {
+    if (!response.ok) return;
+    const body = await response.arrayBuffer();
+    await this.store.put(key, { body, type: response.headers.get("Content-Type") });
+  }
+
+  private async manifest(base: string, request: Request, later: Later): Promise<Response> {
+    const response = await this.networkFirst(this.keys.manifest(base), request, later);
+    if (response.ok) {
+      const listed = this.readListed(base, await response.clone().text());
+      this.listed.set(base, listed);
+      later(listed);
+    }
+    return response;
+  }
+
+  private async file(
+    base: string,
+    path: string,
+    request: Request,
+    later: Later,
+  ): Promise<Response> {
+    const listed = (await this.listedOf(base)) ?? {};
+    const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
+    if (ref === undefined) return fetch(request);
+    const range = request.headers.get("Range");
+    const part =
+      range === null ? null : await this.store.get(this.keys.file(base, ref.sha256, range));
+    const kept = part ?? (await this.store.get(this.keys.file(base, ref.sha256)));
+    if (kept !== null) return kept; // a whole file answers a range too, as a host may
+    const response = await fetch(request);
+    if (response.ok) later(this.keepFile(base, { path, ...ref }, range, response.clone()));
+    return response;
+  }
+
+  /** Keep a file, or a part of it, if it is what files.json says. The page tells what is not. */
+  private async keepFile(
+    base: string,
+    ref: FileRef,
+    range: string | null,
+    response: Response,
+  ): Promise<void> {
+    const body = await response.arrayBuffer();
+    const type = response.headers.get("Content-Type");
+    if (response.status !== 206) {
+      await checkFile(ref, new Uint8Array(body));
+      await this.store.put(this.keys.file(base, ref.sha256), { body, type });
+      return;
+    }
+    const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(range ?? "") ?? [];
+    if (first === undefined || body.byteLength !== Number(last) - Number(first) + 1) return;
+    const found = `bytes ${first}-${last}/${ref.bytes}`;
+    if (response.headers.get("Content-Range") !== found) return;
+    await this.store.put(this.keys.file(base, ref.sha256, range), { body, type, range: found });
+  }
+
+  /** After a restart of this worker the kept manifest tells. */
+  private listedOf(base: string): Promise<Listed | null> {
+    let listed = this.listed.get(base);
+    if (listed === undefined) {
+      listed = this.store
+        .get(this.keys.manifest(base))
+        .then(async (kept) => (kept === null ? null : this.readListed(base, await kept.text())));
+      this.listed.set(base, listed);
+    }
+    return listed;
+  }
+
+  /** Fetch files.json where it isn't kept, and drop the files that it no longer names. */
+  private async readListed(base: string, manifest: string): Promise<Listed | null> {
+    try {
+      const { files } = JSON.parse(manifest) as { files: FileRef };
+      const key = this.keys.file(base, files.sha256);
+      const kept = await this.store.get(key);
+      if (kept !== null) return (await kept.json()) as Listed;
+      const response = await fetch(fileAddress(base, files.path));
+      const body = await response.arrayBuffer();
+      await checkFile(files, new Uint8Array(body));
+      const listed = JSON.parse(new TextDecoder().decode(body)) as Listed;
+      await this.store.put(key, { body, type: response.headers.get("Content-Type") });
+      const hashes = new Set([files.sha256, ...Object.values(listed).map(({ sha256 }) => sha256)]);
+      await this.store.retain(this.keys.files(base), (each) => hashes.has(this.keys.hashOf(each)));
+      return listed;
+    } catch {
+      return null; // nothing is kept of a bundle that can't be understood; the page says why
+    }
+  }
+}

@@ -1,0 +1,27 @@
+import { describe, expect, it } from "vitest";
+import { fromText, outOfRoom, toText, totalBytes } from "./ledger";
+
+const LEDGER = new Map([
+  ["new", { bytes: 30, used_ms: 3 }],
+  ["old", { bytes: 10, used_ms: 1 }],
+  ["middle", { bytes: 20, used_ms: 2 }],
+]);
+
+describe("the offline store's ledger", () => {
+  it("drops what was used least recently, and no more than it must", () => {
+    expect(totalBytes(LEDGER)).toBe(60);
+    expect(outOfRoom(LEDGER, 60)).toEqual([]);
+    expect(outOfRoom(LEDGER, 55)).toEqual(["old"]);
+    expect(outOfRoom(LEDGER, 50)).toEqual(["old"]);
+    expect(outOfRoom(LEDGER, 49)).toEqual(["old", "middle"]);
+    expect(outOfRoom(LEDGER, 0)).toEqual(["old", "middle", "new"]);
+  });
+
+  it("is the same after it was written and read", () => {
+    expect(fromText(toText(LEDGER))).toEqual(LEDGER);
+  });
+
+  it("is empty where its text is broken", () => {
+    for (const text of ["", "[1", "{}", "[1]"]) expect(fromText(text).size).toBe(0);
+  });
+});

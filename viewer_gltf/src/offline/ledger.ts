@@ -1,0 +1,38 @@
+/** What the offline store holds and when each entry was last used. Plain data. */
+
+export type Use = Readonly<{ bytes: number; used_ms: number }>;
+/** By key, in no order. */
+export type Ledger = ReadonlyMap<string, Use>;
+
+export function totalBytes(ledger: Ledger): number {
+  let sum = 0;
+  for (const { bytes } of ledger.values()) sum += bytes;
+  return sum;
+}
+
+/** The keys to drop until at most `limit_bytes` are left: least recently used first. */
+export function outOfRoom(ledger: Ledger, limit_bytes: number): string[] {
+  let excess = totalBytes(ledger) - limit_bytes;
+  const dropped: string[] = [];
+  const oldest = [...ledger].sort(([, a], [, b]) => a.used_ms - b.used_ms);
+  for (const [key, { bytes }] of oldest) {
+    if (excess <= 0) break;
+    dropped.push(key);
+    excess -= bytes;
+  }
+  return dropped;
+}
+
+export function toText(ledger: Ledger): string {
+  return JSON.stringify([...ledger].map(([key, { bytes, used_ms }]) => [key, bytes, used_ms]));
+}
+
+/** An unreadable text is an empty ledger: the store then finds its entries anew. */
+export function fromText(text: string): Map<string, Use> {
+  try {
+    const rows = JSON.parse(text) as [string, number, number][];
+    return new Map(rows.map(([key, bytes, used_ms]) => [key, { bytes, used_ms }]));
+  } catch {
+    return new Map();
+  }
+}

@@ -1,0 +1,54 @@
+/** Make the viewer and what it has shown usable without a network, where the browser can. */
+import { takeAsked } from "../bundle/log";
+import { ownBundle } from "./plan";
+import type { Opened } from "./sw";
+import workerAddress from "./sw?worker&url";
+
+/** A worker takes its pages over within this time, or never. */
+const CLAIM_MS = 10_000;
+
+/** Only on a host that browsers trust (https, or this machine), and for bundles of that host. */
+export function canKeep(page: string, isSecure: boolean): boolean {
+  return /^https?:/.test(page) && isSecure && ownBundle(page) !== null;
+}
+
+/**
+ * Start the service worker and hand it what was loaded before; for after the first picture. Sets
+ * `data-offline="ready"` on the page's root once all that was shown is kept, or "refused" where the
+ * browser keeps nothing, as on a full disk: the viewer then works as before.
+ */
+export async function keepOffline(): Promise<void> {
+  const { serviceWorker } = navigator as { serviceWorker?: ServiceWorkerContainer };
+  const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
+  if (!isAble || serviceWorker === undefined) {
+    takeAsked(); // nobody will want the log
+    return;
+  }
+  const wasServed = serviceWorker.controller !== null;
+  try {
+    await serviceWorker.register(workerAddress);
+  } catch {
+    takeAsked();
+    return; // such as where cookies are blocked
+  }
+  const { active } = await serviceWorker.ready;
+  await served(serviceWorker);
+  const { port1, port2 } = new MessageChannel();
+  port1.onmessage = ({ data }: MessageEvent<boolean>) => {
+    document.documentElement.dataset.offline = data ? "ready" : "refused";
+    port1.close();
+  };
+  // Whatever is asked from now on passes the worker; what came before, it is told.
+  const asked = takeAsked();
+  const message: Opened = { type: "opened", page: location.href, asked: wasServed ? [] : asked };
+  active?.postMessage(message, [port2]);
+}
+
+/** Resolves once the page's requests pass the worker, or it is clear that they won't. */
+function served(serviceWorker: ServiceWorkerContainer): Promise<void> {
+  if (serviceWorker.controller !== null) return Promise.resolve();
+  return new Promise((resolve) => {
+    serviceWorker.addEventListener("controllerchange", () => resolve(), { once: true });
+    setTimeout(resolve, CLAIM_MS); // a page that was reloaded past its worker is never served
+  });
+}

@@ -1,0 +1,16 @@
+import { describe, expect, it } from "vitest";
+import { breakLines } from "./paint";
+
+const measure = (words: string) => words.length;
+
+describe("text on the panel", () => {
+  it("stays as it is where it fits", () => {
+    expect(breakLines("one two", 7, 1, measure)).toEqual(["one two"]);
+  });
+
+  it("breaks between words, and ends with an ellipsis where lines run out", () => {
+    expect(breakLines("one two three", 7, 2, measure)).toEqual(["one two", "three"]);
+    expect(breakLines("one two three four", 7, 2, measure)).toEqual(["one two", "three…"]);
+    expect(breakLines("unbroken", 5, 1, measure)).toEqual(["unbr…"]);
+  });
+});

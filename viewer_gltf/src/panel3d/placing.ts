@@ -1,0 +1,81 @@
+/** Where in the room the panel and its button are, as directions from the eye. Radians. Pure. */
+import { type Matrix4, Vector3 } from "three";
+
+/** From the eye: to the right of -z, and up. */
+export type Bearing = Readonly<{ yaw: number; pitch: number }>;
+/** What the specimen covers, as seen from the eye; yaw about that of the head. */
+export type Extent = Readonly<{
+  yaw: readonly [number, number];
+  pitch: readonly [number, number];
+}>;
+
+const DEG = Math.PI / 180;
+/** Between specimen and panel. */
+const GAP = 3 * DEG;
+/** Heads are not turned further for it. */
+const LOWEST = -35 * DEG;
+const FARTHEST = 62 * DEG;
+/** It is read looking down a little, as a page is. */
+const COMFORT = -15 * DEG;
+/** Where the button is: under all that is looked at, and under the panel. */
+export const OPENER_PITCH = -52 * DEG;
+/** The head turns so far before the button follows. */
+const SLACK = 35 * DEG;
+/** Looking down further than this is looking for the button: it waits. */
+const LOOKING_DOWN = -20 * DEG;
+const FOLLOW_PER_S = 4;
+
+export function bearingOf(direction: Vector3): Bearing {
+  const { x, y, z } = direction;
+  return { yaw: Math.atan2(x, -z), pitch: Math.atan2(y, Math.hypot(x, z)) };
+}
+
+export function pointAt({ yaw, pitch }: Bearing, eye: Vector3, distance_m: number): Vector3 {
+  const flat = Math.cos(pitch);
+  const direction = new Vector3(flat * Math.sin(yaw), Math.sin(pitch), -flat * Math.cos(yaw));
+  return direction.multiplyScalar(distance_m).add(eye);
+}
+
+export function headBearing(head: Matrix4): Bearing {
+  return bearingOf(new Vector3(0, 0, -1).transformDirection(head));
+}
+
+/** -pi..pi */
+function wrapped(angle: number): number {
+  return Math.atan2(Math.sin(angle), Math.cos(angle));
+}
+
+/** Corners alone would miss what an edge that passes close to the eye covers. */
+export function extentOf(points: readonly Vector3[], eye: Vector3, headYaw: number): Extent {
+  const bearings = points.map((point) => bearingOf(point.clone().sub(eye)));
+  const yaws = bearings.map(({ yaw }) => wrapped(yaw - headYaw));
+  const pitches = bearings.map(({ pitch }) => pitch);
+  return {
+    yaw: [Math.min(...yaws), Math.max(...yaws)],
+    pitch: [Math.min(...pitches), Math.max(...pitches)],
+  };
+}
+
+/** Where the panel's middle goes, yaw about that of the head; `half`: of what the panel covers. */
+export function placePanel({ yaw, pitch }: Extent, half: Bearing): Bearing {
+  const middle = Math.min(0.5, Math.max(-0.5, (yaw[0] + yaw[1]) / 2));
+  const below: Bearing = {
+    yaw: middle,
+    pitch: Math.min(pitch[0] - GAP - half.pitch, COMFORT),
+  };
+  if (below.pitch >= LOWEST) return below;
+  const level = Math.min(0, Math.max(COMFORT, (pitch[0] + pitch[1]) / 2));
+  const left: Bearing = { yaw: yaw[0] - GAP - half.yaw, pitch: level };
+  if (left.yaw >= -FARTHEST) return left;
+  const right: Bearing = { yaw: yaw[1] + GAP + half.yaw, pitch: level };
+  if (right.yaw <= FARTHEST) return right;
+  return { yaw: -FARTHEST, pitch: level }; // the specimen is all around
+}
+
+/** The button stays where it is until the head has turned away, and while it is looked for. */
+export function followHead(yaw: number, head: Bearing, dt_s: number): number {
+  if (head.pitch < LOOKING_DOWN) return yaw;
+  const away = wrapped(head.yaw - yaw);
+  const over = Math.sign(away) * Math.max(0, Math.abs(away) - SLACK);
+  return wrapped(yaw + over * Math.min(1, FOLLOW_PER_S * dt_s));
+}

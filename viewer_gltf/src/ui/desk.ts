@@ -1,0 +1,188 @@
+/**
+ * What the user works the viewer by: panel, keys, list of keys, share link. Holds the panel's own
+ * view and turns wishes into actions and commands; whoever draws the panel elsewhere takes
+ * `layOut` and hands its wishes to `perform`.
+ */
+import { copyText } from "../share/copy";
+import { readLink, writeLink } from "../share/link";
+import { SETTINGS, settingsOf } from "../share/settings";
+import { initialState } from "../state";
+import type { Viewer } from "../viewer";
+import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/profile";
+import type { XrSupport } from "../xr/support";
+import type { Ranges } from "./channel_layout";
+import type { Command } from "./commands";
+import { changePanel, type Layout, type PanelView, START_VIEW, type Wish } from "./controls";
+import { Help } from "./help";
+import { type KeyContext, listenForKeys, wishOf } from "./keys";
+import { type Facts, layOut } from "./layout";
+import type { Said } from "./overlays";
+import { Panel } from "./panel";
+import { told } from "./told";
+
+/** What a phone lacks for it, the phone says when it is asked. */
+const SPLIT: XrSupport = { isAvailable: true, reason: "" };
+/** Figures that change with each frame can be read at this rate. */
+const REFRESH_MS = 250;
+
+export type DeskOptions = Readonly<{
+  subtitle: string;
+  /** Enter stereo; called from within a click or a key, as is the other. */
+  onStereo: () => void;
+  /** Split the screen for a phone viewer of such lenses. */
+  onSplit: (lenses: Profile) => void;
+}>;
+
+export class Desk {
+  readonly panel: Panel;
+  private view = START_VIEW;
+  private stereo: XrSupport = { isAvailable: false, reason: "" };
+  private readonly help: Help;
+  private readonly ranges: Ranges;
+  private readonly disposed = new AbortController();
+  private timer = 0;
+
+  constructor(
+    private readonly viewer: Viewer,
+    parent: HTMLElement,
+    private readonly said: Said,
+    private readonly options: DeskOptions,
+  ) {
+    const { channels } = viewer.bundle.manifest;
+    this.ranges = new Map(channels.map(({ id, window }) => [id, window]));
+    this.panel = new Panel((wish) => this.perform(wish));
+    parent.append(this.panel.root);
+    this.help = new Help(parent, () => {
+      if (this.view.isHelpOpen) this.perform({ panel: "help" });
+    });
+    listenForKeys((name) => this.press(name), this.disposed.signal);
+    // A link to another view of the same bundle: what it leaves out is as the bundle opens.
+    addEventListener("hashchange", () => location.reload(), { signal: this.disposed.signal });
+    this.refresh();
+  }
+
+  /** What a panel shows now; one that is drawn elsewhere has its own sections open. */
+  layOut(view: PanelView = this.view): Layout {
+    return layOut(this.viewer.state, this.facts, view);
+  }
+
+  setStereo(support: XrSupport): void {
+    this.stereo = support;
+    this.refresh();
+  }
+
+  /** Bring the panel to the state; to be called after each change. */
+  refresh(): void {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    this.panel.update(this.layOut());
+    this.help.update(this.view.isHelpOpen);
+  }
+
+  /** Bring the figures to the frame that was just drawn, now and then. */
+  refreshSoon(): void {
+    if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
+  }
+
+  perform(wish: Wish): void {
+    if (typeof wish === "string") this.run(wish);
+    else if ("panel" in wish) {
+      this.view = changePanel(this.view, wish);
+      this.refresh();
+    } else this.viewer.dispatch(wish);
+  }
+
+  /** Go to what the page's address asks for. */
+  followAddress(search: string, hash: string): void {
+    const { viewer } = this;
+    const { bounds_um } = viewer.bundle.manifest.specimen;
+    const { actions, look } = readLink(hash, viewer.state, bounds_um);
+    for (const action of [...settingsOf(search), ...actions]) viewer.dispatch(action);
+    if (look !== null) viewer.lookFrom(look);
+  }
+
+  private run(command: Command): void {
+    if (command === "share") void this.share();
+    else if (command === "stereo") {
+      if (this.stereo.isAvailable) this.options.onStereo();
+      else this.said.say(this.stereo.reason);
+    } else if (command === "split") {
+      this.splitScreen();
+    } else if (!this.viewer.run(command)) this.said.say("This viewer can't do that here.");
+  }
+
+  private splitScreen(): void {
+    const { lenses, code } = this.view;
+    try {
+      this.options.onSplit(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
+    } catch (error) {
+      if (!(error instanceof ProfileError)) throw error;
+      this.said.say(error.message);
+    }
+  }
+
+  private press(name: string): boolean {
+    const { viewer, view } = this;
+    const context: KeyContext = {
+      state: viewer.state,
+      view,
+      specimen: viewer.bundle.manifest.specimen.bounds_um,
+      gazed: viewer.snapshot().gazed,
+    };
+    const wish = wishOf(name, context);
+    if (wish === null) return false;
+    this.perform(wish);
+    const text = told(wish, viewer.state, this.ranges);
+    if (text !== "") this.said.say(text);
+    return true;
+  }
+
+  /** The address of this view, in the clipboard, in the address bar and in the panel. */
+  private async share(): Promise<void> {
+    const { viewer } = this;
+    const address = new URL(location.href);
+    for (const name of SETTINGS) address.searchParams.delete(name);
+    const start = initialState(viewer.bundle.manifest);
+    address.hash = writeLink(viewer.state, start, viewer.look);
+    history.replaceState(history.state, "", address);
+    const open = this.view.open.filter((id) => id !== "share");
+    this.view = { ...this.view, link: address.href, open: [...open, "share"] };
+    this.refresh();
+    if (await copyText(address.href)) this.said.say("The link is in the clipboard.");
+    else {
+      this.panel.focus("link"); // which selects it
+      this.said.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
+    }
+  }
+
+  private get facts(): Facts {
+    const { viewer, stereo } = this;
+    const { specimen } = viewer.bundle.manifest;
+    const { triangles, volumes, isLoading, gazed, frame_ms, isStereo, settings } =
+      viewer.snapshot();
+    const levels = volumes.flatMap(({ level }) => (level === null ? [] : [level]));
+    return {
+      title: specimen.name,
+      subtitle: this.options.subtitle,
+      specimen: specimen.bounds_um,
+      ranges: this.ranges,
+      gazed,
+      isStereo,
+      stereo,
+      split: SPLIT,
+      frame_ms: frame_ms > 0 ? frame_ms : null,
+      settings,
+      triangles,
+      volumeLevel: levels.length > 0 ? Math.min(...levels) : null,
+      isLoading,
+      values: [],
+    };
+  }
+
+  dispose(): void {
+    clearTimeout(this.timer);
+    this.disposed.abort();
+    this.panel.root.remove();
+    this.help.dispose();
+  }
+}

@@ -1,0 +1,268 @@
+/** Every key, what it asks for, and the words of the list that `?` opens. Pure but for the listener. */
+import { fromHex, toHex } from "../color";
+import { type ChannelState, LIMITS, type ViewerState } from "../state";
+import type { Box } from "../view/clip";
+import type { PanelView, Wish } from "./controls";
+import { middleBox, middlePlane, modesOf } from "./layout";
+import { nextColour } from "./palettes";
+import { chosenTile } from "./tile_layout";
+
+export type KeyContext = Readonly<{
+  state: ViewerState;
+  view: PanelView;
+  /** um, world. */
+  specimen: Box;
+  gazed: string | null;
+}>;
+
+export type Key = Readonly<{
+  /** As `KeyboardEvent.key` has it; several mean the same. */
+  keys: readonly string[];
+  label: string;
+  /** null: there is nothing to do now. `name`: which of its keys it was. */
+  to: (context: KeyContext, name: string) => Wish | null;
+}>;
+export type KeyGroup = Readonly<{ name: string; keys: readonly Key[] }>;
+
+const QUALITIES = ["auto", "low", "high"] as const;
+const OPACITY_STEP = 0.05;
+const WINDOW_STEP = 1 / 64;
+const DISC_STEP_DEG = 1;
+/** Of a distance, so that near and far feel alike. */
+const DISTANCE_FACTOR = 1.1;
+
+/** The item after (or before) the present one, round the end. */
+function neighbour<T>(items: readonly T[], present: T | undefined, by: number): T | null {
+  if (items.length === 0) return null;
+  const at = present === undefined ? -1 : items.indexOf(present);
+  if (at === -1) return by > 0 ? items[0] : items[items.length - 1];
+  return items[(at + by + items.length) % items.length];
+}
+
+/** The channel that the channel keys mean: the open card's, or the first one shown. */
+export function meantChannel({ state, view }: KeyContext): ChannelState | undefined {
+  const shown = state.channels.filter((channel) => channel.shown);
+  return shown.find(({ id }) => id === view.picked) ?? shown[0];
+}
+
+function key(keys: string | readonly string[], label: string, to: Wish | Key["to"]): Key {
+  return {
+    keys: typeof keys === "string" ? [keys] : keys,
+    label,
+    to: typeof to === "function" ? to : () => to,
+  };
+}
+
+/** A key of the meant channel. */
+function ofChannel(name: string, label: string, to: (channel: ChannelState) => Wish | null): Key {
+  return key(name, label, (context) => {
+    const channel = meantChannel(context);
+    return channel === undefined ? null : to(channel);
+  });
+}
+
+function pick(by: number): Key["to"] {
+  return ({ state, view }) => {
+    const shown = state.channels.filter((each) => each.shown).map(({ id }) => id);
+    const channel = neighbour(shown, view.picked ?? undefined, by);
+    return channel === null ? null : { panel: "pick", channel };
+  };
+}
+
+function nextTile(by: number): Key["to"] {
+  return ({ state }) => {
+    const ids = state.tiles.map(({ id }) => id);
+    const tile = neighbour(ids, state.isolated ?? state.selected ?? undefined, by);
+    if (tile === null) return null;
+    return state.isolated === null ? { type: "select", tile } : { type: "isolate", tile };
+  };
+}
+
+function fade(by: number) {
+  return ({ id, opacity }: ChannelState): Wish => ({
+    type: "fade",
+    channel: id,
+    opacity: Math.round(100 * (opacity + by)) / 100,
+  });
+}
+
+function shift(low: number, high: number) {
+  return ({ id, window }: ChannelState): Wish => ({
+    type: "window",
+    channel: id,
+    window: [window[0] + low, window[1] + high],
+  });
+}
+
+function farther(factor: number): Key["to"] {
+  const [least, most] = LIMITS.switchDistance_m;
+  return ({ state: { switchDistance_m } }) => ({
+    type: "set-switch-distance",
+    distance_m: Math.min(most, Math.max(least, Number((switchDistance_m * factor).toPrecision(3)))),
+  });
+}
+
+const wider =
+  (by: number): Key["to"] =>
+  ({ state }) => ({ type: "set-disc-radius", radius_deg: state.discRadius_deg + by });
+
+const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
+
+const CHANNEL_KEYS: readonly Key[] = [
+  key(DIGITS, "Show or hide this channel of the bundle", ({ state }, name) => {
+    const channel = state.channels[Number(name) - 1];
+    if (channel === undefined) return null;
+    return { type: "show", channel: channel.id, shown: !channel.shown };
+  }),
+  key("c", "Next channel: the keys below mean it", pick(1)),
+  key("C", "Previous channel", pick(-1)),
+  ofChannel("x", "Hide the channel", ({ id }) => ({ type: "show", channel: id, shown: false })),
+  ofChannel("v", "Volume on or off", ({ id, volume }) => ({
+    type: "draw-volume",
+    channel: id,
+    volume: !volume,
+  })),
+  ofChannel("f", "Next transfer function", ({ id, transferFunction, transferFunctions }) => {
+    const name = neighbour(transferFunctions, transferFunction, 1);
+    return name === null ? null : { type: "choose-transfer-function", channel: id, name };
+  }),
+  ofChannel("k", "Next colour of the palettes", ({ id, color }) => ({
+    type: "recolor",
+    channel: id,
+    color: fromHex(nextColour(toHex(color))),
+  })),
+  ofChannel("o", "Less opacity", fade(-OPACITY_STEP)),
+  ofChannel("O", "More opacity", fade(OPACITY_STEP)),
+  ofChannel("w", "Window: lower end down", shift(-WINDOW_STEP, 0)),
+  ofChannel("W", "Window: lower end up", shift(WINDOW_STEP, 0)),
+  ofChannel("e", "Window: upper end down", shift(0, -WINDOW_STEP)),
+  ofChannel("E", "Window: upper end up", shift(0, WINDOW_STEP)),
+];
+
+const VOLUME_KEYS: readonly Key[] = [
+  key("m", "Next mode: where volumes show", ({ state }) => {
+    const mode = neighbour(modesOf(state), state.mode, 1);
+    return mode === null ? null : { type: "choose-mode", mode };
+  }),
+  key("s", "Smaller switch distance", farther(1 / DISTANCE_FACTOR)),
+  key("S", "Larger switch distance", farther(DISTANCE_FACTOR)),
+  key("d", "Smaller disc", wider(-DISC_STEP_DEG)),
+  key("D", "Larger disc", wider(DISC_STEP_DEG)),
+  key("q", "Next quality", ({ state }) => {
+    const level = neighbour(QUALITIES, state.quality, 1);
+    return level === null ? null : { type: "choose-quality", level };
+  }),
+];
+
+const TILE_KEYS: readonly Key[] = [
+  key("t", "Next tile", nextTile(1)),
+  key("T", "Previous tile", nextTile(-1)),
+  key("i", "Show only the tile that is chosen or looked at; again: all", (context) => {
+    const { state, gazed } = context;
+    if (state.isolated !== null) return { type: "isolate", tile: null };
+    const tile = state.selected ?? gazed;
+    return tile === null ? null : { type: "isolate", tile };
+  }),
+  key("g", "Choose the tile that is looked at", ({ state, gazed }) =>
+    gazed === null ? null : chosenTile(state, gazed),
+  ),
+  key(["Escape", "Backspace"], "Back: all tiles, then none chosen", "back"),
+];
+
+const VIEW_KEYS: readonly Key[] = [
+  key("ArrowLeft", "Turn left", "turn-left"),
+  key("ArrowRight", "Turn right", "turn-right"),
+  key("ArrowUp", "Turn up", "turn-up"),
+  key("ArrowDown", "Turn down", "turn-down"),
+  key(["+", "="], "Zoom in", "zoom-in"),
+  key("-", "Zoom out", "zoom-out"),
+  key("z", "From the front (along z)", "front"),
+  key("a", "From the side (along x)", "side"),
+  key("y", "From the top (along y)", "top"),
+  key("r", "Reset the view", "reset"),
+  key("V", "Enter stereo (VR)", "stereo"),
+  key("P", "Split screen for a phone viewer", "split"),
+  key("j", "Choosing by gaze on or off", ({ state }) => ({
+    type: "set-dwell",
+    isOn: !state.isDwellOn,
+  })),
+];
+
+const TOOL_KEYS: readonly Key[] = [
+  key("p", "A tap selects or measures", ({ state }) => ({
+    type: "choose-tool",
+    tool: state.tool === "select" ? "measure" : "select",
+  })),
+  key("Enter", "Tap in the middle of the view", "press"),
+  key("u", "Clear what was measured", ({ state }) =>
+    state.measured.length === 0 ? null : { type: "measure", points: [] },
+  ),
+  key("b", "Cut by a box: on or off", ({ state: { clip }, specimen }) => ({
+    type: "set-clip",
+    clip: { ...clip, box: clip.box === null ? middleBox(specimen) : null },
+  })),
+  key("n", "Cut by a plane: on or off", ({ state: { clip }, specimen }) => ({
+    type: "set-clip",
+    clip: { ...clip, plane: clip.plane === null ? middlePlane(specimen) : null },
+  })),
+  key("l", "Copy a link to this view", "share"),
+  key("Delete", "Dismiss the newest notice", ({ state }) => {
+    const text = state.notices.at(-1);
+    return text === undefined ? null : { type: "dismiss", text };
+  }),
+  key("h", "Hide or show the panel", { panel: "hide" }),
+  key("?", "This list", { panel: "help" }),
+];
+
+export const KEYS: readonly KeyGroup[] = [
+  { name: "View", keys: VIEW_KEYS },
+  { name: "Channels", keys: CHANNEL_KEYS },
+  { name: "Volumes", keys: VOLUME_KEYS },
+  { name: "Tiles", keys: TILE_KEYS },
+  { name: "Tools", keys: TOOL_KEYS },
+];
+
+const BY_KEY: ReadonlyMap<string, Key> = new Map(
+  KEYS.flatMap(({ keys }) =>
+    keys.flatMap((each) => each.keys.map((name) => [name, each] as const)),
+  ),
+);
+
+export function wishOf(name: string, context: KeyContext): Wish | null {
+  return BY_KEY.get(name)?.to(context, name) ?? null;
+}
+
+/** What has the keyboard: a field takes every key, a control those that it is worked by. */
+export type Focus = "field" | "control" | "page";
+
+export function firesOn(name: string, focus: Focus): boolean {
+  if (focus === "field") return false;
+  return focus === "page" || (name.length === 1 && !["+", "-", "=", " "].includes(name));
+}
+
+const TEXT_INPUTS = ["text", "search", "url", "number", "color", "email", "password", "tel"];
+
+export function focusOf(target: EventTarget | null): Focus {
+  if (!(target instanceof HTMLElement)) return "page";
+  if (target.isContentEditable || target instanceof HTMLTextAreaElement) return "field";
+  if (target instanceof HTMLSelectElement) return "field"; // letters choose its options
+  if (target instanceof HTMLInputElement) {
+    return TEXT_INPUTS.includes(target.type) ? "field" : "control";
+  }
+  return target instanceof HTMLButtonElement ? "control" : "page";
+}
+
+/** @param onKey returns whether the key did something: then the browser does nothing with it */
+export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSignal): void {
+  addEventListener(
+    "keydown",
+    (event) => {
+      if (event.defaultPrevented || event.isComposing) return;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (document.querySelector("dialog[open]") !== null) return;
+      if (!firesOn(event.key, focusOf(event.target))) return;
+      if (onKey(event.key)) event.preventDefault();
+    },
+    { signal },
+  );
+}

@@ -1,0 +1,248 @@
+/** What the panel shows of a state: see controls.ts. Pure. */
+import { distanceBetween, distanceText } from "../measure/measure";
+import type { QualityLevel, QualitySettings } from "../quality/controller";
+import { LIMITS, MODES, type Mode, type Tool, type ViewerState } from "../state";
+import type { Box, ClipPlane } from "../view/clip";
+import { channelItems, type Ranges } from "./channel_layout";
+import type { Control, Layout, PanelView, Section, Slider } from "./controls";
+import { command, inline } from "./shapes";
+import { type StereoSupport, stereoItems } from "./stereo_layout";
+import { tileItems } from "./tile_layout";
+
+export { chosenTile } from "./tile_layout";
+
+/** What the state does not hold. */
+export type Facts = StereoSupport &
+  Readonly<{
+    title: string;
+    subtitle: string;
+    /** um, world. */
+    specimen: Box;
+    ranges: Ranges;
+    /** The tile that is looked at. */
+    gazed: string | null;
+    isStereo: boolean;
+    /** null: not known yet. */
+    frame_ms: number | null;
+    settings: QualitySettings | null;
+    triangles: number;
+    /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
+    volumeLevel: number | null;
+    isLoading: boolean;
+    /** The channels' values at the second measured point, as `DAPI 1210`. */
+    values: readonly string[];
+  }>;
+
+const MODE_NAMES: Readonly<Record<Mode, string>> = {
+  disc: "Disc",
+  tile: "Tile",
+  all: "All",
+  stage: "Staged",
+  off: "Off",
+};
+const QUALITY_NAMES: Readonly<Record<QualityLevel, string>> = {
+  auto: "Auto",
+  low: "Low",
+  high: "High",
+};
+const TOOL_NAMES: Readonly<Record<Tool, string>> = { select: "Select", measure: "Measure" };
+const SLIDER_STEPS = 100;
+
+/** The modes that can be chosen: as staged only where an artist has staged something. */
+export function modesOf(state: ViewerState): readonly Mode[] {
+  const isStaged = state.tiles.some(({ representation }) => representation !== "mesh");
+  return MODES.filter((mode) => mode !== "stage" || isStaged);
+}
+
+/** The middle half of the specimen along each axis: a cut that is seen at once, from every side. */
+export function middleBox({ min, max }: Box): Box {
+  const at = (i: 0 | 1 | 2, share: number) => min[i] + share * (max[i] - min[i]);
+  return {
+    min: [at(0, 0.25), at(1, 0.25), at(2, 0.25)],
+    max: [at(0, 0.75), at(1, 0.75), at(2, 0.75)],
+  };
+}
+
+/** Through the specimen's middle, the half towards the viewer cut away. */
+export function middlePlane({ min, max }: Box): ClipPlane {
+  return { normal: [0, 0, 1], offset_um: (min[2] + max[2]) / 2 };
+}
+
+export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layout {
+  const section = (id: string, label: string, items: Section["items"]): Section => ({
+    id,
+    label,
+    isOpen: view.open.includes(id),
+    opener: { panel: "unfold", section: id },
+    items,
+  });
+  return {
+    title: facts.title,
+    subtitle: facts.subtitle,
+    isHidden: view.isHidden,
+    sections: [
+      section("channels", "Channels", channelItems(state, facts.ranges, view)),
+      section("volumes", "Volumes", volumeItems(state)),
+      section("tiles", "Tiles", tileItems(state, facts.gazed)),
+      section("view", "View", [
+        command("front", "Front"),
+        command("side", "Side"),
+        command("top", "Top"),
+        command("reset", "Reset"),
+      ]),
+      section("stereo", "Stereo", stereoItems(state, facts, view)),
+      section("measure", "Measure", measureItems(state, facts.values)),
+      section("cut", "Cut open", cutItems(state, facts.specimen)),
+      section("quality", "Quality", qualityItems(state, facts)),
+      section("share", "Share", [
+        command("share", "Copy a link to this view"),
+        ...(view.link === ""
+          ? []
+          : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
+        { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
+      ]),
+    ],
+    status: statusOf(facts),
+  };
+}
+
+function volumeItems(state: ViewerState): readonly Control[] {
+  const [least, most] = LIMITS.switchDistance_m;
+  const [narrowest, widest] = LIMITS.discRadius_deg;
+  const distance: Slider = {
+    kind: "slider",
+    id: "switch-distance",
+    label: "Switch distance",
+    name: "Switch distance: volumes show within",
+    value: Math.log(state.switchDistance_m / least) / Math.log(most / least),
+    steps: SLIDER_STEPS,
+    text: `${state.switchDistance_m.toPrecision(2)} m`,
+    // As many digits as a step needs; more would only lengthen a link.
+    to: (value) => ({
+      type: "set-switch-distance",
+      distance_m: Number((least * (most / least) ** value).toPrecision(3)),
+    }),
+  };
+  const radius: Slider = {
+    kind: "slider",
+    id: "disc-radius",
+    label: "Disc radius",
+    value: (state.discRadius_deg - narrowest) / (widest - narrowest),
+    steps: 2 * (widest - narrowest),
+    text: `${Number(state.discRadius_deg.toFixed(1))}°`,
+    refusal: state.mode === "disc" ? "" : "Only the mode Disc has one.",
+    to: (value) => ({
+      type: "set-disc-radius",
+      radius_deg: Number((narrowest + (widest - narrowest) * value).toFixed(2)),
+    }),
+  };
+  const isNear = state.mode === "disc" || state.mode === "tile";
+  const mode = inline(
+    "mode",
+    "Where volumes show",
+    state.mode,
+    MODE_NAMES,
+    modesOf(state),
+    (each) => ({
+      type: "choose-mode",
+      mode: each,
+    }),
+  );
+  return [
+    mode,
+    { ...distance, refusal: isNear ? "" : "Only the modes Disc and Tile have one." },
+    radius,
+  ];
+}
+
+/** `12.3 µm`, or what is missing to it. */
+export function measuredText({ tool, measured }: ViewerState): string {
+  const [from, to] = measured;
+  if (from !== undefined && to !== undefined) return distanceText(distanceBetween(from, to));
+  if (from !== undefined) return "Now the other point.";
+  return tool === "measure" ? "Choose two points of the specimen." : "";
+}
+
+function measureItems(state: ViewerState, values: readonly string[]): readonly Control[] {
+  const text = [measuredText(state), ...values].filter((each) => each !== "").join(" · ");
+  return [
+    inline("tool", "A tap", state.tool, TOOL_NAMES, ["select", "measure"], (tool) => ({
+      type: "choose-tool",
+      tool,
+    })),
+    { kind: "text", id: "distance", label: "Distance", value: text },
+    {
+      kind: "button",
+      id: "clear-measured",
+      label: "Clear",
+      refusal: state.measured.length === 0 ? "Nothing is measured." : "",
+      to: () => ({ type: "measure", points: [] }),
+    },
+  ];
+}
+
+function cutItems({ clip }: ViewerState, specimen: Box): readonly Control[] {
+  return [
+    {
+      kind: "toggle",
+      id: "clip-box",
+      label: "Box",
+      name: "Cut by a box",
+      value: clip.box !== null,
+      to: (value) => ({
+        type: "set-clip",
+        clip: { ...clip, box: value ? middleBox(specimen) : null },
+      }),
+    },
+    {
+      kind: "toggle",
+      id: "clip-plane",
+      label: "Plane",
+      name: "Cut by a plane",
+      value: clip.plane !== null,
+      to: (value) => ({
+        type: "set-clip",
+        clip: { ...clip, plane: value ? middlePlane(specimen) : null },
+      }),
+    },
+  ];
+}
+
+function qualityItems(state: ViewerState, { settings, frame_ms }: Facts): readonly Control[] {
+  const levels = ["auto", "low", "high"] as const;
+  const level = inline("quality", "Quality", state.quality, QUALITY_NAMES, levels, (each) => ({
+    type: "choose-quality",
+    level: each,
+  }));
+  const items: Control[] = [
+    level,
+    {
+      kind: "text",
+      id: "frame-time",
+      label: "Frame",
+      value: frameText(frame_ms) || "not measured yet",
+    },
+  ];
+  if (settings !== null) {
+    const { steps, resolution, errorFactor } = settings;
+    const parts = [`${steps} steps a ray`, `${Math.round(100 * resolution)} % resolution`];
+    if (errorFactor !== 1) parts.push(`${errorFactor} x coarser surfaces`);
+    items.push({ kind: "text", id: "settings", label: "March", value: parts.join(", ") });
+  }
+  return items;
+}
+
+function frameText(frame_ms: number | null): string {
+  return frame_ms === null ? "" : `${frame_ms.toFixed(frame_ms < 10 ? 1 : 0)} ms`;
+}
+
+function statusOf({ triangles, volumeLevel, frame_ms, isLoading }: Facts): string {
+  return [
+    `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`,
+    volumeLevel === null ? "" : `volume level ${volumeLevel}`,
+    frameText(frame_ms),
+    isLoading ? "refining …" : "",
+  ]
+    .filter((part) => part !== "")
+    .join(" · ");
+}

@@ -1,0 +1,74 @@
+/** What a key has done, in words: whoever uses keys may not see the control that it stands for. Pure. */
+import type { Action, ViewerState } from "../state";
+import { intensityText, type Ranges } from "./channel_layout";
+import type { Wish } from "./controls";
+import { measuredText } from "./layout";
+
+/** @param state after the wish was granted; "" where the picture says it all */
+export function told(wish: Wish, state: ViewerState, ranges: Ranges): string {
+  if (typeof wish === "string") return "";
+  if (!("panel" in wish)) return toldAction(wish, state, ranges);
+  if (wish.panel !== "pick" || wish.channel === null) return "";
+  return `Channel ${nameOf(wish.channel, state)}`;
+}
+
+function nameOf(id: string, { channels }: ViewerState): string {
+  return channels.find((channel) => channel.id === id)?.name ?? id;
+}
+
+function toldAction(action: Action, state: ViewerState, ranges: Ranges): string {
+  if ("channel" in action) return toldChannel(action, state, ranges);
+  switch (action.type) {
+    case "select":
+      return action.tile === null ? "No tile chosen" : `Tile ${action.tile}`;
+    case "isolate":
+      return action.tile === null ? "All tiles" : `Only tile ${action.tile}`;
+    case "choose-mode":
+      return `Volumes: ${state.mode}`;
+    case "set-switch-distance":
+      return `Volumes within ${state.switchDistance_m.toPrecision(2)} m`;
+    case "set-disc-radius":
+      return `Disc ${Number(state.discRadius_deg.toFixed(1))}°`;
+    case "set-clip": {
+      const { box, plane } = state.clip;
+      const cuts = [box && "a box", plane && "a plane"].filter(Boolean).join(" and ");
+      return cuts === "" ? "Not cut" : `Cut by ${cuts}`;
+    }
+    case "choose-tool":
+      return state.tool === "measure" ? measuredText(state) : "A tap selects";
+    case "measure":
+      return measuredText(state);
+    case "set-dwell":
+      return `Choosing by gaze: ${state.isDwellOn ? "on" : "off"}`;
+    case "choose-quality":
+      return `Quality: ${state.quality}`;
+    default:
+      return "";
+  }
+}
+
+function toldChannel(
+  { channel: id, type }: Extract<Action, { channel: string }>,
+  state: ViewerState,
+  ranges: Ranges,
+): string {
+  const channel = state.channels.find((each) => each.id === id);
+  if (channel === undefined) return "";
+  const { name, window } = channel;
+  switch (type) {
+    case "show":
+      return `${name}: ${channel.shown ? "shown" : "hidden"}`;
+    case "fade":
+      return `${name}: opacity ${Math.round(100 * channel.opacity)} %`;
+    case "window": {
+      const ends = window.map((end) => intensityText(end, ranges.get(id)));
+      return `${name}: window ${ends.join(" – ")}`;
+    }
+    case "draw-volume":
+      return `${name}: volume ${channel.volume ? "on" : "off"}`;
+    case "choose-transfer-function":
+      return `${name}: ${channel.transferFunction}`;
+    case "recolor":
+      return `${name}: another colour`;
+  }
+}

@@ -1,0 +1,35 @@
+import { CylinderGeometry, Mesh, MeshBasicMaterial } from "three";
+import { describe, expect, it } from "vitest";
+import { Hand } from "./controllers";
+
+/** Only what a hand reads of its source. */
+function handOf(source: Partial<Record<keyof XRInputSource, unknown>>): Hand {
+  const line = new Mesh(new CylinderGeometry(), new MeshBasicMaterial());
+  return new Hand({ profiles: [], ...source } as unknown as XRInputSource, line);
+}
+
+describe("an input source", () => {
+  it("squeezes if its profiles say so; bare hands and one-button remotes don't", () => {
+    const profiles = ["meta-quest-touch-plus", "generic-trigger-squeeze-thumbstick"];
+    expect(handOf({ profiles }).canSqueeze).toBe(true);
+    const remote = ["oculus-go", "generic-trigger-touchpad"];
+    const gamepad = { mapping: "xr-standard", buttons: [{}, {}, {}], axes: [] };
+    expect(handOf({ profiles: remote, gamepad }).canSqueeze).toBe(false);
+    expect(handOf({ profiles: ["unheard-of"], gamepad }).canSqueeze).toBe(true);
+    expect(handOf({ profiles, hand: {} }).canSqueeze).toBe(false);
+  });
+
+  it("has a stick that rests at zero, or a touchpad", () => {
+    const stick = (axes: number[]) => handOf({ gamepad: { mapping: "xr-standard", axes } }).stick;
+    expect(stick([0, 0, 0.1, -0.8])).toEqual({ x: 0, y: -0.8 });
+    expect(stick([0.5, 0])).toEqual({ x: 0.5, y: 0 });
+    expect(stick([])).toEqual({ x: 0, y: 0 });
+    expect(handOf({}).stick).toEqual({ x: 0, y: 0 });
+  });
+
+  it("has no place of its own where it is a look or a screen", () => {
+    const isTracked = (targetRayMode: string) => handOf({ targetRayMode }).isTracked;
+    expect(["gaze", "screen"].map(isTracked)).toEqual([false, false]);
+    expect(["tracked-pointer", "transient-pointer"].map(isTracked)).toEqual([true, true]);
+  });
+});

@@ -1,0 +1,121 @@
+/** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
+import { type Camera, Matrix4, type WebGLRenderer } from "three";
+import type { ViewerState } from "../state";
+import type { Command } from "../ui/commands";
+import type { Eyes } from "../view/eyes";
+import type { Profile } from "./cardboard/profile";
+import type { SplitSession } from "./cardboard/split_session";
+import { Hands, type HandsOptions } from "./hands";
+import { betweenEyes } from "./head";
+import { XrSession } from "./session";
+
+export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
+  Readonly<{ onStart: () => void; onEnd: () => void }>;
+
+export class Stereo {
+  readonly headset: XrSession;
+  readonly hands: Hands;
+  private split: SplitSession | null = null;
+  private readonly between = new Matrix4();
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly options: StereoOptions,
+  ) {
+    this.hands = new Hands({ ...options, xr: renderer.xr, onLeave: () => this.end() });
+    this.headset = new XrSession(
+      renderer,
+      () => this.begin(this.headset.current),
+      () => this.leave(),
+    );
+  }
+
+  get kind(): "headset" | "split" | null {
+    if (this.renderer.xr.isPresenting) return "headset";
+    return this.split?.isRunning ? "split" : null;
+  }
+
+  /**
+   * Split screen for a phone in a viewer without WebXR. Must be called from a tap. Throws
+   * BundleError in words if the browser or the user refuses. Returns what could not be had.
+   */
+  async startSplit(profile: Profile): Promise<readonly string[]> {
+    if (this.split === null) {
+      const { SplitSession } = await import("./cardboard/split_session");
+      this.split ??= new SplitSession(
+        this.renderer,
+        () => this.begin(null),
+        () => this.leave(),
+        () => this.hands.tap(),
+      );
+    }
+    await this.split.start(profile);
+    return this.split.problems;
+  }
+
+  /** Where the eyes are in this frame. Returns the camera to draw with; null: no stereo. */
+  pose(eyes: Eyes): Camera | null {
+    if (this.renderer.xr.isPresenting) {
+      eyes.followHeadset(this.renderer, this.headset.camera);
+      return this.headset.camera;
+    }
+    if (!this.split?.isRunning) return null;
+    this.split.update();
+    eyes.follow(this.split.eyes.map(({ camera, viewport }) => [camera, viewport]));
+    return this.split.camera;
+  }
+
+  /** The camera that sees what both eyes see. */
+  seenBy(camera: Camera): Camera {
+    // three moves the headset's cameras, not the one that it is given
+    return this.renderer.xr.isPresenting ? this.renderer.xr.getCamera() : camera;
+  }
+
+  /** Pose of the head in the room, between the eyes; null: no stereo. */
+  get head(): Matrix4 | null {
+    if (this.renderer.xr.isPresenting) {
+      return betweenEyes(this.renderer.xr.getCamera().cameras, this.between);
+    }
+    return this.split?.isRunning ? this.split.head : null;
+  }
+
+  /** Draw a frame: through the lenses, where the screen is split. */
+  present(draw: () => void): void {
+    const { split } = this;
+    if (!split?.isRunning) {
+      draw();
+      return;
+    }
+    this.renderer.setRenderTarget(split.target);
+    draw();
+    this.renderer.setRenderTarget(null);
+    split.present();
+  }
+
+  /** Whether a command was one of those that move the specimen before the eyes. */
+  run(command: Command, state: ViewerState): boolean {
+    if (command !== "press") return this.hands.run(command, state);
+    this.hands.tap();
+    return true;
+  }
+
+  private begin(session: XRSession | null): void {
+    this.options.onStart();
+    this.hands.start(session);
+  }
+
+  private leave(): void {
+    this.hands.stop();
+    this.options.onEnd();
+  }
+
+  private end(): void {
+    this.split?.end();
+    void this.headset.end();
+  }
+
+  dispose(): void {
+    this.hands.dispose();
+    this.split?.dispose();
+  }
+}

@@ -1,0 +1,141 @@
+/** Faults on the way to the page: a network that goes and comes, files cut short, nothing to show. */
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
+import { afterEach, beforeEach, expect, it } from "vitest";
+import { ViewerPage } from "./driver/page";
+import { isBackground, takePicture } from "./driver/picture";
+import { describeInChromium } from "./driver/skip";
+import { prepareStand } from "./driver/stand";
+import { Gate } from "./offline/gate";
+
+describeInChromium("a fault on the way", () => {
+  const stand = prepareStand({ viewport: { width: 640, height: 360 } });
+  let gate: Gate;
+
+  beforeEach(async () => {
+    gate = await Gate.before(stand.host.address);
+  });
+
+  afterEach(async () => {
+    await gate.stop();
+  });
+
+  const through = (query = "") => `${gate.address}/app/?bundle=../bundle/${query}`;
+  const notices = async () => (await stand.viewer.snapshot()).state.notices;
+
+  async function fatalText(body: string | Uint8Array, path = "manifest.json"): Promise<string> {
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+    await stand.viewer.page.goto(`${stand.host.address}/app/?bundle=../bundle/`);
+    return (await stand.viewer.page.locator("[data-fatal]").textContent()) ?? "";
+  }
+
+  it("a manifest that is cut short is told as such", async () => {
+    const text = JSON.stringify(stand.manifest);
+    expect(await fatalText(text.slice(0, text.length / 2))).toContain(
+      "manifest.json: the JSON is broken or cut short (",
+    );
+  });
+
+  it("a manifest of a newer format is told with both versions", async () => {
+    expect(await fatalText(JSON.stringify({ ...stand.manifest, version: 2 }))).toContain(
+      "manifest.json: version: this viewer reads version 1, found 2; open the bundle with the viewer",
+    );
+  });
+
+  it("a bundle without channels is told in one line", async () => {
+    expect(await fatalText(JSON.stringify({ ...stand.manifest, channels: [] }))).toContain(
+      "manifest.json: channels: the bundle holds none, so nothing can be shown",
+    );
+  });
+
+  it("a host that can't be reached is told as such", async () => {
+    await stand.viewer.page.route("**/manifest.json", (route) => route.abort());
+    await stand.viewer.page.goto(through());
+    const fatal = stand.viewer.page.locator("[data-fatal]");
+    expect(await fatal.textContent()).toMatch(
+      /^.*manifest\.json: the host of .* can't be reached/s,
+    );
+  });
+
+  it("a volume that is cut short is named, and the surfaces stay", async () => {
+    const path = "volumes/r0_c0/Block.ktx2";
+    const whole = await readFile(join(stand.bundle, path));
+    stand.host.hasRanges = false;
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body: whole.subarray(0, 100) });
+    await stand.open();
+    await stand.viewer.drawVolume("Block", true);
+    await stand.viewer.chooseMode("all");
+    expect((await notices()).join()).toContain(
+      `${path}: expected ${whole.length} bytes, found 100 (a broken upload?)`,
+    );
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0); // the other tile's
+    const picture = await takePicture(stand.viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+  });
+
+  it("a volume with other bytes than it should have is named", async () => {
+    const path = "volumes/r0_c0/Block.ktx2";
+    const body = Buffer.from(await readFile(join(stand.bundle, path)));
+    body[body.length - 1] ^= 1;
+    stand.host.hasRanges = false;
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+    await stand.open();
+    await stand.viewer.drawVolume("Block", true);
+    await stand.viewer.chooseMode("all");
+    expect((await notices()).join()).toMatch(new RegExp(`${path}: expected SHA-256 .*, found`));
+  });
+
+  it("a surface that is no glTF inside is named, and the others stay", async () => {
+    const path = "channels/Balls/r0_c1/lod2.glb";
+    const body = Buffer.from(await readFile(join(stand.bundle, path)));
+    body.fill(0x7b, 20, 40); // the JSON chunk's start
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+    await stand.open();
+    await stand.viewer.settled();
+    expect((await notices()).join()).toContain(`${path}: the surface can't be read`);
+    expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
+  });
+
+  it("a network that is lost in the middle, and comes back, leaves no trace", async () => {
+    const viewer = new ViewerPage(stand.viewer.page);
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    gate.shut();
+    const shown = viewer.drawVolume("Block", true).then(() => viewer.chooseMode("all"));
+    await new Promise((resolve) => setTimeout(resolve, 700)); // a first try has failed
+    gate.open();
+    await shown;
+    await viewer.settled();
+    expect(await notices()).toEqual([]);
+    expect((await viewer.snapshot()).volumes.length).toBeGreaterThan(0);
+  });
+
+  it("a network that stays away is told, and what is here stays on screen", async () => {
+    const viewer = new ViewerPage(stand.viewer.page);
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    const { triangles } = await viewer.snapshot();
+    gate.shut();
+    await viewer.drawVolume("Block", true);
+    await viewer.chooseMode("all");
+    expect((await notices()).join()).toMatch(/can't be reached/);
+    expect((await viewer.snapshot()).triangles).toBeGreaterThan(0);
+    await viewer.chooseMode("off");
+    expect((await viewer.snapshot()).triangles).toBe(triangles);
+    const picture = await takePicture(viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+  });
+
+  it("a connection that breaks is tried again", async () => {
+    const path = "/bundle/channels/Balls/r0_c1/lod2.glb";
+    let broken = 0;
+    await stand.viewer.page.route(`**${path}`, async (route) => {
+      if (broken++ > 0) return route.continue();
+      return route.abort("connectionreset");
+    });
+    await stand.open();
+    await stand.viewer.settled();
+    expect(await notices()).toEqual([]);
+    expect(broken).toBe(2);
+  });
+});

@@ -1,0 +1,143 @@
+/** The panel on a plane in the room: what it shows, what rays do to it, and when it is painted. */
+import { mkdir } from "node:fs/promises";
+import { expect, it } from "vitest";
+import { describeInChromium } from "./driver/skip";
+import { type At, prepareHands } from "./stereo/stand";
+
+const RIGHT: At = [0.25, -0.3, -0.3];
+const AWAY: At = [0, 5, -1];
+/** Where pictures to look at are kept, if they are wanted. */
+const PICTURES = process.env.STEREO_PICTURES;
+
+describeInChromium("the panel in the room", () => {
+  const hands = prepareHands(PICTURES === undefined ? undefined : { width: 1800, height: 900 });
+
+  async function picture(name: string): Promise<void> {
+    if (PICTURES === undefined) return;
+    await mkdir(PICTURES, { recursive: true });
+    await hands().step([0, 0]);
+    await hands().page.screenshot({ path: `${PICTURES}/${name}.png` });
+  }
+
+  async function gazeAt(id: string, across?: number): Promise<void> {
+    await hands().lookAt(await hands().controlAt(id, across));
+  }
+
+  it("opens by a look down, beside the specimen, and closes again", async () => {
+    await hands().gazeOnly();
+    expect((await hands().status()).isOpen).toBe(false);
+    await gazeAt("opener");
+    await hands().wait(1.4);
+    expect((await hands().status()).isOpen).toBe(false);
+    await hands().wait(0.2);
+    expect((await hands().status()).isOpen).toBe(true);
+    await hands().lookAt([0, 0, -1]);
+    await picture("ahead");
+    // all tiles can still be gazed at
+    for (const tile of ["r0_c0", "r0_c4", "r1_c0", "r1_c2", "r1_c4"]) {
+      await hands().lookAt(await hands().tileAt(tile));
+      expect((await hands().status()).pointed).toBe(`tile:${tile}`);
+    }
+    await gazeAt("close");
+    await hands().tap();
+    expect((await hands().status()).isOpen).toBe(false);
+  });
+
+  it("toggles what a ray points at, by gaze, tap and trigger", async () => {
+    await hands().gazeOnly();
+    await hands().openPanel();
+    await hands().page.evaluate(() => {
+      window.hands.fieldOfView_deg = 60;
+    });
+    await gazeAt("c1/shown");
+    await hands().wait(0.75);
+    await picture("dwell");
+    await hands().wait(0.75);
+    expect(await hands().actions()).toEqual([{ type: "show", channel: "c1", shown: false }]);
+    await hands().connect("right", true);
+    await hands().point("right", RIGHT, await hands().controlAt("c0/volume"));
+    expect((await hands().status()).pointed).toBe("panel:c0/volume");
+    await hands().press("right");
+    expect((await hands().actions()).slice(1)).toEqual([
+      { type: "draw-volume", channel: "c0", volume: false },
+    ]);
+    await hands().point("right", RIGHT, AWAY);
+    await gazeAt("tab=tiles");
+    await hands().tap();
+    await gazeAt("tile-map=r1_c4");
+    await hands().tap();
+    expect((await hands().actions()).at(-1)).toEqual({ type: "select", tile: "r1_c4" });
+    await picture("tiles");
+  });
+
+  it("sets a slider where it is pointed at, and drags it while the trigger is held", async () => {
+    await hands().connect("left", false);
+    await hands().point("right", RIGHT, AWAY);
+    await hands().openPanel();
+    const choose = async (id: string) => {
+      await hands().point("right", RIGHT, await hands().controlAt(id));
+      await hands().press("right");
+    };
+    await choose("c0/open");
+    await hands().point("right", RIGHT, await hands().controlAt("c0/opacity", 0.5));
+    await hands().button("right", "trigger", 1);
+    await hands().point("right", RIGHT, await hands().controlAt("c0/opacity", 1));
+    await hands().wait(0.5);
+    await hands().button("right", "trigger", 0);
+    const opacities = (await hands().actions()).flatMap((action) =>
+      action.type === "fade" ? [action.opacity] : [],
+    );
+    expect(new Set(opacities)).toEqual(new Set([0.5, 1]));
+    expect(opacities.length).toBeLessThan(5); // not one for each frame
+    await picture("card");
+    await choose("tab=view");
+    await choose("top");
+    expect(await hands().page.evaluate(() => window.hands.commands)).toEqual(["top"]);
+    await choose("leave");
+    expect(await hands().page.evaluate(() => window.hands.leaves)).toBe(1);
+  });
+
+  it("is painted only when what it shows changes", async () => {
+    await hands().gazeOnly();
+    await hands().openPanel();
+    const paints = async () => (await hands().status()).paints;
+    const before = await paints();
+    await hands().wait(3);
+    await gazeAt("c0/shown");
+    await gazeAt("c1/shown");
+    await hands().wait(0.5);
+    expect(await paints()).toBe(before);
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "choose-quality", level: "low" }),
+    );
+    await hands().step([0.05]);
+    expect(await paints()).toBe(before); // the section that is open does not show it
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "fade", channel: "c0", opacity: 0.5 }),
+    );
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "draw-volume", channel: "c0", volume: false }),
+    );
+    await hands().step([0.05]);
+    expect(await paints()).toBe(before + 1);
+  });
+
+  it("stays whole for the march where the specimen is cut away", async () => {
+    const left = await hands().page.evaluate(() => window.leftOfTheUncut());
+    expect(left).toEqual([
+      [1, 0],
+      [1, 0],
+    ]);
+  });
+
+  it("leaves nothing on the GPU", async () => {
+    const before = await hands().status();
+    await hands().openPanel();
+    await hands().page.evaluate(() => window.hands.dispose());
+    await hands().step([0]);
+    const after = await hands().status();
+    expect(after.textures).toBeLessThan(before.textures + 1);
+    expect(after.geometries).toBeLessThanOrEqual(before.geometries);
+    expect(after.isRingShown).toBe(false);
+  });
+});

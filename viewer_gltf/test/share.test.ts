@@ -1,0 +1,95 @@
+/** The share link in headless Chromium: opening it shows the same view. */
+import { expect, it } from "vitest";
+import type { Snapshot } from "../src/api";
+import { difference, takePicture } from "./driver/picture";
+import { describeInChromium } from "./driver/skip";
+import { prepareStand } from "./driver/stand";
+
+const F = "F_x20_body";
+/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+const SAME = 0.002;
+
+describeInChromium("the share link", () => {
+  const stand = prepareStand({ viewport: { width: 640, height: 360 } });
+  const page = () => stand.viewer.page;
+  const hash = () => page().evaluate(() => location.hash);
+  const said = () => page().locator("[data-said]").textContent();
+
+  /** What a view is made of; notices and the order of showing are not. */
+  function viewOf({ state }: Snapshot) {
+    const { notices, channels, ...rest } = state;
+    return { ...rest, channels: channels.map(({ turn, ...channel }) => channel) };
+  }
+
+  it("brings back state and picture in another page", async () => {
+    await stand.open("&mode=tile&disc=20");
+    const { viewer } = stand;
+    await viewer.settled();
+    await viewer.turnLeftSideToFront();
+    await viewer.recolor(F, "#ff00ff");
+    await viewer.show("Balls", false);
+    await viewer.openCard(F);
+    await viewer.slide(`${F}/opacity`, 0.5);
+    await viewer.chooseTile("r0_c0");
+    await viewer.chooseMode("all");
+    for (const key of ["n", "j", "p", "l"]) await page().keyboard.press(key);
+    await viewer.still();
+    await expect.poll(said, { timeout: 10_000 }).toBe(""); // it lies over the picture
+    const [before, picture] = [viewOf(await viewer.snapshot()), await takePicture(page())];
+    const address = page().url();
+    expect(address).toContain("#v=1&");
+    // A setting of the address is part of the view by now.
+    expect(new URL(address).search).toBe("?bundle=..%2Fbundle%2F");
+    expect(address).toContain("&disc=20&");
+    expect(await page().locator('[data-control="link"]').inputValue()).toBe(address);
+
+    await page().goto("about:blank");
+    await viewer.open(address);
+    await viewer.still();
+    expect(viewOf(await viewer.snapshot())).toEqual(before);
+    expect((await viewer.snapshot()).state.notices).toEqual([]);
+    expect(difference(picture, await takePicture(page()))).toBeLessThan(SAME);
+  });
+
+  it("goes to the clipboard, and says so", async () => {
+    await page().context().grantPermissions(["clipboard-read", "clipboard-write"]);
+    await stand.open();
+    await page().keyboard.press("d");
+    await page().keyboard.press("l");
+    await expect.poll(said).toBe("The link is in the clipboard.");
+    const copied = await page().evaluate(() => navigator.clipboard.readText());
+    expect(copied).toBe(page().url());
+    expect(copied).toContain("disc=11");
+  });
+
+  it("is selected in a field where the browser refuses the clipboard", async () => {
+    await page().addInitScript(() => {
+      Object.defineProperty(navigator, "clipboard", { value: undefined });
+    });
+    await stand.open();
+    await page().keyboard.press("l");
+    await expect.poll(said).toContain("selected");
+    expect(await page().evaluate(() => getSelection()?.toString())).toBe(page().url());
+  });
+
+  it("shows what it can of a link to another bundle, and says what is missing", async () => {
+    await stand.open("#v=1&c=Balls,CD8&tile=r7_c7&disc=9&box=NaN");
+    const { state } = await stand.viewer.snapshot();
+    expect(state.channels.filter(({ shown }) => shown).map(({ id }) => id)).toEqual(["Balls"]);
+    expect(state.discRadius_deg).toBe(9);
+    expect(await page().locator("[data-notices]").textContent()).toMatch(
+      /no channel CD8, tile r7_c7\..*can't be read: box/,
+    );
+  });
+
+  it("opens when pasted over another view of the same page", async () => {
+    await stand.open();
+    expect(await hash()).toBe("");
+    await page().evaluate(() => {
+      location.hash = "#v=1&disc=33";
+    });
+    await expect
+      .poll(async () => (await stand.viewer.snapshot().catch(() => null))?.state.discRadius_deg)
+      .toBe(33);
+  });
+});
