@@ -10,6 +10,9 @@ import type { VolumeStatus } from "./volume/volume_set";
 
 export type Snapshot = Readonly<{
   state: ViewerState;
+  /** Whether all tiles show, in the first channel. */
+  hasFirstPicture: boolean;
+  /** Of all shown channels. */
   overview: Progress;
   isLoading: boolean;
   /** Triangles of the surfaces on screen. */

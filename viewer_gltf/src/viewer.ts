@@ -226,6 +226,7 @@ export class Viewer {
   snapshot(): Snapshot {
     return {
       state: this.state,
+      hasFirstPicture: this.surfaces.hasFirst,
       overview: this.surfaces.overview,
       isLoading: this.isLoading,
       triangles: this.surfaces.triangles,

@@ -38,6 +38,29 @@ describeInChromium("hands on the picture", () => {
     }
   });
 
+  it("isolate the tile by a second click, and bring all back", async () => {
+    const box = await stageBox();
+    const [{ id, bounds_um }] = stand.manifest.tiles;
+    const { min, max } = bounds_um;
+    const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
+    const { x, y } = project(front, stand.manifest.specimen.bounds_um, box.width, box.height);
+    const click = () => stand.viewer.page.mouse.click(box.x + x, box.y + y);
+    const whole = await takePicture(stand.viewer.page);
+    await click();
+    await click();
+    await stand.viewer.settled();
+    expect((await stand.viewer.snapshot()).state.isolated).toBe(id);
+    expect(difference(whole, await takePicture(stand.viewer.page))).toBeGreaterThan(TURNED);
+    await stand.viewer.page.keyboard.press("Escape");
+    await stand.viewer.settled();
+    const { isolated, selected } = (await stand.viewer.snapshot()).state;
+    expect([isolated, selected]).toEqual([null, id]);
+    await stand.viewer.page.keyboard.press("Escape");
+    await stand.viewer.settled();
+    expect(await tileNow()).toBeNull();
+    expect(difference(whole, await takePicture(stand.viewer.page))).toBeLessThan(TURNED / 10);
+  });
+
   it("turn the specimen by dragging, which chooses nothing", async () => {
     const before = await takePicture(stand.viewer.page);
     const start = await tileNow();

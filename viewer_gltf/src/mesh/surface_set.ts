@@ -20,6 +20,8 @@ export class SurfaceSet {
   private readonly tilesets = new Map<string, SurfaceTileset>();
   private state: ViewerState | null = null;
   private nearby: Nearby = NOTHING_NEAR;
+  /** Whether the first picture is whole. */
+  private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
 
   constructor(
@@ -34,6 +36,12 @@ export class SurfaceSet {
 
   get overview(): Progress {
     return overview(this.shown().map(([, tileset]) => tileset.progress));
+  }
+
+  /** Whether one channel shows all tiles. */
+  get hasFirst(): boolean {
+    const [first] = this.shown();
+    return first === undefined || overview([first[1].progress]).isComplete;
   }
 
   get isLoading(): boolean {
@@ -94,7 +102,10 @@ export class SurfaceSet {
     for (const [, tileset] of this.shown()) {
       if (isComplete) tileset.refine(this.errorTarget_px);
       tileset.update(camera, width_px, height_px);
+      // one channel after another: the first shows all tiles the sooner
+      if (!this.hasBegun && !overview([tileset.progress]).isComplete) break;
     }
+    this.hasBegun ||= isComplete;
   }
 
   private shown(): [string, SurfaceTileset][] {

@@ -7,7 +7,7 @@ type Vec3 = readonly [number, number, number];
 /** The specimen's longest edge in the room. */
 export const LONGEST_EDGE_M = 1.2;
 /** In a headset the specimen's centre is this far in front of the eyes, at their height. */
-export const XR_DISTANCE_M = 1.5;
+export const XR_DISTANCE_M = 1.1;
 /** Share of the picture that the specimen may fill at the start. */
 const FILL = 0.88;
 

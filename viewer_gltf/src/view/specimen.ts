@@ -46,7 +46,7 @@ export class Specimen {
     this.settle(this.home);
   }
 
-  /** Bring a tile to the middle, as large as the whole was; null: the whole again. */
+  /** Bring a tile to the middle, as large as fits where the whole was; null: the whole again. */
   show(tile: Bounds | null): void {
     if (tile === this.focus) return;
     this.focus = tile;
@@ -59,12 +59,15 @@ export class Specimen {
   /** Where it is as long as nobody moves it. */
   get home(): SpecimenPose {
     const orientation = new Quaternion();
-    if (this.focus === null) return { position: this.anchor.clone(), orientation, scale: 1 };
+    const { focus } = this;
+    if (focus === null) return { position: this.anchor.clone(), orientation, scale: 1 };
     const whole = place(this.bounds);
-    const tile = place(this.focus);
-    const scale = tile.scale / whole.scale;
+    const tile = place(focus);
+    const edge = ({ min, max }: Bounds, axis: 0 | 1) => Math.max(max[axis] - min[axis], 1e-9);
+    const fits = ([0, 1] as const).map((axis) => edge(this.bounds, axis) / edge(focus, axis));
+    const scale = Math.min(...fits);
     const aside = new Vector3(...whole.center).sub(new Vector3(...tile.center));
-    const position = aside.multiplyScalar(tile.scale).add(this.anchor);
+    const position = aside.multiplyScalar(scale * whole.scale).add(this.anchor);
     return { position, orientation, scale };
   }
 

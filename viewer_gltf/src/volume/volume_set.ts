@@ -1,5 +1,6 @@
 /** All volumes on screen: follows who is drawn how, loads what is missing, drops what is gone. */
 import { Group, Matrix4, Scene, Vector3 } from "three";
+import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
 import { isInDisc, type WantedTile } from "../hybrid/who";
@@ -55,6 +56,7 @@ export class VolumeSet {
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
   private turn = 0;
+  private hasToldLimit = false;
 
   constructor(
     private readonly bundle: Bundle,
@@ -203,6 +205,7 @@ export class VolumeSet {
     resident.turn = this.turn;
     const [first] = sources.values();
     if (first === undefined) return;
+    this.tellLimit(first);
     const share = this.limits.bytes / Math.max(this.wanted.length + KEPT_TILES, 1);
     const levels = levelsToFetch(
       first.volume.levels,
@@ -210,6 +213,20 @@ export class VolumeSet {
       this.limits.side,
     );
     resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1));
+  }
+
+  /** Said once: what is drawn is coarser than what there is. */
+  private tellLimit({ volume }: VolumeSource): void {
+    const { side } = this.limits;
+    const longest = Math.max(...volume.size);
+    if (longest <= side || this.hasToldLimit) return;
+    this.hasToldLimit = true;
+    this.onError(
+      new BundleError(
+        `This device draws volumes of at most ${side} voxels along an edge: ` +
+          `those of ${longest} are shown at a coarser level.`,
+      ),
+    );
   }
 
   private addTile(tile: string): Resident {
