@@ -3,14 +3,12 @@ import { type Camera, type Matrix4, Quaternion, type Vector2, Vector3, WebGLRend
 import type { Snapshot } from "./api";
 import { BundleError } from "./bundle/errors";
 import type { Bundle } from "./bundle/load";
+import { Contents } from "./contents";
 import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
 import { pickTile, type Ray } from "./gaze/pick";
 import { Hybrid } from "./hybrid/hybrid";
-import { wantedTiles } from "./hybrid/who";
-import { Marks } from "./marks/marks";
 import { listenForHandles } from "./marks/pointer";
-import { SurfaceLoader } from "./mesh/loader";
-import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX, SurfaceSet } from "./mesh/surface_set";
+import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX } from "./mesh/surface_set";
 import { Pace } from "./quality/pace";
 import type { Look } from "./share/look";
 import { type Action, initialState, reduce, type ViewerState } from "./state";
@@ -21,8 +19,6 @@ import { Picture } from "./view/picture";
 import { place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
 import { StageSize } from "./view/stage_size";
-import { volumeBudget } from "./volume/levels";
-import { VolumeSet } from "./volume/volume_set";
 import type { Profile } from "./xr/cardboard/profile";
 import { Stereo } from "./xr/stereo";
 
@@ -45,18 +41,13 @@ export class Viewer {
   private readonly picture: Picture;
   private readonly hybrid: Hybrid;
   private readonly pace: Pace;
-  private readonly surfaceLoader: SurfaceLoader;
-  private readonly surfaces: SurfaceSet;
-  private readonly volumes: VolumeSet;
-  private readonly marks: Marks;
+  private readonly contents: Contents;
   private readonly size: StageSize;
   private readonly disposed = new AbortController();
   private last_ms = 0;
   private isStale = true;
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
-  /** Volumes come after the first picture of all tiles. */
-  private hasOverview = false;
   private waiting: (() => void)[] = [];
 
   /**
@@ -80,50 +71,29 @@ export class Viewer {
     const refresh = () => {
       this.isStale = true;
     };
-    const fail = (error: unknown) => this.report(error);
     this.room = new Room(manifest);
     this.hybrid = new Hybrid(manifest);
     this.picture = new Picture(this.renderer, this.room, this.hybrid);
     this.pace = new Pace(gl);
-    this.surfaceLoader = new SurfaceLoader(this.renderer);
-    this.volumes = new VolumeSet(
+    this.contents = new Contents({
       bundle,
-      this.picture.marchFrame,
-      {
-        bytes: volumeBudget(navigator),
-        side: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
-      },
-      refresh,
-      fail,
-    );
-    this.surfaces = new SurfaceSet(
-      bundle,
-      this.surfaceLoader,
-      this.picture.surfaceFrame,
-      (tile, channel) => this.volumes.presence(tile, channel),
-      refresh,
-      fail,
-    );
-    const marked = {
-      manifest,
-      base: bundle.base,
-      surfaces: () => this.surfaces.meshes,
-      volumes: () => this.volumes.shown(),
-      source: (tile: string, channel: string) => this.volumes.source(tile, channel),
-      dispatch: (action: Action) => this.dispatch(action),
+      renderer: this.renderer,
+      picture: this.picture,
+      state: this.state,
+      dispatch: (action) => this.dispatch(action),
       onChange: refresh,
-      onError: fail,
-    };
-    this.marks = new Marks(marked, this.state);
-    stage.append(...this.marks.overlayElements);
-    this.room.specimen.group.add(this.surfaces.group, this.marks.group);
+      onError: (error) => this.report(error),
+    });
+    const { marks, surfaces, volumes } = this.contents;
+    stage.append(...marks.overlayElements);
+    this.room.specimen.group.add(surfaces.group, marks.group);
 
     this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), refresh);
     this.stereo = new Stereo(this.renderer, {
       scene: this.room.scene,
       specimen: this.room.specimen,
       tiles: manifest.tiles,
-      handles: [this.marks.target],
+      handles: [marks.target],
       layOut: (view) => this.layOut(view),
       onAction: (action) => this.dispatch(action),
       onCommand: (command) => void this.run(command),
@@ -139,9 +109,9 @@ export class Viewer {
       canvas,
       {
         pick: (point, pointing) =>
-          this.stereo.kind === null ? this.marks.pick(rayAt(point), pointing) : null,
-        drag: (id, point) => this.marks.drag(id, rayAt(point)),
-        mean: (id) => this.marks.mean(id),
+          this.stereo.kind === null ? marks.pick(rayAt(point), pointing) : null,
+        drag: (id, point) => marks.drag(id, rayAt(point)),
+        mean: (id) => marks.mean(id),
       },
       signal,
     );
@@ -153,7 +123,7 @@ export class Viewer {
       this.dispatch({ type: "notify", text: lost }),
     );
     canvas.addEventListener("webglcontextrestored", () => {
-      this.volumes.forget(); // their texels went with the context
+      volumes.forget(); // their texels went with the context
       this.follow();
       this.dispatch({ type: "dismiss", text: lost });
     });
@@ -168,7 +138,6 @@ export class Viewer {
     if (next === this.state) return;
     this.state = next;
     this.follow();
-    this.marks.follow(next);
     this.onState(next);
   }
 
@@ -224,14 +193,15 @@ export class Viewer {
   }
 
   snapshot(): Snapshot {
+    const { surfaces, volumes } = this.contents;
     return {
       state: this.state,
-      hasFirstPicture: this.surfaces.hasFirst,
-      overview: this.surfaces.overview,
-      isLoading: this.isLoading,
-      triangles: this.surfaces.triangles,
-      volumes: this.volumes.status(),
-      volumeBytes: this.volumes.bytes,
+      hasFirstPicture: surfaces.hasFirst,
+      overview: surfaces.overview,
+      isLoading: this.contents.isLoading,
+      triangles: surfaces.triangles,
+      volumes: volumes.status(),
+      volumeBytes: volumes.bytes,
       gazed: this.hybrid.nearby.gazed,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.pace.frame_ms,
@@ -261,18 +231,11 @@ export class Viewer {
     for (const text of problems) this.dispatch({ type: "notify", text });
   }
 
-  private get isLoading(): boolean {
-    return this.surfaces.isLoading || this.volumes.isLoading || !this.surfaces.overview.isComplete;
-  }
-
   private follow(): void {
-    const { nearby, mayRefine } = this.hybrid;
     const { isolated, selected, quality } = this.state;
     const tile = this.bundle.manifest.tiles.find(({ id }) => id === isolated);
     this.room.specimen.show(tile?.bounds_um ?? null);
-    const wanted = this.hasOverview ? wantedTiles(this.state, nearby) : [];
-    this.volumes.follow(this.state, wanted, mayRefine);
-    this.surfaces.follow(this.state, nearby);
+    this.contents.follow(this.state, this.hybrid);
     this.room.mark(isolated === null ? selected : null);
     this.pace.setLevel(quality);
     this.isStale = true;
@@ -282,14 +245,11 @@ export class Viewer {
     const interval_ms = time_ms - this.last_ms;
     const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
     this.last_ms = time_ms;
-    const wasLoading = this.isLoading;
-    if (!this.hasOverview && this.surfaces.overview.isComplete) {
-      this.hasOverview = true;
-      this.follow();
-    }
-    const seen = this.stereo.pose(this.picture.eyes);
-    const isStereo = seen !== null;
-    const camera = seen ?? this.poseMono();
+    const wasLoading = this.contents.isLoading;
+    if (this.contents.hasJustBegun()) this.follow();
+    const inRoom = this.stereo.pose(this.picture.eyes);
+    const isStereo = inRoom !== null;
+    const camera = inRoom ?? this.poseMono();
     if (isStereo) this.stereo.hands.update(dt_s, this.head, this.state);
     const isChanging = this.advance(dt_s);
     if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving) return;
@@ -297,10 +257,13 @@ export class Viewer {
     const isMoving = isStereo || this.isStale;
     const settings = this.pace.begin(isMoving, interval_ms, this.stereo.headset.rate_hz);
     const target_px = isStereo ? ERROR_TARGET_XR_PX : ERROR_TARGET_PX;
-    this.surfaces.setErrorTarget(target_px * settings.errorFactor);
     this.picture.marchFrame.uSteps.value = settings.steps;
     this.hybrid.radiusShare = settings.discShare;
-    this.updateSurfaces(camera);
+    const [eye] = this.picture.eyes.all; // a headset has none before its first pose
+    if (eye !== undefined) {
+      const { z, w } = eye.viewport;
+      this.contents.stream(this.stereo.seenBy(camera), z, w, target_px * settings.errorFactor);
+    }
     if (isMoving || this.wasMoving) {
       this.isStale = isChanging;
       this.draw(camera, settings.resolution);
@@ -310,7 +273,7 @@ export class Viewer {
     this.pace.end();
     this.wasMoving = isMoving;
     const isAtRest = isStereo || !isMoving;
-    if (this.waiting.length > 0 && !this.isLoading && !this.isStale && isAtRest) {
+    if (this.waiting.length > 0 && !this.contents.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
   }
@@ -323,29 +286,19 @@ export class Viewer {
 
   /** Follow the gaze, and go on with what moves or fades; whether the next frame differs by itself. */
   private advance(dt_s: number): boolean {
-    const { hybrid, volumes, state } = this;
+    const { hybrid, contents, head, navigation, stage, state } = this;
     const { specimen } = this.room;
+    const { group } = specimen;
     const isMoving = specimen.advance(dt_s);
-    const isReady = (tile: string) => volumes.isReady(tile);
-    if (hybrid.look(state, this.head, specimen.group.matrixWorld, isReady, dt_s)) this.follow();
-    const isFading = volumes.advance(dt_s);
-    this.mark(dt_s);
-    const isChanging = isMoving || isFading || hybrid.isChanging(state);
-    if (isChanging) this.isStale = true;
-    if (this.isStale) this.surfaces.dressAll();
-    return isChanging;
-  }
-
-  private mark(dt_s: number): void {
-    const { head, hybrid, navigation, stage } = this;
-    const { group } = this.room.specimen;
+    const isReady = (tile: string) => contents.volumes.isReady(tile);
+    if (hybrid.look(state, head, group.matrixWorld, isReady, dt_s)) this.follow();
     const screen = {
       camera: navigation.camera,
       width_px: stage.clientWidth,
       height_px: stage.clientHeight,
       focus: navigation.controls.target,
     };
-    this.marks.update({
+    const isFading = contents.advance({
       head,
       specimen: group.matrixWorld,
       screen: this.stereo.kind === null ? screen : null,
@@ -353,18 +306,19 @@ export class Viewer {
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       dt_s,
     });
-  }
-
-  private updateSurfaces(camera: Camera): void {
-    const { viewport } = this.picture.eyes.all[0] ?? {};
-    if (viewport) this.surfaces.update(this.stereo.seenBy(camera), viewport.z, viewport.w);
+    const isChanging = isMoving || isFading || hybrid.isChanging(state);
+    if (isChanging) this.isStale = true;
+    if (this.isStale) contents.surfaces.dressAll();
+    return isChanging;
   }
 
   private draw(camera: Camera, resolution: number): void {
-    const { surfaces, marks, stereo, volumes, head } = this;
-    const translucent = [...surfaces.blended, ...marks.overlays, ...stereo.hands.overlays];
+    const { contents, stereo, head, picture } = this;
+    const translucent = [...contents.translucent, ...stereo.hands.overlays];
     const { clip } = this.state;
-    stereo.present(() => this.picture.draw(camera, head, volumes, translucent, clip, resolution));
+    stereo.present(() =>
+      picture.draw(camera, head, contents.volumes, translucent, clip, resolution),
+    );
   }
 
   /** Pose of the head, or of the mono camera. */
@@ -402,7 +356,7 @@ export class Viewer {
   /** Measure, or select the tile; what is selected already is isolated. */
   private choose(ray: Ray, tile: string | null): void {
     const { isolated, selected, tool } = this.state;
-    if (tool === "measure") void this.marks.measure(ray);
+    if (tool === "measure") void this.contents.marks.measure(ray);
     else if (isolated !== null || tile === null) return;
     else if (tile === selected) this.dispatch({ type: "isolate", tile });
     else this.dispatch({ type: "select", tile });
@@ -412,12 +366,9 @@ export class Viewer {
     this.renderer.setAnimationLoop(null);
     this.size.dispose();
     this.disposed.abort();
-    this.marks.dispose();
     this.stereo.dispose();
     this.navigation.dispose();
-    this.surfaces.dispose();
-    this.volumes.dispose();
-    this.surfaceLoader.dispose();
+    this.contents.dispose();
     this.picture.dispose();
     this.pace.dispose();
     this.renderer.dispose();

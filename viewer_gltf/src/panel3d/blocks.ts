@@ -8,7 +8,14 @@ import { free, LABEL, one, region, toneOf } from "./parts";
 import { sliderRow, windowRow } from "./tracks";
 
 /** What has no use in a headset: there is no keyboard, no clipboard, and stereo has begun. */
-const ELSEWHERE: ReadonlySet<string> = new Set(["stereo", "split", "lenses", "share", "help"]);
+const ELSEWHERE: ReadonlySet<string> = new Set([
+  "stereo",
+  "split",
+  "scan",
+  "lenses",
+  "share",
+  "help",
+]);
 /** Widths in a channel's row. */
 const CHIP = 150;
 const SWATCH = 80;

@@ -7,6 +7,8 @@ export type Command =
   | "stereo"
   /** Split screen for a phone in a viewer without WebXR. */
   | "split"
+  /** Read the phone viewer's code by the camera. */
+  | "scan"
   | "share"
   /** What a tap does, in the middle of the view: for hands that have only keys. */
   | "press"

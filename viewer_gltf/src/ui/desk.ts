@@ -9,6 +9,7 @@ import { SETTINGS, settingsOf } from "../share/settings";
 import { initialState } from "../state";
 import type { Viewer } from "../viewer";
 import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/profile";
+import { canScan } from "../xr/cardboard/scan";
 import type { XrSupport } from "../xr/support";
 import type { Ranges } from "./channel_layout";
 import type { Command } from "./commands";
@@ -18,12 +19,34 @@ import { type KeyContext, listenForKeys, wishOf } from "./keys";
 import { type Facts, layOut } from "./layout";
 import type { Said } from "./overlays";
 import { Panel } from "./panel";
+import { scanByCamera } from "./scanner";
 import { told } from "./told";
 
 /** What a phone lacks for it, the phone says when it is asked. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Figures that change with each frame can be read at this rate. */
 const REFRESH_MS = 250;
+
+const LENS_KEY = "stereocell-lens";
+
+/** What the user's phone viewer is, from the visit before. */
+function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
+  try {
+    const { lenses, code } = JSON.parse(localStorage.getItem(LENS_KEY) ?? "{}");
+    const isKnown = lenses === "own" || lenses in BUILT_IN;
+    return isKnown && typeof code === "string" ? { lenses, code } : {};
+  } catch {
+    return {}; // no storage here, or another's words in it: then as at first
+  }
+}
+
+function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
+  try {
+    localStorage.setItem(LENS_KEY, JSON.stringify(lens));
+  } catch {
+    // no storage here: it has to be chosen anew next time
+  }
+}
 
 export type DeskOptions = Readonly<{
   subtitle: string;
@@ -35,12 +58,13 @@ export type DeskOptions = Readonly<{
 
 export class Desk {
   readonly panel: Panel;
-  private view = START_VIEW;
+  private view: PanelView = { ...START_VIEW, ...rememberedLens() };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
+  private canScan = false;
 
   constructor(
     private readonly viewer: Viewer,
@@ -59,6 +83,10 @@ export class Desk {
     // A link to another view of the same bundle: what it leaves out is as the bundle opens.
     addEventListener("hashchange", () => location.reload(), { signal: this.disposed.signal });
     this.refresh();
+    void canScan().then((isAble) => {
+      this.canScan = isAble;
+      this.refresh();
+    });
   }
 
   /** What a panel shows now; one that is drawn elsewhere has its own sections open. */
@@ -108,6 +136,8 @@ export class Desk {
       else this.said.say(this.stereo.reason);
     } else if (command === "split") {
       this.splitScreen();
+    } else if (command === "scan") {
+      void this.scan();
     } else if (!this.viewer.run(command)) this.said.say("This viewer can't do that here.");
   }
 
@@ -115,8 +145,19 @@ export class Desk {
     const { lenses, code } = this.view;
     try {
       this.options.onSplit(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
+      rememberLens({ lenses, code });
     } catch (error) {
       if (!(error instanceof ProfileError)) throw error;
+      this.said.say(error.message);
+    }
+  }
+
+  private async scan(): Promise<void> {
+    try {
+      const text = await scanByCamera(document.body);
+      if (text !== null) this.perform({ panel: "code", text });
+    } catch (error) {
+      if (!(error instanceof ProfileError || error instanceof DOMException)) throw error;
       this.said.say(error.message);
     }
   }
@@ -170,6 +211,7 @@ export class Desk {
       isStereo,
       stereo,
       split: SPLIT,
+      canScan: this.canScan,
       frame_ms: frame_ms > 0 ? frame_ms : null,
       settings,
       triangles,

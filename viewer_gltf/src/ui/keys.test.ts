@@ -59,6 +59,7 @@ describe("the keys", () => {
       back: true,
       stereo: true,
       split: true,
+      scan: true,
       share: true,
       press: true,
       front: true,

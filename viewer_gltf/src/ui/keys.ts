@@ -182,6 +182,7 @@ const VIEW_KEYS: readonly Key[] = [
   key("r", "Reset the view", "reset"),
   key("V", "Enter stereo (VR)", "stereo"),
   key("P", "Split screen for a phone viewer", "split"),
+  key("K", "Scan the phone viewer's code", "scan"),
   key("j", "Choosing by gaze on or off", ({ state }) => ({
     type: "set-dwell",
     isOn: !state.isDwellOn,

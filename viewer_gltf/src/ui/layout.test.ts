@@ -23,6 +23,7 @@ const FACTS: Facts = {
   isStereo: false,
   stereo: { isAvailable: false, reason: "No headset was found." },
   split: null,
+  canScan: false,
   frame_ms: 12.3,
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 12_345,
@@ -215,6 +216,9 @@ describe("the panel's layout", () => {
     expect(refusal("")).toContain("empty");
     expect(refusal("https://example.org/")).toContain("not a Cardboard viewer's code");
     expect(refusal("https://g.co/cardboard")).toBe("");
+    const has = (canScan: boolean) =>
+      JSON.stringify(laid(start(), other, { ...facts, canScan })).includes("Scan the code");
+    expect([has(true), has(false)]).toEqual([true, false]);
   });
 
   it("asks for the views by command, and shows the figures", () => {

@@ -5,8 +5,12 @@ import type { XrSupport } from "../xr/support";
 import type { Button, Control, Lenses, PanelView } from "./controls";
 import { command, inline } from "./shapes";
 
-/** `split` null: there is none in this viewer. */
-export type StereoSupport = Readonly<{ stereo: XrSupport; split: XrSupport | null }>;
+/** `split` null: there is none in this viewer. `canScan`: the browser reads QR codes. */
+export type StereoSupport = Readonly<{
+  stereo: XrSupport;
+  split: XrSupport | null;
+  canScan: boolean;
+}>;
 
 const LENS_NAMES: Readonly<Record<Lenses, string>> = {
   v1: "Cardboard v1 (2014)",
@@ -24,7 +28,7 @@ export function stereoItems(
 ): readonly Control[] {
   return [
     { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
-    ...(facts.split === null ? [] : splitItems(facts.split, view)),
+    ...(facts.split === null ? [] : splitItems(facts.split, facts.canScan, view)),
     {
       kind: "toggle",
       id: "dwell",
@@ -36,7 +40,7 @@ export function stereoItems(
 }
 
 /** A phone in a viewer of lenses: which, and of another than Google's own what its code says. */
-function splitItems(split: XrSupport, view: PanelView): readonly Control[] {
+function splitItems(split: XrSupport, canScan: boolean, view: PanelView): readonly Control[] {
   const { lenses, code } = view;
   const fault = lenses === "own" ? codeFault(code) : "";
   const items: Control[] = [
@@ -56,6 +60,7 @@ function splitItems(split: XrSupport, view: PanelView): readonly Control[] {
       value: code,
       to: (text) => ({ panel: "code", text }),
     });
+    if (canScan) items.push(command("scan", "Scan the code"));
   }
   const support = split.isAvailable && fault !== "" ? { isAvailable: false, reason: fault } : split;
   return [...items, { ...command("split", "Split screen"), ...onlyIf(support) }];

@@ -41,6 +41,7 @@ const FACTS: Facts = {
   isStereo: true,
   stereo: { isAvailable: true, reason: "" },
   split: null,
+  canScan: false,
   frame_ms: null,
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 123_456,

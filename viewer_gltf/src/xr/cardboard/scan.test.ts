@@ -1,6 +1,5 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { CARDBOARD_V1 } from "./profile";
-import { canScan, scanProfile } from "./scan";
+import { canScan, scanCode } from "./scan";
 
 const video = (readyState = 4) => ({ readyState }) as HTMLVideoElement;
 const noAbort = new AbortController().signal;
@@ -22,25 +21,25 @@ describe("scanning a viewer's code", () => {
   it("waits for the first code that the camera sees", async () => {
     see([[], [], ["https://g.co/cardboard"]]);
     expect(await canScan()).toBe(true);
-    expect(await scanProfile(video(), noAbort)).toBe(CARDBOARD_V1);
+    expect(await scanCode(video(), noAbort)).toBe("https://g.co/cardboard");
   });
 
   it("asks for the code's address where the browser can't scan", async () => {
     expect(await canScan()).toBe(false);
-    await expect(scanProfile(video(), noAbort)).rejects.toThrow(/can't read QR codes.*paste/);
+    await expect(scanCode(video(), noAbort)).rejects.toThrow(/can't read QR codes.*paste/);
     see([], ["ean_13"]);
     expect(await canScan()).toBe(false);
   });
 
   it("tells that a code is another's", async () => {
     see([["https://example.org/menu"]]);
-    await expect(scanProfile(video(), noAbort)).rejects.toThrow("not a Cardboard viewer's code");
+    await expect(scanCode(video(), noAbort)).rejects.toThrow("not a Cardboard viewer's code");
   });
 
   it("stops when it is told to, before the camera's first frame too", async () => {
     see([["https://g.co/cardboard"]]);
     const stop = new AbortController();
-    const scanned = scanProfile(video(0), stop.signal);
+    const scanned = scanCode(video(0), stop.signal);
     stop.abort(new Error("closed"));
     await expect(scanned).rejects.toThrow("closed");
   });

@@ -3,7 +3,7 @@
  * which Chrome has on Android and Safari has not. Elsewhere the code's address is pasted, which the
  * camera app of every phone gives.
  */
-import { type Profile, ProfileError, parseProfile } from "./profile";
+import { ProfileError, parseProfile } from "./profile";
 
 type Detector = { detect: (source: HTMLVideoElement) => Promise<{ rawValue: string }[]> };
 type DetectorClass = {
@@ -29,17 +29,20 @@ export async function canScan(): Promise<boolean> {
 }
 
 /**
- * The profile of the first code that the video shows. Throws ProfileError where there is no
+ * The text of the first viewer's code that the video shows. Throws ProfileError where there is no
  * scanner, or the code is another's; the signal's reason where it is aborted.
  */
-export async function scanProfile(video: HTMLVideoElement, signal: AbortSignal): Promise<Profile> {
+export async function scanCode(video: HTMLVideoElement, signal: AbortSignal): Promise<string> {
   const detector = await findDetector();
   if (detector === null) throw new ProfileError(NO_SCANNER);
   for (;;) {
     signal.throwIfAborted();
     // Before its first frame a video is refused.
     const codes = video.readyState >= 2 ? await detector.detect(video) : [];
-    if (codes[0] !== undefined) return parseProfile(codes[0].rawValue);
+    if (codes[0] !== undefined) {
+      parseProfile(codes[0].rawValue);
+      return codes[0].rawValue;
+    }
     await new Promise((resolve) => setTimeout(resolve, PAUSE_ms));
   }
 }
