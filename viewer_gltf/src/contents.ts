@@ -6,9 +6,9 @@ import { wantedTiles } from "./hybrid/who";
 import { Marks, type MarksView } from "./marks/marks";
 import { SurfaceLoader } from "./mesh/loader";
 import { SurfaceSet } from "./mesh/surface_set";
+import { memoryBudget } from "./quality/memory";
 import type { Action, ViewerState } from "./state";
 import type { Picture } from "./view/picture";
-import { volumeBudget } from "./volume/levels";
 import { VolumeSet } from "./volume/volume_set";
 
 export type ContentsOptions = Readonly<{
@@ -35,12 +35,14 @@ export class Contents {
     const gl = renderer.getContext() as WebGL2RenderingContext;
     this.loader = new SurfaceLoader(renderer);
     const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
-    const limits = { bytes: volumeBudget(navigator), side };
+    const budget = memoryBudget(navigator);
+    const limits = { bytes: budget.volumes, side };
     this.volumes = new VolumeSet(bundle, picture.marchFrame, limits, onChange, onError);
     this.surfaces = new SurfaceSet(
       bundle,
       this.loader,
       picture.surfaceFrame,
+      budget.surfaces,
       (tile, channel) => this.volumes.presence(tile, channel),
       onChange,
       onError,

@@ -2,7 +2,7 @@
 import { expect, it } from "vitest";
 import type { Mode } from "../src/state";
 import { project } from "./driver/camera";
-import { type Picture, takePicture } from "./driver/picture";
+import { isBackground, type Picture, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
 import { BALLS } from "./fixture/bodies";
@@ -126,6 +126,28 @@ describeInChromium("surface or volume", () => {
     await stand.viewer.recolor("Block", "#ff00ff");
     expect((await take()).filter((bytes) => bytes > 0)).toEqual([]);
     expect(stand.host.requests.length).toBe(requests);
+  });
+
+  it("looks alike at fewer pixels and steps", async () => {
+    const blockAt = async (quality: string) => {
+      await stand.open(`&mode=all&quality=${quality}`);
+      for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Block");
+      return takePicture(stand.viewer.page);
+    };
+    const [high, low] = [await blockAt("high"), await blockAt("low")];
+    const { settings } = await stand.viewer.snapshot();
+    expect(settings.resolution).toBeLessThanOrEqual(0.5);
+    expect(settings.steps).toBeLessThan(100);
+    const pixels = VIEWPORT.width * VIEWPORT.height;
+    expect(apart(high, low, 0, 40)).toBeGreaterThan(0); // it is another picture
+    expect(apart(high, low, 0, 40, 20)).toBeLessThan(0.01 * pixels); // at outlines
+    // nothing is shifted: what is drawn has its middle where it was
+    const middle = (picture: Picture) => {
+      const drawn = picture.where((pixel) => !isBackground(pixel));
+      return [0, 1].map((i) => drawn.reduce((sum, at) => sum + at[i], 0) / drawn.length);
+    };
+    const [a, b] = [middle(high), middle(low)];
+    expect(Math.hypot(a[0] - b[0], a[1] - b[1])).toBeLessThan(0.7);
   });
 
   it("cancels what is no longer wanted", async () => {

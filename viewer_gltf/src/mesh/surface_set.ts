@@ -28,6 +28,8 @@ export class SurfaceSet {
     private readonly bundle: Bundle,
     private readonly loader: SurfaceLoader,
     private readonly frame: SurfaceFrame,
+    /** Of the GPU's memory, for all channels. */
+    private readonly bytes: number,
     /** How far the volume of a tile and channel has faded in, 0..1. */
     private readonly presence: (tile: string, channel: string) => number,
     private readonly onChange: () => void,
@@ -120,6 +122,7 @@ export class SurfaceSet {
       channel,
       this.loader,
       this.frame,
+      this.bytes,
       (surface) => this.dress(id, surface),
       this.onChange,
       this.onError,

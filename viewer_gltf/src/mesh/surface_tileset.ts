@@ -28,8 +28,6 @@ import type { TileProgress } from "./progress";
 const UM_PER_METRE = 1e6;
 /** The root holds no content; below it lie the tiles' coarsest LODs. */
 const DEPTH_OF_COARSEST = 1;
-/** GPU memory for the surfaces of all channels, which share one cache; hidden ones go first. */
-const SURFACE_BUDGET_BYTES = 384 * 1024 * 1024;
 /** What is left of a full cache after hidden surfaces were dropped. */
 const KEPT_SHARE = 0.75;
 
@@ -57,6 +55,7 @@ export class SurfaceTileset {
     channel: Channel,
     loader: SurfaceLoader,
     private readonly frame: SurfaceFrame,
+    bytes: number,
     private readonly onSurface: (surface: Surface) => void,
     private readonly onChange: () => void,
     onError: (error: unknown) => void,
@@ -67,8 +66,8 @@ export class SurfaceTileset {
     const folder = new URL(".", base).href.split("?")[0];
     const root = new URL(file.path, folder).href;
     this.tiles = new TilesRenderer(root);
-    this.tiles.lruCache.maxBytesSize = SURFACE_BUDGET_BYTES;
-    this.tiles.lruCache.minBytesSize = KEPT_SHARE * SURFACE_BUDGET_BYTES;
+    this.tiles.lruCache.maxBytesSize = bytes;
+    this.tiles.lruCache.minBytesSize = KEPT_SHARE * bytes;
     this.tiles.maxDepth = DEPTH_OF_COARSEST + 1;
     this.tiles.manager.addHandler(/\.(gltf|glb)$/, loader.gltf);
     const nameOf = (url: string) => decodeURIComponent(url.replace(folder, ""));

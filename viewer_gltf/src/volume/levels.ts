@@ -3,16 +3,6 @@ import type { MipLevel } from "../bundle/generated/volumes";
 
 /** The first picture comes from the finest level that is not larger than this. */
 export const FIRST_LEVEL_BYTES = 64 * 1024;
-const MIB = 1024 * 1024;
-
-/** GPU memory for all volumes together: less on a phone, or on a computer with little memory. */
-export function volumeBudget(
-  device: Readonly<{ userAgent: string; deviceMemory?: number }>,
-): number {
-  const isPhone = /Android|iPhone|iPad|Mobile/.test(device.userAgent);
-  return isPhone || (device.deviceMemory ?? 8) <= 4 ? 128 * MIB : 512 * MIB;
-}
-
 export function texels(level: MipLevel): number {
   const [x, y, z] = level.size;
   return x * y * z;
