@@ -69,6 +69,13 @@ function staged(given: Manifest, representations: Readonly<Record<string, Repres
   return { ...given, tiles: [first, ...others] } satisfies Manifest;
 }
 
+/** Within the switch distance, the first of them looked at. */
+const near = (...tiles: readonly string[]): Nearby => ({
+  gazed: tiles[0],
+  disc: tiles,
+  near: new Set(tiles),
+});
+
 /** The tiles in which any channel is a volume. */
 function marched(state: ViewerState, nearby: Nearby = NOTHING_NEAR): readonly string[] {
   return wantedTiles(state, nearby).map(({ tile: id }) => id);
@@ -99,10 +106,7 @@ describe("the viewer's state", () => {
     expect(state.channels[1].hasSurface).toBe(false);
     expect(state.mode).toBe("disc");
     expect(marched(state)).toEqual([]);
-    expect(marched(state, { gazed: "r0_c2", disc: ["r0_c2", "r0_c1"] })).toEqual([
-      "r0_c2",
-      "r0_c1",
-    ]);
+    expect(marched(state, near("r0_c2", "r0_c1"))).toEqual(["r0_c2", "r0_c1"]);
     expect(state.middle).toBe("r0_c1");
   });
 
@@ -145,16 +149,18 @@ describe("the viewer's state", () => {
     const others = Array.from({ length: VOLUME_TILES_AT_START }, (_, i) => tile(`r1_c${i}`, i));
     const state = initialState({ ...many, tiles: [first, ...others] });
     expect(marched(state)).toEqual([state.middle]);
-    expect(marched(state, { gazed: "r1_c0", disc: [] })).toEqual(["r1_c0"]);
+    expect(marched(state, { ...near("r1_c0"), disc: [] })).toEqual(["r1_c0"]);
     expect(marched(reduce(state, { type: "select", tile: "r1_c3" }))).toEqual(["r1_c3"]);
   });
 
   it("shows a volume in the gazed tile, the selected one, or in all", () => {
-    const gaze = { gazed: "r0_c1", disc: ["r0_c1", "r0_c0"] };
+    const gaze = near("r0_c1", "r0_c0", "r0_c2");
     const state = reduce(initialState(manifest(2)), { type: "choose-mode", mode: "tile" });
     expect(marched(state)).toEqual([]);
     expect(marched(state, gaze)).toEqual(["r0_c1"]);
-    expect(marched(reduce(state, { type: "select", tile: "r0_c2" }), gaze)).toEqual(["r0_c2"]);
+    const selected = reduce(state, { type: "select", tile: "r0_c2" });
+    expect(marched(selected, gaze)).toEqual(["r0_c2"]);
+    expect(marched(selected, near("r0_c1"))).toEqual([]); // it is too far away
     expect(marched(reduce(state, { type: "choose-mode", mode: "all" }))).toHaveLength(3);
     expect(marched(reduce(state, { type: "choose-mode", mode: "off" }), gaze)).toEqual([]);
     const none = after(
@@ -174,7 +180,7 @@ describe("the viewer's state", () => {
   });
 
   it("takes from a surface what its volume shows, once that has come", () => {
-    const nearby = { gazed: "r0_c1", disc: ["r0_c1"] };
+    const nearby = near("r0_c1");
     const state = initialState(unclear(manifest(3), 2));
     const taken = (channel: string, id: string, presence: number) =>
       takenFrom(state, ...find(state, channel, id), nearby, presence);

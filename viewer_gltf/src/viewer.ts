@@ -20,6 +20,7 @@ import { place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
 import { StageSize } from "./view/stage_size";
 import type { Profile } from "./xr/cardboard/profile";
+import { ahead } from "./xr/head";
 import { Stereo } from "./xr/stereo";
 
 /** A phone's third pixel in each direction costs more than it shows. */
@@ -40,7 +41,7 @@ export class Viewer {
   private readonly room: Room;
   private readonly picture: Picture;
   private readonly hybrid: Hybrid;
-  private readonly pace: Pace;
+  private pace: Pace;
   private readonly contents: Contents;
   private readonly size: StageSize;
   private readonly disposed = new AbortController();
@@ -124,6 +125,7 @@ export class Viewer {
     );
     canvas.addEventListener("webglcontextrestored", () => {
       volumes.forget(); // their texels went with the context
+      this.pace = new Pace(gl); // and the times that were asked for
       this.follow();
       this.dispatch({ type: "dismiss", text: lost });
     });
@@ -146,7 +148,7 @@ export class Viewer {
     switch (command) {
       case "reset":
         this.dispatch({ type: "isolate", tile: null });
-        this.room.specimen.goHome();
+        this.recentre();
         this.navigation.reset();
         break;
       case "back":
@@ -334,6 +336,14 @@ export class Viewer {
     this.renderer.setSize(clientWidth, clientHeight);
     this.navigation.fit(clientWidth / clientHeight);
     this.isStale = true;
+  }
+
+  /** The specimen where it opens: in stereo straight before the head, at its height. */
+  private recentre(): void {
+    const { specimen } = this.room;
+    const head = this.stereo.recentre();
+    if (head === null) specimen.goHome();
+    else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
   }
 
   private enterStereo(): void {

@@ -89,6 +89,28 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeGreaterThan(TURNED);
   });
 
+  it("choose nothing by two fingers, though neither moves", async () => {
+    const { middle } = await stageBox();
+    const devtools = await stand.viewer.page.context().newCDPSession(stand.viewer.page);
+    const [x, y] = middle;
+    const [one, two] = [
+      { x: x - 20, y, id: 1 },
+      { x: x + 20, y, id: 2 },
+    ];
+    const touch = (type: "touchStart" | "touchEnd", touchPoints: (typeof one)[]) =>
+      devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
+    await touch("touchStart", [one]);
+    await touch("touchStart", [one, two]);
+    await touch("touchEnd", [one]);
+    await touch("touchEnd", []);
+    await stand.viewer.still();
+    expect(await tileNow()).toBeNull();
+    await touch("touchStart", [one]); // one finger does
+    await touch("touchEnd", []);
+    await stand.viewer.still();
+    expect(await tileNow()).not.toBeNull();
+  });
+
   it("find targets of 40 pixels where the pointer is a finger", async () => {
     await stand.viewer.drawVolume(stand.manifest.channels[0].id, true);
     const small = await stand.viewer.page.evaluate(() => {

@@ -121,8 +121,9 @@ describeInChromium("an artist's layer over the stage", () => {
         pictures.set(`balls as a ${as}`, await only(stand, "Balls", as));
       }
 
+      await only(stand, "Slab", "volume");
       await stand.viewer.recolor("Slab", "#ffffff");
-      const slab = await only(stand, "Slab", "volume");
+      const slab = await takePicture(stand.viewer.page);
       expect(opacityAt(slab, spot(slab, stand.manifest, centerOf("r1_c0")))).toBeGreaterThan(0.95);
 
       const sheet = await only(stand, "Sheet", "volume");

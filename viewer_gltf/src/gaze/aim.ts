@@ -34,16 +34,26 @@ export function rayAlong({ origin, direction }: RoomRay, toSpecimen: Matrix4): R
   return { origin: from.toArray(), direction: to.sub(from).toArray() };
 }
 
-/** Calls `onClick` with the place in -1..1, y up, of every click or tap that does not drag. */
+/**
+ * Calls `onClick` with the place in -1..1, y up, of every click or tap that does not drag. Two
+ * fingers zoom and move: neither taps.
+ */
 export function listenForClicks(
   canvas: HTMLCanvasElement,
   onClick: (point: Vector2) => void,
 ): void {
-  const down = new Vector2();
-  canvas.addEventListener("pointerdown", (event) => down.set(event.clientX, event.clientY));
+  const down = new Map<number, Vector2>();
+  let isTap = false;
+  canvas.addEventListener("pointerdown", (event) => {
+    down.set(event.pointerId, new Vector2(event.clientX, event.clientY));
+    isTap = down.size === 1;
+  });
+  canvas.addEventListener("pointercancel", (event) => down.delete(event.pointerId));
   canvas.addEventListener("pointerup", (event) => {
-    if (event.button !== 0) return;
-    if (down.distanceTo(new Vector2(event.clientX, event.clientY)) > CLICK_PX) return;
+    const start = down.get(event.pointerId);
+    down.delete(event.pointerId);
+    if (start === undefined || !isTap || event.button !== 0) return;
+    if (start.distanceTo(new Vector2(event.clientX, event.clientY)) > CLICK_PX) return;
     const box = canvas.getBoundingClientRect();
     const x = ((event.clientX - box.left) / box.width) * 2 - 1;
     const y = 1 - ((event.clientY - box.top) / box.height) * 2;

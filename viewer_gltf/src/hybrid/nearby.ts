@@ -34,7 +34,6 @@ export type GazeInput = Readonly<{
 
 export type NearbyState = Nearby &
   Readonly<{
-    near: ReadonlySet<string>;
     /** What is looked at, before it has rested there. */
     glanced: string | null;
     glanced_s: number;

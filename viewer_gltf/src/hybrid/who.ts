@@ -14,9 +14,11 @@ export type Nearby = Readonly<{
   gazed: string | null;
   /** The tiles that the disc round the gaze meets first, the gazed one first. */
   disc: readonly string[];
+  /** All tiles within the switch distance. */
+  near: ReadonlySet<string>;
 }>;
 
-export const NOTHING_NEAR: Nearby = { gazed: null, disc: [] };
+export const NOTHING_NEAR: Nearby = { gazed: null, disc: [], near: new Set() };
 
 /** A tile whose volume is wanted, with its channels in the bundle's order. */
 export type WantedTile = Readonly<{
@@ -48,7 +50,7 @@ export function drawnAs(
 function isMarched(state: ViewerState, tile: string, nearby: Nearby): boolean {
   switch (state.mode) {
     case "tile":
-      return tile === chosenTile(state, nearby);
+      return tile === chosenTile(state, nearby) && nearby.near.has(tile);
     case "disc":
       return nearby.disc.includes(tile);
     case "all":

@@ -112,7 +112,10 @@ export class BlendedSurface {
       uTaken: { value: 0 },
       uInDisc: { value: false },
     };
-    for (const material of materials) this.patch(material);
+    for (const material of materials) {
+      this.patch(material);
+      material.forceSinglePass = true; // the depth that is written first sorts both sides
+    }
     this.depth = depthMaterial(this.uniforms, "if (shareLeft() <= 0.0) discard;");
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
@@ -162,7 +165,11 @@ export class BlendedSurface {
     this.uniforms.uInDisc.value = isInDisc;
     this.isBlended = opacity < 1 || taken > 0;
     this.scene.visible = opacity > 0 && (taken < 1 || isInDisc);
-    for (const material of this.materials) material.transparent = this.isBlended;
+    for (const material of this.materials) {
+      if (material.transparent === this.isBlended) continue;
+      material.transparent = this.isBlended;
+      material.needsUpdate = true; // an opaque surface's shader leaves its alpha out
+    }
     for (const twin of this.twins) twin.visible = this.isBlended;
   }
 

@@ -12,6 +12,8 @@ import {
 import { GpuTimer, type TimedContext } from "./gpu_timer";
 
 const RATE_HZ = 60;
+/** So many times a frame's time between two frames: the picture is not kept up. */
+const LATE = 1.3;
 
 export class Pace {
   /** Between the last two frames, smoothed. */
@@ -42,9 +44,13 @@ export class Pace {
     if (isMoving && this.wasMoving) {
       this.frame_ms += (interval_ms - this.frame_ms) / 8;
       const { timing } = this.quality;
-      const spent = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
-      if (spent !== null) {
-        this.quality = advanceQuality(this.quality, spent, frameBudget_ms(rate_hz, timing));
+      const budget_ms = frameBudget_ms(rate_hz, timing);
+      const work_ms = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
+      if (work_ms !== null) {
+        // where the GPU waits for the page itself, its own time says nothing
+        const isLate = this.frame_ms > LATE * (1000 / rate_hz);
+        const spent_ms = isLate ? Math.max(work_ms, interval_ms) : work_ms;
+        this.quality = advanceQuality(this.quality, spent_ms, budget_ms);
       }
     }
     this.wasMoving = isMoving;
@@ -58,7 +64,6 @@ export class Pace {
     this.timer?.end();
   }
 
-  /** The context was lost: nothing pending will be answered. */
   dispose(): void {
     this.timer?.dispose();
   }

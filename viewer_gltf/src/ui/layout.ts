@@ -33,6 +33,9 @@ export type Facts = StereoSupport &
     values: readonly string[];
   }>;
 
+/** The newest few say what is wrong. */
+const MOST_NOTICES = 3;
+
 const MODE_NAMES: Readonly<Record<Mode, string>> = {
   disc: "Disc",
   tile: "Tile",
@@ -81,6 +84,9 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     subtitle: facts.subtitle,
     isHidden: view.isHidden,
     sections: [
+      ...(facts.isStereo && state.notices.length > 0
+        ? [section("notices", "Notices", noticeItems(state.notices))]
+        : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view)),
       section("volumes", "Volumes", volumeItems(state)),
       section("tiles", "Tiles", tileItems(state, facts.gazed)),
@@ -104,6 +110,19 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     ],
     status: statusOf(facts),
   };
+}
+
+/** On a flat screen they lie over the picture; in stereo there is the panel alone. */
+function noticeItems(notices: readonly string[]): readonly Control[] {
+  return notices.slice(-MOST_NOTICES).flatMap((text, i): Control[] => [
+    { kind: "text", id: `notice-${i}`, label: "Notice", value: text },
+    {
+      kind: "button",
+      id: `dismiss-${i}`,
+      label: "Dismiss",
+      to: () => ({ type: "dismiss", text }),
+    },
+  ]);
 }
 
 function volumeItems(state: ViewerState): readonly Control[] {

@@ -42,6 +42,8 @@ export class TileTexture {
 
   private sources: ReadonlyMap<string, VolumeSource> = new Map();
   private levels: readonly number[] = [];
+  /** That there is room for: what is finer gives way to it. */
+  private finest = 0;
   /** After a fault, which was told, a channel is not tried again until it is turned on anew. */
   private readonly failed = new Set<string>();
   private isDisposed = false;
@@ -73,15 +75,19 @@ export class TileTexture {
   }
 
   /** Load these channels and levels, given coarse to fine; what is there already is kept. */
-  want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[]): void {
+  want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     for (const [id, source] of this.sources) {
-      if (sources.get(id) !== source) this.failed.delete(id);
+      if (sources.get(id) === source) continue;
+      this.failed.delete(id);
+      source.release();
     }
     this.sources = sources;
     this.levels = levels;
+    this.finest = finest;
     if (this.loading !== null) {
       const { channels, level, abort } = this.loading;
-      if (!same(channels, this.wanted) || !levels.includes(level)) abort.abort();
+      const isOf = levels.includes(level) || level === finest;
+      if (!same(channels, this.wanted) || !isOf || levels.length === 0) abort.abort();
     }
     if (!this.isLoading) void this.run();
   }
@@ -129,6 +135,7 @@ export class TileTexture {
     if (channels.length === 0) return null;
     const { shown } = this;
     if (shown !== null && same(shown.channels, channels)) {
+      if (this.levels.length > 0 && this.finest > shown.level) return this.finest;
       return this.levels.find((index) => index < shown.level) ?? null;
     }
     // the same level as before, if all of it has come; else what comes first

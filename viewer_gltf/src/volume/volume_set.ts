@@ -212,7 +212,8 @@ export class VolumeSet {
       share / stride(sources.size),
       this.limits.side,
     );
-    resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1));
+    const finest = levels[levels.length - 1];
+    resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
   }
 
   /** Said once: what is drawn is coarser than what there is. */

@@ -20,3 +20,11 @@ export function betweenEyes(eyes: readonly Eye[], head = new Matrix4()): Matrix4
 }
 
 const ONE = new Vector3(1, 1, 1);
+
+/** The point so far ahead of the head, at its height, wherever up or down it looks. */
+export function ahead(head: Matrix4, distance_m: number): Vector3 {
+  const eye = new Vector3().setFromMatrixPosition(head);
+  const gaze = new Vector3(0, 0, -1).transformDirection(head).setY(0);
+  if (gaze.lengthSq() < 1e-6) gaze.set(0, 0, -1); // straight up or down
+  return gaze.normalize().multiplyScalar(distance_m).add(eye);
+}

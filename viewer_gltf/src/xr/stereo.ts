@@ -79,6 +79,15 @@ export class Stereo {
     return this.split?.isRunning ? this.split.head : null;
   }
 
+  /** Take what the head looks at for ahead. Returns its pose then; null: no stereo. */
+  recentre(): Matrix4 | null {
+    if (this.split?.isRunning) {
+      this.split.recentre();
+      this.split.update();
+    }
+    return this.head;
+  }
+
   /** Draw a frame: through the lenses, where the screen is split. */
   present(draw: () => void): void {
     const { split } = this;

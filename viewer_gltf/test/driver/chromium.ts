@@ -55,7 +55,7 @@ export async function launch(
   };
 }
 
-/** Give the page an emulated headset (iwer), before its own scripts run. */
+/** Give the page an emulated headset (iwer, `window.headset`), before its own scripts run. */
 export async function addHeadset(page: Page): Promise<void> {
   const script = new URL(import.meta.resolve("iwer/build/iwer.min.js"));
   await page.addInitScript(await readFile(script, "utf8"));
@@ -64,6 +64,7 @@ export async function addHeadset(page: Page): Promise<void> {
     const device = new XRDevice(metaQuest3, { stereoEnabled: true });
     device.installRuntime({ forceInstall: true }); // Chromium has a runtime, but no headset
     device.position.set(0, 1.6, 0);
+    Object.assign(window, { headset: device }); // for tests to move
     // The emulator gives the canvas the window's size; the page's own style would squash it.
     document.addEventListener("DOMContentLoaded", () => {
       const sheet = new CSSStyleSheet(); // the page's policy allows no other

@@ -1,0 +1,83 @@
+/** The whole page in stereo: what hands and gaze do to it, and how it ends. */
+import { expect, it } from "vitest";
+import { addHeadset } from "./driver/chromium";
+import { isBackground, takePicture } from "./driver/picture";
+import { describeInChromium } from "./driver/skip";
+import { prepareStand } from "./driver/stand";
+
+type Headset = import("iwer").XRDevice;
+
+describeInChromium("the page in stereo", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 270 } });
+  const state = async () => (await stand.viewer.snapshot()).state;
+  const notices = async () => (await state()).notices;
+
+  /** Controllers away from the specimen: then the gaze alone points at it. */
+  async function open(query: string, hasHands: boolean): Promise<void> {
+    await addHeadset(stand.viewer.page);
+    await stand.open(query);
+    await stand.viewer.enterStereo();
+    await stand.viewer.page.evaluate((areHere) => {
+      const { headset } = window as unknown as { headset: Headset };
+      for (const hand of ["left", "right"] as const) {
+        const controller = headset.controllers[hand];
+        if (controller === undefined) throw new Error(`no ${hand} controller`);
+        controller.position.set(hand === "left" ? -0.2 : 0.2, 1.5, -0.1);
+        // to the floor, or straight ahead
+        if (areHere) controller.quaternion.set(0, 0, 0, 1);
+        else controller.quaternion.set(-Math.SQRT1_2, 0, 0, Math.SQRT1_2);
+      }
+    }, hasHands);
+  }
+
+  it("selects what is looked at for 1.5 s, and nothing where dwell is off", async () => {
+    await open("&mode=off", false);
+    await expect.poll(async () => (await state()).selected, { timeout: 20_000 }).not.toBeNull();
+    expect((await state()).isolated).toBeNull(); // once
+  });
+
+  it("selects by the trigger, and isolates by the next", async () => {
+    await open("&mode=off", true);
+    const press = async () => {
+      for (const value of [1, 0]) {
+        await stand.viewer.page.evaluate((each) => {
+          const { headset } = window as unknown as { headset: Headset };
+          headset.controllers.right?.updateButtonValue("trigger", each);
+        }, value);
+        await stand.viewer.page.waitForTimeout(300);
+      }
+    };
+    await press();
+    await expect.poll(async () => (await state()).selected).not.toBeNull();
+    await press();
+    await expect.poll(async () => (await state()).isolated).not.toBeNull();
+  });
+
+  it("goes back to the flat screen when the session ends", async () => {
+    await open("&mode=off", false);
+    await stand.viewer.page.evaluate(() =>
+      (window as unknown as { headset: Headset }).headset.activeSession?.end(),
+    );
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+    await stand.viewer.settled();
+    const picture = await takePicture(stand.viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    expect(await notices()).toEqual([]);
+  });
+
+  it("splits the screen without WebXR, and goes back by Escape", async () => {
+    await stand.open("&mode=off");
+    await stand.viewer.page.keyboard.press("P");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+    await stand.viewer.page.waitForTimeout(1500);
+    const { width, height } = { width: 480, height: 270 };
+    const half = { y: 0, width: width / 2, height };
+    const isDrawn = (pixel: readonly [number, number, number]) => Math.max(...pixel) > 60;
+    for (const x of [0, width / 2]) {
+      const eye = await takePicture(stand.viewer.page, { x, ...half });
+      expect(eye.count(isDrawn)).toBeGreaterThan(100);
+    }
+    await stand.viewer.page.keyboard.press("Escape");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+  });
+});
