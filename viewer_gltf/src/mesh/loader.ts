@@ -2,10 +2,14 @@
 import type { WebGLRenderer } from "three";
 import { type GLTF, GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import type { KTX2Loader } from "three/examples/jsm/loaders/KTX2Loader.js";
+import type { MeshoptWorker } from "./meshopt";
 import { needsOf } from "./needs";
 
 class LazyGltfLoader extends GLTFLoader {
-  constructor(private readonly textures: () => Promise<KTX2Loader>) {
+  constructor(
+    private readonly buffers: () => Promise<MeshoptWorker>,
+    private readonly textures: () => Promise<KTX2Loader>,
+  ) {
     super();
   }
 
@@ -23,20 +27,35 @@ class LazyGltfLoader extends GLTFLoader {
   private async prepare(data: ArrayBuffer | string): Promise<void> {
     const { meshopt, basis } = needsOf(data);
     const [decoder, textures] = await Promise.all([
-      meshopt ? import("three/examples/jsm/libs/meshopt_decoder.module.js") : null,
+      meshopt ? this.buffers() : null,
       basis ? this.textures() : null,
     ]);
-    if (decoder !== null) this.setMeshoptDecoder(decoder.MeshoptDecoder);
+    // three's types ask for the whole decoder; its loader uses what this one has
+    if (decoder !== null) this.setMeshoptDecoder(decoder as never);
     if (textures !== null) this.setKTX2Loader(textures);
   }
 }
 
 export class SurfaceLoader {
-  readonly gltf = new LazyGltfLoader(() => this.textures());
+  readonly gltf = new LazyGltfLoader(
+    () => this.buffers(),
+    () => this.textures(),
+  );
+  private meshopt: Promise<MeshoptWorker> | null = null;
   private ktx2: Promise<KTX2Loader> | null = null;
   private isDisposed = false;
 
   constructor(private readonly renderer: WebGLRenderer) {}
+
+  private buffers(): Promise<MeshoptWorker> {
+    if (this.meshopt === null) {
+      this.meshopt = import("./meshopt").then((module) => new module.MeshoptWorker());
+      this.meshopt.catch(() => {
+        this.meshopt = null; // the next surface tries again
+      });
+    }
+    return this.meshopt;
+  }
 
   private textures(): Promise<KTX2Loader> {
     if (this.ktx2 === null) {
@@ -57,6 +76,7 @@ export class SurfaceLoader {
 
   dispose(): void {
     this.isDisposed = true;
+    void this.meshopt?.then((worker) => worker.dispose());
     this.ktx2?.then(
       (loader) => loader.dispose(),
       () => undefined, // told where it was wanted

@@ -1,0 +1,69 @@
+/**
+ * meshopt's decoder beside the frame. Its own workers are made of a Blob, which the page's policy
+ * forbids; this one is a file.
+ */
+export type MeshoptRequest = Readonly<{
+  id: number;
+  count: number;
+  stride: number;
+  source: Uint8Array;
+  mode: string;
+  filter: string | undefined;
+}>;
+
+export type MeshoptAnswer = Readonly<{
+  id: number;
+  decoded?: Uint8Array<ArrayBuffer>;
+  fault?: string;
+}>;
+
+type Waiting = Readonly<{
+  resolve: (decoded: Uint8Array<ArrayBuffer>) => void;
+  reject: (error: Error) => void;
+}>;
+
+/** What of the decoder three's loader uses. */
+export class MeshoptWorker {
+  readonly supported = true;
+  readonly ready = Promise.resolve();
+  private readonly worker: Worker;
+  private readonly waiting = new Map<number, Waiting>();
+  private last = 0;
+
+  constructor() {
+    this.worker = new Worker(new URL("./meshopt_worker.ts", import.meta.url), { type: "module" });
+    this.worker.addEventListener("message", ({ data }: MessageEvent<MeshoptAnswer>) => {
+      const job = this.waiting.get(data.id);
+      this.waiting.delete(data.id);
+      if (data.decoded !== undefined) job?.resolve(data.decoded);
+      else job?.reject(new Error(`meshopt: ${data.fault}`));
+    });
+    this.worker.addEventListener("error", (event) => {
+      const error = new Error(`meshopt: ${event.message || "the worker can't be started"}`);
+      for (const { reject } of this.waiting.values()) reject(error);
+      this.waiting.clear();
+    });
+  }
+
+  decodeGltfBufferAsync(
+    count: number,
+    stride: number,
+    source: Uint8Array,
+    mode: string,
+    filter?: string,
+  ): Promise<Uint8Array<ArrayBuffer>> {
+    const id = ++this.last;
+    // a copy of its part: posting the view would send the whole file along
+    const request: MeshoptRequest = { id, count, stride, source: source.slice(), mode, filter };
+    return new Promise((resolve, reject) => {
+      this.waiting.set(id, { resolve, reject });
+      this.worker.postMessage(request, [request.source.buffer]);
+    });
+  }
+
+  dispose(): void {
+    this.worker.terminate();
+    for (const { reject } of this.waiting.values()) reject(new Error("meshopt: no longer wanted"));
+    this.waiting.clear();
+  }
+}
