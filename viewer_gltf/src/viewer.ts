@@ -208,6 +208,7 @@ export class Viewer {
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.pace.frame_ms,
       settings: this.pace.settings,
+      measuredValues: this.contents.marks.values,
       gpuObjects: {
         ...this.renderer.info.memory,
         programs: this.renderer.info.programs?.length ?? 0,

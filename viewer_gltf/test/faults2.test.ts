@@ -29,6 +29,16 @@ describeInChromium("a fault on the way", () => {
     return (await stand.viewer.page.locator("[data-fatal]").textContent()) ?? "";
   }
 
+  it("a decoder that can't be had is told for every surface, and nothing hangs", async () => {
+    await stand.viewer.page.route("**/meshopt_worker*", (route) => route.abort());
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    const told = await notices();
+    expect(told.length).toBeGreaterThan(1); // what comes after the first is told too
+    for (const text of told) expect(text).toMatch(/\.glb: the surface can't be read: meshopt: /);
+    expect((await stand.viewer.snapshot()).triangles).toBe(0);
+  });
+
   it("a manifest that is cut short is told as such", async () => {
     const text = JSON.stringify(stand.manifest);
     expect(await fatalText(text.slice(0, text.length / 2))).toContain(

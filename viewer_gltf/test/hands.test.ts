@@ -89,6 +89,26 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeGreaterThan(TURNED);
   });
 
+  it("measure, and read the channels' values there in the panel too", async () => {
+    await stand.viewer.chooseMode("all"); // so that all volumes are at hand
+    const box = await stageBox();
+    const { specimen, tiles } = stand.manifest;
+    await stand.viewer.page.keyboard.press("p");
+    for (const { bounds_um } of tiles.slice(0, 2)) {
+      const { min, max } = bounds_um;
+      const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
+      const { x, y } = project(front, specimen.bounds_um, box.width, box.height);
+      await stand.viewer.page.mouse.click(box.x + x, box.y + y);
+    }
+    const values = async () => (await stand.viewer.snapshot()).measuredValues;
+    await expect.poll(async () => (await values()).length, { timeout: 15_000 }).toBeGreaterThan(0);
+    expect((await stand.viewer.snapshot()).state.measured).toHaveLength(2);
+    await stand.viewer.unfold("measure");
+    const [first] = await values();
+    expect(first).toMatch(/\d/);
+    await expect.poll(() => stand.viewer.page.locator(".panel").textContent()).toContain(first);
+  });
+
   it("choose nothing by two fingers, though neither moves", async () => {
     const { middle } = await stageBox();
     const devtools = await stand.viewer.page.context().newCDPSession(stand.viewer.page);

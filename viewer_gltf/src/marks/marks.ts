@@ -134,6 +134,14 @@ export class Marks {
     this.measured.update(this.sight);
   }
 
+  /** Each shown channel's value at the second measured point, as `DAPI 1210`; those that have come. */
+  get values(): readonly string[] {
+    return this.measured
+      .valuesAt(1)
+      .split("\n")
+      .filter((line) => line !== "");
+  }
+
   /** The handle that a ray (um) means. */
   pick(ray: Ray, pointing: Pointing): HandleId | null {
     return pickHandle(ray, this.target.handles, this.sight.zoom * TOLERANCE_RAD[pointing]);

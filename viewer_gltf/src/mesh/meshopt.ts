@@ -29,6 +29,8 @@ export class MeshoptWorker {
   private readonly worker: Worker;
   private readonly waiting = new Map<number, Waiting>();
   private last = 0;
+  /** Why no answer comes any more: the worker's script did not load. */
+  private fault: Error | null = null;
 
   constructor() {
     this.worker = new Worker(new URL("./meshopt_worker.ts", import.meta.url), { type: "module" });
@@ -39,8 +41,8 @@ export class MeshoptWorker {
       else job?.reject(new Error(`meshopt: ${data.fault}`));
     });
     this.worker.addEventListener("error", (event) => {
-      const error = new Error(`meshopt: ${event.message || "the worker can't be started"}`);
-      for (const { reject } of this.waiting.values()) reject(error);
+      this.fault = new Error(`meshopt: ${event.message || "the worker can't be started"}`);
+      for (const { reject } of this.waiting.values()) reject(this.fault);
       this.waiting.clear();
     });
   }
@@ -52,6 +54,7 @@ export class MeshoptWorker {
     mode: string,
     filter?: string,
   ): Promise<Uint8Array<ArrayBuffer>> {
+    if (this.fault !== null) return Promise.reject(this.fault);
     const id = ++this.last;
     // a copy of its part: posting the view would send the whole file along
     const request: MeshoptRequest = { id, count, stride, source: source.slice(), mode, filter };

@@ -217,7 +217,7 @@ export class Desk {
       triangles,
       volumeLevel: levels.length > 0 ? Math.min(...levels) : null,
       isLoading,
-      values: [],
+      values: viewer.snapshot().measuredValues,
     };
   }
 

@@ -20,7 +20,6 @@ describe("a stereo session", () => {
       { xr } as unknown as WebGLRenderer,
       () => started++,
       () => undefined,
-      () => undefined,
     );
     await expect(stereo.start(system)).rejects.toThrow("no layer");
     expect(stereo.isRunning).toBe(false);

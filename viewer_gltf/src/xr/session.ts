@@ -11,12 +11,10 @@ export class XrSession {
   readonly camera = new PerspectiveCamera(70, 1, 0.05, 20);
   private session: XRSession | null = null;
 
-  /** @param onSelect any button at all; hands.ts knows which ray it belongs to */
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly onStart: () => void,
     private readonly onEnd: () => void,
-    private readonly onSelect: () => void = () => undefined,
   ) {
     renderer.xr.enabled = true;
     // The origin is where the eyes are when the session starts, whatever the body's height.
@@ -44,7 +42,6 @@ export class XrSession {
       optionalFeatures: ["local-floor"],
     });
     this.session = session;
-    session.addEventListener("select", this.onSelect);
     session.addEventListener("end", () => {
       this.session = null;
       this.onEnd();
