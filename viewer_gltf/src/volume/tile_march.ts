@@ -82,11 +82,9 @@ export function wholeSpecimen(): Clip {
 }
 
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
-/** Nothing may be leapt over until the table of leaps is there. */
-const NO_LEAPS = nearest3D(new Uint8Array(1), [1, 1, 1]);
 
-function nearest3D(data: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
-  const texture = new Data3DTexture(data, ...size);
+function tableOfLeaps(leaps: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
+  const texture = new Data3DTexture(leaps, ...size);
   texture.format = RedFormat;
   texture.type = UnsignedByteType;
   texture.minFilter = texture.magFilter = NearestFilter;
@@ -107,7 +105,9 @@ export function textureCorners(volume: TileVolume): { low: Vector3; high: Vector
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
-  private occupancy: Data3DTexture | null = null;
+  /** All zero, nothing may be leapt over, until the table has come. */
+  private readonly leaps: Uint8Array<ArrayBuffer>;
+  private readonly occupancy: Data3DTexture;
   private readonly lut: DataTexture;
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
@@ -127,6 +127,9 @@ export class TileMarch {
     const rows = new Uint8Array(channelCount * ENTRIES * 4);
     this.lut = new DataTexture(rows, ENTRIES, channelCount, RGBAFormat, UnsignedByteType);
     this.lut.minFilter = this.lut.magFilter = LinearFilter;
+    const bricks = brickCounts(volume.size);
+    this.leaps = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
+    this.occupancy = tableOfLeaps(this.leaps, bricks);
     const material = new ShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
@@ -163,7 +166,7 @@ export class TileMarch {
         uVolume: { value: null },
         uOldVolume: { value: null },
         uFresh: { value: 1 },
-        uOccupancy: { value: NO_LEAPS },
+        uOccupancy: { value: this.occupancy },
         uLut: { value: this.lut },
       },
     });
@@ -252,10 +255,9 @@ export class TileMarch {
 
   /** Where rays may leap, one byte a brick, of `brickDistances`; null: nowhere, for now. */
   leapBy(distances: Uint8Array<ArrayBuffer> | null): void {
-    this.occupancy?.dispose();
-    this.occupancy =
-      distances === null ? null : nearest3D(distances, brickCounts(this.volume.size));
-    this.mesh.material.uniforms.uOccupancy.value = this.occupancy ?? NO_LEAPS;
+    if (distances === null) this.leaps.fill(0);
+    else this.leaps.set(distances);
+    this.occupancy.needsUpdate = true;
   }
 
   private define(name: string, isOn: boolean): void {
@@ -270,7 +272,7 @@ export class TileMarch {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
     this.lut.dispose();
-    this.occupancy?.dispose();
+    this.occupancy.dispose();
   }
 }
 

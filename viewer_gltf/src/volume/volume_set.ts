@@ -56,6 +56,8 @@ export class VolumeSet {
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
   private turn = 0;
+  /** Tables of leaps that are being made. */
+  private leapsUnderWay = 0;
   private hasToldLimit = false;
 
   constructor(
@@ -71,6 +73,7 @@ export class VolumeSet {
 
   get isLoading(): boolean {
     return (
+      this.leapsUnderWay > 0 ||
       [...this.channels.values()].includes("loading") ||
       [...this.residents.values()].some(({ texture }) => texture.isLoading)
     );
@@ -338,14 +341,19 @@ export class VolumeSet {
 
   private async findLeaps(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
     march.leapBy(null); // what the old table leaps over may show now
-    const distances = await this.occupancy.computeDistances(march.volume.tile, {
-      bricks: shown.bricks,
-      alphas: looks.map(({ table }) => opacities(table)),
-      count: brickCounts(march.volume.size),
-    });
+    this.leapsUnderWay++;
+    const distances = await this.occupancy
+      .computeDistances(march.volume.tile, {
+        bricks: shown.bricks,
+        alphas: looks.map(({ table }) => opacities(table)),
+        count: brickCounts(march.volume.size),
+      })
+      .finally(() => {
+        this.leapsUnderWay--;
+        this.onChange();
+      });
     if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
     march.leapBy(distances);
-    this.onChange();
   }
 
   private show({ march, texture, packed, presence }: Resident): void {
