@@ -36,7 +36,10 @@ def read(data):
             rows = meshoptimizer.decode_vertex_buffer(
                 view["count"], view["byteStride"], stored, dtype=row
             )
-            arrays.append(rows["row"][:, : {"VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]])
+            decoded = np.ascontiguousarray(rows["row"])
+            if view.get("filter") == "OCTAHEDRAL":
+                decoded = meshoptimizer.decode_filter_oct(decoded, *decoded.shape)
+            arrays.append(decoded[:, : {"VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]])
     return document, arrays
 
 

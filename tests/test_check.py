@@ -1,3 +1,4 @@
+import re
 import shutil
 import subprocess
 
@@ -17,6 +18,7 @@ from stereocell.write.stl import write_stl
 from stereocell.write.usd import TileExtent, write_stage, write_tile
 
 GLB = "channels/CD31/r0_c0/lod0.glb"
+VOLUME = "volumes/r0_c0/CD31.ktx2"
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,13 @@ def lines(out):
 def failed(out):
     """Names of the lines that fail, but for the plan, which these folders don't have."""
     return {name for name, line in lines(out).items() if not line.ok} - {"plan"}
+
+
+def change_byte(path):
+    """Change one byte near the file's end; its length stays."""
+    data = bytearray(path.read_bytes())
+    data[-40] ^= 1
+    path.write_bytes(data)
 
 
 @pytest.fixture(scope="module")
@@ -79,13 +88,40 @@ def test_a_build_without_anything_in_it_fails_in_every_line(tmp_path):
     assert all("\n" not in line.detail for line in found.values())
 
 
-def test_changed_byte_is_found(out):
-    path = out / "bundle" / GLB
-    data = bytearray(path.read_bytes())
-    data[-40] ^= 1
-    path.write_bytes(data)
+@pytest.mark.parametrize("name", [GLB, VOLUME])
+def test_changed_byte_is_found(out, name):
+    change_byte(out / "bundle" / name)
     assert "hashes" in failed(out)
-    assert f"{GLB}: not the bytes" in lines(out)["hashes"].detail
+    assert f"{name}: not the bytes" in lines(out)["hashes"].detail
+
+
+def test_changed_byte_of_a_surface_is_not_what_its_tileset_says(out):
+    change_byte(out / "bundle" / GLB)
+    assert "tilesets" in failed(out)
+    detail = lines(out)["tilesets"].detail
+    assert "CD31/tileset.json: r0_c0/lod0.glb: expected sha-256-128 " in detail
+    assert "lod1.glb" not in detail
+
+
+def test_changed_byte_of_a_level_is_not_what_its_list_says(out):
+    """The finest level lies last."""
+    change_byte(out / "bundle" / VOLUME)
+    assert "volume lists" in failed(out)
+    detail = lines(out)["volume lists"].detail
+    assert f"{VOLUME}: level 0: expected SHA-256 " in detail
+    assert "level 1" not in detail
+
+
+def test_surface_without_a_hash_is_found(out):
+    path = out / "bundle" / "channels/CD31/tileset.json"
+    path.write_text(path.read_text().replace("sha-256-128", "md5", 1))
+    assert "has no hash, expected extras.sha-256-128" in lines(out)["tilesets"].detail
+
+
+def test_level_without_a_hash_is_found(out):
+    path = out / "bundle" / "channels/CD31/volumes.json"
+    path.write_text(re.sub(r'("length":\d+),"sha256":"\w+"', r"\1", path.read_text(), count=1))
+    assert "'sha256' is a required property" in lines(out)["volume lists"].detail
 
 
 def test_missing_and_unlisted_files_are_found(out):

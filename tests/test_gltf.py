@@ -87,6 +87,29 @@ def test_color_and_extras_are_written():
     assert "KHR_texture_basisu" not in document["extensionsUsed"]
 
 
+def test_normals_and_tangents_are_kept_to_about_a_degree():
+    rng = np.random.default_rng(0)
+    mesh = patch(0, 10, n=40)
+    normals = rng.normal(size=(1600, 3))
+    normals[:6] = [*np.eye(3), *-np.eye(3)]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    signs = rng.choice([-1.0, 1.0], size=(1600, 1))
+    tangents = np.hstack([normals[::-1], signs]).astype(np.float32)
+    mesh = replace(mesh, normals=normals.astype(np.float32), tangents=tangents)
+    document, arrays = read(encode_glb(mesh, choose_step(20), RED, "m", EXTRAS, MAP).data)
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    # vertices are ordered anew: find each by its place
+    x, _, z = arrays[attributes["POSITION"]].astype(float).T
+    u, v = (np.rint(39 * axis / axis.max()).astype(int) for axis in (x, z))
+    for name, expected in (("NORMAL", normals), ("TANGENT", tangents)):
+        found = arrays[attributes[name]] / 127
+        there = expected[40 * v + u]
+        cosines = (found[:, :3] * there[:, :3]).sum(1) / np.linalg.norm(found[:, :3], axis=1)
+        assert np.degrees(np.arccos(cosines.clip(-1, 1))).max() < 1.1
+        assert np.abs(np.linalg.norm(found[:, :3], axis=1) - 1).max() < 0.01
+        assert (found[:, 3:] == there[:, 3:]).all()
+
+
 def test_normal_map_brings_uvs_with_v_down_and_tangents():
     mesh = patch(0, 10)
     document, arrays = read(

@@ -1,11 +1,18 @@
+import base64
+import hashlib
+
 import pytest
 
-from stereocell.write.tiles3d import TileLod, make_tileset
+from stereocell.write.tiles3d import TileLod, content_hash, make_tileset
+
+ABC = hashlib.sha256(b"abc").hexdigest()  # ba7816bf8f01cfea414140de5dae2223...
 
 
 def lods(x0, distances):
     return [
-        TileLod(f"t{x0}/lod{k}.glb", d, (x0 * 1e-6, -4e-6, 1e-6), ((x0 + 10) * 1e-6, -1e-6, 3e-6))
+        TileLod(
+            f"t{x0}/lod{k}.glb", ABC, d, (x0 * 1e-6, -4e-6, 1e-6), ((x0 + 10) * 1e-6, -1e-6, 3e-6)
+        )
         for k, d in enumerate(distances)
     ]
 
@@ -33,6 +40,13 @@ def test_boxes_are_turned_z_up():
     box = make_tileset([lods(0, [0])])["root"]["boundingVolume"]["box"]
     # glTF centre (5, -2.5, 2), half size (5, 1.5, 1) um -> (x, -z, y)
     assert [n * 1e6 for n in box] == pytest.approx([5, -2, -2.5, 5, 0, 0, 0, 1, 0, 0, 0, 1.5])
+
+
+def test_contents_give_the_first_128_bits_of_their_hash():
+    assert content_hash(ABC) == "ungWv48Bz-pBQUDeXa4iIw"
+    assert base64.urlsafe_b64decode(content_hash(ABC) + "==") == bytes.fromhex(ABC)[:16]
+    (tile,) = make_tileset([lods(0, [0])])["root"]["children"]
+    assert tile["content"]["extras"] == {"sha-256-128": content_hash(ABC)}
 
 
 def test_root_holds_every_tile_and_has_no_content():

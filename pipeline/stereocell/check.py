@@ -23,6 +23,7 @@ from stereocell.validate_usd import validate_stage, validate_usdz
 from stereocell.write.bundle import FILES, MANIFEST
 from stereocell.write.exr import check_exr
 from stereocell.write.stl import check_stl
+from stereocell.write.tiles3d import CONTENT_HASH, content_hash
 from stereocell.write.usd_tile import closed_file, has_mesh
 from stereocell.write.usdz import USDZ_NAME
 from stereocell.write.vdb import check_vdb
@@ -133,7 +134,7 @@ def _lost_copies(out: Path) -> list[str]:
 
 
 def _check_volume_lists(bundle: Path) -> str:
-    """Check each volumes.json, and what it says of the levels' places in the textures."""
+    """Check each volumes.json, and what it says of the levels in the textures."""
     problems = []
     volumes = 0
     for channel in _channels(bundle):
@@ -141,9 +142,12 @@ def _check_volume_lists(bundle: Path) -> str:
         content = read_json(path, "volumes.schema.json", _RUN_BUNDLE)
         for volume in content["volumes"]:
             volumes += 1
+            texture = bundle / volume["file"]["path"]
             listed = [(level["offset"], level["length"]) for level in volume["levels"]]
-            if _levels_of(bundle / volume["file"]["path"], len(listed)) != listed:
+            if _levels_of(texture, len(listed)) != listed:
                 problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
+                continue
+            problems += _spoilt_levels(texture, volume)
     _raise_on(problems)
     return f"{volumes} volumes"
 
@@ -158,6 +162,24 @@ def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
     if len(head) < 80 + 24 * count or struct.unpack_from("<I", head, 40) != (count,):
         return []
     return [struct.unpack_from("<2Q", head, 80 + 24 * k) for k in range(count)]
+
+
+def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
+    """Return what is wrong where a level, whose place is right, is not what its hash says."""
+    problems = []
+    try:
+        with texture.open("rb") as file:
+            for k, level in enumerate(volume["levels"]):
+                file.seek(level["offset"])
+                found = hashlib.sha256(file.read(level["length"])).hexdigest()
+                if found != level["sha256"]:
+                    problems.append(
+                        f"{volume['file']['path']}: level {k}: "
+                        f"expected SHA-256 {level['sha256']}, found {found}"
+                    )
+    except OSError as error:
+        raise CheckError(f"{texture}: {error.strerror or error}") from error
+    return problems
 
 
 def _channels(bundle: Path) -> list[dict[str, Any]]:
@@ -175,10 +197,13 @@ def _check_tilesets(bundle: Path) -> str:
         path = bundle / channel["tileset"]["path"]
         tileset = read_json(path, None, _RUN_BUNDLE)
         try:
-            for uri, error, limit in _walk(tileset["root"], tileset["geometricError"]):
+            for content, error, limit in _walk(tileset["root"], tileset["geometricError"]):
                 contents += 1
+                uri = content["uri"]
                 if not (path.parent / uri).is_file():
                     problems.append(f"{path}: no file at {uri}")
+                else:
+                    problems += _spoilt_content(path, content)
                 if error > limit:
                     problems.append(f"{path}: {uri} has a larger geometricError than its parent")
         except (KeyError, TypeError) as error:
@@ -187,11 +212,24 @@ def _check_tilesets(bundle: Path) -> str:
     return f"{contents} contents"
 
 
-def _walk(tile: dict[str, Any], limit: float) -> Iterator[tuple[str, float, float]]:
-    """Yield address, geometricError and the parent's geometricError of each content."""
+def _spoilt_content(tileset: Path, content: dict[str, Any]) -> list[str]:
+    """Return what is wrong where a surface is not what the tileset's hash says."""
+    uri = content["uri"]
+    try:
+        expected = content["extras"][CONTENT_HASH]
+    except (KeyError, TypeError):
+        return [f"{tileset}: {uri} has no hash, expected extras.{CONTENT_HASH}"]
+    found = content_hash(_measure(tileset.parent / uri)["sha256"])
+    if found == expected:
+        return []
+    return [f"{tileset}: {uri}: expected {CONTENT_HASH} {expected}, found {found}"]
+
+
+def _walk(tile: dict[str, Any], limit: float) -> Iterator[tuple[dict[str, Any], float, float]]:
+    """Yield each content, its tile's geometricError and that of the parent."""
     error = tile["geometricError"]
     if "content" in tile:
-        yield tile["content"]["uri"], error, limit
+        yield tile["content"], error, limit
     for child in tile.get("children", ()):
         yield from _walk(child, error)
 

@@ -33,6 +33,8 @@ export type Snapshot = Readonly<{
   /** Of three's own count. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;
+  /** What is said before the eyes now, in stereo. */
+  told: readonly string[];
 }>;
 
 export interface StereoCellApi {

@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../test/fixture/manifest";
 import type { Manifest } from "./bundle/generated/bundle";
 import {
   drawnAs,
@@ -13,45 +14,12 @@ import {
   initialState,
   LIMITS,
   MAX_CHANNELS,
+  newNotice,
   type Representation,
   reduce,
   type ViewerState,
   VOLUME_TILES_AT_START,
 } from "./state";
-
-const FILE = { path: "x", bytes: 0, sha256: "0".repeat(64) };
-const BOUNDS: Manifest["specimen"]["bounds_um"] = { min: [0, 0, 0], max: [3, 1, 1] };
-const tile = (id: string, x: number): Manifest["tiles"][number] => ({
-  id,
-  representation: "mesh",
-  bounds_um: { min: [x, 0, 0], max: [x + 1, 1, 1] },
-});
-
-function manifest(channels: number): Manifest {
-  return {
-    format: "stereocell-bundle",
-    version: 1,
-    generator: "test",
-    specimen: { name: "test", bounds_um: BOUNDS },
-    tiles: [tile("r0_c1", 1), tile("r0_c0", 0), tile("r0_c2", 2)],
-    channels: Array.from({ length: channels }, (_, i) => ({
-      id: `c${i}`,
-      name: `channel ${i}`,
-      color: [1, 0, 0],
-      window: [0, 100],
-      iso_value: 50,
-      iso_normalized: 0.5,
-      surface: i === 1 ? "none" : "clear",
-      transfer_function: "default",
-      transfer_functions: ["default", "soft"],
-      lut: FILE,
-      tileset: i === 1 ? null : FILE,
-      triangles: [10, 5],
-      volumes: FILE,
-    })),
-    files: FILE,
-  };
-}
 
 function unclear(given: Manifest, ...indices: number[]): Manifest {
   const channels = given.channels.map((channel, i) =>
@@ -67,6 +35,17 @@ function staged(given: Manifest, representations: Readonly<Record<string, Repres
     representation: representations[each.id] ?? each.representation,
   }));
   return { ...given, tiles: [first, ...others] } satisfies Manifest;
+}
+
+/** The tile in the middle, and a row of so many others beside it. */
+function withRow(given: Manifest, count: number, representation: Representation = "mesh") {
+  const middle = given.tiles[2];
+  const row = Array.from({ length: count }, (_, i): typeof middle => {
+    const x = 25 + 10 * (i - count / 2);
+    const bounds_um: typeof middle.bounds_um = { min: [x, -10, 0], max: [x + 10, 0, 8] };
+    return { id: `r1_c${i}`, representation, bounds_um };
+  });
+  return { ...given, tiles: [middle, ...row] } satisfies Manifest;
 }
 
 /** Within the switch distance, the first of them looked at. */
@@ -101,21 +80,21 @@ function after(state: ViewerState, ...actions: Parameters<typeof reduce>[1][]): 
 
 describe("the viewer's state", () => {
   it("opens with surfaces of the first channels, and volumes for what comes near", () => {
-    const state = initialState(manifest(70));
+    const state = initialState(sampleManifest(70));
     expect(state.channels.filter((c) => c.shown)).toHaveLength(MAX_CHANNELS);
     expect(state.channels[1].hasSurface).toBe(false);
     expect(state.mode).toBe("disc");
     expect(marched(state)).toEqual([]);
     expect(marched(state, near("r0_c2", "r0_c1"))).toEqual(["r0_c2", "r0_c1"]);
-    expect(state.middle).toBe("r0_c1");
+    expect(state.middle).toBe("r0_c2");
   });
 
   it("lets the channel that was shown longest leave for a fifth, and says so", () => {
-    const state = initialState(manifest(7));
+    const state = initialState(sampleManifest(7));
     const five = reduce(state, { type: "show", channel: "c5", shown: true });
     const shown = (each: ViewerState) => each.channels.filter((c) => c.shown).map((c) => c.id);
     expect(shown(five)).toEqual(["c1", "c2", "c3", "c5"]);
-    expect(five.notices).toEqual(["4 channels show at once: channel 0 left for channel 5."]);
+    expect(five.notices).toEqual(["4 channels show at once: Marker 0 left for Marker 5."]);
     const back = reduce(five, { type: "show", channel: "c0", shown: true });
     expect(shown(back)).toEqual(["c0", "c2", "c3", "c5"]);
     const room = after(
@@ -128,8 +107,8 @@ describe("the viewer's state", () => {
   });
 
   it("opens channels without a clear surface as volumes in all tiles, and loads no surface", () => {
-    const state = initialState(unclear(manifest(3), 0));
-    expect(marched(state)).toHaveLength(3);
+    const state = initialState(unclear(sampleManifest(3), 0));
+    expect(marched(state)).toHaveLength(state.tiles.length);
     expect(wantedTiles(state, NOTHING_NEAR)[0].channels).toEqual(["c0"]);
     expect(wantsSurface(state, state.channels[0])).toBe(false);
     expect(looks(state, "c0", "r0_c0")).toBe("volume");
@@ -144,10 +123,8 @@ describe("the viewer's state", () => {
   });
 
   it("opens a specimen of many tiles with the volumes of one", () => {
-    const many = unclear(manifest(1), 0);
-    const [first] = many.tiles;
-    const others = Array.from({ length: VOLUME_TILES_AT_START }, (_, i) => tile(`r1_c${i}`, i));
-    const state = initialState({ ...many, tiles: [first, ...others] });
+    const many = unclear(sampleManifest(1), 0);
+    const state = initialState(withRow(many, VOLUME_TILES_AT_START));
     expect(marched(state)).toEqual([state.middle]);
     expect(marched(state, { ...near("r1_c0"), disc: [] })).toEqual(["r1_c0"]);
     expect(marched(reduce(state, { type: "select", tile: "r1_c3" }))).toEqual(["r1_c3"]);
@@ -155,13 +132,15 @@ describe("the viewer's state", () => {
 
   it("shows a volume in the gazed tile, the selected one, or in all", () => {
     const gaze = near("r0_c1", "r0_c0", "r0_c2");
-    const state = reduce(initialState(manifest(2)), { type: "choose-mode", mode: "tile" });
+    const state = reduce(initialState(sampleManifest(2)), { type: "choose-mode", mode: "tile" });
     expect(marched(state)).toEqual([]);
     expect(marched(state, gaze)).toEqual(["r0_c1"]);
     const selected = reduce(state, { type: "select", tile: "r0_c2" });
     expect(marched(selected, gaze)).toEqual(["r0_c2"]);
     expect(marched(selected, near("r0_c1"))).toEqual([]); // it is too far away
-    expect(marched(reduce(state, { type: "choose-mode", mode: "all" }))).toHaveLength(3);
+    expect(marched(reduce(state, { type: "choose-mode", mode: "all" }))).toHaveLength(
+      state.tiles.length,
+    );
     expect(marched(reduce(state, { type: "choose-mode", mode: "off" }), gaze)).toEqual([]);
     const none = after(
       state,
@@ -172,7 +151,7 @@ describe("the viewer's state", () => {
   });
 
   it("shows nothing but the isolated tile", () => {
-    const state = reduce(initialState(manifest(2)), { type: "isolate", tile: "r0_c0" });
+    const state = reduce(initialState(sampleManifest(2)), { type: "isolate", tile: "r0_c0" });
     expect(looks(state, "c0", "r0_c0")).toBe("surface");
     expect(looks(state, "c0", "r0_c1")).toBe("");
     const all = reduce(state, { type: "choose-mode", mode: "all" });
@@ -181,7 +160,7 @@ describe("the viewer's state", () => {
 
   it("takes from a surface what its volume shows, once that has come", () => {
     const nearby = near("r0_c1");
-    const state = initialState(unclear(manifest(3), 2));
+    const state = initialState(unclear(sampleManifest(3), 2));
     const taken = (channel: string, id: string, presence: number) =>
       takenFrom(state, ...find(state, channel, id), nearby, presence);
     expect(taken("c0", "r0_c1", 0)).toBe(0);
@@ -192,7 +171,7 @@ describe("the viewer's state", () => {
   });
 
   it("keeps what is set within its limits", () => {
-    const state = initialState(manifest(1));
+    const state = initialState(sampleManifest(1));
     const far = reduce(state, { type: "set-switch-distance", distance_m: 1e9 });
     expect(far.switchDistance_m).toBe(LIMITS.switchDistance_m[1]);
     const wide = reduce(state, { type: "set-disc-radius", radius_deg: -3 });
@@ -209,7 +188,7 @@ describe("the viewer's state", () => {
   });
 
   it("ignores tiles and transfer functions that the bundle does not have", () => {
-    const state = initialState(manifest(1));
+    const state = initialState(sampleManifest(1));
     expect(reduce(state, { type: "select", tile: "r9_c9" })).toBe(state);
     const chosen = reduce(state, {
       type: "choose-transfer-function",
@@ -222,12 +201,29 @@ describe("the viewer's state", () => {
   it("says each fault once and forgets it when dismissed", () => {
     const text = "channels/c0/r0_c0/lod0.glb: not found (404)";
     const twice = after(
-      initialState(manifest(1)),
+      initialState(sampleManifest(1)),
       { type: "notify", text },
       { type: "notify", text },
     );
     expect(twice.notices).toEqual([text]);
     expect(reduce(twice, { type: "dismiss", text }).notices).toEqual([]);
+    expect(reduce(twice, { type: "dismiss", text: "another" })).toBe(twice);
+  });
+
+  it("tells which notice a change has brought, also once more", () => {
+    const brought = (before: ViewerState, action: Parameters<typeof reduce>[1]) =>
+      newNotice(before, reduce(before, action));
+    const faulty = after(
+      initialState(sampleManifest(6)),
+      { type: "notify", text: "a" },
+      { type: "notify", text: "b" },
+    );
+    expect(brought(faulty, { type: "notify", text: "c" })).toBe("c");
+    expect(brought(faulty, { type: "notify", text: "a" })).toBe("a");
+    expect(brought(faulty, { type: "notify", text: "b" })).toBe("b");
+    expect(brought(faulty, { type: "show", channel: "c4", shown: true })).toMatch(/^4 channels/);
+    expect(brought(faulty, { type: "dismiss", text: "a" })).toBeNull();
+    expect(brought(faulty, { type: "fade", channel: "c0", opacity: 0.5 })).toBeNull();
   });
 });
 
@@ -235,7 +231,7 @@ describe("what the stage draws in a tile", () => {
   const MIXED = { r0_c0: "volume", r0_c2: "both" } as const;
 
   it("is what the viewer opens with, whatever the other tiles are", () => {
-    const state = initialState(staged(manifest(3), MIXED));
+    const state = initialState(staged(sampleManifest(3), MIXED));
     expect(state.channels.every((c) => c.shown && c.volume)).toBe(true);
     for (const channel of ["c0", "c2"]) {
       expect(looks(state, channel, "r0_c0")).toBe("volume");
@@ -247,18 +243,18 @@ describe("what the stage draws in a tile", () => {
   });
 
   it("leaves channels without a clear surface as volumes, and gives their surface to `both`", () => {
-    const state = initialState(staged(unclear(manifest(3), 0), MIXED));
+    const state = initialState(staged(unclear(sampleManifest(3), 0), MIXED));
     expect(looks(state, "c0", "r0_c0")).toBe("volume");
     expect(looks(state, "c0", "r0_c1")).toBe("volume");
     expect(looks(state, "c0", "r0_c2")).toBe("surface + volume");
     expect(looks(state, "c2", "r0_c1")).toBe("surface");
     expect(wantsSurface(state, state.channels[0])).toBe(true);
-    const without = initialState(staged(unclear(manifest(3), 0), { r0_c0: "volume" }));
+    const without = initialState(staged(unclear(sampleManifest(3), 0), { r0_c0: "volume" }));
     expect(wantsSurface(without, without.channels[0])).toBe(false);
   });
 
   it("gives way to what the user chooses", () => {
-    const state = initialState(staged(manifest(3), MIXED));
+    const state = initialState(staged(sampleManifest(3), MIXED));
     const off = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
     expect(looks(off, "c0", "r0_c0")).toBe("surface");
     expect(looks(off, "c2", "r0_c0")).toBe("volume");
@@ -270,13 +266,8 @@ describe("what the stage draws in a tile", () => {
   });
 
   it("opens as volumes only so many tiles, from the middle, and says so", () => {
-    const many = unclear(manifest(3), 2);
-    const tiles = Array.from({ length: VOLUME_TILES_AT_START + 4 }, (_, i) => ({
-      ...tile(`r1_c${i}`, i - 10),
-      representation: "volume" as const,
-    }));
-    const [first] = many.tiles;
-    const state = initialState({ ...many, tiles: [first, ...tiles] });
+    const many = unclear(sampleManifest(3), 2);
+    const state = initialState(withRow(many, VOLUME_TILES_AT_START + 4, "volume"));
     const tilesOf = (channel: string) =>
       wantedTiles(state, NOTHING_NEAR).filter(({ channels }) => channels.includes(channel));
     expect(tilesOf("c0")).toHaveLength(VOLUME_TILES_AT_START);

@@ -250,8 +250,10 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       return action.level === state.quality ? state : { ...state, quality: action.level };
     case "notify":
       return withNotice(state, action.text);
-    case "dismiss":
-      return { ...state, notices: state.notices.filter((n) => n !== action.text) };
+    case "dismiss": {
+      const notices = state.notices.filter((n) => n !== action.text);
+      return notices.length === state.notices.length ? state : { ...state, notices };
+    }
   }
 }
 
@@ -263,6 +265,12 @@ function withTile(
   const isThere = tile === null || state.tiles.some(({ id }) => id === tile);
   if (!isThere || state[key] === tile) return state;
   return { ...state, [key]: tile };
+}
+
+/** The notice that a change has brought, also if it was there before; null: none. */
+export function newNotice(before: ViewerState, after: ViewerState): string | null {
+  const isNew = after.notices !== before.notices && after.notices.length >= before.notices.length;
+  return (isNew && after.notices.at(-1)) || null;
 }
 
 /** The channels that may be marched, in the bundle's order. */

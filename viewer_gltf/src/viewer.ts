@@ -5,15 +5,18 @@ import { BundleError } from "./bundle/errors";
 import type { Bundle } from "./bundle/load";
 import { Contents } from "./contents";
 import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
-import { pickTile, type Ray } from "./gaze/pick";
+import { pickTile, type Ray, shownBox, shownTiles } from "./gaze/pick";
 import { Hybrid } from "./hybrid/hybrid";
+import type { HandleId } from "./marks/handles";
 import { listenForHandles } from "./marks/pointer";
 import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX } from "./mesh/surface_set";
 import { Pace } from "./quality/pace";
 import type { Look } from "./share/look";
-import { type Action, initialState, reduce, type ViewerState } from "./state";
-import type { Command } from "./ui/commands";
+import { type Action, initialState, newNotice, reduce, type ViewerState } from "./state";
+import { CANT, type Command } from "./ui/commands";
 import type { Layout, PanelView } from "./ui/controls";
+import { chosenTile } from "./ui/tile_layout";
+import { moveByOneHand } from "./view/grab";
 import { Navigation } from "./view/navigation";
 import { Picture } from "./view/picture";
 import { place, XR_DISTANCE_M } from "./view/placement";
@@ -97,7 +100,9 @@ export class Viewer {
       handles: [marks.target],
       layOut: (view) => this.layOut(view),
       onAction: (action) => this.dispatch(action),
-      onCommand: (command) => void this.run(command),
+      onCommand: (command) => {
+        if (!this.run(command)) this.stereo.tell(CANT);
+      },
       onChoose: (ray, tile) => this.choose(ray, tile),
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
@@ -138,7 +143,9 @@ export class Viewer {
   dispatch(action: Action): void {
     const next = reduce(this.state, action);
     if (next === this.state) return;
+    const notice = newNotice(this.state, next);
     this.state = next;
+    if (notice !== null) this.stereo.tell(notice);
     this.follow();
     this.onState(next);
   }
@@ -169,6 +176,11 @@ export class Viewer {
     }
     this.isStale = true;
     return true;
+  }
+
+  /** Light up a handle of the cuts; null: none. */
+  mean(handle: HandleId | null): void {
+    this.contents.marks.mean(handle);
   }
 
   /** From where the specimen is seen; null: as it opens. */
@@ -214,6 +226,7 @@ export class Viewer {
         programs: this.renderer.info.programs?.length ?? 0,
       },
       isStereo: this.stereo.kind !== null,
+      told: this.stereo.hands.notice.texts,
     };
   }
 
@@ -236,8 +249,8 @@ export class Viewer {
 
   private follow(): void {
     const { isolated, selected, quality } = this.state;
-    const tile = this.bundle.manifest.tiles.find(({ id }) => id === isolated);
-    this.room.specimen.show(tile?.bounds_um ?? null);
+    const { manifest } = this.bundle;
+    this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
     this.room.mark(isolated === null ? selected : null);
     this.pace.setLevel(quality);
@@ -347,9 +360,18 @@ export class Viewer {
     else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
   }
 
+  /** The specimen turns the same side to the head as to the screen, what was looked at ahead. */
   private enterStereo(): void {
-    this.navigation.controls.enabled = false;
-    this.room.specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
+    const { navigation, room } = this;
+    const { specimen } = room;
+    const { target, object } = navigation.controls;
+    navigation.controls.enabled = false;
+    const inRoom = { position: new Vector3(0, 0, -XR_DISTANCE_M), orientation: new Quaternion() };
+    const onScreen = { position: target, orientation: object.quaternion };
+    const pose = moveByOneHand(specimen.pose, onScreen, inRoom);
+    const isHome = navigation.look === null && !specimen.isMoved;
+    specimen.anchorAt(inRoom.position);
+    if (!isHome) specimen.moveTo(pose, new Vector3());
     this.onState(this.state);
   }
 
@@ -361,16 +383,15 @@ export class Viewer {
   }
 
   private tap(ray: Ray): void {
-    this.choose(ray, pickTile(ray, this.bundle.manifest.tiles));
+    const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
+    this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
   }
 
-  /** Measure, or select the tile; what is selected already is isolated. */
+  /** Measure, or choose the tile; of one that is alone nothing is left to choose. */
   private choose(ray: Ray, tile: string | null): void {
-    const { isolated, selected, tool } = this.state;
-    if (tool === "measure") void this.contents.marks.measure(ray);
-    else if (isolated !== null || tile === null) return;
-    else if (tile === selected) this.dispatch({ type: "isolate", tile });
-    else this.dispatch({ type: "select", tile });
+    const { state } = this;
+    if (state.tool === "measure") void this.contents.marks.measure(ray);
+    else if (state.isolated === null && tile !== null) this.dispatch(chosenTile(state, tile));
   }
 
   dispose(): void {

@@ -3,9 +3,10 @@ import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { afterEach, beforeEach, expect, it } from "vitest";
 import { ViewerPage } from "./driver/page";
-import { isBackground, takePicture } from "./driver/picture";
+import { hasColor, isBackground, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
+import { swapSurface } from "./fixture/swap";
 import { Gate } from "./offline/gate";
 
 describeInChromium("a fault on the way", () => {
@@ -22,6 +23,17 @@ describeInChromium("a fault on the way", () => {
 
   const through = (query = "") => `${gate.address}/app/?bundle=../bundle/${query}`;
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
+
+  /** The file with one byte changed; 40 before the end of a glb lie the bytes of its mesh. */
+  async function changed(path: string): Promise<Buffer> {
+    const body = Buffer.from(await readFile(join(stand.bundle, path)));
+    body[body.length - 40] ^= 1;
+    return body;
+  }
+
+  function answer(path: string, body: string | Uint8Array): void {
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+  }
 
   async function fatalText(body: string | Uint8Array, path = "manifest.json"): Promise<string> {
     stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
@@ -95,11 +107,69 @@ describeInChromium("a fault on the way", () => {
     expect((await notices()).join()).toMatch(new RegExp(`${path}: expected SHA-256 .*, found`));
   });
 
+  it("a level with other bytes than it should have is named once, and the surfaces stay", async () => {
+    const path = "volumes/r0_c0/Block.ktx2";
+    const statuses: number[] = [];
+    await stand.viewer.page.route(`**/${path}`, async (route) => {
+      const response = await route.fetch();
+      const body = await response.body();
+      body[body.length >> 1] ^= 1;
+      statuses.push(response.status());
+      await route.fulfill({ response, body });
+    });
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    const { triangles } = await stand.viewer.snapshot();
+    expect(triangles).toBeGreaterThan(0);
+    await stand.viewer.drawVolume("Block", true);
+    await stand.viewer.chooseMode("all");
+    expect(statuses).toEqual([206]); // a range, asked for once
+    expect(await notices()).toEqual([
+      expect.stringMatching(
+        new RegExp(`^${path}: level \\d+: expected SHA-256 [0-9a-f]{64}, found [0-9a-f]{64}$`),
+      ),
+    ]);
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0); // the other tile's
+    const picture = await takePicture(stand.viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    await stand.viewer.chooseMode("off");
+    expect((await stand.viewer.snapshot()).triangles).toBe(triangles);
+  });
+
+  it("a surface with another byte than it should have is named, and the others stay", async () => {
+    const path = "channels/Balls/r0_c1/lod2.glb";
+    answer(path, await changed(path));
+    await stand.open("&mode=off");
+    await stand.viewer.show("F_x20_body", false);
+    expect(await notices()).toEqual([
+      expect.stringMatching(
+        new RegExp(`^${path}: expected sha-256-128 [\\w-]{22}, found [\\w-]{22}$`),
+      ),
+    ]);
+    expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
+  });
+
+  it("a finer surface with another byte is named, and the coarser one stays", async () => {
+    await stand.open("&mode=off");
+    await stand.viewer.show("F_x20_body", false);
+    const whole = (await stand.viewer.snapshot()).triangles;
+    const path = "channels/Balls/r0_c1/lod1.glb";
+    answer(path, await changed(path));
+    await stand.open("&mode=off");
+    await stand.viewer.show("F_x20_body", false);
+    expect(await notices()).toEqual([expect.stringContaining(`${path}: expected sha-256-128 `)]);
+    expect((await stand.viewer.snapshot()).triangles).toBeLessThan(whole);
+    const picture = await takePicture(stand.viewer.page);
+    const places = picture.where(hasColor([0.05, 0.4, 1]));
+    expect(places.filter(([x]) => x > picture.width / 2).length).toBeGreaterThan(100);
+  });
+
   it("a surface that is no glTF inside is named, and the others stay", async () => {
     const path = "channels/Balls/r0_c1/lod2.glb";
     const body = Buffer.from(await readFile(join(stand.bundle, path)));
     body.fill(0x7b, 20, 40); // the JSON chunk's start
-    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+    const files = await swapSurface(stand.bundle, "Balls", "r0_c1/lod2.glb", body);
+    for (const [file, content] of files) answer(file, content);
     await stand.open();
     await stand.viewer.settled();
     expect((await notices()).join()).toContain(`${path}: the surface can't be read`);

@@ -38,6 +38,33 @@ describeInChromium("hands on the picture", () => {
     }
   });
 
+  it("choose no tile where all of it is cut away", async () => {
+    const box = await stageBox();
+    const [{ id, bounds_um }] = stand.manifest.tiles;
+    const { min, max } = bounds_um;
+    const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
+    const { specimen } = stand.manifest;
+    const { x, y } = project(front, specimen.bounds_um, box.width, box.height);
+    const { page } = stand.viewer;
+    await page.keyboard.press("b");
+    await page.mouse.click(box.x + x, box.y + y); // a corner, of which the box leaves nothing there
+    expect(await tileNow()).toBeNull();
+    await page.keyboard.press("b");
+    await page.mouse.click(box.x + x, box.y + y);
+    expect(await tileNow()).toBe(id);
+  });
+
+  it("move the picture by keys, and back", async () => {
+    const { page } = stand.viewer;
+    const before = await takePicture(page);
+    for (const key of ["Shift+ArrowRight", "Shift+ArrowUp"]) await page.keyboard.press(key);
+    await stand.viewer.still();
+    expect(difference(before, await takePicture(page))).toBeGreaterThan(TURNED);
+    for (const key of ["Shift+ArrowLeft", "Shift+ArrowDown"]) await page.keyboard.press(key);
+    await stand.viewer.still();
+    expect(difference(before, await takePicture(page))).toBeLessThan(TURNED / 10);
+  });
+
   it("isolate the tile by a second click, and bring all back", async () => {
     const box = await stageBox();
     const [{ id, bounds_um }] = stand.manifest.tiles;

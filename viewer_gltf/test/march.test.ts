@@ -92,7 +92,20 @@ describeInChromium("the ray-march", () => {
       log += Math.log(1 - ((opacity / 255) * (i + 0.5)) / 10_000);
     }
     const expected = 1 - Math.exp((log / 10_000) * (side - 3));
-    expect(Math.abs((await inPage("rampOpacity", side, opacity)) - expected)).toBeLessThan(2 / 255);
+    const found = await inPage("meanOpacity", "ramp", side, opacity);
+    expect(Math.abs(found - expected)).toBeLessThan(2 / 255);
+  });
+
+  it("makes a uniform cube as opaque as its length says, whatever its opacity", async () => {
+    // 64 voxels are a step each; of 200 some are longer than a voxel, and are corrected for it
+    for (const side of [67, 203]) {
+      for (const opacity of [1, 5, 20]) {
+        const expected = 1 - (1 - opacity / 255) ** (side - 3);
+        const found = await inPage("meanOpacity", "uniform", side, opacity);
+        const ends = expected > 0.99 ? 0.01 : 2 / 255; // rays that are as opaque go no further
+        expect(Math.abs(found - expected), `${side}, ${opacity}`).toBeLessThan(ends);
+      }
+    }
   });
 
   it("finds where a ray enters and leaves a box", async () => {

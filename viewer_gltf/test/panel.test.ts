@@ -132,7 +132,13 @@ describeInChromium("the panel", () => {
     await press("m");
     expect((await state()).mode).toBe("tile");
     await press("b");
-    expect((await state()).clip.box).not.toBeNull();
+    const box = async () => (await state()).clip.box;
+    const before = await box();
+    await press("B"); // the last of its faces
+    await press(".");
+    expect((await box())?.min).toEqual(before?.min);
+    expect((await box())?.max[2]).toBeGreaterThan(before?.max[2] ?? Number.NaN);
+    expect(await page().locator("[data-said]").textContent()).toMatch(/^Box: z to .+ µm$/);
     await press("h");
     expect(await page().locator(".panel .body").isVisible()).toBe(false);
     await press("h");
@@ -179,6 +185,9 @@ describeInChromium("the panel", () => {
     host.overrides.set("/bundle/manifest.json", { status: 200, body });
     await stand.open("&mode=off");
     expect(await page().locator("[data-channel]").count()).toBeLessThan(12);
+    await page().keyboard.press("h");
+    await page().keyboard.press("/");
+    expect(await focused()).toBe("find-channel");
     await control("find-channel").fill("marker 42");
     await page().keyboard.press("Tab");
     await page().keyboard.press("Space");

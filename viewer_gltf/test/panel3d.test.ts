@@ -97,6 +97,45 @@ describeInChromium("the panel in the room", () => {
     expect(await hands().page.evaluate(() => window.hands.leaves)).toBe(1);
   });
 
+  it("says why a control refuses, under the gaze, for a while", async () => {
+    await hands().gazeOnly();
+    await hands().openPanel();
+    await gazeAt("tab=tiles");
+    await hands().tap();
+    await gazeAt("back");
+    await hands().tap();
+    const why = "No tile is chosen.";
+    const commands = await hands().page.evaluate(() => window.hands.commands);
+    expect([(await hands().status()).told, commands]).toEqual([[why], []]);
+    const [aside, up] = await hands().page.evaluate(() => window.hands.noticeAt());
+    expect(aside).toBeCloseTo(0);
+    expect(up).toBeCloseTo(-20);
+    await picture("refusal");
+    await hands().wait(5);
+    expect((await hands().status()).told).toEqual([why]);
+    await hands().wait(1.1);
+    expect((await hands().status()).told).toEqual([]);
+  });
+
+  it("leaves what is told where the head looked when it came", async () => {
+    const fault = "channels/c0/r0_c0/lod0.glb: not found (404). The other tiles go on.";
+    const tell = (text: string) => hands().page.evaluate((t) => window.hands.tell(t), text);
+    const noticeAt = () => hands().page.evaluate(() => window.hands.noticeAt());
+    await hands().gazeOnly();
+    await hands().lookAt([0, 0, -1]);
+    await tell(fault);
+    await picture("notice");
+    await hands().lookAt([0.3, 0, -1]);
+    const [aside] = await noticeAt();
+    expect(aside).toBeCloseTo((-Math.atan(0.3) * 180) / Math.PI);
+    await tell("Another comes where the head looks now.");
+    expect((await noticeAt())[0]).toBeCloseTo(0);
+    expect((await hands().status()).told).toHaveLength(2);
+    await picture("notices");
+    await hands().wait(12.2);
+    expect((await hands().status()).told).toEqual([]);
+  });
+
   it("is painted only when what it shows changes", async () => {
     await hands().gazeOnly();
     await hands().openPanel();

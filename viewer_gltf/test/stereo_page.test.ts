@@ -36,6 +36,24 @@ describeInChromium("the page in stereo", () => {
     expect((await state()).isolated).toBeNull(); // once
   });
 
+  it.each([
+    ["what was looked at on the screen", false, "r0_c1"],
+    ["the side that was turned to the screen", true, "r0_c0"],
+  ])("shows %s", async (_, isTurned, tile) => {
+    await addHeadset(stand.viewer.page);
+    await stand.open("&mode=tile&switch=9");
+    const press = async (key: string, n: number) => {
+      for (let i = 0; i < n; i++) await stand.viewer.page.keyboard.press(key);
+    };
+    if (isTurned) await press("ArrowRight", 12); // half round: what lay on the left lies on the right
+    await press("Shift+ArrowRight", 4);
+    await stand.viewer.settled();
+    const gazed = async () => (await stand.viewer.snapshot()).gazed;
+    await expect.poll(gazed).toBe(tile);
+    await stand.viewer.enterStereo();
+    await expect.poll(gazed).toBe(tile);
+  });
+
   it("selects by the trigger, and isolates by the next", async () => {
     await open("&mode=off", true);
     const press = async () => {
@@ -66,9 +84,19 @@ describeInChromium("the page in stereo", () => {
   });
 
   it("splits the screen without WebXR, and goes back by Escape", async () => {
+    await stand.viewer.page.addInitScript(() =>
+      Object.defineProperty(Navigator.prototype, "wakeLock", { value: undefined }),
+    );
     await stand.open("&mode=off");
+    await stand.viewer.page.keyboard.press("t");
     await stand.viewer.page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+    // What the browser could not give is said before the eyes: the stage hides the page.
+    const { told } = await stand.viewer.snapshot();
+    expect(told.at(-1)).toMatch(/can't keep the screen on/);
+    expect(told).toEqual(await notices());
+    await stand.viewer.page.keyboard.press("j");
+    expect((await stand.viewer.snapshot()).told.at(-1)).toBe("Choosing by gaze: off");
     await stand.viewer.page.waitForTimeout(1500);
     const { width, height } = { width: 480, height: 270 };
     const half = { y: 0, width: width / 2, height };
@@ -79,5 +107,7 @@ describeInChromium("the page in stereo", () => {
     }
     await stand.viewer.page.keyboard.press("Escape");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+    expect((await stand.viewer.snapshot()).told).toEqual([]);
+    expect((await state()).selected).not.toBeNull(); // Escape has done no more than that
   });
 });

@@ -10,6 +10,7 @@ A file stores the 16-bit offset from its own origin, which is a lattice point as
 node carries scale = step and translation = origin * step. Every factor is then a dyadic number
 and a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps
 (for tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin).
+The coarsest LODs, which a reader waits for first, have a lattice of their own with longer steps.
 """
 
 import json
@@ -28,7 +29,7 @@ from stereocell.write.meshopt import CompressedBuffers, reorder
 _METRES_PER_UM = 1e-6
 _MOST_STEPS = 0xFFFF  # that 16 bits span
 _WANTED_STEPS = 1 << 14  # as fine as a 20th of a voxel, and the low bits don't compress
-_BYTE, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5120, 5121, 5123, 5126
+_UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
 _AMBIENT_SHARE = 0.4  # of the light in the viewer's room, about
 _OF_COLOR = {"baseColorTexture"}  # the maps that lie one level deeper in a material
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
@@ -110,10 +111,7 @@ def encode_glb(
                 "max": [int(m) for m in max_offset],
             },
         ),
-        "NORMAL": buffers.add_attribute(
-            _padded(_to_snorm8(_unit(mesh.normals[order]))),
-            {"componentType": _BYTE, "normalized": True, "type": "VEC3"},
-        ),
+        "NORMAL": buffers.add_directions(_unit(mesh.normals[order]), "VEC3"),
     }
     if maps:
         if mesh.uvs is None:
@@ -230,10 +228,7 @@ def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> 
 
 def _add_tangents(buffers: CompressedBuffers, tangents: NDArray[np.float32]) -> int:
     signs = np.where(tangents[:, 3:] < 0, -1.0, 1.0)
-    return buffers.add_attribute(
-        _to_snorm8(np.hstack([_unit(tangents[:, :3]), signs])),
-        {"componentType": _BYTE, "normalized": True, "type": "VEC4"},
-    )
+    return buffers.add_directions(np.hstack([_unit(tangents[:, :3]), signs]), "VEC4")
 
 
 def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
@@ -242,10 +237,6 @@ def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     lengths = np.linalg.norm(wide, axis=1, keepdims=True)
     wide[lengths[:, 0] == 0] = (0.0, 0.0, 1.0)
     return wide / np.where(lengths == 0, 1.0, lengths)
-
-
-def _to_snorm8(values: NDArray[np.float64]) -> NDArray[np.int8]:
-    return np.rint(values * 127).astype(np.int8)
 
 
 def _padded(values: NDArray[Any]) -> NDArray[Any]:

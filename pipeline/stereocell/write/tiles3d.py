@@ -5,8 +5,15 @@
 
 Lengths are metres. Tilesets are z-up where glTF is y-up: readers turn glTF's (x, y, z) into
 (x, -z, y), and the boxes here are turned the same way.
+
+The extras of each content give its file's hash, so that a reader who trusts the tileset knows a
+spoilt surface. 128 bits are enough for that, in base64url, named as RFC 6920 names them:
+"sha-256-128". The first picture waits for a tileset, and hashes don't compress: the demo's three,
+92 contents, were 27.0 kB (2.8 gzip), are 31.6 (4.8) and would be 35.0 (6.6) with 64 hexadecimal
+digits each.
 """
 
+import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +21,8 @@ from typing import Any
 from stereocell.write.generator import GENERATOR
 
 _METRES_PER_UM = 1e-6
+CONTENT_HASH = "sha-256-128"  # in the extras of a content
+_CONTENT_HASH_BYTES = 16
 _ROOT_ERROR = 100.0  # in diagonals of the channel: never small enough to draw nothing
 
 Point = tuple[float, float, float]
@@ -23,13 +32,21 @@ Point = tuple[float, float, float]
 class TileLod:
     """One .glb: its address from the tileset, and the box (x, y, z) of its vertices in metres.
 
+    sha256       of the file, hexadecimal
     distance_um  the LOD's measured distance from the finest surface
     """
 
     uri: str
+    sha256: str
     distance_um: float
     min_m: Point
     max_m: Point
+
+
+def content_hash(sha256: str) -> str:
+    """Return what a content's extras say of a file with this SHA-256 (hexadecimal)."""
+    start = bytes.fromhex(sha256)[:_CONTENT_HASH_BYTES]
+    return base64.urlsafe_b64encode(start).rstrip(b"=").decode()
 
 
 def make_tileset(tiles: Sequence[Sequence[TileLod]]) -> dict[str, Any]:
@@ -63,7 +80,7 @@ def _chain(lods: Sequence[TileLod]) -> dict[str, Any]:
             "boundingVolume": {"box": box},
             "geometricError": error,
             "refine": "REPLACE",
-            "content": {"uri": lod.uri},
+            "content": {"uri": lod.uri, "extras": {CONTENT_HASH: content_hash(lod.sha256)}},
         }
         if k:
             coarser["children"] = [tile]

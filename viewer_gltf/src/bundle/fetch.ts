@@ -1,6 +1,7 @@
 /** Fetch files of a bundle. Every fault becomes a BundleError that names the file. */
 import { BundleError, TemporaryError } from "./errors";
 import type { FileRef } from "./generated/bundle";
+import { checkHash } from "./hash";
 import { noteAsked } from "./log";
 import { withRetries } from "./retry";
 
@@ -82,13 +83,7 @@ export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): 
       `${file.path}: expected ${file.bytes} bytes, found ${bytes.length} (a broken upload?)`,
     );
   }
-  // The hash needs a secure context (https or localhost); elsewhere the size has to do.
-  if (!globalThis.isSecureContext) return;
-  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
-  const hash = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
-  if (hash !== file.sha256) {
-    throw new BundleError(`${file.path}: expected SHA-256 ${file.sha256}, found ${hash}`);
-  }
+  await checkHash(file.path, bytes, file.sha256);
 }
 
 /** The parsed text. Throws BundleError if it is no JSON, as a host's own error page, or cut short. */

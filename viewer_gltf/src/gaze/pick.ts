@@ -1,40 +1,45 @@
 /** Which tile a ray meets first. Pure. */
-import type { Manifest } from "../bundle/generated/bundle";
+import { AHEAD, type Box, boxSpan, type Clip, clipSpan } from "../view/clip";
 
 export type Vec3 = readonly [number, number, number];
 export type Ray = Readonly<{ origin: Vec3; direction: Vec3 }>;
 
-/** Distance along the ray (in lengths of its direction) to the box; 0 inside; null if it misses. */
-export function distanceToBox(ray: Ray, min: Vec3, max: Vec3): number | null {
-  let near = 0;
-  let far = Number.POSITIVE_INFINITY;
-  for (let axis = 0; axis < 3; axis++) {
-    const o = ray.origin[axis];
-    const d = ray.direction[axis];
-    if (d === 0) {
-      if (o < min[axis] || o > max[axis]) return null;
-      continue;
-    }
-    const a = (min[axis] - o) / d;
-    const b = (max[axis] - o) / d;
-    near = Math.max(near, Math.min(a, b));
-    far = Math.min(far, Math.max(a, b));
-  }
-  return near <= far ? near : null;
+export type BoxedTile = Readonly<{ id: string; bounds_um: Box }>;
+type Boxed<B extends Box> = Readonly<{ bounds_um: B }>;
+/** How far the tile is, in lengths of the ray's direction. */
+export type MetTile = Readonly<{ id: string; distance: number }>;
+
+/** The tiles that can be seen: all, or the isolated one. */
+export function shownTiles<T extends Readonly<{ id: string }>>(
+  tiles: readonly T[],
+  isolated: string | null,
+): readonly T[] {
+  return isolated === null ? tiles : tiles.filter(({ id }) => id === isolated);
 }
 
-/** The id of the first tile along the ray (um, world), or null. */
-export function pickTile(
-  ray: Ray,
-  tiles: readonly Pick<Manifest["tiles"][number], "id" | "bounds_um">[],
-): string | null {
+/** The box of what can be seen: the specimen's, or the isolated tile's. */
+export function shownBox<B extends Box>(
+  { specimen, tiles }: Readonly<{ specimen: Boxed<B>; tiles: readonly (BoxedTile & Boxed<B>)[] }>,
+  isolated: string | null,
+): B {
+  return (tiles.find(({ id }) => id === isolated) ?? specimen).bounds_um;
+}
+
+/** The first tile along the ray (um, world) of which something is left there; null: none. */
+export function pickTile(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): MetTile | null {
+  const kept = clipSpan(AHEAD, ray, clip);
+  if (kept === null) return null;
   let nearest = Number.POSITIVE_INFINITY;
   let picked: string | null = null;
   for (const { id, bounds_um } of tiles) {
-    const distance = distanceToBox(ray, bounds_um.min, bounds_um.max);
-    if (distance === null || distance >= nearest) continue;
-    nearest = distance;
+    const span = boxSpan(AHEAD, ray, bounds_um);
+    if (span === null) continue;
+    const from = Math.max(span[0], kept[0]);
+    const to = Math.min(span[1], kept[1]);
+    const isFlat = span[0] === span[1]; // otherwise a cut along its face has taken all of it
+    if (from >= nearest || !(from < to || (isFlat && from === to))) continue;
+    nearest = from;
     picked = id;
   }
-  return picked;
+  return picked === null ? null : { id: picked, distance: nearest };
 }

@@ -1,6 +1,7 @@
 /** What the gaze makes of the state, frame by frame: which volumes are wanted, and where they show. */
 import { Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
+import { shownTiles } from "../gaze/pick";
 import type { ViewerState } from "../state";
 import { advanceNearby, discReach, FAR_AWAY, isWaiting, type NearbyState } from "./nearby";
 
@@ -60,9 +61,8 @@ export class Hybrid {
     const limit_rad = state.discRadius_deg * RADIANS * this.radiusShare;
     this.nearby = advanceNearby(before, {
       gaze: { origin: this.apex_um.toArray(), direction: this.axis_um.toArray() },
-      tiles: this.manifest.tiles.filter(
-        ({ id }) => state.isolated === null || state.isolated === id,
-      ),
+      tiles: shownTiles(this.manifest.tiles, state.isolated),
+      clip: state.clip,
       switchDistance_um: state.switchDistance_m / specimen.getMaxScaleOnAxis(),
       discRadius_rad: limit_rad,
       dt_s,

@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { WHOLE } from "../view/clip";
 import {
   advanceNearby,
   discReach,
@@ -25,6 +26,7 @@ const TILES = Array.from({ length: 10 }, (_, i) => {
 const input = (x: number, y: number, away: number, dt_s = 1): GazeInput => ({
   gaze: { origin: [x, y, 5 + away], direction: [0, 0, -1] },
   tiles: TILES,
+  clip: WHOLE,
   switchDistance_um: 20,
   discRadius_rad: Math.atan(4 / 10), // 4 um at a distance of 10
   dt_s,
@@ -58,6 +60,14 @@ describe("the gazed tile", () => {
     expect(advanceNearby(FAR_AWAY, input(25, -15, 10)).gazed).toBe("r1_c2");
     expect(advanceNearby(FAR_AWAY, input(25, -15, 30)).gazed).toBeNull();
     expect(advanceNearby(FAR_AWAY, input(60, -15, 10)).gazed).toBeNull();
+  });
+
+  it("is not one that is cut away where it is looked at", () => {
+    const plane = { normal: [0, 0, 1], offset_um: 0 } as const; // all that lies before z = 0
+    const cut = { ...input(25, -15, 10), clip: { box: null, plane } };
+    expect(advanceNearby(FAR_AWAY, cut)).toMatchObject({ gazed: null, disc: [] });
+    const left = { ...cut, clip: { box: null, plane: { ...plane, offset_um: 1 } } };
+    expect(advanceNearby(FAR_AWAY, left).gazed).toBe("r1_c2");
   });
 
   it("changes only once the gaze has rested on another", () => {

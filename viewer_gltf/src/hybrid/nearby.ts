@@ -5,8 +5,8 @@
  * has to rest on another tile for a moment.
  */
 import { Matrix4, Vector3 } from "three";
-import type { Manifest } from "../bundle/generated/bundle";
-import { pickTile, type Ray, type Vec3 } from "../gaze/pick";
+import { type BoxedTile, pickTile, type Ray, type Vec3 } from "../gaze/pick";
+import type { Clip } from "../view/clip";
 import type { Nearby } from "./who";
 
 /** A tile is left at so much more than the distance at which it was met. */
@@ -19,13 +19,13 @@ export const MAX_DISC_TILES = 4;
 const RINGS = 20;
 const SPOKES = 16;
 
-export type BoxedTile = Pick<Manifest["tiles"][number], "id" | "bounds_um">;
-
 export type GazeInput = Readonly<{
   /** From the head straight ahead, um, world; the direction has unit length. */
   gaze: Ray;
   /** Tiles that can be looked at. */
   tiles: readonly BoxedTile[];
+  /** What of them is left. */
+  clip: Clip;
   switchDistance_um: number;
   discRadius_rad: number;
   /** Since the frame before. */
@@ -63,7 +63,7 @@ export function advanceNearby(before: NearbyState, input: GazeInput): NearbyStat
     const limit = switchDistance_um * (before.near.has(id) ? HYSTERESIS : 1);
     if (distanceTo(gaze.origin, bounds_um) < limit) near.add(id);
   }
-  const glanced = pickTile(gaze, input.tiles);
+  const glanced = pickTile(gaze, input.tiles, input.clip)?.id ?? null;
   const glanced_s = glanced === before.glanced ? before.glanced_s + input.dt_s : 0;
   const isFirst = before.gazed === null || !near.has(before.gazed);
   const settled = glanced_s >= REST_S || (isFirst && glanced !== null) ? glanced : before.gazed;
@@ -82,7 +82,7 @@ const ORIGIN = new Vector3();
 const UP = new Vector3(0, 1, 0);
 const ASIDE = new Vector3(1, 0, 0);
 
-function feel({ gaze, tiles, discRadius_rad }: GazeInput): (string | null)[] {
+function feel({ gaze, tiles, clip, discRadius_rad }: GazeInput): (string | null)[] {
   const ahead = new Vector3(...gaze.direction).normalize();
   const up = Math.abs(ahead.dot(UP)) > 0.99 ? ASIDE : UP;
   const turn = new Matrix4().lookAt(ORIGIN, ahead, up);
@@ -96,7 +96,8 @@ function feel({ gaze, tiles, discRadius_rad }: GazeInput): (string | null)[] {
         .set(Math.sin(angle) * Math.cos(around), Math.sin(angle) * Math.sin(around), -1)
         .setZ(-Math.cos(angle))
         .transformDirection(turn);
-      felt.push(pickTile({ origin: gaze.origin, direction: direction.toArray() }, tiles));
+      const ray = { origin: gaze.origin, direction: direction.toArray() };
+      felt.push(pickTile(ray, tiles, clip)?.id ?? null);
     }
   }
   return felt;

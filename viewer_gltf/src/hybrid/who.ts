@@ -27,7 +27,7 @@ export type WantedTile = Readonly<{
 }>;
 
 /** The tile that volumes follow: the selected one, or the gazed one. */
-export function chosenTile(state: ViewerState, nearby: Nearby): string | null {
+export function followedTile(state: ViewerState, nearby: Nearby): string | null {
   return state.selected ?? nearby.gazed;
 }
 
@@ -44,13 +44,13 @@ export function drawnAs(
   if (isMarched(state, tile.id, nearby)) return "volume";
   if (!channel.prefersVolume) return "mesh";
   const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
-  return isSmall || tile.id === (chosenTile(state, nearby) ?? state.middle) ? "volume" : null;
+  return isSmall || tile.id === (followedTile(state, nearby) ?? state.middle) ? "volume" : null;
 }
 
 function isMarched(state: ViewerState, tile: string, nearby: Nearby): boolean {
   switch (state.mode) {
     case "tile":
-      return tile === chosenTile(state, nearby) && nearby.near.has(tile);
+      return tile === followedTile(state, nearby) && nearby.near.has(tile);
     case "disc":
       return nearby.disc.includes(tile);
     case "all":

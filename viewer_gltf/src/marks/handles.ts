@@ -5,8 +5,10 @@ import type { Action } from "../state";
 import {
   AXES,
   type Box,
+  type BoxHandle,
   boxHandles,
   type Clip,
+  type ClipPlane,
   dragBox,
   planeHandles,
   type Side,
@@ -17,7 +19,8 @@ import { HANDLE_RADIUS } from "./look";
 
 export const BOX_HANDLES = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"] as const;
 export const PLANE_HANDLES = ["plane-middle", "plane-tip"] as const;
-type BoxHandleId = (typeof BOX_HANDLES)[number];
+export type BoxHandleId = (typeof BOX_HANDLES)[number];
+export type Face = Pick<BoxHandle, "axis" | "side">;
 export type HandleId = BoxHandleId | (typeof PLANE_HANDLES)[number];
 export type Handle = Readonly<{ id: HandleId; position: Vec3 }>;
 
@@ -81,19 +84,32 @@ export function pickHandle(
 
 /** What dragging a handle to a ray (um) makes of the clip; null: nothing. */
 export function dragHandle(id: HandleId, ray: Ray, clip: Clip, shown: Box): Action | null {
-  const { box, plane } = clip;
-  if (id === "plane-middle" || id === "plane-tip") {
-    if (plane === null) return null;
-    const moved =
-      id === "plane-middle"
-        ? slidePlane(plane, ray, shown)
-        : turnPlane(plane, ray, shown, armOf(shown));
-    return moved === plane ? null : { type: "set-clip", clip: { box, plane: moved } };
+  if (id === "plane-middle") return changePlane(clip, (plane) => slidePlane(plane, ray, shown));
+  if (id === "plane-tip") {
+    return changePlane(clip, (plane) => turnPlane(plane, ray, shown, armOf(shown)));
   }
+  return changeFace(clip, id, shown, (seen, face) => dragBox(seen, face, ray, shown));
+}
+
+export function changePlane(
+  { box, plane }: Clip,
+  change: (plane: ClipPlane) => ClipPlane,
+): Action | null {
+  const changed = plane && change(plane);
+  return changed === plane ? null : { type: "set-clip", clip: { box, plane: changed } };
+}
+
+/** @param change gets the box as far as it is shown */
+export function changeFace(
+  { box, plane }: Clip,
+  id: BoxHandleId,
+  shown: Box,
+  change: (seen: Box, face: Face) => Box,
+): Action | null {
   if (box === null) return null;
   const { axis, side } = faceOf(id);
   const seen = boxWithin(box, shown);
-  const place = dragBox(seen, { axis, side }, ray, shown)[side][axis];
+  const place = change(seen, { axis, side })[side][axis];
   if (place === seen[side][axis]) return null;
   // the faces that nobody touches stay where they are, also outside of what is shown
   const corner: [number, number, number] = [...box[side]];
@@ -105,7 +121,7 @@ function idOf(axis: 0 | 1 | 2, side: Side): BoxHandleId {
   return BOX_HANDLES[2 * axis + (side === "max" ? 1 : 0)];
 }
 
-function faceOf(id: BoxHandleId): { axis: 0 | 1 | 2; side: Side } {
+export function faceOf(id: BoxHandleId): Face {
   const index = BOX_HANDLES.indexOf(id);
   return { axis: AXES[index >> 1], side: index % 2 === 1 ? "max" : "min" };
 }

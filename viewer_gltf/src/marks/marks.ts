@@ -3,7 +3,7 @@
  * scale bar, orientation, names. And what a ray means among them.
  */
 import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
-import type { Ray } from "../gaze/pick";
+import { type Ray, shownBox } from "../gaze/pick";
 import type { Action, ViewerState } from "../state";
 import type { Box } from "../view/clip";
 import { ClipMark } from "./clip_mark";
@@ -169,9 +169,7 @@ export class Marks {
 
   /** Box of what is shown: the specimen, or the isolated tile. */
   private get shown(): Box {
-    const { tiles, specimen } = this.options.manifest;
-    const tile = tiles.find(({ id }) => id === this.state.isolated);
-    return (tile ?? specimen).bounds_um;
+    return shownBox(this.options.manifest, this.state.isolated);
   }
 
   private updateInRoom(): void {

@@ -88,7 +88,7 @@ describe("a ray at volumes", () => {
       apron: 0,
       bounds_um: { min: [0, -100, 0], max: [100, 0, 100] },
       matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
-      levels: [{ size, offset: 0, length: 1 }],
+      levels: [{ size, offset: 0, length: 1, sha256: "" }],
     };
     const texels = new Uint8Array(SIDE ** 3);
     for (let k = 0; k < SIDE; k++) {

@@ -7,9 +7,9 @@
  */
 import { type Intersection, Matrix4, type Mesh, Raycaster, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
-import type { Ray, Vec3 } from "../gaze/pick";
+import { type BoxedTile, pickTile, type Ray, type Vec3 } from "../gaze/pick";
 import { type VolumeLevel, valueAt } from "../measure/measure";
-import { type Box, type Clip, clipSpan, isKept, type Span } from "../view/clip";
+import { AHEAD, boxSpan, type Clip, clipSpan, isKept, type Span } from "../view/clip";
 
 /** A surface on screen. */
 export type ShownSurface = Readonly<{ mesh: Mesh; tile: string; channel: string }>;
@@ -28,8 +28,6 @@ export type ProbedVolume = Readonly<{
 /** The disc's cone: it shows volumes where the angle's cosine is larger. */
 export type Cone = Readonly<{ apex_um: Vector3; axis_um: Vector3; cosine: number }>;
 
-export type Tile = Readonly<{ id: string; bounds_um: Box }>;
-
 /** `channel`: null where only a tile's box was met. */
 export type Probed = Readonly<{
   point: Vec3;
@@ -42,7 +40,6 @@ const MOST_SAMPLES = 512;
 /** What is less opaque along the whole ray is not seen. */
 const SEEN = 0.1;
 const BYTES = [0, 255] as const;
-const AHEAD: Span = [0, Number.POSITIVE_INFINITY];
 
 /** The same ray, its direction of unit length. */
 export function unitRay({ origin, direction }: Ray): Ray {
@@ -65,7 +62,7 @@ export function probeSurfaces(
   surfaces: readonly ShownSurface[],
   specimen: Matrix4,
   clip: Clip,
-  tiles: readonly Tile[],
+  tiles: readonly BoxedTile[],
 ): Probed | null {
   const entry = clipSpan(AHEAD, ray, clip);
   if (entry === null) return null;
@@ -167,7 +164,7 @@ function spanOf(ray: Ray, { matrix, bounds_um }: TileVolume): Span | null {
   const origin = new Vector3(...ray.origin).applyMatrix4(toTile);
   const ahead = new Vector3(...pointOn(ray, 1)).applyMatrix4(toTile).sub(origin);
   const local: Ray = { origin: origin.toArray(), direction: ahead.toArray() };
-  return clipSpan(AHEAD, local, { box: bounds_um, plane: null });
+  return boxSpan(AHEAD, local, bounds_um);
 }
 
 /** The shortest edge of a texel, um. */
@@ -186,13 +183,9 @@ function isInCone(point: Vec3, { apex_um, axis_um, cosine }: Cone): boolean {
 }
 
 /** Where the ray enters the first tile, as far as it is kept. */
-export function probeBoxes(ray: Ray, tiles: readonly Tile[], clip: Clip): Probed | null {
-  let nearest: Probed | null = null;
-  for (const { id, bounds_um } of tiles) {
-    const span = clipSpan(AHEAD, ray, { box: bounds_um, plane: null });
-    const kept = span === null ? null : clipSpan(span, ray, clip);
-    if (kept === null || (nearest !== null && kept[0] >= nearest.distance_um)) continue;
-    nearest = { point: pointOn(ray, kept[0]), tile: id, channel: null, distance_um: kept[0] };
-  }
-  return nearest;
+export function probeBoxes(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): Probed | null {
+  const met = pickTile(ray, tiles, clip);
+  if (met === null) return null;
+  const { id, distance } = met;
+  return { point: pointOn(ray, distance), tile: id, channel: null, distance_um: distance };
 }

@@ -1,7 +1,7 @@
 /** What the specimen is where a ray meets it: surface, volume or tile, and the channels' values. */
 import type { Matrix4 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
-import { pickTile, type Ray, type Vec3 } from "../gaze/pick";
+import { pickTile, type Ray, shownTiles, type Vec3 } from "../gaze/pick";
 import { valueAt, valueText } from "../measure/measure";
 import type { ViewerState } from "../state";
 import { isKept } from "../view/clip";
@@ -70,7 +70,7 @@ export class Reading {
   /** The same, but at once and without volumes. */
   glance(ray: Ray): Probed | null {
     const along = unitRay(ray);
-    if (pickTile(along, this.tiles) === null) return null;
+    if (pickTile(along, this.tiles, this.state.clip) === null) return null;
     return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, this.state.clip);
   }
 
@@ -94,8 +94,7 @@ export class Reading {
   }
 
   private get tiles() {
-    const { isolated } = this.state;
-    return this.options.manifest.tiles.filter(({ id }) => isolated === null || id === isolated);
+    return shownTiles(this.options.manifest.tiles, this.state.isolated);
   }
 
   private probeSurfaces(along: Ray): Probed | null {
@@ -105,7 +104,8 @@ export class Reading {
   }
 
   private async volumesAlong(along: Ray): Promise<readonly ProbedVolume[]> {
-    const met = this.tiles.filter((tile) => pickTile(along, [tile]) !== null);
+    const { clip } = this.state;
+    const met = this.tiles.filter((tile) => pickTile(along, [tile], clip) !== null);
     const found: ProbedVolume[] = [];
     for (const { source, ...shown } of this.options.volumes()) {
       if (!met.some(({ id }) => id === shown.tile)) continue;

@@ -17,6 +17,7 @@ function volumeOf(name: string, sides: readonly number[]): TileVolume {
     size: [n, n, n] as [number, number, number],
     offset: 0,
     length: 1,
+    sha256: "",
   }));
   return {
     tile: "r0_c0",

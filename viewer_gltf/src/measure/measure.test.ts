@@ -16,7 +16,7 @@ function tile(matrix = IDENTITY): TileVolume {
     apron: 1,
     bounds_um: { min: [10, -11.5, 2], max: [13.5, -10, 4] },
     matrix,
-    levels: [{ size: [10, 6, 5], offset: 0, length: 1 }],
+    levels: [{ size: [10, 6, 5], offset: 0, length: 1, sha256: "" }],
   };
 }
 

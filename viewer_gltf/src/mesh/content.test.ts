@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { checkGlb, checkTileset } from "./content";
+import { checkGlb, checkTileset, contentHashes } from "./content";
 
 const PATH = "channels/A/r0_c0/lod0.glb";
 
@@ -33,5 +33,27 @@ describe("a tileset", () => {
     for (const wrong of [null, [], {}, { asset: {}, root: { children: [] } }]) {
       expect(() => checkTileset(wrong, "t.json")).toThrow("t.json: expected a 3D Tiles tileset");
     }
+  });
+});
+
+describe("the hashes of a tileset", () => {
+  const content = (uri: string, hash: string) => ({ uri, extras: { "sha-256-128": hash } });
+  const tileset = (root: object) => checkTileset({ asset: { version: "1.1" }, root }, "t.json");
+  const address = "https://host/b/channels/A/tileset.json";
+
+  it("are those of all levels, by the surfaces' addresses", () => {
+    const finer = { content: content("r0_c0/lod0.glb", "fine") };
+    const coarse = { content: content("r0_c0/lod1.glb", "coarse"), children: [finer] };
+    expect([...contentHashes(tileset({ children: [coarse] }), "t.json", address)]).toEqual([
+      ["https://host/b/channels/A/r0_c0/lod1.glb", "coarse"],
+      ["https://host/b/channels/A/r0_c0/lod0.glb", "fine"],
+    ]);
+  });
+
+  it("are all there", () => {
+    const bare = { content: { uri: "r0_c0/lod0.glb" } };
+    expect(() => contentHashes(tileset({ children: [bare] }), "t.json", address)).toThrow(
+      "t.json: r0_c0/lod0.glb has no hash, expected extras.sha-256-128",
+    );
   });
 });

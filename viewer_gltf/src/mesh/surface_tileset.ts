@@ -21,7 +21,7 @@ import { BundleError } from "../bundle/errors";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Rgb } from "../color";
 import { BlendedSurface, type SurfaceFrame } from "./blend";
-import { fetchGlb, fetchTileset } from "./content";
+import { contentHashes, fetchGlb, fetchTileset } from "./content";
 import type { SurfaceLoader } from "./loader";
 import type { TileProgress } from "./progress";
 
@@ -71,10 +71,21 @@ export class SurfaceTileset {
     this.tiles.maxDepth = DEPTH_OF_COARSEST + 1;
     this.tiles.manager.addHandler(/\.(gltf|glb)$/, loader.gltf);
     const nameOf = (url: string) => decodeURIComponent(url.replace(folder, ""));
+    let hashes: ReadonlyMap<string, string> = new Map();
+    const fetchRoot = async () => {
+      const tileset = await fetchTileset(base, file);
+      hashes = contentHashes(tileset, file.path, root);
+      return tileset;
+    };
+    const fetchSurface = async (url: string, signal: RequestInit["signal"]) => {
+      const hash = hashes.get(url);
+      if (hash === undefined) throw new Error(`${url} is not in its tileset`);
+      return fetchGlb(base, nameOf(url), hash, signal);
+    };
     this.tiles.registerPlugin({
       name: "STEREOCELL_BUNDLE",
       fetchData: (url: string, { signal }: RequestInit) =>
-        url === root ? fetchTileset(base, file) : fetchGlb(base, nameOf(url), signal),
+        url === root ? fetchRoot() : fetchSurface(url, signal),
       // Before the renderer puts its own `tile` into every userData.
       processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
     });

@@ -152,10 +152,11 @@ export class Keeper {
     const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
     if (ref === undefined) return fetch(request);
     const range = request.headers.get("Range");
+    const isAskedAnew = request.cache === "reload"; // what was kept has the wrong hash
     const part =
       range === null ? null : await this.store.get(this.keys.file(base, ref.sha256, range));
     const kept = part ?? (await this.store.get(this.keys.file(base, ref.sha256)));
-    if (kept !== null) return kept; // a whole file answers a range too, as a host may
+    if (kept !== null && !isAskedAnew) return kept; // a whole file answers a range too, as a host may
     const response = await fetch(request);
     if (response.ok) later(this.keepFile(base, { path, ...ref }, range, response.clone()));
     return response;

@@ -4,7 +4,7 @@
 import type { Control, Group, Toggle } from "../ui/controls";
 import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
 import { type Block, box, type Mark, type Rect, type Region, ROW, SMALL, text } from "./marks";
-import { free, LABEL, one, region, toneOf } from "./parts";
+import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
 import { sliderRow, windowRow } from "./tracks";
 
 /** What has no use in a headset: there is no keyboard, no clipboard, and stereo has begun. */
@@ -34,7 +34,7 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
             box(row, item.isPrimary && !item.refusal ? "accent" : "raised"),
             text(row, item.label, { align: "center", tone: toneOf(item, item.isPrimary) }),
           ],
-          free(item, [region(item.id, item.label, row, item.to)]),
+          unlessRefused(item, [region(item.id, item.label, row, item.to)]),
         ),
       ];
     case "slider":
@@ -64,7 +64,10 @@ function toggleRow(toggle: Toggle, row: Rect): Block {
   ];
   if (toggle.value) marks.push({ kind: "tick", rect: inner(mark), tone: "ink" });
   const label_ = toggle.name ?? toggle.label;
-  return one(marks, free(toggle, [region(toggle.id, label_, row, () => toggle.to(!toggle.value))]));
+  return one(
+    marks,
+    unlessRefused(toggle, [region(toggle.id, label_, row, () => toggle.to(!toggle.value))]),
+  );
 }
 
 function inner({ x, y, width, height }: Rect): Rect {
@@ -79,7 +82,7 @@ function chip(toggle: Toggle, rect: Rect): Block {
       box(rect, isOn ? "accent" : "raised", isOn ? null : "line"),
       text(rect, toggle.label, { align: "center", tone: toneOf(toggle, isOn) }),
     ],
-    free(toggle, [
+    unlessRefused(toggle, [
       region(toggle.id, toggle.name ?? toggle.label, rect, () => toggle.to(!toggle.value)),
     ]),
   );

@@ -13,7 +13,7 @@ import {
   split,
   text,
 } from "./marks";
-import { captioned, free, LABEL, one, region, toneOf } from "./parts";
+import { captioned, LABEL, one, region, toneOf, unlessRefused } from "./parts";
 
 /** A map of few tiles need not fill the panel. */
 const LARGEST_CELL = 96;
@@ -34,7 +34,7 @@ export function chips(choice: Choice, width: number): Block {
     );
     regions.push(region(`${choice.id}=${value}`, label, rects[i], () => choice.to(value)));
   });
-  return captioned(choice.label, width, one(marks, free(choice, regions)));
+  return captioned(choice.label, width, one(marks, unlessRefused(choice, regions)));
 }
 
 /** Many options, or long ones: the one before and the one after. */
@@ -64,7 +64,7 @@ export function stepper(choice: Choice, row: Rect): Block {
     marks,
     isAlone
       ? []
-      : free(choice, [
+      : unlessRefused(choice, [
           region(`${id}=before`, `${choice.label}: before`, before, step(-1)),
           region(`${id}=after`, `${choice.label}: after`, after, step(1)),
         ]),
@@ -75,7 +75,7 @@ export function stepper(choice: Choice, row: Rect): Block {
 export function nextSwatch(colour: Colour, rect: Rect): Block {
   return one(
     [box(rect, toneOfHex(colour.value), "line")],
-    free(colour, [
+    unlessRefused(colour, [
       region(colour.id, colour.name ?? colour.label, rect, () =>
         colour.to(nextColour(colour.value)),
       ),
@@ -92,7 +92,7 @@ export function palettes(colour: Colour, width: number): readonly Block[] {
     const regions = colors.map(({ name: label, hex }, i) =>
       region(`${colour.id}=${name}=${hex}`, label, rects[i], () => colour.to(hex)),
     );
-    return captioned(name, width, one(marks, free(colour, regions)));
+    return captioned(name, width, one(marks, unlessRefused(colour, regions)));
   });
 }
 
@@ -123,7 +123,7 @@ export function mapBlock(map: TileMap, width: number): Block {
     }
     regions.push(region(`${map.id}=${tile.id}`, tile.id, rect, () => map.to(tile.id)));
   }
-  const block = one(marks, free(map, regions), Math.ceil(cell * map.rows) + GAP);
+  const block = one(marks, unlessRefused(map, regions), Math.ceil(cell * map.rows) + GAP);
   return captioned(map.label, width, block);
 }
 

@@ -25,6 +25,8 @@ export type Mark =
 export type PlaneChange =
   | Readonly<{ plane: "tab"; section: string }>
   | Readonly<{ plane: "page"; page: number }>
+  /** Say why what was asked for can't be done. */
+  | Readonly<{ plane: "tell"; text: string }>
   | Readonly<{ plane: "close" }>
   | Readonly<{ plane: "leave" }>;
 

@@ -102,11 +102,13 @@ describe("the panel on a plane", () => {
     }
   });
 
-  it("shows nothing to press where something is refused", () => {
+  it("says why where something is refused", () => {
     const off = reduce(start(), { type: "choose-mode", mode: "off" });
-    const ids = pageOf(laidOut(off), { tab: "volumes", page: 0 }).regions.map(({ id }) => id);
-    expect(ids).not.toContain("disc-radius");
-    expect(ids).toContain("mode=disc");
+    const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
+    const radius = find(page, "disc-radius");
+    expect(radius.isSlide).toBe(false);
+    expect(radius.to(0.3)).toEqual({ plane: "tell", text: "Only the mode Disc has one." });
+    expect(find(page, "mode=disc").to(0)).toEqual({ type: "choose-mode", mode: "disc" });
   });
 });
 

@@ -21,9 +21,14 @@ export function region(
   return { id, label, rect, to, isSlide };
 }
 
-/** What can't be used can't be pointed at. */
-export function free({ refusal }: Pick<Control, "refusal">, regions: readonly Region[]) {
-  return refusal ? [] : regions;
+/** What can't be used tells why when it is chosen, wherever in it. */
+export function unlessRefused(
+  { refusal }: Pick<Control, "refusal">,
+  regions: readonly Region[],
+): readonly Region[] {
+  if (!refusal) return regions;
+  const to = () => ({ plane: "tell", text: refusal }) as const;
+  return regions.map((each) => ({ ...each, isSlide: false, to }));
 }
 
 export function toneOf({ refusal }: Pick<Control, "refusal">, isOnAccent = false) {

@@ -1,6 +1,6 @@
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { bearingOf, extentOf, followHead, placePanel, pointAt } from "./placing";
+import { bearingOf, extentOf, followHead, placePanel, pointAt, toldBearing } from "./placing";
 
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.3, 1.6, -0.2);
@@ -44,6 +44,17 @@ describe("the panel's place", () => {
     expect(at.distanceTo(EYE)).toBeCloseTo(1.2, 12);
     const { yaw, pitch } = bearingOf(at.sub(EYE));
     expect([yaw, pitch]).toEqual([expect.closeTo(0.7, 12), expect.closeTo(-0.4, 12)]);
+  });
+});
+
+describe("what is told", () => {
+  it("is under the gaze, but for one at the floor", () => {
+    expect(toldBearing({ yaw: 1, pitch: 0.2 })).toEqual({
+      yaw: 1,
+      pitch: expect.closeTo(0.2 - 20 * DEG, 12),
+    });
+    expect(toldBearing({ yaw: 0, pitch: -50 * DEG }).pitch).toBeCloseTo(-60 * DEG);
+    expect(toldBearing({ yaw: 0, pitch: -80 * DEG }).pitch).toBeCloseTo(-80 * DEG);
   });
 });
 

@@ -25,6 +25,15 @@ const SLACK = 35 * DEG;
 const LOOKING_DOWN = -20 * DEG;
 const FOLLOW_PER_S = 4;
 
+/** So far under the gaze is the middle of what is told: it covers nothing that is looked at. */
+const TOLD_BELOW = 20 * DEG;
+/** Whoever looks at the floor reads it there. */
+const TOLD_LOWEST = -60 * DEG;
+
+export function toldBearing({ yaw, pitch }: Bearing): Bearing {
+  return { yaw, pitch: Math.max(pitch - TOLD_BELOW, Math.min(pitch, TOLD_LOWEST)) };
+}
+
 export function bearingOf(direction: Vector3): Bearing {
   const { x, y, z } = direction;
   return { yaw: Math.atan2(x, -z), pitch: Math.atan2(y, Math.hypot(x, z)) };

@@ -29,6 +29,8 @@ export type RoomPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onWish: (wish: Action | Command) => void;
   onLeave: () => void;
+  /** What was asked for can't be done: why. */
+  onTell: (text: string) => void;
 }>;
 
 export class RoomPanel {
@@ -226,6 +228,7 @@ export class RoomPanel {
     else if ("type" in wish) this.options.onWish(wish);
     else if (wish.plane === "tab") this.section = { tab: wish.section, page: 0 };
     else if (wish.plane === "page") this.section = { ...this.section, page: wish.page };
+    else if (wish.plane === "tell") this.options.onTell(wish.text);
     else if (wish.plane === "close") this.close();
     else this.options.onLeave();
   }

@@ -1,7 +1,7 @@
 /** Sliders of the panel on a plane. Pure. */
 import type { Slider, Window, Wish } from "../ui/controls";
 import { type Block, type Mark, type Rect, ROW, SMALL, text } from "./marks";
-import { free, LABEL, one, region, toneOf } from "./parts";
+import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
 
 /** A slider's value, as a share of the row. */
 const VALUE = 0.21;
@@ -49,7 +49,7 @@ function track(slider: Track, row: Rect): Block {
     const share = Math.min(1, Math.max(0, (across * whole.width - end) / length));
     return slider.to(Math.round(share * slider.steps) / slider.steps);
   };
-  return one(marks, free(slider, [region(slider.id, slider.label, whole, to, true)]));
+  return one(marks, unlessRefused(slider, [region(slider.id, slider.label, whole, to, true)]));
 }
 
 export function sliderRow(slider: Slider, row: Rect): Block {

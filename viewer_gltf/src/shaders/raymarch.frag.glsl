@@ -71,7 +71,7 @@ void main() {
   span.x = max(span.x, 0.0);
   vec2 all = intersectBox(vEye, invDir, uAllLow, uAllHigh);
   float share = (span.y - span.x) / max(all.y - max(all.x, 0.0), 1e-6);
-  int steps = max(1, int(min(1.0, share) * float(uSteps - uSpare) + 1e-3));
+  int steps = clamp(int(min(1.0, share) * float(uSteps - uSpare) + 1e-3), 1, MAX_STEPS);
   span = clipSpan(span, vEye, dir, invDir);
 #ifdef DISC
   if (uAllInDisc) span = coneSpan(span, vEye, dir);
@@ -96,20 +96,21 @@ void main() {
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
   int i = 0;
-  for (; i < MAX_STEPS && i < steps && t < end && sum.a < OPAQUE; i++) {
+  for (; i < steps && t < end && sum.a < OPAQUE; i++) {
     // What remains of the ray over what remains of the budget: it always reaches the end.
     float dt = max(uMinStep, (end - t) / float(steps - i));
-    if (t >= exit) {
+    // A loop of its own: rays beside each other then sample together, whatever they leapt over.
+    while (t >= exit) {
       vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-      exit = block.x;
       // By whole steps, so that samples lie where they would without leaps.
-      float leap = floor((exit - t) / dt) * dt;
-      if (block.y > 0.0 && leap > 0.0) {
-        t += leap;
-        exit = t;
-        continue;
-      }
+      float leap = block.y * floor((block.x - t) / dt) * dt;
+      exit = leap > 0.0 ? t + leap : block.x;
+      if (leap <= 0.0) break;
+      t = exit;
+      if (++i >= steps || t >= end) break;
+      dt = max(uMinStep, (end - t) / float(steps - i));
     }
+    if (i >= steps || t >= end) break;
     bool isInFront = t < edge;
     float here = min(dt, (isInFront ? edge : end) - t);  // the last step may be shorter
     float at = t + shift * here;

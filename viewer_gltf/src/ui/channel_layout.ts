@@ -128,12 +128,18 @@ export function foundChannels(state: ViewerState, search: string): readonly Chan
   );
 }
 
+/** How many pages those that are found take. */
+export function pagesOf(state: ViewerState, search: string): number {
+  return Math.max(1, Math.ceil(foundChannels(state, search).length / PAGE));
+}
+
 function addingOf(state: ViewerState, view: PanelView): readonly (Control | Group)[] {
   const hidden = foundChannels(state, "").length;
   if (hidden === 0) return [];
   const isLong = hidden > PAGE;
-  const found = foundChannels(state, isLong ? view.search : "");
-  const pages = Math.max(1, Math.ceil(found.length / PAGE));
+  const search = isLong ? view.search : "";
+  const found = foundChannels(state, search);
+  const pages = pagesOf(state, search);
   const page = Math.min(view.page, pages - 1);
   const listed = found.slice(page * PAGE, (page + 1) * PAGE);
   const items: (Control | Group)[] = [];

@@ -12,6 +12,8 @@ export type Command =
   | "share"
   /** What a tap does, in the middle of the view: for hands that have only keys. */
   | "press"
+  /** To the panel's search among the channels that are not shown. */
+  | "find"
   | "front"
   | "side"
   | "top"
@@ -20,4 +22,11 @@ export type Command =
   | "turn-left"
   | "turn-right"
   | "turn-up"
-  | "turn-down";
+  | "turn-down"
+  | "pan-left"
+  | "pan-right"
+  | "pan-up"
+  | "pan-down";
+
+/** Where nobody does what was asked for. */
+export const CANT = "This viewer can't do that here.";

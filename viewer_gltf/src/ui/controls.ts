@@ -5,16 +5,19 @@
  */
 import type { Action } from "../state";
 import type { Command } from "./commands";
+import type { Grip } from "./grips";
 
 /** Of the viewer that a phone is put into: Google's of 2014, of 2015, another. */
 export type Lenses = "v1" | "v2" | "own";
 
-/** What the panel keeps for itself: it changes what is listed, never the picture. */
+/** What the panel keeps for itself: it changes what is listed or meant, never the picture. */
 export type PanelChange =
   | Readonly<{ panel: "find"; text: string }>
   | Readonly<{ panel: "page"; page: number }>
   /** The channel whose card is open, and whom the channel keys mean; null: none. */
   | Readonly<{ panel: "pick"; channel: string | null }>
+  /** The part of the cuts that the keys move. */
+  | Readonly<{ panel: "grip"; grip: Grip }>
   | Readonly<{ panel: "unfold"; section: string }>
   | Readonly<{ panel: "lenses"; lenses: Lenses }>
   /** Of the phone viewer's lenses, as its QR code has it. */
@@ -30,6 +33,7 @@ export type PanelView = Readonly<{
   /** Of the channels that are not shown. */
   page: number;
   picked: string | null;
+  grip: Grip | null;
   /** Sections that are open. */
   open: readonly string[];
   lenses: Lenses;
@@ -44,6 +48,7 @@ export const START_VIEW: PanelView = {
   search: "",
   page: 0,
   picked: null,
+  grip: null,
   open: ["channels", "volumes", "tiles", "view", "stereo"],
   lenses: "v2",
   code: "",
@@ -180,6 +185,8 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       return change.page === view.page ? view : { ...view, page: change.page };
     case "pick":
       return change.channel === view.picked ? view : { ...view, picked: change.channel };
+    case "grip":
+      return change.grip === view.grip ? view : { ...view, grip: change.grip };
     case "unfold": {
       const { section } = change;
       const isOpen = view.open.includes(section);

@@ -3,6 +3,7 @@
  * view and turns wishes into actions and commands; whoever draws the panel elsewhere takes
  * `layOut` and hands its wishes to `perform`.
  */
+import { shownBox } from "../gaze/pick";
 import { copyText } from "../share/copy";
 import { readLink, writeLink } from "../share/link";
 import { SETTINGS, settingsOf } from "../share/settings";
@@ -12,8 +13,9 @@ import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardbo
 import { canScan } from "../xr/cardboard/scan";
 import type { XrSupport } from "../xr/support";
 import type { Ranges } from "./channel_layout";
-import type { Command } from "./commands";
+import { CANT, type Command } from "./commands";
 import { changePanel, type Layout, type PanelView, START_VIEW, type Wish } from "./controls";
+import { handleOf } from "./grips";
 import { Help } from "./help";
 import { type KeyContext, listenForKeys, wishOf } from "./keys";
 import { type Facts, layOut } from "./layout";
@@ -115,6 +117,7 @@ export class Desk {
   perform(wish: Wish): void {
     if (typeof wish === "string") this.run(wish);
     else if ("panel" in wish) {
+      if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
       this.refresh();
     } else this.viewer.dispatch(wish);
@@ -132,13 +135,36 @@ export class Desk {
   private run(command: Command): void {
     if (command === "share") void this.share();
     else if (command === "stereo") {
-      if (this.stereo.isAvailable) this.options.onStereo();
-      else this.said.say(this.stereo.reason);
+      if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
+      else if (this.stereo.isAvailable) this.options.onStereo();
+      else this.say(this.stereo.reason);
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {
       void this.scan();
-    } else if (!this.viewer.run(command)) this.said.say("This viewer can't do that here.");
+    } else if (command === "find") {
+      const isLong = this.goTo("channels", "find-channel");
+      if (!isLong) this.say("The panel lists all channels.");
+    } else if (!this.viewer.run(command)) this.say(CANT);
+  }
+
+  /** On the page, and in stereo before the eyes, which don't see the page. */
+  private say(text: string): void {
+    this.said.say(text);
+    this.viewer.stereo.tell(text);
+  }
+
+  private unfold(section: string): void {
+    const open = this.view.open.filter((id) => id !== section);
+    this.view = { ...this.view, open: [...open, section] };
+    this.refresh();
+  }
+
+  /** Bring the keyboard to a control, also of a panel that is hidden; whether there is one. */
+  private goTo(section: string, control: string): boolean {
+    this.view = { ...this.view, isHidden: false };
+    this.unfold(section);
+    return this.panel.focus(control);
   }
 
   private splitScreen(): void {
@@ -148,7 +174,7 @@ export class Desk {
       rememberLens({ lenses, code });
     } catch (error) {
       if (!(error instanceof ProfileError)) throw error;
-      this.said.say(error.message);
+      this.say(error.message);
     }
   }
 
@@ -158,7 +184,7 @@ export class Desk {
       if (text !== null) this.perform({ panel: "code", text });
     } catch (error) {
       if (!(error instanceof ProfileError || error instanceof DOMException)) throw error;
-      this.said.say(error.message);
+      this.say(error.message);
     }
   }
 
@@ -168,13 +194,17 @@ export class Desk {
       state: viewer.state,
       view,
       specimen: viewer.bundle.manifest.specimen.bounds_um,
+      shown: shownBox(viewer.bundle.manifest, viewer.state.isolated),
       gazed: viewer.snapshot().gazed,
     };
     const wish = wishOf(name, context);
     if (wish === null) return false;
     this.perform(wish);
-    const text = told(wish, viewer.state, this.ranges);
-    if (text !== "") this.said.say(text);
+    if (typeof wish !== "string" && "panel" in wish && wish.panel === "grip") {
+      viewer.mean(handleOf(wish.grip));
+    }
+    const text = told(wish, context.state, viewer.state, this.ranges);
+    if (text !== "") this.say(text);
     return true;
   }
 
@@ -186,13 +216,12 @@ export class Desk {
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.look);
     history.replaceState(history.state, "", address);
-    const open = this.view.open.filter((id) => id !== "share");
-    this.view = { ...this.view, link: address.href, open: [...open, "share"] };
-    this.refresh();
-    if (await copyText(address.href)) this.said.say("The link is in the clipboard.");
+    this.view = { ...this.view, link: address.href };
+    this.unfold("share");
+    if (await copyText(address.href)) this.say("The link is in the clipboard.");
     else {
-      this.panel.focus("link"); // which selects it
-      this.said.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
+      this.goTo("share", "link"); // which selects it
+      this.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
     }
   }
 

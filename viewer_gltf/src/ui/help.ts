@@ -12,6 +12,12 @@ const NAMES: Readonly<Record<string, string>> = {
   Backspace: "⌫",
 };
 
+/** With Shift where it belongs to the key. */
+function textOf(key: string): string {
+  const [, shift = "", name = key] = /^(Shift\+)(.+)$/.exec(key) ?? [];
+  return `${shift && "⇧ "}${NAMES[name] ?? name}`;
+}
+
 /** Of many keys that mean the same, such as the digits, the first and the last. */
 function shownKeys(keys: readonly string[]): readonly string[] {
   return keys.length > 3 ? [keys[0], "…", keys[keys.length - 1]] : keys;
@@ -43,9 +49,7 @@ export class Help {
               "dt",
               {},
               {},
-              ...shownKeys(each.keys).map((key) =>
-                element("kbd", { textContent: NAMES[key] ?? key }),
-              ),
+              ...shownKeys(each.keys).map((key) => element("kbd", { textContent: textOf(key) })),
             ),
             element("dd", { textContent: each.label }),
           ]),

@@ -2,8 +2,8 @@ import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/fixture/manifest";
 import { type Action, initialState, reduce } from "../state";
 import type { Command } from "./commands";
-import { START_VIEW } from "./controls";
-import { firesOn, KEYS, type KeyContext, wishOf } from "./keys";
+import { type PanelChange, START_VIEW } from "./controls";
+import { firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
 import { told } from "./told";
 
 const ALL = KEYS.flatMap(({ keys }) => keys);
@@ -11,9 +11,11 @@ const CONTEXT: KeyContext = {
   state: [
     { type: "measure", points: [[0, 0, 0]] } as const,
     { type: "notify", text: "a fault" } as const,
-  ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(6))),
+    { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
+  ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,
   specimen: SPECIMEN_BOX,
+  shown: SPECIMEN_BOX,
   gazed: "r0_c2",
 };
 
@@ -71,9 +73,65 @@ describe("the keys", () => {
       "turn-right": true,
       "turn-up": true,
       "turn-down": true,
+      "pan-left": true,
+      "pan-right": true,
+      "pan-up": true,
+      "pan-down": true,
+      find: true,
     };
     const asked = wishes.filter((wish) => typeof wish === "string");
     expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));
+  });
+
+  it("reach what the panel keeps for itself, but for what is typed and what is folded", () => {
+    const wishes = ALL.map(({ to, keys }) => to(CONTEXT, keys[0]));
+    const changes = new Set(
+      wishes.flatMap((wish) =>
+        wish !== null && typeof wish !== "string" && "panel" in wish ? [wish.panel] : [],
+      ),
+    );
+    const wanted: Readonly<Record<PanelChange["panel"], boolean>> = {
+      page: true,
+      pick: true,
+      grip: true,
+      lenses: true,
+      hide: true,
+      help: true,
+      find: false,
+      code: false,
+      unfold: false,
+    };
+    for (const [panel, isWanted] of Object.entries(wanted)) {
+      expect(changes.has(panel as PanelChange["panel"]), panel).toBe(isWanted);
+    }
+  });
+
+  it("move the part of the cuts that is meant", () => {
+    expect(wishOf("N", CONTEXT)).toEqual({ panel: "grip", grip: "x-min" });
+    expect(wishOf("B", CONTEXT)).toEqual({ panel: "grip", grip: "z-max" });
+    const { min, max } = SPECIMEN_BOX;
+    const cut = (box: typeof SPECIMEN_BOX | object) => ({
+      type: "set-clip",
+      clip: { box, plane: null },
+    });
+    expect(wishOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
+    const view = { ...START_VIEW, grip: "y-max" } as const;
+    const inside = wishOf(",", { ...CONTEXT, view });
+    expect(inside).toEqual(cut({ min, max: [max[0], -0.4, max[2]] }));
+    expect(wishOf(".", { ...CONTEXT, view })).toBeNull(); // there the specimen ends
+    const whole = reduce(CONTEXT.state, { type: "set-clip", clip: { box: null, plane: null } });
+    expect(wishOf(".", { ...CONTEXT, state: whole })).toBeNull();
+    expect(wishOf("N", { ...CONTEXT, state: whole })).toBeNull();
+  });
+
+  it("have a name on every keyboard", () => {
+    const named = (key: string, code: string, shiftKey = false) => keyName({ key, code, shiftKey });
+    expect(named("a", "KeyQ")).toBe("a"); // as a French keyboard has it
+    expect(named("ф", "KeyA")).toBe("a");
+    expect(named("Ф", "KeyA", true)).toBe("A");
+    expect(named("?", "Minus", true)).toBe("?");
+    expect(named("ArrowLeft", "ArrowLeft")).toBe("ArrowLeft");
+    expect(named("ArrowLeft", "ArrowLeft", true)).toBe("Shift+ArrowLeft");
   });
 
   it("mean the channel whose card is open, or the first one shown", () => {
@@ -92,7 +150,7 @@ describe("the keys", () => {
   });
 
   it("do nothing where there is nothing to do", () => {
-    expect(wishOf("9", CONTEXT)).toBeNull();
+    expect(wishOf("0", CONTEXT)).toBeNull();
     expect(wishOf("F12", CONTEXT)).toBeNull();
     expect(wishOf("g", { ...CONTEXT, gazed: null })).toBeNull();
   });
@@ -109,7 +167,7 @@ describe("the keys", () => {
       expect(firesOn(name, "field"), name).toBe(false);
       expect(firesOn(name, "page"), name).toBe(true);
     }
-    for (const name of ["ArrowLeft", "Enter", " ", "Home", "+"]) {
+    for (const name of ["ArrowLeft", "Shift+ArrowLeft", "Enter", " ", "Home", "+"]) {
       expect(firesOn(name, "control"), name).toBe(false);
     }
     expect(firesOn("o", "control")).toBe(true);
@@ -120,12 +178,14 @@ describe("the keys", () => {
     const after = (name: string) => {
       const wish = wishOf(name, CONTEXT);
       if (wish === null || typeof wish === "string" || "panel" in wish) throw new Error(name);
-      return told(wish, reduce(CONTEXT.state, wish), ranges);
+      return told(wish, CONTEXT.state, reduce(CONTEXT.state, wish), ranges);
     };
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");
     expect(after("1")).toBe("Marker 0: hidden");
     expect(after("D")).toBe("Disc 13°");
-    expect(after("b")).toBe("Cut by a box");
+    expect(after("b")).toBe("Not cut");
+    expect(after("n")).toBe("Cut by a box and a plane");
+    expect(after(".")).toBe("Box: x from 1.00 µm");
   });
 });

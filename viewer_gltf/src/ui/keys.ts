@@ -2,9 +2,12 @@
 import { fromHex, toHex } from "../color";
 import { type ChannelState, LIMITS, type ViewerState } from "../state";
 import type { Box } from "../view/clip";
+import { pagesOf } from "./channel_layout";
 import type { PanelView, Wish } from "./controls";
+import { gripsOf, meantGrip, moveGrip } from "./grips";
 import { middleBox, middlePlane, modesOf } from "./layout";
 import { nextColour } from "./palettes";
+import { LENSES } from "./stereo_layout";
 import { chosenTile } from "./tile_layout";
 
 export type KeyContext = Readonly<{
@@ -12,11 +15,13 @@ export type KeyContext = Readonly<{
   view: PanelView;
   /** um, world. */
   specimen: Box;
+  /** The specimen, or the isolated tile. */
+  shown: Box;
   gazed: string | null;
 }>;
 
 export type Key = Readonly<{
-  /** As `KeyboardEvent.key` has it; several mean the same. */
+  /** As `keyName` has them; several mean the same. */
   keys: readonly string[];
   label: string;
   /** null: there is nothing to do now. `name`: which of its keys it was. */
@@ -106,6 +111,20 @@ const wider =
   (by: number): Key["to"] =>
   ({ state }) => ({ type: "set-disc-radius", radius_deg: state.discRadius_deg + by });
 
+function nextGrip(by: number): Key["to"] {
+  return ({ state: { clip }, view }) => {
+    const grip = neighbour(gripsOf(clip), view.grip ?? undefined, by);
+    return grip === null ? null : { panel: "grip", grip };
+  };
+}
+
+function push(steps: number): Key["to"] {
+  return ({ state: { clip }, view, shown }) => {
+    const grip = meantGrip(clip, view.grip);
+    return grip === undefined ? null : moveGrip(grip, steps, clip, shown);
+  };
+}
+
 const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
 
 const CHANNEL_KEYS: readonly Key[] = [
@@ -113,6 +132,11 @@ const CHANNEL_KEYS: readonly Key[] = [
     const channel = state.channels[Number(name) - 1];
     if (channel === undefined) return null;
     return { type: "show", channel: channel.id, shown: !channel.shown };
+  }),
+  key("/", "Find a channel that is not shown", "find"),
+  key("A", "Next page of the channels that are not shown", ({ state, view }) => {
+    const pages = pagesOf(state, view.search);
+    return pages === 1 ? null : { panel: "page", page: (view.page + 1) % pages };
   }),
   key("c", "Next channel: the keys below mean it", pick(1)),
   key("C", "Previous channel", pick(-1)),
@@ -174,13 +198,21 @@ const VIEW_KEYS: readonly Key[] = [
   key("ArrowRight", "Turn right", "turn-right"),
   key("ArrowUp", "Turn up", "turn-up"),
   key("ArrowDown", "Turn down", "turn-down"),
+  key("Shift+ArrowLeft", "Move left", "pan-left"),
+  key("Shift+ArrowRight", "Move right", "pan-right"),
+  key("Shift+ArrowUp", "Move up", "pan-up"),
+  key("Shift+ArrowDown", "Move down", "pan-down"),
   key(["+", "="], "Zoom in", "zoom-in"),
   key("-", "Zoom out", "zoom-out"),
   key("z", "From the front (along z)", "front"),
   key("a", "From the side (along x)", "side"),
   key("y", "From the top (along y)", "top"),
   key("r", "Reset the view", "reset"),
-  key("V", "Enter stereo (VR)", "stereo"),
+  key("V", "Enter stereo (VR), or leave it", "stereo"),
+  key("L", "Next phone viewer", ({ view }) => {
+    const lenses = neighbour(LENSES, view.lenses, 1);
+    return lenses === null ? null : { panel: "lenses", lenses };
+  }),
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),
   key("j", "Choosing by gaze on or off", ({ state }) => ({
@@ -206,6 +238,10 @@ const TOOL_KEYS: readonly Key[] = [
     type: "set-clip",
     clip: { ...clip, plane: clip.plane === null ? middlePlane(specimen) : null },
   })),
+  key("N", "Next part of the cuts: a face, the plane, its turn", nextGrip(1)),
+  key("B", "The part before", nextGrip(-1)),
+  key(",", "Move or turn that part back", push(-1)),
+  key(".", "Move or turn that part on", push(1)),
   key("l", "Copy a link to this view", "share"),
   key("Delete", "Dismiss the newest notice", ({ state }) => {
     const text = state.notices.at(-1);
@@ -231,6 +267,21 @@ const BY_KEY: ReadonlyMap<string, Key> = new Map(
 
 export function wishOf(name: string, context: KeyContext): Wish | null {
   return BY_KEY.get(name)?.to(context, name) ?? null;
+}
+
+/**
+ * The name of a key that was pressed: as `KeyboardEvent.key` has it, with Shift where that leaves no
+ * mark on it. Where a keyboard writes other letters than Latin ones, their place counts.
+ */
+export function keyName({
+  key: written,
+  code,
+  shiftKey,
+}: Pick<KeyboardEvent, "key" | "code" | "shiftKey">): string {
+  if (written.length > 1) return shiftKey ? `Shift+${written}` : written;
+  const [, letter] = /^Key([A-Z])$/.exec(code) ?? [];
+  if (letter === undefined || written <= "~") return written;
+  return shiftKey ? letter : letter.toLowerCase();
 }
 
 /** What has the keyboard: a field takes every key, a control those that it is worked by. */
@@ -261,8 +312,9 @@ export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSig
       if (event.defaultPrevented || event.isComposing) return;
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (document.querySelector("dialog[open]") !== null) return;
-      if (!firesOn(event.key, focusOf(event.target))) return;
-      if (onKey(event.key)) event.preventDefault();
+      const name = keyName(event);
+      if (!firesOn(name, focusOf(event.target))) return;
+      if (onKey(name)) event.preventDefault();
     },
     { signal },
   );

@@ -160,9 +160,11 @@ export class Panel {
     if (focused !== undefined && document.activeElement !== activeElement) this.focus(focused);
   }
 
-  /** Bring the keyboard to a control, by its id. */
-  focus(id: string): void {
+  /** Bring the keyboard to a control, by its id; whether there is one. */
+  focus(id: string): boolean {
     const selector = `[data-control="${CSS.escape(id)}"]:not([tabindex="-1"])`;
-    this.root.querySelector<HTMLElement>(selector)?.focus();
+    const found = this.root.querySelector<HTMLElement>(selector);
+    found?.focus();
+    return found !== null;
   }
 }

@@ -12,11 +12,13 @@ export type StereoSupport = Readonly<{
   canScan: boolean;
 }>;
 
-const LENS_NAMES: Readonly<Record<Lenses, string>> = {
+export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
   v1: "Cardboard v1 (2014)",
   v2: "Cardboard v2 (2015)",
   own: "another",
 };
+export const LENSES = ["v1", "v2", "own"] as const;
+
 function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "tellsWhy"> {
   return { refusal: isAvailable ? "" : reason || "It can't be had here.", tellsWhy: true };
 }
@@ -45,7 +47,7 @@ function splitItems(split: XrSupport, canScan: boolean, view: PanelView): readon
   const fault = lenses === "own" ? codeFault(code) : "";
   const items: Control[] = [
     {
-      ...inline("lenses", "Phone viewer", lenses, LENS_NAMES, ["v1", "v2", "own"], (each) => ({
+      ...inline("lenses", "Phone viewer", lenses, LENS_NAMES, LENSES, (each) => ({
         panel: "lenses",
         lenses: each,
       })),

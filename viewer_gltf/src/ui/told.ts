@@ -2,12 +2,19 @@
 import type { Action, ViewerState } from "../state";
 import { intensityText, type Ranges } from "./channel_layout";
 import type { Wish } from "./controls";
+import { cutText, gripName } from "./grips";
 import { measuredText } from "./layout";
+import { LENS_NAMES } from "./stereo_layout";
 
 /** @param state after the wish was granted; "" where the picture says it all */
-export function told(wish: Wish, state: ViewerState, ranges: Ranges): string {
+export function told(wish: Wish, before: ViewerState, state: ViewerState, ranges: Ranges): string {
   if (typeof wish === "string") return "";
-  if (!("panel" in wish)) return toldAction(wish, state, ranges);
+  if (!("panel" in wish)) {
+    if (wish.type === "set-clip") return cutText(before.clip, state.clip);
+    return toldAction(wish, state, ranges);
+  }
+  if (wish.panel === "grip") return gripName(wish.grip);
+  if (wish.panel === "lenses") return `Phone viewer: ${LENS_NAMES[wish.lenses]}`;
   if (wish.panel !== "pick" || wish.channel === null) return "";
   return `Channel ${nameOf(wish.channel, state)}`;
 }
@@ -29,11 +36,6 @@ function toldAction(action: Action, state: ViewerState, ranges: Ranges): string 
       return `Volumes within ${state.switchDistance_m.toPrecision(2)} m`;
     case "set-disc-radius":
       return `Disc ${Number(state.discRadius_deg.toFixed(1))}°`;
-    case "set-clip": {
-      const { box, plane } = state.clip;
-      const cuts = [box && "a box", plane && "a plane"].filter(Boolean).join(" and ");
-      return cuts === "" ? "Not cut" : `Cut by ${cuts}`;
-    }
     case "choose-tool":
       return state.tool === "measure" ? measuredText(state) : "A tap selects";
     case "measure":

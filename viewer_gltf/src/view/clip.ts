@@ -12,6 +12,10 @@ export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
 export type Clip = Readonly<{ box: Box | null; plane: ClipPlane | null }>;
 /** Part of a ray, in lengths of its direction; entry before exit. */
 export type Span = readonly [number, number];
+/** All of a ray. */
+export const AHEAD: Span = [0, Number.POSITIVE_INFINITY];
+/** Nothing is cut. */
+export const WHOLE: Clip = { box: null, plane: null };
 
 export const AXES = [0, 1, 2] as const;
 export type Side = "min" | "max";
@@ -30,23 +34,40 @@ const THINNEST = 0.01;
 /** Rays so parallel to a handle's axis (sine squared of the angle) say nothing about it. */
 const PARALLEL = 1e-6;
 
+/**
+ * What is left of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
+ * are the same. Every frame asks for thousands: nothing is made but the answer.
+ */
+export function boxSpan(span: Span, { origin, direction }: Ray, { min, max }: Box): Span | null {
+  let from = span[0];
+  let to = span[1];
+  for (let axis = 0; axis < 3; axis++) {
+    const o = origin[axis];
+    const d = direction[axis];
+    if (d === 0) {
+      if (o < min[axis] || o > max[axis]) return null;
+      continue;
+    }
+    const a = (min[axis] - o) / d;
+    const b = (max[axis] - o) / d;
+    from = Math.max(from, Math.min(a, b));
+    to = Math.min(to, Math.max(a, b));
+    if (from > to) return null;
+  }
+  return [from, to];
+}
+
 /** What is left of a ray's span inside box and plane; null: nothing. */
 export function clipSpan(span: Span, ray: Ray, { box, plane }: Clip): Span | null {
-  let [from, to] = span;
-  /** Keep where distance + t * rate >= 0. */
-  const keep = (distance: number, rate: number) => {
-    if (rate > 0) from = Math.max(from, -distance / rate);
-    else if (rate < 0) to = Math.min(to, -distance / rate);
-    else if (distance < 0) to = Number.NEGATIVE_INFINITY;
-  };
-  if (box !== null) {
-    for (const axis of AXES) {
-      keep(ray.origin[axis] - box.min[axis], ray.direction[axis]);
-      keep(box.max[axis] - ray.origin[axis], -ray.direction[axis]);
-    }
-  }
+  const inBox = box === null ? span : boxSpan(span, ray, box);
+  if (inBox === null) return null;
+  let [from, to] = inBox;
   if (plane !== null) {
-    keep(plane.offset_um - dot(plane.normal, ray.origin), -dot(plane.normal, ray.direction));
+    const depth = plane.offset_um - dot(plane.normal, ray.origin); // that of what is kept
+    const rate = dot(plane.normal, ray.direction);
+    if (rate > 0) to = Math.min(to, depth / rate);
+    else if (rate < 0) from = Math.max(from, depth / rate);
+    else if (depth < 0) return null;
   }
   return from < to ? [from, to] : null;
 }
@@ -81,11 +102,20 @@ export function dragBox(
   const { axis, side } = handle;
   const face = withPart(centerOf(box), axis, box[side][axis]);
   const along = closestOnLine(face, withPart([0, 0, 0], axis, 1), ray);
-  if (along === null) return box;
+  return along === null ? box : moveFace(box, handle, along, specimen);
+}
+
+/** The box after its face has gone along the axis; it stays in the specimen, and a box. */
+export function moveFace(
+  box: Box,
+  { axis, side }: Pick<BoxHandle, "axis" | "side">,
+  by_um: number,
+  specimen: Box,
+): Box {
   const gap = THINNEST * (specimen.max[axis] - specimen.min[axis]);
   const lowest = side === "min" ? specimen.min[axis] : box.min[axis] + gap;
   const highest = side === "max" ? specimen.max[axis] : box.max[axis] - gap;
-  const wanted = Math.min(Math.max(box[side][axis] + along, lowest), highest);
+  const wanted = Math.min(Math.max(box[side][axis] + by_um, lowest), highest);
   return { ...box, [side]: withPart(box[side], axis, wanted) };
 }
 
@@ -99,11 +129,17 @@ export function planeHandles(plane: ClipPlane, specimen: Box, arm_um: number): P
   return { middle, tip: along(middle, plane.normal, arm_um) };
 }
 
-/** The plane after its middle was dragged along its normal; it never leaves the specimen. */
+/** The plane after its middle was dragged along its normal. */
 export function slidePlane(plane: ClipPlane, ray: Ray, specimen: Box): ClipPlane {
   const { middle } = planeHandles(plane, specimen, 0);
   const by = closestOnLine(middle, plane.normal, ray);
-  return by === null ? plane : withinSpecimen(plane.normal, plane.offset_um + by, specimen);
+  return by === null ? plane : movePlane(plane, by, specimen);
+}
+
+/** The plane after it has gone along its normal; it never leaves the specimen. */
+export function movePlane(plane: ClipPlane, by_um: number, specimen: Box): ClipPlane {
+  const moved = withinSpecimen(plane.normal, plane.offset_um + by_um, specimen);
+  return moved.offset_um === plane.offset_um ? plane : moved;
 }
 
 /**
@@ -127,8 +163,25 @@ export function turnPlane(plane: ClipPlane, ray: Ray, specimen: Box, arm_um: num
   ends.sort((a, b) => a.distanceToSquared(handle) - b.distanceToSquared(handle));
   const normal = (ends[0] ?? foot).sub(center);
   if (!(normal.length() > 0)) return plane; // through the middle itself: no direction
-  const unit = normal.normalize().toArray();
-  return withinSpecimen(unit, dot(unit, middle), specimen);
+  return aboutMiddle(plane, normal.normalize().toArray(), specimen);
+}
+
+/** The plane after it was turned about an axis through its middle, counter-clockwise. */
+export function spinPlane(
+  plane: ClipPlane,
+  axis: (typeof AXES)[number],
+  angle_rad: number,
+  specimen: Box,
+): ClipPlane {
+  const normal = new Vector3(...plane.normal);
+  normal.applyAxisAngle(new Vector3(...withPart([0, 0, 0], axis, 1)), angle_rad);
+  return aboutMiddle(plane, normal.normalize().toArray(), specimen);
+}
+
+/** The plane through the same middle that faces another way. */
+function aboutMiddle(plane: ClipPlane, normal: Vec3, specimen: Box): ClipPlane {
+  const { middle } = planeHandles(plane, specimen, 0);
+  return withinSpecimen(normal, dot(normal, middle), specimen);
 }
 
 /** The plane, its offset no less and no more than the specimen's corners have. */

@@ -15,6 +15,8 @@ const FARTHEST_M = 8;
 /** A key turns by this. */
 const TURN_RAD = Math.PI / 12;
 const ZOOM = 0.8;
+/** And moves by this share of the picture's height. */
+const PAN = 0.1;
 
 /** Metres of the room. */
 export type Look = Readonly<{
@@ -114,6 +116,18 @@ export class Navigation {
       case "turn-down":
         this.move(0, TURN_RAD, 1);
         return true;
+      case "pan-left":
+        this.pan(-1, 0);
+        return true;
+      case "pan-right":
+        this.pan(1, 0);
+        return true;
+      case "pan-up":
+        this.pan(0, 1);
+        return true;
+      case "pan-down":
+        this.pan(0, -1);
+        return true;
       default:
         return false;
     }
@@ -143,6 +157,21 @@ export class Navigation {
       position: offset.setFromSpherical(at).add(target).toArray(),
       target: target.toArray(),
     });
+  }
+
+  /** Steps to the right and up, as far as the point that is looked at may go. */
+  private pan(right: number, up: number): void {
+    const { target } = this.controls;
+    const { position, quaternion } = this.camera;
+    const height_m =
+      2 * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360) * position.distanceTo(target);
+    const to = new Vector3(right, up, 0)
+      .applyQuaternion(quaternion)
+      .multiplyScalar(PAN * height_m)
+      .add(target)
+      .clamp(this.reach.clone().negate(), this.reach);
+    const from = position.clone().add(to).sub(target);
+    this.lookFrom({ position: from.toArray(), target: to.toArray() });
   }
 
   dispose(): void {

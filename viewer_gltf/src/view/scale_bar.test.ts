@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { chooseScaleBar, LONGEST_PX, SHORTEST_PX, umPerPixel } from "./scale_bar";
+import { chooseScaleBar, LONGEST_PX, umPerPixel } from "./scale_bar";
 
 describe("the scale bar", () => {
   it("is a round length between 60 and 160 px at every zoom", () => {
@@ -7,7 +7,7 @@ describe("the scale bar", () => {
       const um_per_px = 10 ** (-6 + i / 400); // 1 pm to 10 mm
       const bar = chooseScaleBar(um_per_px);
       if (bar === null) throw new Error(`no bar at ${um_per_px}`);
-      expect(bar.length_px).toBeGreaterThanOrEqual(SHORTEST_PX);
+      expect(bar.length_px).toBeGreaterThanOrEqual(60);
       expect(bar.length_px).toBeLessThanOrEqual(LONGEST_PX * (1 + 1e-9));
       expect(bar.length_px * um_per_px).toBeCloseTo(bar.length_um, 12 - Math.ceil(i / 400));
       const digits = bar.length_um.toExponential().split("e")[0];

@@ -7,7 +7,7 @@ function chain(x: number, y: number, z: number): MipLevel[] {
   const levels: MipLevel[] = [];
   for (let k = 0; ; k++) {
     const size = [x, y, z].map((n) => Math.max(1, n >> k)) as [number, number, number];
-    levels.push({ size, offset: 0, length: 1 });
+    levels.push({ size, offset: 0, length: 1, sha256: "" });
     if (Math.max(...size) === 1) return levels;
   }
 }

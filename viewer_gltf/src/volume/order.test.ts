@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { distanceToBox, type Vec3 } from "../gaze/pick";
+import type { Vec3 } from "../gaze/pick";
+import { AHEAD, boxSpan } from "../view/clip";
 import { distanceInGrid } from "./order";
 
 const EDGES = [
@@ -31,7 +32,7 @@ describe("the order of boxes", () => {
       ) as unknown as Vec3;
       const hit = boxes()
         .map(({ min, max }) => ({
-          along: distanceToBox({ origin, direction }, min, max),
+          along: boxSpan(AHEAD, { origin, direction }, { min, max })?.[0] ?? null,
           order: distanceInGrid(origin, min, max),
         }))
         .filter(({ along }) => along !== null)

@@ -4,7 +4,8 @@
  */
 import { BundleError } from "../bundle/errors";
 import { checkFile, fetchFile, fileAddress, readBody, request } from "../bundle/fetch";
-import type { MipLevel, TileVolume } from "../bundle/generated/volumes";
+import type { TileVolume } from "../bundle/generated/volumes";
+import { checkHash } from "../bundle/hash";
 import { brickCounts } from "./brick_counts";
 import { compressedLevel, readLevel, readTexture } from "./ktx2";
 
@@ -53,8 +54,8 @@ export class VolumeSource {
   }
 
   private async fetchLevel(index: number, signal: AbortSignal): Promise<Uint8Array> {
-    const { file, levels, size } = this.volume;
-    const part = this.whole === null ? await this.fetchRange(levels[index], signal) : null;
+    const { file, size } = this.volume;
+    const part = this.whole === null ? await this.fetchRange(index, signal) : null;
     if (part !== null) return part;
     if (this.whole === null) throw new Error("a whole file was promised");
     const texture = readTexture(this.whole, file.path, "R8", size);
@@ -65,12 +66,21 @@ export class VolumeSource {
     return frame;
   }
 
-  /** The compressed bytes of a level, or null if the host sent the whole file (then it is kept). */
-  private async fetchRange(level: MipLevel, signal: AbortSignal): Promise<Uint8Array | null> {
-    const { file } = this.volume;
+  /**
+   * The compressed bytes of a level, or null if the host sent the whole file (then it is kept). What
+   * was spoilt on its way may lie in a cache since: it is asked for once more, past all caches.
+   */
+  private async fetchRange(
+    index: number,
+    signal: AbortSignal,
+    cache: RequestCache = "default",
+  ): Promise<Uint8Array | null> {
+    const { file, levels } = this.volume;
+    const level = levels[index];
     const last = level.offset + level.length - 1;
     const response = await request(fileAddress(this.base, file.path), file.path, {
       signal,
+      cache,
       headers: { Range: `bytes=${level.offset}-${last}` },
     });
     const bytes = await readBody(response, file.path);
@@ -87,6 +97,12 @@ export class VolumeSource {
       throw new BundleError(
         `${file.path}: expected ${level.length} bytes of a range, found ${bytes.length}`,
       );
+    }
+    try {
+      await checkHash(`${file.path}: level ${index}`, bytes, level.sha256);
+    } catch (error) {
+      if (cache === "reload" || !(error instanceof BundleError)) throw error;
+      return this.fetchRange(index, signal, "reload");
     }
     return bytes;
   }

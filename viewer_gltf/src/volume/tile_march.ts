@@ -72,14 +72,7 @@ export type Look = Readonly<{
 }>;
 
 /** Of the specimen, um: what is left of it. `plane`: unit normal and offset. */
-export type Clip = Readonly<{ min: Vector3; max: Vector3; plane: Vector4 }>;
-
-/** Nothing is cut off. Tiles that were moved by an artist may lie outside the specimen. */
-export function wholeSpecimen(): Clip {
-  const far = 1e9;
-  const max = new Vector3(far, far, far);
-  return { min: max.clone().negate(), max, plane: new Vector4(0, 0, 0, 1) };
-}
+export type MarchClip = Readonly<{ min: Vector3; max: Vector3; plane: Vector4 }>;
 
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
 
@@ -203,7 +196,7 @@ export class TileMarch {
     uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
   }
 
-  clip({ min, max, plane }: Clip): void {
+  clip({ min, max, plane }: MarchClip): void {
     const { uniforms } = this.mesh.material;
     toBox(min, max, this.toTile, this.low, uniforms.uClipLow.value, uniforms.uClipHigh.value);
     // a plane n . p <= w of the world is n' . p' <= w' of the box

@@ -12,7 +12,7 @@ import { loadTransferFunctions, lookUpTable, opacities, type TransferFunction } 
 import { OccupancyClient } from "./occupancy_client";
 import { LoadQueue } from "./queue";
 import { VolumeSource } from "./source";
-import { type Clip, type Look, type MarchFrame, TileMarch } from "./tile_march";
+import { type Look, type MarchClip, type MarchFrame, TileMarch } from "./tile_march";
 import { type Packed, stride, TileTexture } from "./tile_texture";
 
 const PARALLEL_LOADS = 4;
@@ -20,6 +20,8 @@ const PARALLEL_LOADS = 4;
 export const PRESENCE_S = 0.25;
 /** So many tiles that are no longer looked at stay for a while: the gaze often comes back. */
 const KEPT_TILES = 2;
+/** Bytes of a level and of the next coarser one, which stays while the finer one fades in. */
+const WITH_OLD_LEVEL = 9 / 8;
 
 type ChannelVolumes = Readonly<{
   sources: ReadonlyMap<string, VolumeSource>;
@@ -144,7 +146,7 @@ export class VolumeSet {
   }
 
   /** Before every frame. `eye` and the disc's cone in um, world. */
-  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: Clip): void {
+  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: MarchClip): void {
     const boxes = new Bounds();
     for (const { march } of this.drawn()) boxes.add(march);
     for (const { march } of this.drawn()) {
@@ -209,7 +211,7 @@ export class VolumeSet {
     const [first] = sources.values();
     if (first === undefined) return;
     this.tellLimit(first);
-    const share = this.limits.bytes / Math.max(this.wanted.length + KEPT_TILES, 1);
+    const share = this.limits.bytes / (WITH_OLD_LEVEL * (this.wanted.length + KEPT_TILES));
     const levels = levelsToFetch(
       first.volume.levels,
       share / stride(sources.size),
@@ -255,7 +257,10 @@ export class VolumeSet {
     );
     idle.sort(([, a], [, b]) => b.turn - a.turn);
     for (const [, resident] of idle) resident.texture.want(new Map(resident.texture.kept), []);
-    for (const [tile, resident] of idle.slice(KEPT_TILES)) {
+    const leaving = [...this.residents.values()].filter(
+      ({ wanted, presence }) => !wanted && presence > 0,
+    );
+    for (const [tile, resident] of idle.slice(Math.max(0, KEPT_TILES - leaving.length))) {
       resident.march?.dispose();
       resident.texture.dispose();
       this.residents.delete(tile);

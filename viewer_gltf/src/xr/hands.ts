@@ -3,11 +3,11 @@
  * WebXR and the split screen, where there is nothing but the gaze and a tap.
  */
 import { Matrix4, type Scene, Vector3, type WebXRManager } from "three";
-import type { Manifest } from "../bundle/generated/bundle";
-import type { Ray } from "../gaze/pick";
+import { type BoxedTile, type Ray, shownTiles } from "../gaze/pick";
 import { gazeOf, type Met, meetFirst, Pointer, type RoomRay, type Target } from "../gaze/pointer";
 import { Ring } from "../gaze/ring";
 import { TILE, TileTarget } from "../gaze/tile_target";
+import { RoomNotice } from "../panel3d/room_notice";
 import { RoomPanel } from "../panel3d/room_panel";
 import type { Action, ViewerState } from "../state";
 import type { Command } from "../ui/commands";
@@ -23,7 +23,7 @@ export type HandsOptions = Readonly<{
   xr: Pick<WebXRManager, "getFrame" | "getReferenceSpace">;
   scene: Scene;
   specimen: Specimen;
-  tiles: readonly Pick<Manifest["tiles"][number], "id" | "bounds_um">[];
+  tiles: readonly BoxedTile[];
   /** Between the panel and the tiles: what is dragged, such as a cut's handles. */
   handles?: readonly Target[];
   layOut: (view: PanelView) => Layout;
@@ -52,6 +52,7 @@ type Press = {
 export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
+  readonly notice = new RoomNotice();
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
   private readonly tiles: TileTarget;
@@ -66,23 +67,28 @@ export class Hands {
   private shown = "";
 
   constructor(private readonly options: HandsOptions) {
-    const { scene, specimen, tiles, handles = [], layOut, onLeave } = options;
+    const { scene, specimen, handles = [], layOut, onLeave } = options;
     this.panel = new RoomPanel({
       layOut,
       onLeave,
+      onTell: (text) => this.tell(text),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
         else options.onAction(wish);
       },
     });
-    this.tiles = new TileTarget(tiles, specimen.group, options.onChoose);
+    this.tiles = new TileTarget(specimen.group, options.onChoose);
     this.targets = [...this.panel.targets, ...handles, this.tiles];
-    scene.add(this.panel.group, this.controllers.group, this.ring.group);
+    scene.add(...this.groups);
   }
 
   /** What is no opaque thing, which the pass for the depth has to leave out. */
   get overlays() {
-    return [this.ring.group];
+    return [this.ring.group, this.notice.mesh];
+  }
+
+  private get groups() {
+    return [this.panel.group, this.controllers.group, ...this.overlays];
   }
 
   /** What is met now, for tests and for the names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
@@ -116,12 +122,18 @@ export class Hands {
     this.held.clear();
     this.taps = 0;
     this.panel.setShown(false);
+    this.notice.clear();
     this.ring.hide();
   }
 
   /** The only button of the split screen. */
   tap(): void {
     this.taps++;
+  }
+
+  /** Say something where the head looks. */
+  tell(text: string): void {
+    if (this.isRunning) this.notice.tell(text);
   }
 
   /** What would move the camera of a flat screen; false: the command is another's. */
@@ -138,7 +150,8 @@ export class Hands {
     if (!this.isRunning) return false;
     const { xr } = this.options;
     this.gaze = gazeOf(head);
-    this.tiles.shown = { isolated: state.isolated, clip: state.clip };
+    this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
+    this.tiles.clip = state.clip;
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
     for (; this.taps > 0; this.taps--) this.press(this.gaze);
@@ -146,18 +159,20 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld;
     const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
+    const isToldAnew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired !== null) this.choose(fired);
     const hasCarried = this.carry.follow(this.gaze);
-    return this.draw(head) || hasMoved || isRepainted || hasCarried;
+    return this.draw(head) || hasMoved || isRepainted || isToldAnew || hasCarried;
   }
 
   dispose(): void {
     this.stop();
     const { scene } = this.options;
-    scene.remove(this.panel.group, this.controllers.group, this.ring.group);
+    scene.remove(...this.groups);
     this.panel.dispose();
+    this.notice.dispose();
     this.controllers.dispose();
     this.ring.dispose();
   }
@@ -278,8 +293,7 @@ export class Hands {
 
   private around({ isolated }: ViewerState): readonly Vector3[] {
     const { tiles, specimen } = this.options;
-    const shown = tiles.filter(({ id }) => isolated === null || id === isolated);
-    return hullOf(shown, specimen.group.matrixWorld);
+    return hullOf(shownTiles(tiles, isolated), specimen.group.matrixWorld);
   }
 
   /** Ring, rays, and the light on what is pointed at. */

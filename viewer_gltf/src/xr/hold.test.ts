@@ -82,6 +82,8 @@ describe("a command", () => {
     const left = moveByCommand(START, "turn-left", pivot);
     expect(left?.orientation.angleTo(new Quaternion())).toBeCloseTo(Math.PI / 12, 12);
     expect(turned(new Vector3(0, 0, 1), left).x).toBeGreaterThan(0);
+    const aside = moveByCommand(START, "pan-left", pivot)?.position.clone().sub(START.position);
+    expect(aside?.toArray()).toEqual([0.1, 0, 0]); // as if the viewer went to the left
     expect(moveByCommand(START, "share", pivot)).toBeNull();
   });
 });

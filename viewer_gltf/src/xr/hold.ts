@@ -17,6 +17,7 @@ const ZOOM_PER_S = 2.5;
 /** As the keys move the camera on a flat screen. */
 const STEP_RAD = Math.PI / 12;
 const ZOOM = 0.8;
+const STEP_M = 0.1;
 
 /** By whoever holds: their poses now, null where tracking is lost. At most two count. */
 export type Holders<K> = ReadonlyMap<K, HandPose | null>;
@@ -67,6 +68,14 @@ const TURNS: Readonly<Partial<Record<Command, Quaternion>>> = {
   "turn-down": about(RIGHT, -STEP_RAD),
 };
 
+/** And to the right, where it would go to the left. */
+const SHIFTS: Readonly<Partial<Record<Command, Vector3>>> = {
+  "pan-left": new Vector3(STEP_M, 0, 0),
+  "pan-right": new Vector3(-STEP_M, 0, 0),
+  "pan-up": new Vector3(0, -STEP_M, 0),
+  "pan-down": new Vector3(0, STEP_M, 0),
+};
+
 /**
  * In stereo nobody moves the eyes but the head, so that what would move a camera moves the
  * specimen, about `pivot`. null: the command is another's.
@@ -82,6 +91,8 @@ export function moveByCommand(
   }
   const turn = TURNS[command];
   if (turn !== undefined) return turnAbout(pose, turn, pivot);
+  const shift = SHIFTS[command];
+  if (shift !== undefined) return { ...pose, position: pose.position.clone().add(shift) };
   if (command === "zoom-in") return zoomAbout(pose, pivot, 1 / ZOOM);
   if (command === "zoom-out") return zoomAbout(pose, pivot, ZOOM);
   return null;

@@ -1,11 +1,9 @@
 /** Where what is shown of the specimen is in the room. Pure. */
 import { type Matrix4, Vector3 } from "three";
-import type { Manifest } from "../bundle/generated/bundle";
-
-type Tile = Pick<Manifest["tiles"][number], "bounds_um">;
+import type { BoxedTile } from "../gaze/pick";
 
 /** Corners of the box around the tiles, middles of its edges and faces, and its own. */
-export function hullOf(tiles: readonly Tile[], toRoom: Matrix4): readonly Vector3[] {
+export function hullOf(tiles: readonly BoxedTile[], toRoom: Matrix4): readonly Vector3[] {
   const [xs, ys, zs] = ([0, 1, 2] as const).map((axis) => {
     const low = Math.min(...tiles.map(({ bounds_um }) => bounds_um.min[axis]));
     const high = Math.max(...tiles.map(({ bounds_um }) => bounds_um.max[axis]));

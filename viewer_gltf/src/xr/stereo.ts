@@ -108,6 +108,23 @@ export class Stereo {
     return true;
   }
 
+  end(): void {
+    this.split?.end();
+    void this.headset.end();
+  }
+
+  /** Say something before the eyes; nothing where there is no stereo. */
+  tell(text: string): void {
+    this.hands.tell(text);
+  }
+
+  /** Open or close the panel in the room; false: no stereo. */
+  togglePanel(): boolean {
+    if (this.kind === null) return false;
+    this.hands.panel.toggle();
+    return true;
+  }
+
   private begin(session: XRSession | null): void {
     this.options.onStart();
     this.hands.start(session);
@@ -116,11 +133,6 @@ export class Stereo {
   private leave(): void {
     this.hands.stop();
     this.options.onEnd();
-  }
-
-  private end(): void {
-    this.split?.end();
-    void this.headset.end();
   }
 
   dispose(): void {

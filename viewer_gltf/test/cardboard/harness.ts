@@ -69,9 +69,9 @@ class Stand {
   }
 
   status() {
-    const { isRunning, problems, hasOrientation } = this.split;
+    const { isRunning, problems } = this.split;
     const { geometries, textures } = this.renderer.info.memory;
-    return { isRunning, problems, hasOrientation, log: this.log, geometries, textures };
+    return { isRunning, problems, log: this.log, geometries, textures };
   }
 
   /** The mark in each eye's undistorted picture: left, then right, from its viewport's corner. */

@@ -11,8 +11,13 @@ export async function readChunks(...names: string[]): Promise<Record<string, str
   return Object.fromEntries(await Promise.all(names.map(read)));
 }
 
-/** A 2D or 3D texture of bytes, nearest; `size` has two or three parts. */
-export type Texture = Readonly<{ size: readonly number[]; channels: 1 | 4; texels: number[] }>;
+/** A 2D or 3D texture of bytes, nearest unless linear; `size` has two or three parts. */
+export type Texture = Readonly<{
+  size: readonly number[];
+  channels: 1 | 4;
+  texels: number[];
+  isLinear?: boolean;
+}>;
 
 /**
  * What `oColor` is after the program.
@@ -51,24 +56,27 @@ export async function runProgram(
       }
       gl.linkProgram(program);
       gl.useProgram(program);
-      const bind = (unit: number, target: number) => {
+      const bind = (unit: number, target: number, isLinear = false) => {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(target, gl.createTexture());
         for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-          gl.texParameteri(target, filter, gl.NEAREST);
+          gl.texParameteri(target, filter, isLinear ? gl.LINEAR : gl.NEAREST);
+        }
+        for (const way of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]) {
+          gl.texParameteri(target, way, gl.CLAMP_TO_EDGE);
         }
       };
       gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-      Object.entries(textures).forEach(([name, { size, channels, texels }], unit) => {
+      Object.entries(textures).forEach(([name, { size, channels, texels, isLinear }], unit) => {
         const [inside, format] = channels === 1 ? [gl.R8, gl.RED] : [gl.RGBA8, gl.RGBA];
         const [w, h, d] = size;
         const bytes = Uint8Array.from(texels);
         const type = gl.UNSIGNED_BYTE;
         if (d === undefined) {
-          bind(unit, gl.TEXTURE_2D);
+          bind(unit, gl.TEXTURE_2D, isLinear);
           gl.texImage2D(gl.TEXTURE_2D, 0, inside, w, h, 0, format, type, bytes);
         } else {
-          bind(unit, gl.TEXTURE_3D);
+          bind(unit, gl.TEXTURE_3D, isLinear);
           gl.texImage3D(gl.TEXTURE_3D, 0, inside, w, h, d, 0, format, type, bytes);
         }
         gl.uniform1i(gl.getUniformLocation(program, name), unit);

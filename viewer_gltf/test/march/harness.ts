@@ -18,7 +18,7 @@ import { Eyes } from "../../src/view/eyes";
 import { brickCounts } from "../../src/volume/brick_counts";
 import { opacities } from "../../src/volume/luts";
 import { occupancyDistances } from "../../src/volume/occupancy";
-import { makeFrame, TileMarch, wholeSpecimen } from "../../src/volume/tile_march";
+import { makeFrame, TileMarch } from "../../src/volume/tile_march";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
 
@@ -48,7 +48,7 @@ function cube(side: number, left_um = 0): TileVolume {
     apron: 1,
     bounds_um: { min: [left_um, -edge, 0], max: [left_um + edge, 0, edge] },
     matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
-    levels: [{ size: [side, side, side], offset: 0, length: 1 }],
+    levels: [{ size: [side, side, side], offset: 0, length: 1, sha256: "" }],
   };
 }
 
@@ -78,7 +78,6 @@ function marchOf(
   frame.uPart.value.set(0, 0, PIXELS, PIXELS);
   const march = new TileMarch(volume, 1, frame);
   const texture = texture3D(texels, side);
-  march.clip(wholeSpecimen());
   march.show({ channels: ["A"], level: 0, texture, bricks: [bricks] }, null, 1, 1);
   march.dress([{ color: [1, 1, 1], table, isInDisc: false }]);
   const count = brickCounts(volume.size);
@@ -229,15 +228,18 @@ function compareLeaps(seed: number): Readonly<{ apart: number; drawn: number }> 
   return { apart: Math.max(...plain.map((v, i) => Math.abs(v - leaping[i]))), drawn };
 }
 
-/** Mean opacity, 0..1, seen along x through a cube whose intensity rises from 0 to 255 along x. */
-function rampOpacity(side: number, opacity: number): number {
+/** Intensities of a cube from 0 to 255 along x, or 255 everywhere. */
+export type Filling = "ramp" | "uniform";
+
+/** Mean opacity, 0..1, seen along x through a cube. */
+function meanOpacity(filling: Filling, side: number, opacity: number): number {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
   const edge = side - 3;
   const texels = new Uint8Array(side ** 3);
   for (let i = 0; i < texels.length; i++) {
     const x = Math.min(edge, Math.max(0, (i % side) - 1));
-    texels[i] = Math.round((255 * x) / edge);
+    texels[i] = filling === "ramp" ? Math.round((255 * x) / edge) : 255;
   }
   const table = new Uint8Array(1024).fill(255);
   for (let i = 0; i < 256; i++) table[4 * i + 3] = Math.round((opacity * i) / 255);
@@ -255,7 +257,7 @@ function rampOpacity(side: number, opacity: number): number {
   return inner.reduce((a, b) => a + b, 0) / inner.length;
 }
 
-const harness = { countSteps, countThrough, compareLeaps, rampOpacity };
+const harness = { countSteps, countThrough, compareLeaps, meanOpacity };
 export type Harness = typeof harness;
 
 declare global {

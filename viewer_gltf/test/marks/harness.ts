@@ -75,7 +75,7 @@ const VOLUME: LevelSource = {
     apron: 1,
     bounds_um: { min: [500, -400, 0], max: [1000, 0, 200] },
     matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
-    levels: [{ size: [8, 8, 8], offset: 0, length: 1 }],
+    levels: [{ size: [8, 8, 8], offset: 0, length: 1, sha256: "" }],
   },
   has: () => true,
   level: async () => new Uint8Array(1),

@@ -213,6 +213,20 @@ class Stand {
     return point.toArray();
   }
 
+  tell(text: string): Promise<void> {
+    this.hands.tell(text);
+    return this.step([0]);
+  }
+
+  /** How far the notice's middle is from straight ahead, degrees: to the right, and up. */
+  noticeAt(): readonly [number, number] {
+    const { mesh } = this.hands.notice;
+    const head = betweenEyes(this.renderer.xr.getCamera().cameras).invert();
+    const at = mesh.getWorldPosition(new Vector3()).applyMatrix4(head);
+    const degrees = (radians: number) => (radians * 180) / Math.PI;
+    return [degrees(Math.atan2(at.x, -at.z)), degrees(Math.atan2(at.y, Math.hypot(at.x, at.z)))];
+  }
+
   tap(): Promise<void> {
     this.hands.tap();
     return this.step([0]);
@@ -236,6 +250,7 @@ class Stand {
       scale,
       regions: panel.regions.map(({ id }) => id),
       drags: this.drags.length,
+      told: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
       textures: this.renderer.info.memory.textures,
       geometries: this.renderer.info.memory.geometries,
     };

@@ -128,7 +128,7 @@ function volumeOf(about: About): TileVolume {
     apron: 1,
     bounds_um: { min: [...about.low_um], max: [...about.high_um] },
     matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
-    levels: [{ size, offset: 0, length: 1 }],
+    levels: [{ size, offset: 0, length: 1, sha256: "" }],
   };
 }
 

@@ -13,13 +13,14 @@ float distanceOf(float depth, float back) {
 // its depth is not, so a pixel at a silhouette would else show the room between mesh and volume.
 vec3 sceneDistances(float back) {
   ivec2 pixel = ivec2((gl_FragCoord.xy - uPart.xy) * uEye.zw / uPart.zw + uEye.xy);
-  ivec2 last = textureSize(uSceneDepth, 0) - 1;
+  ivec2 first = ivec2(uEye.xy);  // the other eye's depth begins beside this one's
+  ivec2 last = ivec2(uEye.xy + uEye.zw) - 1;
   float near = distanceOf(texelFetch(uSceneDepth, pixel, 0).r, back);
   float far = near;
   float farther = 0.0;
   for (int i = 0; i < 4; i++) {
     ivec2 aside = i < 2 ? ivec2(2 * i - 1, 0) : ivec2(0, 2 * i - 5);
-    float depth = texelFetch(uSceneDepth, clamp(pixel + aside, ivec2(0), last), 0).r;
+    float depth = texelFetch(uSceneDepth, clamp(pixel + aside, first, last), 0).r;
     float there = distanceOf(depth, back);
     if (there < near + JUMP_VOXELS * uVoxel) continue;
     far = max(far, there);

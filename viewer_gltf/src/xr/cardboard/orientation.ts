@@ -104,10 +104,6 @@ export class HeadSensor {
     );
   }
 
-  get hasReading(): boolean {
-    return this.reading !== null;
-  }
-
   /** Ahead is where the phone looks now, or as soon as it is level. */
   recentre(): void {
     this.heading = FREE_HEADING;

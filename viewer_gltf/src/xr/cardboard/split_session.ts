@@ -58,7 +58,7 @@ export class SplitSession {
     private readonly onStart: () => void,
     private readonly onEnd: () => void,
     private readonly onSelect: () => void,
-    private options: SplitOptions = { cssPixelsPerInch: null },
+    private readonly options: SplitOptions = { cssPixelsPerInch: null },
   ) {
     const { stencil = false } = renderer.getContext().getContextAttributes() ?? {};
     this.target = new WebGLRenderTarget(1, 1, {
@@ -88,11 +88,6 @@ export class SplitSession {
   /** What this browser could not give, in words; empty if all is as it should be. */
   get problems(): readonly string[] {
     return this.running?.problems ?? [];
-  }
-
-  /** Whether the head is followed by now: false too while the first reading is awaited. */
-  get hasOrientation(): boolean {
-    return this.running?.sensor.hasReading ?? false;
   }
 
   /** Must be called from a click or a tap. Throws BundleError if the orientation is refused. */
@@ -133,13 +128,6 @@ export class SplitSession {
     this.running?.sensor.recentre();
   }
 
-  /** Other lenses, or another size of the screen, from the next frame on. */
-  setLens(profile: Profile, options: SplitOptions): void {
-    this.profile = profile;
-    this.options = options;
-    this.layout = "";
-  }
-
   /** Read the head's turn, and move the eyes with it. Once a frame, before anything is drawn. */
   update(): void {
     this.fit();
@@ -158,7 +146,7 @@ export class SplitSession {
     this.pass.dispose();
   }
 
-  /** Lay the pictures out anew if the canvas has another size, or other lenses came. */
+  /** Lay the pictures out anew if the canvas has another size. */
   private fit(): void {
     const { width, height } = this.renderer.getDrawingBufferSize(this.size);
     const layout = `${width} ${height} ${this.renderer.getPixelRatio()}`;
@@ -203,8 +191,12 @@ class Running {
       zIndex,
     });
     stage.addEventListener("pointerdown", select, { signal });
-    const onKey = ({ key }: KeyboardEvent) => key === "Escape" && end();
-    addEventListener("keydown", onKey, { signal });
+    const onKey = (event: KeyboardEvent) => {
+      if (event.key !== "Escape") return;
+      event.preventDefault(); // on the page the key means another step back
+      end();
+    };
+    addEventListener("keydown", onKey, { signal, capture: true });
     // A step in the history, so that the back gesture leaves the viewer and not the page.
     history.pushState({ split: this.step }, "");
     addEventListener("popstate", end, { signal });
