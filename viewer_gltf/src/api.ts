@@ -28,8 +28,8 @@ export type Snapshot = Readonly<{
   frame_ms: number;
   /** What the last frame was drawn with. */
   settings: QualitySettings;
-  /** Each shown channel's value at the second measured point. */
-  measuredValues: readonly string[];
+  /** Of each measured point: each shown channel's value there. */
+  measuredValues: readonly (readonly string[])[];
   /** Of three's own count. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;

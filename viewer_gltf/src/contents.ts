@@ -1,5 +1,5 @@
 /** What is shown of a bundle: its surfaces, its volumes, and the marks on them. */
-import type { Camera, Object3D, WebGLRenderer } from "three";
+import type { Camera, WebGLRenderer } from "three";
 import type { Bundle } from "./bundle/load";
 import type { Hybrid } from "./hybrid/hybrid";
 import { wantedTiles } from "./hybrid/who";
@@ -53,6 +53,7 @@ export class Contents {
       surfaces: () => this.surfaces.meshes,
       volumes: () => this.volumes.shown(),
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
+      sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
       onChange,
       onError,
@@ -64,16 +65,18 @@ export class Contents {
     return this.surfaces.isLoading || this.volumes.isLoading || !this.surfaces.overview.isComplete;
   }
 
-  /** What is not opaque now. */
-  get translucent(): readonly Object3D[] {
-    return [...this.surfaces.blended, ...this.marks.overlays];
-  }
-
   follow(state: ViewerState, { nearby, mayRefine }: Hybrid): void {
     const wanted = this.hasOverview ? wantedTiles(state, nearby) : [];
     this.volumes.follow(state, wanted, mayRefine);
     this.surfaces.follow(state, nearby);
     this.marks.follow(state);
+  }
+
+  /** What has failed is asked for again; then `follow`. */
+  retryFailed(): void {
+    this.surfaces.retryFailed();
+    this.volumes.retryFailed();
+    this.marks.readAnew();
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -43,7 +43,10 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
   stage.role = "img";
   const progress = new ProgressBar();
-  const notices = new Notices((text) => viewer.dispatch({ type: "dismiss", text }));
+  const notices = new Notices(
+    (text) => viewer.dispatch({ type: "dismiss", text }),
+    () => viewer.run("retry"),
+  );
   const said = new Said();
   const over = [progress.root, said.root, notices.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
@@ -53,7 +56,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     stage,
     (state) => {
       desk?.refresh();
-      notices.update(state.notices);
+      notices.update(state);
     },
     () => {
       progress.update(viewer.snapshot().overview);
@@ -67,7 +70,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   });
   const { layOut } = desk;
   viewer.layOut = layOut.bind(desk);
-  notices.update(viewer.state.notices);
+  notices.update(viewer.state);
   desk.followAddress(location.search, location.hash);
   desk.setStereo(await findXrSupport(navigator.xr, isSecureContext));
   return viewer;

@@ -77,6 +77,8 @@ export type ViewerState = Readonly<{
   quality: QualityLevel;
   /** Faults that leave the rest usable, newest last. */
   notices: readonly string[];
+  /** Of these, what another try may mend. */
+  mendable: readonly string[];
 }>;
 
 /** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
@@ -99,7 +101,7 @@ export type Action =
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
   | Readonly<{ type: "set-dwell"; isOn: boolean }>
   | Readonly<{ type: "choose-quality"; level: QualityLevel }>
-  | Readonly<{ type: "notify"; text: string }>
+  | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
   | Readonly<{ type: "dismiss"; text: string }>;
 
 /** The tiles, those first whose centres are nearest to the specimen's. */
@@ -159,6 +161,7 @@ export function initialState(manifest: Manifest): ViewerState {
               `the ${VOLUME_TILES_AT_START} in the middle are, "All" draws the rest.`,
           ]
         : [],
+    mendable: [],
   };
 }
 
@@ -174,7 +177,12 @@ function withNotice(state: ViewerState, text: string): ViewerState {
   return { ...state, notices: [...state.notices.filter((n) => n !== text), text] };
 }
 
-/** Show a channel; if there is no room, the one that has been shown longest leaves. */
+function withMendable(state: ViewerState, text: string, isMendable: boolean): ViewerState {
+  const others = state.mendable.filter((n) => n !== text);
+  return { ...state, mendable: isMendable ? [...others, text] : others };
+}
+
+/** Show a channel; if there is no room, the one that has been shown longest leaves: see remark.ts. */
 function withShown(state: ViewerState, id: string): ViewerState {
   const channel = state.channels.find((c) => c.id === id);
   if (channel === undefined || channel.shown) return state;
@@ -183,10 +191,7 @@ function withShown(state: ViewerState, id: string): ViewerState {
   const next = withChannel(state, id, (c) => ({ ...c, shown: true, turn }));
   const [leaves] = shown;
   if (shown.length < MAX_CHANNELS) return next;
-  return withNotice(
-    withChannel(next, leaves.id, (c) => ({ ...c, shown: false })),
-    `${MAX_CHANNELS} channels show at once: ${leaves.name} left for ${channel.name}.`,
-  );
+  return withChannel(next, leaves.id, (c) => ({ ...c, shown: false }));
 }
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
@@ -249,10 +254,11 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "choose-quality":
       return action.level === state.quality ? state : { ...state, quality: action.level };
     case "notify":
-      return withNotice(state, action.text);
+      return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {
       const notices = state.notices.filter((n) => n !== action.text);
-      return notices.length === state.notices.length ? state : { ...state, notices };
+      if (notices.length === state.notices.length) return state;
+      return withMendable({ ...state, notices }, action.text, false);
     }
   }
 }

@@ -1,7 +1,7 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
 import { type Camera, type Matrix4, Quaternion, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { Snapshot } from "./api";
-import { BundleError } from "./bundle/errors";
+import { BundleError, TemporaryError } from "./bundle/errors";
 import type { Bundle } from "./bundle/load";
 import { Contents } from "./contents";
 import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
@@ -9,14 +9,16 @@ import { pickTile, type Ray, shownBox, shownTiles } from "./gaze/pick";
 import { Hybrid } from "./hybrid/hybrid";
 import type { HandleId } from "./marks/handles";
 import { listenForHandles } from "./marks/pointer";
-import { ERROR_TARGET_PX, ERROR_TARGET_XR_PX } from "./mesh/surface_set";
+import { ERROR_TARGET_PX } from "./mesh/surface_set";
 import { Pace } from "./quality/pace";
 import type { Look } from "./share/look";
 import { type Action, initialState, newNotice, reduce, type ViewerState } from "./state";
 import { CANT, type Command } from "./ui/commands";
 import type { Layout, PanelView } from "./ui/controls";
+import { remarkOn } from "./ui/remark";
 import { chosenTile } from "./ui/tile_layout";
-import { moveByOneHand } from "./view/grab";
+import { intoRoom, ontoScreen } from "./view/crossing";
+import type { HandPose, SpecimenPose } from "./view/grab";
 import { Navigation } from "./view/navigation";
 import { Picture } from "./view/picture";
 import { place, XR_DISTANCE_M } from "./view/placement";
@@ -41,6 +43,8 @@ export class Viewer {
   frames = 0;
   /** What a panel in the room shows; whoever has the panel says. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
+  /** What a change has brought besides what it shows; whoever has the page tells it. */
+  onRemark: (text: string) => void = () => undefined;
   private readonly room: Room;
   private readonly picture: Picture;
   private readonly hybrid: Hybrid;
@@ -53,6 +57,8 @@ export class Viewer {
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
   private waiting: (() => void)[] = [];
+  /** In stereo: where the specimen was when it began, in the room and on the screen. */
+  private entered: Readonly<{ inRoom: SpecimenPose; onScreen: SpecimenPose | null }> | null = null;
 
   /**
    * @param onState called after every change of the state
@@ -125,15 +131,17 @@ export class Viewer {
       if (this.stereo.kind === null) this.tap(rayAt(point));
     });
     const lost = "The graphics driver has dropped the picture: it is drawn anew.";
-    canvas.addEventListener("webglcontextlost", () =>
-      this.dispatch({ type: "notify", text: lost }),
-    );
-    canvas.addEventListener("webglcontextrestored", () => {
+    canvas.addEventListener("webglcontextlost", () => {
+      this.dispatch({ type: "notify", text: lost });
       volumes.forget(); // their texels went with the context
-      this.pace = new Pace(gl); // and the times that were asked for
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      volumes.forget(); // those that have come since
+      this.pace = new Pace(gl); // the times that were asked for went, too
       this.follow();
       this.dispatch({ type: "dismiss", text: lost });
     });
+    addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
     this.fit();
     this.follow();
@@ -144,8 +152,10 @@ export class Viewer {
     const next = reduce(this.state, action);
     if (next === this.state) return;
     const notice = newNotice(this.state, next);
+    const remark = remarkOn(this.state, next, this.bundle.manifest.tiles);
     this.state = next;
     if (notice !== null) this.stereo.tell(notice);
+    if (remark !== null) this.onRemark(remark);
     this.follow();
     this.onState(next);
   }
@@ -161,6 +171,9 @@ export class Viewer {
       case "back":
         if (this.state.isolated !== null) this.dispatch({ type: "isolate", tile: null });
         else this.dispatch({ type: "select", tile: null });
+        break;
+      case "retry":
+        this.retry();
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
@@ -185,9 +198,9 @@ export class Viewer {
 
   /** From where the specimen is seen; null: as it opens. */
   get look(): Look | null {
-    const { isMoved, pose } = this.room.specimen;
-    const eye = isMoved ? this.navigation.lookNow : this.navigation.look;
-    if (eye === null || !isMoved) return eye && { ...eye, specimen: null };
+    const { navigation, poseOnScreen: pose } = this;
+    const eye = pose === null ? navigation.look : navigation.lookNow;
+    if (eye === null || pose === null) return eye && { ...eye, specimen: null };
     const { position, orientation, scale } = pose;
     const specimen = { position: position.toArray(), orientation: orientation.toArray(), scale };
     return { ...eye, specimen };
@@ -238,7 +251,18 @@ export class Viewer {
 
   report(error: unknown): void {
     if (!(error instanceof BundleError)) throw error;
-    this.dispatch({ type: "notify", text: error.message });
+    const isMendable = error instanceof TemporaryError;
+    const text = isMendable ? error.notice : error.message;
+    // for each of a host's files it would be told anew
+    if (isMendable && this.state.mendable.includes(text)) return;
+    this.dispatch({ type: "notify", text, isMendable });
+  }
+
+  /** Ask again for all that has failed. */
+  private retry(): void {
+    for (const text of this.state.mendable) this.dispatch({ type: "dismiss", text });
+    this.contents.retryFailed();
+    this.follow();
   }
 
   /** Must be called from a tap. Throws BundleError in words if the browser or the user refuses. */
@@ -258,6 +282,7 @@ export class Viewer {
   }
 
   private frame(time_ms: number): void {
+    if (this.renderer.getContext().isContextLost()) return; // there is nothing to draw on
     const interval_ms = time_ms - this.last_ms;
     const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
     this.last_ms = time_ms;
@@ -272,13 +297,17 @@ export class Viewer {
     // a picture that came to rest is drawn once more, as well as can be
     const isMoving = isStereo || this.isStale;
     const settings = this.pace.begin(isMoving, interval_ms, this.stereo.headset.rate_hz);
-    const target_px = isStereo ? ERROR_TARGET_XR_PX : ERROR_TARGET_PX;
     this.picture.marchFrame.uSteps.value = settings.steps;
     this.hybrid.radiusShare = settings.discShare;
     const [eye] = this.picture.eyes.all; // a headset has none before its first pose
     if (eye !== undefined) {
       const { z, w } = eye.viewport;
-      this.contents.stream(this.stereo.seenBy(camera), z, w, target_px * settings.errorFactor);
+      this.contents.stream(
+        this.stereo.seenBy(camera),
+        z,
+        w,
+        ERROR_TARGET_PX * settings.errorFactor,
+      );
     }
     if (isMoving || this.wasMoving) {
       this.isStale = isChanging;
@@ -310,7 +339,6 @@ export class Viewer {
     if (hybrid.look(state, head, group.matrixWorld, isReady, dt_s)) this.follow();
     const screen = {
       camera: navigation.camera,
-      width_px: stage.clientWidth,
       height_px: stage.clientHeight,
       focus: navigation.controls.target,
     };
@@ -320,6 +348,7 @@ export class Viewer {
       screen: this.stereo.kind === null ? screen : null,
       gaze: rayAhead(head, group),
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
+      isPanelOpen: this.stereo.hands.panel.isOpen,
       dt_s,
     });
     const isChanging = isMoving || isFading || hybrid.isChanging(state);
@@ -330,10 +359,11 @@ export class Viewer {
 
   private draw(camera: Camera, resolution: number): void {
     const { contents, stereo, head, picture } = this;
-    const translucent = [...contents.translucent, ...stereo.hands.overlays];
+    const { volumes, surfaces, marks } = contents;
+    const overlays = [...marks.overlays, ...stereo.hands.overlays];
     const { clip } = this.state;
     stereo.present(() =>
-      picture.draw(camera, head, contents.volumes, translucent, clip, resolution),
+      picture.draw(camera, head, volumes, surfaces.blended, overlays, clip, resolution),
     );
   }
 
@@ -364,22 +394,42 @@ export class Viewer {
   private enterStereo(): void {
     const { navigation, room } = this;
     const { specimen } = room;
-    const { target, object } = navigation.controls;
     navigation.controls.enabled = false;
-    const inRoom = { position: new Vector3(0, 0, -XR_DISTANCE_M), orientation: new Quaternion() };
-    const onScreen = { position: target, orientation: object.quaternion };
-    const pose = moveByOneHand(specimen.pose, onScreen, inRoom);
-    const isHome = navigation.look === null && !specimen.isMoved;
-    specimen.anchorAt(inRoom.position);
-    if (!isHome) specimen.moveTo(pose, new Vector3());
+    const ahead_m = new Vector3(0, 0, -XR_DISTANCE_M);
+    const onScreen = this.poseOnScreen;
+    const pose = intoRoom(specimen.pose, this.screenHold, ahead_m);
+    specimen.anchorAt(ahead_m);
+    if (navigation.look !== null || onScreen !== null) specimen.moveTo(pose, new Vector3());
+    this.entered = { inRoom: specimen.pose, onScreen };
     this.onState(this.state);
   }
 
+  /** What was looked at stays. */
   private leaveStereo(): void {
-    this.navigation.controls.enabled = true;
-    this.room.specimen.anchorAt(new Vector3());
+    const { navigation, poseOnScreen: pose } = this;
+    const { specimen } = this.room;
+    this.entered = null;
+    navigation.controls.enabled = true;
+    specimen.anchorAt(new Vector3());
+    if (pose !== null) specimen.moveTo(pose, navigation.camera.position);
     this.fit();
     this.onState(this.state);
+  }
+
+  /** The flat camera, held as a hand holds a thing: by the point that it is turned about. */
+  private get screenHold(): HandPose {
+    const { target, object } = this.navigation.controls;
+    return { position: target, orientation: object.quaternion };
+  }
+
+  /** Where the specimen is to the flat camera, also while there is stereo; null: where it opens. */
+  private get poseOnScreen(): SpecimenPose | null {
+    const { entered, navigation } = this;
+    const { anchor, home, isMoved, pose } = this.room.specimen;
+    if (entered === null) return isMoved ? pose : null;
+    if (pose === entered.inRoom) return entered.onScreen; // nobody has moved it there
+    if (!isMoved && navigation.look === null) return null;
+    return ontoScreen(isMoved ? pose : home, this.screenHold, anchor);
   }
 
   private tap(ray: Ray): void {

@@ -163,7 +163,7 @@ describeInChromium("the shader's chunks", () => {
       const whole = [0, 0, ...size];
       const x = -(FAR + NEAR) / (FAR - NEAR);
       const y = (-2 * FAR * NEAR) / (FAR - NEAR);
-      const head = `uniform sampler2D uSceneDepth;
+      const head = `uniform sampler2D uSceneDepth, uPaneDepth;
         const vec4 uEye = ${vec(...(eye ?? whole))}; const vec4 uPart = ${vec(...(part ?? whole))};
         const vec2 vDepth = ${vec(x, y)}; const float vViewZ = ${VIEW_Z.toFixed(1)};
         const float uVoxel = ${VOXEL}; const vec4 place = ${vec(...at, 0, 1)};
@@ -171,9 +171,11 @@ describeInChromium("the shader's chunks", () => {
       const chunks = await readChunks("scene_distance");
       const text = chunks["chunks/scene_distance"].replaceAll("gl_FragCoord", "place");
       const uSceneDepth = { size, channels: 1, texels: depths.flat() } as const;
-      const body = `oColor = vec4(sceneDistances(${BACK.toFixed(1)}), 0.0);`;
+      const uPaneDepth = { size, channels: 1, texels: depths.flat().map((k) => 255 - k) } as const;
+      const back = BACK.toFixed(1);
+      const body = `oColor = vec4(sceneDistances(${back}), paneDistance(${back}));`;
       const program = { "chunks/scene_distance": text };
-      return (await runProgram(page, program, head, body, { uSceneDepth })).slice(0, 3);
+      return runProgram(page, program, head, body, { uSceneDepth, uPaneDepth });
     }
 
     const plain = (k: number) => [3, 3, 3].map((n) => new Array<number>(n).fill(k));
@@ -248,6 +250,8 @@ describeInChromium("the shader's chunks", () => {
       const near = async (x: number) => (await ends(picture, [x, 0.5], right))[0];
       expect((await near(2.5)) / distanceOf(160)).toBeCloseTo(1, 4);
       expect((await near(3.5)) / distanceOf(180)).toBeCloseTo(1, 4);
+      const pane = (await ends(picture, [2.5, 0.5], right))[3];
+      expect(pane / distanceOf(255 - 160)).toBeCloseTo(1, 4);
     });
   });
 

@@ -17,6 +17,10 @@ describeInChromium("the graphics driver", () => {
         return made as never;
       };
     });
+    const warnings: string[] = [];
+    stand.viewer.page.on("console", (message) => {
+      if (message.type() === "warning") warnings.push(message.text());
+    });
     await stand.open("&mode=tile&switch=9&quality=high");
     await stand.viewer.chooseTile("r0_c1");
     const before = await takePicture(stand.viewer.page);
@@ -37,6 +41,8 @@ describeInChromium("the graphics driver", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeLessThan(0.002);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.every(({ level }) => level === 0)).toBe(true);
+    // nothing is drawn while there is nothing to draw on, nor dropped what belongs to another
+    expect(warnings.filter((text) => /TilesRenderer|does not belong/.test(text))).toEqual([]);
   });
 
   it("takes no large textures: a coarser level is shown, and the page says so", async () => {

@@ -123,7 +123,7 @@ describeInChromium("a fault on the way", () => {
     expect(triangles).toBeGreaterThan(0);
     await stand.viewer.drawVolume("Block", true);
     await stand.viewer.chooseMode("all");
-    expect(statuses).toEqual([206]); // a range, asked for once
+    expect(statuses).toEqual([206, 206]); // a range, asked for once more past all caches
     expect(await notices()).toEqual([
       expect.stringMatching(
         new RegExp(`^${path}: level \\d+: expected SHA-256 [0-9a-f]{64}, found [0-9a-f]{64}$`),
@@ -204,6 +204,78 @@ describeInChromium("a fault on the way", () => {
     expect((await viewer.snapshot()).triangles).toBe(triangles);
     const picture = await takePicture(viewer.page);
     expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+  });
+
+  it("a bundle without faults leaves no warning in the console", async () => {
+    const said: string[] = [];
+    stand.viewer.page.on("console", (message) => {
+      if (["warning", "error"].includes(message.type())) said.push(message.text());
+    });
+    await stand.open("&mode=all");
+    await stand.viewer.settled();
+    // the driver allows none, and software draws slowly
+    expect(said.filter((text) => !/Service Worker|GL Driver/.test(text))).toEqual([]);
+  });
+
+  /** Turn volumes on and come near, without a network, until all tries are used up. */
+  async function starve(viewer: ViewerPage): Promise<number> {
+    for (let i = 0; i < 10; i++) await viewer.page.keyboard.press("+");
+    await viewer.settled();
+    const { triangles } = await viewer.snapshot();
+    await viewer.chooseMode("all");
+    const { state, volumes } = await viewer.snapshot();
+    expect(state.notices).toEqual([
+      expect.stringMatching(/^The host .* can't be reached, or forbids this page: not all files/),
+    ]);
+    expect(volumes).toEqual([]);
+    return triangles;
+  }
+
+  async function expectAll(viewer: ViewerPage, starved: number): Promise<void> {
+    await expect.poll(notices).toEqual([]);
+    await viewer.settled();
+    const { volumes } = await viewer.snapshot();
+    expect(volumes.length).toBeGreaterThan(0);
+    expect(volumes.filter(({ level }) => level === null)).toEqual([]);
+    await viewer.chooseMode("off");
+    expect((await viewer.snapshot()).triangles).toBeGreaterThan(starved);
+    expect(await viewer.page.locator("[data-action=retry]").count()).toBe(0);
+    expect(await notices()).toEqual([]);
+  }
+
+  /** The pauses between tries are over at once. */
+  const hurry = () =>
+    stand.viewer.page.addInitScript(() => {
+      const real = window.setTimeout.bind(window);
+      const hurried = (job: TimerHandler, pause_ms?: number) =>
+        real(job, Math.min(pause_ms ?? 0, 50));
+      window.setTimeout = hurried as typeof setTimeout;
+    });
+
+  it("an outage that outlasts all tries leaves no trace, once the device has a network", async () => {
+    await hurry();
+    const viewer = new ViewerPage(stand.viewer.page);
+    const context = viewer.page.context();
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    await context.setOffline(true);
+    const starved = await starve(viewer);
+    await context.setOffline(false);
+    await expectAll(viewer, starved);
+  });
+
+  it("a host that was away for long brings all once it is asked to try again", async () => {
+    await hurry();
+    const viewer = new ViewerPage(stand.viewer.page);
+    await viewer.page.route("**/Balls/tileset.json", (route) => route.abort());
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    await viewer.page.unroute("**/Balls/tileset.json");
+    gate.shut();
+    const starved = await starve(viewer);
+    gate.open();
+    await viewer.page.locator("[data-action=retry]").click();
+    await expectAll(viewer, starved);
   });
 
   it("a connection that breaks is tried again", async () => {

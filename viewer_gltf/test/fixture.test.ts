@@ -68,6 +68,29 @@ describeInChromium("the picture of the fixture", () => {
     expect(blue).toBeLessThan(behind[2] - 20);
   });
 
+  it("keeps the order where a surface is a little translucent", async () => {
+    await stand.viewer.showAs("Balls", "surface");
+    await showAsVolume("Block");
+    const opaque = await takePicture(stand.viewer.page);
+    await stand.viewer.openCard("Balls");
+    await stand.viewer.slide("Balls/opacity", 0.98);
+    const glass = await takePicture(stand.viewer.page);
+    for (const { center } of [BALLS[2], BALLS[3]]) {
+      const [before, after] = [at(opaque, center), at(glass, center)];
+      expect(after).not.toEqual(before);
+      after.forEach((v, i) => {
+        expect(Math.abs(v - before[i])).toBeLessThan(8);
+      });
+    }
+    await stand.viewer.slide("Balls/opacity", 0.5);
+    const half = at(await takePicture(stand.viewer.page), BALLS[2].center);
+    await stand.viewer.show("Balls", false);
+    const behind = at(await takePicture(stand.viewer.page), BALLS[2].center);
+    half.forEach((v, i) => {
+      expect(Math.abs(v - (at(opaque, BALLS[2].center)[i] + behind[i]) / 2)).toBeLessThan(6);
+    });
+  });
+
   it("shows less through a softer transfer function", async () => {
     await showAsVolume("Block");
     const point = [56, -42, 12] as const;

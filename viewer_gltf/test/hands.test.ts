@@ -116,25 +116,38 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeGreaterThan(TURNED);
   });
 
-  it("measure, and read the channels' values there in the panel too", async () => {
-    await stand.viewer.chooseMode("all"); // so that all volumes are at hand
-    const box = await stageBox();
-    const { specimen, tiles } = stand.manifest;
-    await stand.viewer.page.keyboard.press("p");
-    for (const { bounds_um } of tiles.slice(0, 2)) {
-      const { min, max } = bounds_um;
-      const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
-      const { x, y } = project(front, specimen.bounds_um, box.width, box.height);
-      await stand.viewer.page.mouse.click(box.x + x, box.y + y);
-    }
-    const values = async () => (await stand.viewer.snapshot()).measuredValues;
-    await expect.poll(async () => (await values()).length, { timeout: 15_000 }).toBeGreaterThan(0);
-    expect((await stand.viewer.snapshot()).state.measured).toHaveLength(2);
-    await stand.viewer.unfold("measure");
-    const [first] = await values();
-    expect(first).toMatch(/\d/);
-    await expect.poll(() => stand.viewer.page.locator(".panel").textContent()).toContain(first);
-  });
+  it.each([
+    "off", // no volume is drawn
+    "all",
+  ] as const)(
+    "measure, and read the channels' values there (%s) in the panel too",
+    async (mode) => {
+      await stand.viewer.chooseMode(mode);
+      const box = await stageBox();
+      const { specimen, tiles } = stand.manifest;
+      await stand.viewer.page.keyboard.press("p");
+      for (const { bounds_um } of tiles.slice(0, 2)) {
+        const { min, max } = bounds_um;
+        const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
+        const { x, y } = project(front, specimen.bounds_um, box.width, box.height);
+        await stand.viewer.page.mouse.click(box.x + x, box.y + y);
+      }
+      const points = async () => (await stand.viewer.snapshot()).state.measured.length;
+      await expect.poll(points, { timeout: 15_000 }).toBe(2);
+      const values = async () => (await stand.viewer.snapshot()).measuredValues;
+      const least = async () => {
+        const [one = [], two = []] = await values();
+        return Math.min(one.length, two.length);
+      };
+      await expect.poll(least, { timeout: 15_000 }).toBeGreaterThan(0);
+      await stand.viewer.unfold("measure");
+      const [first, second] = (await values()).map((lines) => lines.join(" · "));
+      expect([first, second].join()).toMatch(/\d.*,.*\d/);
+      const fact = (i: number) => stand.viewer.page.locator(`[data-control="values-${i}"]`);
+      await expect.poll(() => fact(0).textContent()).toBe(`First point${first}`);
+      await expect.poll(() => fact(1).textContent()).toBe(`Second point${second}`);
+    },
+  );
 
   it("choose nothing by two fingers, though neither moves", async () => {
     const { middle } = await stageBox();

@@ -142,8 +142,14 @@ describeInChromium("marks", () => {
     );
     const at = (index: 0 | 1) => page.evaluate((i) => window.bench?.valuesAt(i), index);
     await expect.poll(() => at(1)).toBe("CD8 T cells 13107"); // 51 / 255 of 65535
-    expect(await at(0)).toBe(""); // no volume is known there
+    expect(await at(0)).toBe(""); // that tile has no volume
     await shoot("values");
+    const measureAbove = (above_um: number) =>
+      page.evaluate((z) => window.bench?.measure([[750, -200, z]]), 200 + above_um);
+    await measureAbove(300);
+    await expect.poll(() => at(0)).toBe("");
+    await measureAbove(0.1); // surfaces end a little outside
+    await expect.poll(() => at(0)).toBe("CD8 T cells 13107");
   });
 
   it("have labels of the same angle from near and far", async () => {
@@ -215,6 +221,14 @@ describeInChromium("marks", () => {
     for (let i = 0; i < 5; i++) await look([-0.3, 0, 1.6], [-0.3, 0, 0], { dt_s: 0.1 });
     expect(await name()).toBe("r0_c0 · CD8 T cells");
     await shoot("name");
+    const [mark, bar] = await page.evaluate(() =>
+      [".name-mark", ".scale-bar"].map((each) =>
+        document.querySelector(each)?.getBoundingClientRect().toJSON(),
+      ),
+    );
+    expect(mark.bottom).toBeLessThan(bar.top); // above the scale bar, out of what is looked at
+    expect(mark.top).toBeGreaterThan(0.75 * HEIGHT);
+    expect([mark.left, mark.right < WIDTH / 2]).toEqual([bar.left, true]);
     await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
     expect(await name()).toBe("");
     for (let i = 0; i < 5; i++) await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
@@ -234,6 +248,9 @@ describeInChromium("marks", () => {
     const ruler = await page.evaluate(() => window.bench?.ruler());
     expect(ruler?.isVisible).toBe(true);
     expect(ruler?.length_um).toBeGreaterThan(100);
+    await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isPanelOpen: true });
+    const behindPanel = await page.evaluate(() => window.bench?.ruler());
+    expect(behindPanel).toMatchObject({ isVisible: false, hasAxes: false });
     for (const mark of [".scale-bar", ".orientation-mark", ".name-mark"]) {
       expect(await page.locator(mark).isVisible()).toBe(false);
     }

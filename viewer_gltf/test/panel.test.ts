@@ -5,6 +5,7 @@
 import { join } from "node:path";
 import { beforeEach, describe, expect, it } from "vitest";
 import type { ViewerState } from "../src/state";
+import { addHeadset } from "./driver/chromium";
 import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
 
@@ -124,7 +125,7 @@ describeInChromium("the panel", () => {
     expect(await focused()).toBe("back"); // it has nothing to do now, and yet is not lost
   });
 
-  it("has a key for all else, but not while something is typed", async () => {
+  it("has a key for all else", async () => {
     const press = (key: string) => page().keyboard.press(key);
     await press("o");
     expect((await first()).opacity).toBeCloseTo(0.95, 5);
@@ -144,7 +145,84 @@ describeInChromium("the panel", () => {
     await press("h");
     await control(`${FIRST}/transfer-function`).focus();
     await press("o");
+    expect((await first()).opacity).toBeCloseTo(0.9, 5);
+  });
+
+  it("leaves the keys alive whatever was clicked", async () => {
+    const press = (key: string) => page().keyboard.press(key);
+    const axes = () => page().locator(".orientation-mark").getAttribute("aria-label");
+    await control("top").click();
+    await stand.viewer.still();
+    const above = await axes();
+    for (let i = 0; i < 6; i++) await press("ArrowRight"); // a quarter
+    await stand.viewer.still();
+    expect(await axes()).not.toBe(above);
+    await press("Enter"); // is the button's still
+    await stand.viewer.still();
+    expect(await axes()).toBe(above);
+
+    const [tile] = await page().locator('[data-tile-choice="r0_c1"]').all();
+    await tile.click();
+    await tile.click();
+    expect((await state()).isolated).toBe("r0_c1");
+    await press("Escape");
+    expect((await state()).isolated).toBeNull();
+
+    await control("disc-radius").click();
+    const { discRadius_deg } = await state();
+    await press("ArrowRight"); // is the slider's still
+    expect((await state()).discRadius_deg).toBeCloseTo(discRadius_deg + 0.5, 5);
+    const from = await axes();
+    await press("z");
+    await stand.viewer.still();
+    expect(await axes()).not.toBe(from);
+  });
+
+  it("leaves a field at Escape, also that of the link", async () => {
+    await page().addInitScript(() => {
+      Object.defineProperty(navigator, "clipboard", { value: undefined });
+    });
+    await stand.open();
+    const press = (key: string) => page().keyboard.press(key);
+    await press("l");
+    await expect.poll(focused).toBe("link");
+    await press("o"); // is the field's
+    expect((await first()).opacity).toBe(1);
+    await press("Escape");
+    expect(await focused()).toBeNull();
+    await press("o");
     expect((await first()).opacity).toBeCloseTo(0.95, 5);
+  });
+
+  it("cuts the only tile that is shown at its own middle, and says where a cut left nothing", async () => {
+    await stand.viewer.unfold("cut");
+    const said = () => page().locator("[data-said]").textContent();
+    const { tiles } = stand.manifest;
+    const [one, other] = [tiles[0], tiles[tiles.length - 1]];
+    const alone = (tile: string) => page().locator(`[data-tile-choice="${tile}"]`).click();
+    await alone(one.id);
+    await alone(one.id);
+    await control("clip-box").check();
+    const { box } = (await state()).clip;
+    for (const i of [0, 1, 2]) {
+      const edge = one.bounds_um.max[i] - one.bounds_um.min[i];
+      expect(box?.min[i]).toBeCloseTo(one.bounds_um.min[i] + edge / 4, 5);
+      expect(box?.max[i]).toBeCloseTo(one.bounds_um.max[i] - edge / 4, 5);
+    }
+    await alone(other.id);
+    expect((await state()).isolated).toBe(other.id);
+    expect(await said()).toBe(`Only tile ${other.id}: the cut leaves nothing of it.`);
+  });
+
+  it("says the same before the eyes in stereo", async () => {
+    await addHeadset(page());
+    await stand.open("&mode=off");
+    await stand.viewer.enterStereo();
+    for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
+    const { isolated } = await state();
+    const { told } = await stand.viewer.snapshot();
+    expect(told.at(-1)).toBe(`Only tile ${isolated}: the cut leaves nothing of it.`);
+    expect((await state()).notices).toEqual([]);
   });
 
   it("lists all keys in a dialog that keeps the focus until Escape", async () => {
@@ -194,9 +272,13 @@ describeInChromium("the panel", () => {
     const shown = (await state()).channels.filter((channel) => channel.shown);
     expect(shown.map(({ id }) => id)).toEqual(["Balls", "Block", "marker_0", "marker_42"]);
     expect(await focused()).toBe("marker_42/shown");
-    expect(await page().locator("[data-notices]").textContent()).toContain(
+    expect(await page().locator("[data-said]").textContent()).toBe(
       "4 channels show at once: F body left for Marker 42.",
     );
+    expect((await state()).notices).toEqual([]); // it is no fault, and goes by itself
+    await expect
+      .poll(() => page().locator("[data-said]").textContent(), { timeout: 8000 })
+      .toBe("");
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "channels-70.png") });
   });
 

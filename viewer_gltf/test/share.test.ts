@@ -1,6 +1,7 @@
 /** The share link in headless Chromium: opening it shows the same view. */
 import { expect, it } from "vitest";
 import type { Snapshot } from "../src/api";
+import { addHeadset } from "./driver/chromium";
 import { difference, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
@@ -8,6 +9,8 @@ import { prepareStand } from "./driver/stand";
 const F = "F_x20_body";
 /** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
 const SAME = 0.002;
+/** In a headset frames are drawn in their budget, some coarser than others. */
+const SAME_IN_HEADSET = 0.008;
 
 describeInChromium("the share link", () => {
   const stand = prepareStand({ viewport: { width: 640, height: 360 } });
@@ -49,6 +52,62 @@ describeInChromium("the share link", () => {
     expect(viewOf(await viewer.snapshot())).toEqual(before);
     expect((await viewer.snapshot()).state.notices).toEqual([]);
     expect(difference(picture, await takePicture(page()))).toBeLessThan(SAME);
+  });
+
+  it("brings a view that was made in a headset to the screen, and to another headset", async () => {
+    const press = async (...keys: readonly string[]) => {
+      for (const key of keys) await page().keyboard.press(key);
+      await stand.viewer.settled();
+    };
+    /** What the link says of eye and specimen. */
+    const written = async (): Promise<readonly number[]> => {
+      await press("l");
+      const parts = new URLSearchParams((await hash()).slice(1));
+      return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
+    };
+    const silent = async () => {
+      await expect.poll(said, { timeout: 10_000 }).toBe(""); // it lies over the picture
+      await expect.poll(told, { timeout: 20_000 }).toEqual([]);
+    };
+    const told = async () => (await stand.viewer.snapshot()).told;
+    const expectSame = (found: readonly number[], wanted: readonly number[]) => {
+      expect(found).toHaveLength(wanted.length);
+      found.forEach((value, i) => {
+        expect(value).toBeCloseTo(wanted[i], 4);
+      });
+    };
+    await addHeadset(page());
+    await stand.open("&mode=off");
+    await press("ArrowRight", "ArrowRight", "ArrowDown", "Shift+ArrowRight", "j");
+    const flat = await written();
+    await stand.viewer.enterStereo();
+    await silent();
+    const unmoved = await takePicture(page());
+    expectSame(await written(), flat); // nobody has moved it there
+    await press("ArrowRight", "+");
+    await silent();
+    const inHeadset = await takePicture(page());
+    expect(difference(unmoved, inHeadset)).toBeGreaterThan(4 * SAME_IN_HEADSET);
+    const moved = await written();
+    expect(moved).toHaveLength(flat.length + 8);
+    expect(moved.slice(0, 6)).toEqual(flat.slice(0, 6));
+    expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2); // and not a headset's metre away
+    const address = page().url();
+
+    await press("V");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+    await stand.viewer.still();
+    expectSame(await written(), moved); // what was done there stays
+    await silent();
+    const left = await takePicture(page());
+
+    await page().goto("about:blank");
+    await stand.viewer.open(address);
+    await stand.viewer.still();
+    expect(difference(left, await takePicture(page()))).toBeLessThan(SAME);
+    await stand.viewer.enterStereo();
+    expect(difference(inHeadset, await takePicture(page()))).toBeLessThan(SAME_IN_HEADSET);
+    expectSame(await written(), moved);
   });
 
   it("goes to the clipboard, and says so", async () => {

@@ -12,6 +12,8 @@ describeInChromium("the page in stereo", () => {
   const state = async () => (await stand.viewer.snapshot()).state;
   const notices = async () => (await state()).notices;
 
+  const isFull = () => stand.viewer.page.evaluate(() => document.fullscreenElement !== null);
+
   /** Controllers away from the specimen: then the gaze alone points at it. */
   async function open(query: string, hasHands: boolean): Promise<void> {
     await addHeadset(stand.viewer.page);
@@ -81,6 +83,57 @@ describeInChromium("the page in stereo", () => {
     const picture = await takePicture(stand.viewer.page);
     expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     expect(await notices()).toEqual([]);
+  });
+
+  /** An iPhone's: it lets a page ask in a click's own call only. */
+  async function addIphone(answer: "granted" | "denied"): Promise<void> {
+    await stand.viewer.page.addInitScript((given) => {
+      let isInTap = false;
+      const leaveTap = new MessageChannel();
+      leaveTap.port1.onmessage = () => {
+        isInTap = false;
+      };
+      const enterTap = () => {
+        isInTap = true;
+        leaveTap.port2.postMessage(null);
+      };
+      addEventListener("click", enterTap, { capture: true });
+      const requestPermission = async () => {
+        if (!isInTap) throw new DOMException("not within a tap", "NotAllowedError");
+        return given;
+      };
+      Object.assign(DeviceOrientationEvent, { requestPermission });
+    }, answer);
+    await stand.open("&mode=off");
+    await stand.viewer.unfold("stereo");
+  }
+  const tapSplit = () => stand.viewer.page.locator('[data-action="split"]').click();
+  const isStereo = async () => (await stand.viewer.snapshot()).isStereo;
+
+  it("splits an iPhone's screen by the first tap", async () => {
+    await addIphone("granted");
+    await tapSplit();
+    await expect.poll(isStereo).toBe(true);
+    expect((await notices()).join()).not.toMatch(/not allowed/);
+  });
+
+  it("says what to do where an iPhone's owner refuses", async () => {
+    await addIphone("denied");
+    await tapSplit();
+    await expect
+      .poll(notices)
+      .toEqual([expect.stringMatching(/not allowed to tell.*open the page again, and allow/)]);
+    expect(await isStereo()).toBe(false);
+    await expect.poll(isFull).toBe(false);
+  });
+
+  it("says so where the rest of the page can't be had, and gives the screen back", async () => {
+    await addIphone("granted");
+    await stand.viewer.page.route("**/split_session*", (route) => route.abort());
+    await tapSplit();
+    await expect.poll(notices).toEqual([expect.stringMatching(/could not be loaded.*tap again/)]);
+    expect(await isStereo()).toBe(false);
+    await expect.poll(isFull).toBe(false);
   });
 
   it("splits the screen without WebXR, and goes back by Escape", async () => {

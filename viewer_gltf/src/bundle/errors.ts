@@ -6,4 +6,13 @@ export class BundleError extends Error {
 /** A fault that may be gone a second later: no connection, or a host that is busy. */
 export class TemporaryError extends BundleError {
   override readonly name = "TemporaryError";
+  /** What the page says, once for all files that the same befalls. */
+  readonly notice: string;
+
+  constructor(message: string, { notice = message, ...options }: TemporaryErrorOptions = {}) {
+    super(message, options);
+    this.notice = notice;
+  }
 }
+
+type TemporaryErrorOptions = ErrorOptions & Readonly<{ notice?: string }>;

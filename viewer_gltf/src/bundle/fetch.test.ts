@@ -45,6 +45,27 @@ describe("a request", () => {
     expect(fetched).toHaveBeenCalledTimes(1);
   });
 
+  it.each([
+    ["", "can't be reached, or forbids this page"],
+    [503, "answers 503"],
+  ])("that fails for the host's sake (%s) is told once for all files", async (status, fault) => {
+    vi.useFakeTimers();
+    vi.stubGlobal("fetch", async () => {
+      if (status === "") throw new TypeError("no network");
+      return new Response("", { status: Number(status) });
+    });
+    const failed = Promise.allSettled(
+      ["a", "b"].map((path) => request(`https://host/${path}`, path)),
+    );
+    await vi.runAllTimersAsync();
+    vi.useRealTimers();
+    for (const each of await failed) {
+      const { reason } = each as PromiseRejectedResult;
+      expect(reason).toBeInstanceOf(TemporaryError);
+      expect(reason.notice).toBe(`The host host ${fault}: not all files have come.`);
+    }
+  });
+
   it("of a file that isn't there fails at once", async () => {
     const fetched = vi.fn(async () => new Response("", { status: 404 }));
     vi.stubGlobal("fetch", fetched);

@@ -33,21 +33,29 @@ export function request(url: string, path: string, options: RequestInit = {}): P
   return withRetries(whole, options.signal);
 }
 
+/** `fault`: of the host. One notice is enough for all files that it does not bring. */
+function noticeOf(url: string, fault: string): string {
+  return `The host ${new URL(url).host} ${fault}: not all files have come.`;
+}
+
 async function requestOnce(url: string, path: string, options: RequestInit): Promise<Response> {
   let response: Response;
   try {
     response = await fetch(url, options);
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new TemporaryError(`${path}: the host of ${url} can't be reached, or forbids this page`, {
+    const fault = "can't be reached, or forbids this page";
+    throw new TemporaryError(`${path}: the host of ${url} ${fault}`, {
       cause: error,
+      notice: noticeOf(url, fault),
     });
   }
   if (response.status === 404) throw new BundleError(`${path}: not found (404) at ${url}`);
   if (!response.ok) {
-    const isTemporary = response.status === BUSY || response.status >= FIRST_SERVER_FAULT;
-    const Fault = isTemporary ? TemporaryError : BundleError;
-    throw new Fault(`${path}: the host answered ${response.status} for ${url}`);
+    const { status } = response;
+    const message = `${path}: the host answered ${status} for ${url}`;
+    if (status !== BUSY && status < FIRST_SERVER_FAULT) throw new BundleError(message);
+    throw new TemporaryError(message, { notice: noticeOf(url, `answers ${status}`) });
   }
   return response;
 }
@@ -58,8 +66,10 @@ export async function readBody(response: Response, path: string): Promise<Uint8A
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
+    const { url } = response; // "" for one that was made here
     throw new TemporaryError(`${path}: the connection broke before the file's end`, {
       cause: error,
+      notice: url === "" ? undefined : noticeOf(url, "breaks the connection off"),
     });
   }
 }

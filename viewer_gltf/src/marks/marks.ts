@@ -39,7 +39,6 @@ export type MarksOptions = ReadingOptions &
 export type MarksScreen = Readonly<{
   camera: PerspectiveCamera;
   /** CSS pixels. */
-  width_px: number;
   height_px: number;
   /** What is looked at, room: the scale bar is true there. */
   focus: Vector3;
@@ -57,6 +56,8 @@ export type MarksView = Readonly<{
   gaze: Ray;
   /** Where volumes show in disc mode. */
   disc: Cone | null;
+  /** The panel lies beside the specimen, and ruler and axes would lie across it. */
+  isPanelOpen: boolean;
   dt_s: number;
 }>;
 
@@ -128,18 +129,25 @@ export class Marks {
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
     if (this.state.measured.length > 0) this.showMeasured(); // volumes come and refine
-    if (view.screen === null) this.updateInRoom();
+    if (view.screen === null) this.updateInRoom(view.isPanelOpen);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.sight);
     this.measured.update(this.sight);
   }
 
-  /** Each shown channel's value at the second measured point, as `DAPI 1210`; those that have come. */
-  get values(): readonly string[] {
-    return this.measured
-      .valuesAt(1)
-      .split("\n")
-      .filter((line) => line !== "");
+  /** Of each measured point: each shown channel's value, as `DAPI 1210`; those that have come. */
+  get values(): readonly (readonly string[])[] {
+    return this.state.measured.map((_, i) =>
+      this.measured
+        .valuesAt(i === 0 ? 0 : 1)
+        .split("\n")
+        .filter((line) => line !== ""),
+    );
+  }
+
+  /** Read the values of the measured points once more. */
+  readAnew(): void {
+    this.measured.readAnew();
   }
 
   /** The handle that a ray (um) means. */
@@ -172,13 +180,14 @@ export class Marks {
     return shownBox(this.options.manifest, this.state.isolated);
   }
 
-  private updateInRoom(): void {
+  private updateInRoom(isPanelOpen: boolean): void {
     const { sight, shown } = this;
     this.mean(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
     this.ruler.update(shown, sight);
-    this.axes.group.visible = true;
+    if (isPanelOpen) this.ruler.group.visible = false;
+    this.axes.group.visible = !isPanelOpen;
     this.axes.update(shown, sight);
     this.name.placeInRoom(sight);
   }
@@ -188,13 +197,13 @@ export class Marks {
     screen: MarksScreen,
     m_per_um: number,
   ): void {
-    const { camera, width_px, height_px, focus } = screen;
+    const { camera, height_px, focus } = screen;
     this.ruler.group.visible = false;
     this.axes.group.visible = false;
     this.scaleBar.update(umPerPixelAt(focus, camera, height_px, m_per_um));
     this.orientation.root.style.display = "";
     this.orientation.update(head, specimen);
-    this.name.placeOnScreen(width_px / 2, height_px / 2);
+    this.name.showOnScreen();
   }
 
   private showMeasured(): void {

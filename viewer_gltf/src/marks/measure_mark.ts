@@ -63,6 +63,11 @@ export class MeasureMark {
     });
   }
 
+  /** With the next `show`, whatever its key. */
+  readAnew(): void {
+    this.key = "";
+  }
+
   update(sight: Sight): void {
     for (const { mesh, values } of this.ends) {
       if (!mesh.visible) continue;

@@ -1,6 +1,7 @@
 /**
  * The name of what is looked at: the tile, and the channel where a surface is met. It comes once the
- * gaze has rested, beside the point and not on it.
+ * gaze has rested: in stereo beside the point and not on it, on a flat screen in the picture's corner,
+ * since the middle of the picture is what is looked at.
  */
 import { Object3D, Vector3 } from "three";
 import type { Ray } from "../gaze/pick";
@@ -65,13 +66,9 @@ export class NameMark {
     this.write(found.text);
   }
 
-  /** On a flat screen, at a point of the picture, CSS pixels. */
-  placeOnScreen(x_px: number, y_px: number): void {
+  showOnScreen(): void {
     this.label.sprite.visible = false;
     this.root.hidden = this.text === "";
-    if (this.root.hidden) return;
-    this.root.style.left = `${x_px}px`;
-    this.root.style.top = `${y_px}px`;
   }
 
   placeInRoom(sight: Sight): void {

@@ -1,9 +1,10 @@
 import { BoxGeometry, DoubleSide, Matrix4, Mesh, MeshBasicMaterial, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
-import type { Ray } from "../gaze/pick";
+import type { Ray, Vec3 } from "../gaze/pick";
 import type { Box, Clip } from "../view/clip";
 import {
+  nearestIn,
   type ProbedVolume,
   probeBoxes,
   probeSurfaces,
@@ -136,6 +137,34 @@ describe("a ray at volumes", () => {
     expect(probeVolumes(FRONT, [], NO_CLIP, null)).toBeNull();
     const aside: Ray = { origin: [500, -50, 1000], direction: [0, 0, -1] };
     expect(probeVolumes(aside, [volumeOf("A", () => 255, 255)], NO_CLIP, null)).toBeNull();
+  });
+});
+
+describe("a point near a volume", () => {
+  /** A voxel is 1 x 2 x 4 um; the tile was turned and moved. */
+  const matrix = new Matrix4().makeTranslation(50, 0, 0).multiply(new Matrix4().makeRotationZ(1.5));
+  const volume: TileVolume = {
+    tile: "r0_c0",
+    file: { path: "a", bytes: 0, sha256: "" },
+    bricks: { path: "b", bytes: 0, sha256: "" },
+    size: [13, 13, 13],
+    apron: 1,
+    bounds_um: { min: [0, -20, 0], max: [10, 0, 40] },
+    matrix: matrix.toArray(),
+    levels: [{ size: [13, 13, 13], offset: 0, length: 1, sha256: "" }],
+  };
+  const nearest = (point: Vec3) => {
+    const world = new Vector3(...point).applyMatrix4(matrix).toArray();
+    const found = nearestIn(volume, world);
+    return found && new Vector3(...found).applyMatrix4(matrix.clone().invert()).toArray();
+  };
+
+  it("is the nearest one inside, if it is at most two voxels outside", () => {
+    expectNear(nearest([3, -4, 5]) ?? [], [3, -4, 5]);
+    expectNear(nearest([11.9, -23.9, 47.9]) ?? [], [10, -20, 40]);
+    expect(nearest([12.1, -4, 5])).toBeNull();
+    expect(nearest([3, 4.1, 5])).toBeNull();
+    expect(nearest([3, -4, -8.1])).toBeNull();
   });
 });
 

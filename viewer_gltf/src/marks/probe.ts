@@ -40,6 +40,8 @@ const MOST_SAMPLES = 512;
 /** What is less opaque along the whole ray is not seen. */
 const SEEN = 0.1;
 const BYTES = [0, 255] as const;
+/** A surface may lie outside its volume by so many of its voxels. */
+const OUTSIDE_VOXELS = 2;
 
 /** The same ray, its direction of unit length. */
 export function unitRay({ origin, direction }: Ray): Ray {
@@ -175,6 +177,23 @@ function voxelOf({ bounds_um, size, apron }: TileVolume, texels: readonly number
     return ((edge / intervals) * n) / texels[i];
   });
   return Math.min(...edges.filter((edge) => edge > 0));
+}
+
+/** The point, or for one that lies a little outside the volume's box its nearest; null: too far. */
+export function nearestIn(
+  { bounds_um, matrix, size, apron }: TileVolume,
+  point: Vec3,
+): Vec3 | null {
+  const toWorld = new Matrix4().fromArray(matrix);
+  const inTile = new Vector3(...point).applyMatrix4(toWorld.clone().invert());
+  const min = new Vector3(...bounds_um.min);
+  const max = new Vector3(...bounds_um.max);
+  const nearest = inTile.clone().clamp(min, max);
+  const intervals = size.map((n) => Math.max(1, n - 1 - 2 * apron));
+  const voxel = max.sub(min).divide(new Vector3(...intervals));
+  const outside = inTile.sub(nearest).toArray();
+  const isNear = voxel.toArray().every((edge, i) => Math.abs(outside[i]) <= OUTSIDE_VOXELS * edge);
+  return isNear ? nearest.applyMatrix4(toWorld).toArray() : null;
 }
 
 function isInCone(point: Vec3, { apex_um, axis_um, cosine }: Cone): boolean {

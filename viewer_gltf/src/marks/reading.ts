@@ -1,13 +1,13 @@
 /** What the specimen is where a ray meets it: surface, volume or tile, and the channels' values. */
-import type { Matrix4 } from "three";
+import { Box3, type Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import { pickTile, type Ray, shownTiles, type Vec3 } from "../gaze/pick";
 import { valueAt, valueText } from "../measure/measure";
 import type { ViewerState } from "../state";
-import { isKept } from "../view/clip";
 import { VolumeSource } from "../volume/source";
 import {
   type Cone,
+  nearestIn,
   type Probed,
   type ProbedVolume,
   probeBoxes,
@@ -34,6 +34,8 @@ export type ReadingOptions = Readonly<{
   volumes: () => readonly ShownVolume[];
   /** null: not known yet, or there is none. */
   source: (tile: string, channel: string) => LevelSource | null;
+  /** The same, once it is known. */
+  sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
   onError: (error: unknown) => void;
 }>;
 
@@ -76,20 +78,29 @@ export class Reading {
 
   /** A line for each shown channel: its name and its value at a point, on the source's scale. */
   async valuesAt(point: Vec3): Promise<readonly string[]> {
-    const lines: string[] = [];
-    for (const { channel, source } of this.sourcesAt(point)) {
-      const level = await this.orReport(this.cache.best(source));
-      const value = level && valueAt(source.volume, level, channel.window, point);
-      if (value !== null) lines.push(`${channel.name} ${valueText(value, channel.window)}`);
-    }
-    return lines;
+    const tile = this.tileAt(point);
+    const lines = await Promise.all(
+      this.shownChannels.map(async (channel) => {
+        const source = await this.options.sourceOf(tile, channel.id);
+        const place = source && nearestIn(source.volume, point);
+        if (source === null || place === null) return [];
+        const level = await this.orReport(this.cache.best(source));
+        const value = level && valueAt(source.volume, level, channel.window, place);
+        return value === null ? [] : [`${channel.name} ${valueText(value, channel.window)}`];
+      }),
+    );
+    return lines.flat();
   }
 
   /** What these values depend on: they may differ only if this does. */
   sourcesKey(points: readonly Vec3[]): string {
-    const known = points.flatMap((point) =>
-      this.sourcesAt(point).map(({ channel, source }) => `${channel.id} ${levelAtHand(source)}`),
-    );
+    const known = points.flatMap((point) => {
+      const tile = this.tileAt(point);
+      return this.shownChannels.map(({ id }) => {
+        const source = this.options.source(tile, id);
+        return `${id} ${source && levelAtHand(source)}`;
+      });
+    });
     return known.join();
   }
 
@@ -115,18 +126,18 @@ export class Reading {
     return found;
   }
 
-  /** The volumes of the shown channels at a point. */
-  private sourcesAt(point: Vec3) {
-    const { manifest, source } = this.options;
-    const tile = manifest.tiles.find(({ bounds_um }) =>
-      isKept(point, { box: bounds_um, plane: null }),
+  /** The nearest tile: a point of a surface can lie a little outside all of them. */
+  private tileAt(point: Vec3): string {
+    const place = new Vector3(...point);
+    const distances = this.options.manifest.tiles.map(({ bounds_um: { min, max } }) =>
+      new Box3(new Vector3(...min), new Vector3(...max)).distanceToPoint(place),
     );
-    if (tile === undefined) return [];
+    return this.options.manifest.tiles[distances.indexOf(Math.min(...distances))].id;
+  }
+
+  private get shownChannels() {
     const shown = new Set(this.state.channels.flatMap((c) => (c.shown ? [c.id] : [])));
-    return manifest.channels.flatMap((channel) => {
-      const found = shown.has(channel.id) ? source(tile.id, channel.id) : null;
-      return found === null ? [] : [{ channel, source: found }];
-    });
+    return this.options.manifest.channels.filter(({ id }) => shown.has(id));
   }
 
   /** null after a fault, which was told. */

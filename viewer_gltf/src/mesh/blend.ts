@@ -95,6 +95,9 @@ void main() {
 /** Before the depth of surfaces without a share, after all opaque ones. */
 const AFTER_OPAQUE = 1;
 
+/** The layer in which only what writes the depth of translucent surfaces is; WebXR has 1 and 2. */
+export const PANES = 3;
+
 export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
@@ -130,6 +133,7 @@ export class BlendedSurface {
       const twin = new Mesh(mesh.geometry, this.depth);
       twin.renderOrder = AFTER_OPAQUE;
       twin.visible = false;
+      twin.layers.enable(PANES);
       mesh.add(twin);
       this.twins.push(twin);
     }

@@ -10,9 +10,8 @@ import type { SurfaceLoader } from "./loader";
 import { overview, type Progress } from "./progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
 
-/** Screen-space error, in pixels, down to which LODs are refined; a headset draws every eye. */
+/** Screen-space error, in pixels, down to which LODs are refined where frames come in time. */
 export const ERROR_TARGET_PX = 2;
-export const ERROR_TARGET_XR_PX = 4;
 
 export class SurfaceSet {
   /** In um, world. */
@@ -52,6 +51,10 @@ export class SurfaceSet {
 
   get triangles(): number {
     return this.shown().reduce((sum, [, tileset]) => sum + tileset.triangles, 0);
+  }
+
+  retryFailed(): void {
+    for (const [, tileset] of this.shown()) tileset.retryFailed();
   }
 
   setErrorTarget(pixels: number): void {

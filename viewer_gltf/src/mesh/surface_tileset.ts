@@ -75,7 +75,8 @@ export class SurfaceTileset {
     const fetchRoot = async () => {
       const tileset = await fetchTileset(base, file);
       hashes = contentHashes(tileset, file.path, root);
-      return tileset;
+      // of 1.1 the renderer warns; it knows all that is new there in a bundle: glTF as content
+      return { ...tileset, asset: { ...tileset.asset, version: "1.0" } };
     };
     const fetchSurface = async (url: string, signal: RequestInit["signal"]) => {
       const hash = hashes.get(url);
@@ -191,7 +192,8 @@ export class SurfaceTileset {
     this.count(tile);
   }
 
-  private retryFailed(): void {
+  /** What was given up is loaded anew where it is needed. */
+  retryFailed(): void {
     if (this.tiles.root === null) this.total = null;
     for (const tile of this.failed) {
       const siblings = tile.parent?.children;

@@ -10,7 +10,7 @@ import { HEIGHT, type Page, PX_PER_M, pageOf, paginate, WIDTH } from "./page";
 const FACTS: Facts = {
   title: "sample",
   subtitle: "",
-  specimen: SPECIMEN_BOX,
+  shown: SPECIMEN_BOX,
   ranges: new Map(),
   gazed: "r1_c2",
   isStereo: true,

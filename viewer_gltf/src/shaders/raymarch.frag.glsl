@@ -1,4 +1,6 @@
-// March the volume of one tile, up to CHANNELS channels together, front to back.
+// March the volume of one tile, up to CHANNELS channels together, front to back. What lies in front
+// of the nearest translucent surface, a pane, and what lies behind it come out apart: the pane itself
+// is drawn between them.
 // Space of the ray: um from the box's low corner, y up, so anisotropic voxels need no care.
 // After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
 precision highp float;
@@ -34,6 +36,8 @@ uniform float uFresh;  // 0..1: share of the new one
 uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
 uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
 uniform sampler2D uSceneDepth;
+uniform sampler2D uPaneDepth;
+uniform bool uHasPane;  // whether any surface is translucent
 uniform sampler2D uNoise;  // blue noise
 uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
 uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
@@ -45,7 +49,8 @@ flat in vec3 vLight;
 flat in vec2 vDepth;
 centroid in float vViewZ;
 
-out vec4 oColor;  // premultiplied
+layout(location = 0) out vec4 oColor;  // premultiplied: up to the pane, or all
+layout(location = 1) out vec4 oBehind;  // beyond the pane
 
 #include <chunks/intersect_box>
 #include <chunks/clip_span>
@@ -61,6 +66,15 @@ out vec4 oColor;  // premultiplied
 #include <chunks/shade>
 #include <chunks/jitter>
 #include <chunks/encoded>
+
+const float NOWHERE = 1e30;
+
+// Blending happens on encoded colours, as for every other surface of the page.
+vec4 shown(vec4 sum) {
+  if (sum.a <= 0.0) return vec4(0.0);
+  float whole = sum.a >= OPAQUE ? sum.a : 1.0;  // what was left out behind looks as what is in front
+  return vec4(encoded(sum.rgb / sum.a) * sum.a, sum.a) / whole;
+}
 
 void main() {
   vec3 ray = vPosition - vEye;
@@ -92,6 +106,9 @@ void main() {
   vec3 invBrickDir = 1.0 / brickDir;
   vec4 sum = vec4(0.0);
   vec4 veil = vec4(0.0);  // the sum in front of the edge
+  float pane = uHasPane ? paneDistance(back) - span.x : NOWHERE;
+  vec4 front = vec4(0.0);  // the sum in front of the pane
+  bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
@@ -111,8 +128,14 @@ void main() {
       dt = max(uMinStep, (end - t) / float(steps - i));
     }
     if (i >= steps || t >= end) break;
+    if (t >= pane) {
+      front = mix(veil, sum, scene.z);
+      sum = veil = vec4(0.0);
+      pane = NOWHERE;
+      isBehind = true;
+    }
     bool isInFront = t < edge;
-    float here = min(dt, (isInFront ? edge : end) - t);  // the last step may be shorter
+    float here = min(dt, min(isInFront ? edge : end, pane) - t);  // the last step may be shorter
     float at = t + shift * here;
     vec3 p = texStart + at * texDir;
     vec4 v = sampleIntensities(p);
@@ -135,8 +158,7 @@ void main() {
   return;
 #endif
   sum = mix(veil, sum, scene.z);
-  if (sum.a >= OPAQUE) sum /= sum.a;  // what was left out behind looks as what is in front
-  if (sum.a <= 0.0) discard;
-  // Blending happens on encoded colours, as for every other surface of the page.
-  oColor = vec4(encoded(sum.rgb / sum.a) * sum.a, sum.a);
+  if (max(sum.a, front.a) <= 0.0) discard;
+  oColor = shown(isBehind ? front : sum);
+  oBehind = isBehind ? shown(sum) : vec4(0.0);
 }

@@ -10,6 +10,8 @@ export type Command =
   /** Read the phone viewer's code by the camera. */
   | "scan"
   | "share"
+  /** Ask again for all that has failed. */
+  | "retry"
   /** What a tap does, in the middle of the view: for hands that have only keys. */
   | "press"
   /** To the panel's search among the channels that are not shown. */

@@ -8,6 +8,7 @@ import { copyText } from "../share/copy";
 import { readLink, writeLink } from "../share/link";
 import { SETTINGS, settingsOf } from "../share/settings";
 import { initialState } from "../state";
+import type { Box } from "../view/clip";
 import type { Viewer } from "../viewer";
 import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/profile";
 import { canScan } from "../xr/cardboard/scan";
@@ -21,6 +22,7 @@ import { type KeyContext, listenForKeys, wishOf } from "./keys";
 import { type Facts, layOut } from "./layout";
 import type { Said } from "./overlays";
 import { Panel } from "./panel";
+import { remarkOn } from "./remark";
 import { scanByCamera } from "./scanner";
 import { told } from "./told";
 
@@ -81,6 +83,7 @@ export class Desk {
     this.help = new Help(parent, () => {
       if (this.view.isHelpOpen) this.perform({ panel: "help" });
     });
+    viewer.onRemark = (text) => this.say(text);
     listenForKeys((name) => this.press(name), this.disposed.signal);
     // A link to another view of the same bundle: what it leaves out is as the bundle opens.
     addEventListener("hashchange", () => location.reload(), { signal: this.disposed.signal });
@@ -193,8 +196,7 @@ export class Desk {
     const context: KeyContext = {
       state: viewer.state,
       view,
-      specimen: viewer.bundle.manifest.specimen.bounds_um,
-      shown: shownBox(viewer.bundle.manifest, viewer.state.isolated),
+      shown: this.shown,
       gazed: viewer.snapshot().gazed,
     };
     const wish = wishOf(name, context);
@@ -203,7 +205,10 @@ export class Desk {
     if (typeof wish !== "string" && "panel" in wish && wish.panel === "grip") {
       viewer.mean(handleOf(wish.grip));
     }
-    const text = told(wish, context.state, viewer.state, this.ranges);
+    const { tiles } = viewer.bundle.manifest;
+    const text =
+      remarkOn(context.state, viewer.state, tiles) ??
+      told(wish, context.state, viewer.state, this.ranges);
     if (text !== "") this.say(text);
     return true;
   }
@@ -225,6 +230,10 @@ export class Desk {
     }
   }
 
+  private get shown(): Box {
+    return shownBox(this.viewer.bundle.manifest, this.viewer.state.isolated);
+  }
+
   private get facts(): Facts {
     const { viewer, stereo } = this;
     const { specimen } = viewer.bundle.manifest;
@@ -234,7 +243,7 @@ export class Desk {
     return {
       title: specimen.name,
       subtitle: this.options.subtitle,
-      specimen: specimen.bounds_um,
+      shown: this.shown,
       ranges: this.ranges,
       gazed,
       isStereo,

@@ -3,18 +3,17 @@ import { SPECIMEN_BOX, sampleManifest } from "../../test/fixture/manifest";
 import { type Action, initialState, reduce } from "../state";
 import type { Command } from "./commands";
 import { type PanelChange, START_VIEW } from "./controls";
-import { firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
+import { type Focus, firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
 import { told } from "./told";
 
 const ALL = KEYS.flatMap(({ keys }) => keys);
 const CONTEXT: KeyContext = {
   state: [
     { type: "measure", points: [[0, 0, 0]] } as const,
-    { type: "notify", text: "a fault" } as const,
+    { type: "notify", text: "a fault", isMendable: true } as const,
     { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,
-  specimen: SPECIMEN_BOX,
   shown: SPECIMEN_BOX,
   gazed: "r0_c2",
 };
@@ -63,6 +62,7 @@ describe("the keys", () => {
       split: true,
       scan: true,
       share: true,
+      retry: true,
       press: true,
       front: true,
       side: true,
@@ -162,15 +162,29 @@ describe("the keys", () => {
     expect(wishOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
   });
 
-  it("rest while something is typed, and leave a control its own", () => {
-    for (const name of ["a", "?", "ArrowLeft", "Escape"]) {
-      expect(firesOn(name, "field"), name).toBe(false);
-      expect(firesOn(name, "page"), name).toBe(true);
-    }
-    for (const name of ["ArrowLeft", "Shift+ArrowLeft", "Enter", " ", "Home", "+"]) {
-      expect(firesOn(name, "control"), name).toBe(false);
-    }
-    expect(firesOn("o", "control")).toBe(true);
+  it("rest while something is typed, and leave a control what it is worked by", () => {
+    const press = ["Enter", " ", "Shift+Enter"];
+    const goThrough = ["ArrowLeft", "Shift+ArrowUp", "Home", "End", "PageUp", "PageDown"];
+    const others = ["o", "?", "+", "-", "=", "Escape", "Delete", "Backspace"];
+    const fire = (focus: Focus) =>
+      [press, goThrough, others].map((names) => {
+        const fired = names.filter((name) => firesOn(name, focus)).length;
+        return fired === 0 ? "none" : fired === names.length ? "all" : "some";
+      });
+    expect(fire("field")).toEqual(["none", "none", "none"]);
+    expect(fire("list")).toEqual(["none", "none", "all"]);
+    expect(fire("button")).toEqual(["none", "all", "all"]);
+    expect(fire("page")).toEqual(["all", "all", "all"]);
+  });
+
+  it("cut what is shown, also of a tile that is shown alone", () => {
+    const shown = { min: [0, -10, 0], max: [10, 0, 8] } as const;
+    const state = initialState(sampleManifest(1));
+    const clipOf = (name: string) => wishOf(name, { ...CONTEXT, state, shown });
+    expect(clipOf("b")).toMatchObject({
+      clip: { box: { min: [2.5, -7.5, 2], max: [7.5, -2.5, 6] } },
+    });
+    expect(clipOf("n")).toMatchObject({ clip: { plane: { normal: [0, 0, 1], offset_um: 4 } } });
   });
 
   it("are told in words that name the new value", () => {

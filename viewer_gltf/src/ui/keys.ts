@@ -13,9 +13,7 @@ import { chosenTile } from "./tile_layout";
 export type KeyContext = Readonly<{
   state: ViewerState;
   view: PanelView;
-  /** um, world. */
-  specimen: Box;
-  /** The specimen, or the isolated tile. */
+  /** The specimen, or the isolated tile; um, world. */
   shown: Box;
   gazed: string | null;
 }>;
@@ -230,13 +228,13 @@ const TOOL_KEYS: readonly Key[] = [
   key("u", "Clear what was measured", ({ state }) =>
     state.measured.length === 0 ? null : { type: "measure", points: [] },
   ),
-  key("b", "Cut by a box: on or off", ({ state: { clip }, specimen }) => ({
+  key("b", "Cut by a box: on or off", ({ state: { clip }, shown }) => ({
     type: "set-clip",
-    clip: { ...clip, box: clip.box === null ? middleBox(specimen) : null },
+    clip: { ...clip, box: clip.box === null ? middleBox(shown) : null },
   })),
-  key("n", "Cut by a plane: on or off", ({ state: { clip }, specimen }) => ({
+  key("n", "Cut by a plane: on or off", ({ state: { clip }, shown }) => ({
     type: "set-clip",
-    clip: { ...clip, plane: clip.plane === null ? middlePlane(specimen) : null },
+    clip: { ...clip, plane: clip.plane === null ? middlePlane(shown) : null },
   })),
   key("N", "Next part of the cuts: a face, the plane, its turn", nextGrip(1)),
   key("B", "The part before", nextGrip(-1)),
@@ -247,6 +245,9 @@ const TOOL_KEYS: readonly Key[] = [
     const text = state.notices.at(-1);
     return text === undefined ? null : { type: "dismiss", text };
   }),
+  key("R", "Try again what the network failed to bring", ({ state }) =>
+    state.mendable.length === 0 ? null : "retry",
+  ),
   key("h", "Hide or show the panel", { panel: "hide" }),
   key("?", "This list", { panel: "help" }),
 ];
@@ -284,24 +285,37 @@ export function keyName({
   return shiftKey ? letter : letter.toLowerCase();
 }
 
-/** What has the keyboard: a field takes every key, a control those that it is worked by. */
-export type Focus = "field" | "control" | "page";
+/**
+ * What has the keyboard. A text field takes every key; a control those that it is worked by: a
+ * button is pressed, a list (or a slider, or radio buttons) is gone through as well.
+ */
+export type Focus = "field" | "list" | "button" | "page";
+
+const PRESS = ["Enter", " "];
+const GO_THROUGH = [
+  ...["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"],
+  ...["Home", "End", "PageUp", "PageDown"],
+];
 
 export function firesOn(name: string, focus: Focus): boolean {
+  if (focus === "page") return true;
   if (focus === "field") return false;
-  return focus === "page" || (name.length === 1 && !["+", "-", "=", " "].includes(name));
+  const plain = name.replace(/^Shift\+/, ""); // which changes nothing to a control
+  return !PRESS.includes(plain) && !(focus === "list" && GO_THROUGH.includes(plain));
 }
 
-const TEXT_INPUTS = ["text", "search", "url", "number", "color", "email", "password", "tel"];
+const TEXT_INPUTS = ["text", "search", "url", "number", "email", "password", "tel"];
 
+/** Groups of buttons with one stop of the Tab key take their arrows themselves: see rove.ts. */
 export function focusOf(target: EventTarget | null): Focus {
   if (!(target instanceof HTMLElement)) return "page";
   if (target.isContentEditable || target instanceof HTMLTextAreaElement) return "field";
-  if (target instanceof HTMLSelectElement) return "field"; // letters choose its options
+  if (target instanceof HTMLSelectElement) return "list";
   if (target instanceof HTMLInputElement) {
-    return TEXT_INPUTS.includes(target.type) ? "field" : "control";
+    if (TEXT_INPUTS.includes(target.type)) return "field";
+    return target.type === "range" || target.type === "radio" ? "list" : "button";
   }
-  return target instanceof HTMLButtonElement ? "control" : "page";
+  return target instanceof HTMLButtonElement ? "button" : "page";
 }
 
 /** @param onKey returns whether the key did something: then the browser does nothing with it */
@@ -312,9 +326,15 @@ export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSig
       if (event.defaultPrevented || event.isComposing) return;
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (document.querySelector("dialog[open]") !== null) return;
+      const { target } = event;
       const name = keyName(event);
-      if (!firesOn(name, focusOf(event.target))) return;
-      if (onKey(name)) event.preventDefault();
+      const focus = focusOf(target);
+      if (firesOn(name, focus)) {
+        if (onKey(name)) event.preventDefault();
+      } else if (focus === "field" && name === "Escape" && target instanceof HTMLElement) {
+        target.blur(); // what was typed stays
+        event.preventDefault();
+      }
     },
     { signal },
   );

@@ -17,7 +17,7 @@ import { PALETTES } from "./palettes";
 const FACTS: Facts = {
   title: "sample",
   subtitle: "",
-  specimen: SPECIMEN_BOX,
+  shown: SPECIMEN_BOX,
   ranges: new Map([["c0", [100, 1120]]]),
   gazed: "r1_c2",
   isStereo: false,
@@ -183,16 +183,44 @@ describe("the panel's layout", () => {
     expect(state.clip.plane).not.toBeNull();
   });
 
-  it("says the measured distance", () => {
+  it("offers in stereo to try again what another try may mend, as long as it is told", () => {
+    const facts = { ...FACTS, isStereo: true };
+    const tell = (isMendable: boolean) =>
+      reduce(start(), { type: "notify", text: "a fault", isMendable });
+    const retry = find(laid(tell(true), START_VIEW, facts), "button", "retry");
+    expect(retry.to()).toBe("retry");
+    const others = controlsOf(laid(tell(false), START_VIEW, facts)).map(({ id }) => id);
+    expect(others).toContain("dismiss-0");
+    expect(others).not.toContain("retry");
+  });
+
+  it("cuts a tile that is shown alone at its own middle", () => {
+    const facts = { ...FACTS, shown: { min: [0, -10, 0], max: [10, 0, 6] } } as const;
+    const layout = laid(start(), START_VIEW, facts);
+    const clipOf = (id: string) => granted(start(), find(layout, "toggle", id).to(true)).clip;
+    expect(clipOf("clip-box").box).toEqual({ min: [2.5, -7.5, 1.5], max: [7.5, -2.5, 4.5] });
+    expect(clipOf("clip-plane").plane?.offset_um).toBe(3);
+  });
+
+  it("says the measured distance, and the channels' values at both ends", () => {
     const points = [
       [0, 0, 0],
       [3, 4, 0],
     ] as const;
     const state = reduce(start(), { type: "measure", points });
-    const facts = { ...FACTS, values: ["Marker 0: 512"] };
-    expect(find(laid(state, START_VIEW, facts), "text", "distance").value).toBe(
-      "5.00 µm · Marker 0: 512",
-    );
+    const facts = { ...FACTS, values: [["Marker 0 12", "Marker 1 7"], ["Marker 0 512"]] };
+    const textsOf = (layout: Layout) =>
+      controlsOf(layout).flatMap((each) =>
+        each.kind === "text" && /^(distance|values-.)$/.test(each.id)
+          ? [`${each.label}: ${each.value}`]
+          : [],
+      );
+    expect(textsOf(laid(state, START_VIEW, facts))).toEqual([
+      "Distance: 5.00 µm",
+      "First point: Marker 0 12 · Marker 1 7",
+      "Second point: Marker 0 512",
+    ]);
+    expect(find(laid(state), "text", "values-0").value).toBe(""); // and so not there to be seen
     expect(find(laid(state), "button", "clear-measured").refusal).toBe("");
   });
 

@@ -16,8 +16,8 @@ export type Facts = StereoSupport &
   Readonly<{
     title: string;
     subtitle: string;
-    /** um, world. */
-    specimen: Box;
+    /** The specimen, or the isolated tile; um, world. */
+    shown: Box;
     ranges: Ranges;
     /** The tile that is looked at. */
     gazed: string | null;
@@ -29,8 +29,8 @@ export type Facts = StereoSupport &
     /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
     volumeLevel: number | null;
     isLoading: boolean;
-    /** The channels' values at the second measured point, as `DAPI 1210`. */
-    values: readonly string[];
+    /** Of each measured point: the channels' values there, as `DAPI 1210`. */
+    values: readonly (readonly string[])[];
   }>;
 
 /** The newest few say what is wrong. */
@@ -49,6 +49,7 @@ const QUALITY_NAMES: Readonly<Record<QualityLevel, string>> = {
   high: "High",
 };
 const TOOL_NAMES: Readonly<Record<Tool, string>> = { select: "Select", measure: "Measure" };
+const POINT_NAMES = ["First point", "Second point"] as const;
 const SLIDER_STEPS = 100;
 
 /** The modes that can be chosen: as staged only where an artist has staged something. */
@@ -57,7 +58,7 @@ export function modesOf(state: ViewerState): readonly Mode[] {
   return MODES.filter((mode) => mode !== "stage" || isStaged);
 }
 
-/** The middle half of the specimen along each axis: a cut that is seen at once, from every side. */
+/** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
 export function middleBox({ min, max }: Box): Box {
   const at = (i: 0 | 1 | 2, share: number) => min[i] + share * (max[i] - min[i]);
   return {
@@ -66,7 +67,7 @@ export function middleBox({ min, max }: Box): Box {
   };
 }
 
-/** Through the specimen's middle, the half towards the viewer cut away. */
+/** Through the middle of what is shown, the half towards the viewer cut away. */
 export function middlePlane({ min, max }: Box): ClipPlane {
   return { normal: [0, 0, 1], offset_um: (min[2] + max[2]) / 2 };
 }
@@ -85,7 +86,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     isHidden: view.isHidden,
     sections: [
       ...(facts.isStereo && state.notices.length > 0
-        ? [section("notices", "Notices", noticeItems(state.notices))]
+        ? [section("notices", "Notices", noticeItems(state))]
         : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view)),
       section("volumes", "Volumes", volumeItems(state)),
@@ -98,7 +99,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       ]),
       section("stereo", "Stereo", stereoItems(state, facts, view)),
       section("measure", "Measure", measureItems(state, facts.values)),
-      section("cut", "Cut open", cutItems(state, facts.specimen)),
+      section("cut", "Cut open", cutItems(state, facts.shown)),
       section("quality", "Quality", qualityItems(state, facts)),
       section("share", "Share", [
         command("share", "Copy a link to this view"),
@@ -113,8 +114,8 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
-function noticeItems(notices: readonly string[]): readonly Control[] {
-  return notices.slice(-MOST_NOTICES).flatMap((text, i): Control[] => [
+function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
+  const items = notices.slice(-MOST_NOTICES).flatMap((text, i): Control[] => [
     { kind: "text", id: `notice-${i}`, label: "Notice", value: text },
     {
       kind: "button",
@@ -123,6 +124,7 @@ function noticeItems(notices: readonly string[]): readonly Control[] {
       to: () => ({ type: "dismiss", text }),
     },
   ]);
+  return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
 }
 
 function volumeItems(state: ViewerState): readonly Control[] {
@@ -182,14 +184,17 @@ export function measuredText({ tool, measured }: ViewerState): string {
   return tool === "measure" ? "Choose two points of the specimen." : "";
 }
 
-function measureItems(state: ViewerState, values: readonly string[]): readonly Control[] {
-  const text = [measuredText(state), ...values].filter((each) => each !== "").join(" · ");
+function measureItems(state: ViewerState, values: Facts["values"]): readonly Control[] {
   return [
     inline("tool", "A tap", state.tool, TOOL_NAMES, ["select", "measure"], (tool) => ({
       type: "choose-tool",
       tool,
     })),
-    { kind: "text", id: "distance", label: "Distance", value: text },
+    { kind: "text", id: "distance", label: "Distance", value: measuredText(state) },
+    ...POINT_NAMES.map((label, i): Control => {
+      const value = (values[i] ?? []).join(" · ");
+      return { kind: "text", id: `values-${i}`, label, value };
+    }),
     {
       kind: "button",
       id: "clear-measured",
@@ -200,7 +205,7 @@ function measureItems(state: ViewerState, values: readonly string[]): readonly C
   ];
 }
 
-function cutItems({ clip }: ViewerState, specimen: Box): readonly Control[] {
+function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   return [
     {
       kind: "toggle",
@@ -210,7 +215,7 @@ function cutItems({ clip }: ViewerState, specimen: Box): readonly Control[] {
       value: clip.box !== null,
       to: (value) => ({
         type: "set-clip",
-        clip: { ...clip, box: value ? middleBox(specimen) : null },
+        clip: { ...clip, box: value ? middleBox(shown) : null },
       }),
     },
     {
@@ -221,7 +226,7 @@ function cutItems({ clip }: ViewerState, specimen: Box): readonly Control[] {
       value: clip.plane !== null,
       to: (value) => ({
         type: "set-clip",
-        clip: { ...clip, plane: value ? middlePlane(specimen) : null },
+        clip: { ...clip, plane: value ? middlePlane(shown) : null },
       }),
     },
   ];

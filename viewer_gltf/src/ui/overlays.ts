@@ -1,5 +1,6 @@
 /** What lies over the picture: the progress bar, notices, and the page of a fatal error. */
 import type { Progress } from "../mesh/progress";
+import type { ViewerState } from "../state";
 import { element, setText } from "./dom";
 
 /** What is said stays for as long; a screen reader reads it at once. */
@@ -31,10 +32,18 @@ export class Notices {
   readonly root = element("div", { className: "notices", role: "status" }, { notices: "" });
 
   private told: readonly string[] = [];
+  private readonly retry = element(
+    "button",
+    { textContent: "Try again", onclick: () => this.onRetry() },
+    { action: "retry" },
+  );
 
-  constructor(private readonly onDismiss: (text: string) => void) {}
+  constructor(
+    private readonly onDismiss: (text: string) => void,
+    private readonly onRetry: () => void,
+  ) {}
 
-  update(notices: readonly string[]): void {
+  update({ notices, mendable }: Pick<ViewerState, "notices" | "mendable">): void {
     if (notices === this.told) return; // what is written anew is read out anew
     this.told = notices;
     // A broken host fails for every file: the newest few say what is wrong.
@@ -55,6 +64,7 @@ export class Notices {
           }),
         ),
       ),
+      ...(mendable.length > 0 ? [this.retry] : []),
     );
   }
 }

@@ -8,6 +8,7 @@ import {
   clipSpan,
   closestOnLine,
   dragBox,
+  isCutAway,
   isKept,
   planeHandles,
   slidePlane,
@@ -69,6 +70,45 @@ describe("a ray's span", () => {
       }
     }
     expect(wrong).toBe(0);
+  });
+});
+
+describe("a box that is cut away", () => {
+  const TILE: Box = { min: [10, -20, 0], max: [20, 0, 50] };
+
+  it("is one of which neither box nor plane leaves anything", () => {
+    const beside: Box = { min: [20, -20, 0], max: [100, 0, 50] }; // they share a face
+    const across: Box = { min: [19, -20, 0], max: [100, 0, 50] };
+    const plane = { normal: [1, 0, 0], offset_um: 18 } as const;
+    expect(isCutAway(TILE, { box: null, plane: null })).toBe(false);
+    expect(isCutAway(TILE, { box: beside, plane: null })).toBe(true);
+    expect(isCutAway(TILE, { box: across, plane: null })).toBe(false);
+    expect(isCutAway(TILE, { box: null, plane })).toBe(false);
+    expect(isCutAway(TILE, { box: across, plane })).toBe(true); // together they leave nothing
+    expect(isCutAway(TILE, { box: null, plane: { ...plane, offset_um: 10 } })).toBe(true);
+    const flat: Box = { min: [10, -20, 5], max: [20, 0, 5] };
+    expect(isCutAway(flat, { box: flat, plane: null })).toBe(false);
+  });
+
+  it("has no point that is kept, for any box and plane", () => {
+    const random = seeded(11);
+    let [gone, wrong] = [0, 0];
+    const between = (low: number, high: number) => low + (high - low) * random();
+    for (let run = 0; run < 300; run++) {
+      const low: Vec3 = [between(0, 25), between(-25, 0), between(-10, 50)];
+      const box: Box = { min: low, max: [low[0] + 8, low[1] + 8, low[2] + 20] };
+      const normal = unit([random() - 0.5, random() - 0.5, random() - 0.5]);
+      const plane = { normal, offset_um: between(-40, 40) };
+      const clip: Clip = { box: random() < 0.3 ? null : box, plane };
+      if (!isCutAway(TILE, clip)) continue;
+      gone++;
+      for (let i = 0; i < 200; i++) {
+        const p: Vec3 = [between(10, 20), between(-20, 0), between(0, 50)];
+        if (isKept(p, clip)) wrong++;
+      }
+    }
+    expect(wrong).toBe(0);
+    expect(gone).toBeGreaterThan(30);
   });
 });
 

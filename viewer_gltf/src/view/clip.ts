@@ -79,6 +79,20 @@ export function isKept(point: Vec3, { box, plane }: Clip): boolean {
   return isInBox && (plane === null || dot(plane.normal, point) <= plane.offset_um);
 }
 
+/** Whether nothing is left of a box. */
+export function isCutAway(of: Box, { box, plane }: Clip): boolean {
+  const min = AXES.map((i) => (box === null ? of.min[i] : Math.max(of.min[i], box.min[i])));
+  const max = AXES.map((i) => (box === null ? of.max[i] : Math.min(of.max[i], box.max[i])));
+  const isGone = AXES.some((i) => (of.min[i] < of.max[i] ? min[i] >= max[i] : min[i] > max[i]));
+  if (isGone || plane === null) return isGone;
+  const { normal, offset_um } = plane;
+  const deepest = AXES.reduce<number>(
+    (sum, i) => sum + normal[i] * (normal[i] > 0 ? min[i] : max[i]),
+    0,
+  );
+  return deepest >= offset_um;
+}
+
 /** A handle in the middle of each face. */
 export function boxHandles(box: Box): readonly BoxHandle[] {
   const middle = centerOf(box);

@@ -1,6 +1,6 @@
 /**
- * Depth of the opaque surfaces, which the ray-march needs as a texture. The surfaces are drawn a
- * second time for it, into a target as large as the picture (both eyes in a headset), only while
+ * Depth of the surfaces, of opaque and of translucent ones apart, which the ray-march needs as
+ * textures. The surfaces are drawn a second time for it, into a target as large as the picture (both eyes in a headset), only while
  * a volume is on screen: the picture itself keeps the browser's own anti-aliasing, and in WebXR
  * its frame buffer can't be read.
  */
@@ -14,43 +14,67 @@ import {
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
-import { depthMaterial } from "../mesh/blend";
+import { depthMaterial, PANES } from "../mesh/blend";
 import type { Cuts } from "./cuts";
 import type { Eyes } from "./eyes";
 import { drawEyes } from "./offscreen";
 
 export class DepthPass {
-  readonly texture = new DepthTexture(1, 1, UnsignedIntType);
-  private readonly target: WebGLRenderTarget;
+  /** Of what is opaque. */
+  private readonly solid = depthTarget();
+  /** Of what is translucent. */
+  private readonly panes = depthTarget();
   private readonly material: Material;
 
   constructor({ uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">) {
     this.material = depthMaterial({ uCuts, uCutCount });
-    this.target = new WebGLRenderTarget(1, 1, {
-      depthTexture: this.texture,
-      minFilter: NearestFilter,
-      magFilter: NearestFilter,
-    });
+  }
+
+  get texture(): DepthTexture {
+    return this.solid.depthTexture;
+  }
+
+  get paneTexture(): DepthTexture {
+    return this.panes.depthTexture;
   }
 
   /** `hidden` are the objects that are not opaque. */
   render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, hidden: readonly Object3D[]): void {
     const visibility = hidden.map((object) => object.visible);
     for (const object of hidden) object.visible = false;
-    const { background } = scene;
-    scene.background = null;
     scene.overrideMaterial = this.material;
-    drawEyes(renderer, scene, eyes, this.target, 1);
+    withoutBackground(scene, () => drawEyes(renderer, scene, eyes, this.solid, 1));
     scene.overrideMaterial = null;
-    scene.background = background;
     hidden.forEach((object, i) => {
       object.visible = visibility[i];
     });
   }
 
+  /** Of translucent surfaces: they have their own way to write depth alone. */
+  renderPanes(renderer: WebGLRenderer, scene: Scene, eyes: Eyes): void {
+    for (const { camera } of eyes.all) camera.layers.set(PANES);
+    withoutBackground(scene, () => drawEyes(renderer, scene, eyes, this.panes, 1));
+    for (const { camera } of eyes.all) camera.layers.set(0);
+  }
+
   dispose(): void {
-    this.target.dispose();
-    this.texture.dispose();
+    for (const target of [this.solid, this.panes]) {
+      target.depthTexture.dispose();
+      target.dispose();
+    }
     this.material.dispose();
   }
+}
+
+function withoutBackground(scene: Scene, draw: () => void): void {
+  const { background } = scene;
+  scene.background = null;
+  draw();
+  scene.background = background;
+}
+
+function depthTarget(): WebGLRenderTarget & { depthTexture: DepthTexture } {
+  const depthTexture = new DepthTexture(1, 1, UnsignedIntType);
+  const filters = { minFilter: NearestFilter, magFilter: NearestFilter } as const;
+  return Object.assign(new WebGLRenderTarget(1, 1, { depthTexture, ...filters }), { depthTexture });
 }

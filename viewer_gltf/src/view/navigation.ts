@@ -43,7 +43,7 @@ export class Navigation {
     this.controls.minDistance = NEAREST_M;
     this.controls.maxDistance = FARTHEST_M;
     this.controls.addEventListener("change", () => {
-      this.controls.target.clamp(this.reach.clone().negate(), this.reach);
+      this.stayWithin();
       onChange();
     });
     this.controls.addEventListener("start", () => {
@@ -131,6 +131,14 @@ export class Navigation {
       default:
         return false;
     }
+  }
+
+  /** Bring the point that is looked at back into its box, and the eye along: the view is not turned. */
+  private stayWithin(): void {
+    const { target } = this.controls;
+    const beyond = target.clone();
+    target.clamp(this.reach.clone().negate(), this.reach);
+    this.camera.position.add(target).sub(beyond);
   }
 
   private framing(axis: 0 | 1 | 2): number {

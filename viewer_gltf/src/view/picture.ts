@@ -1,4 +1,4 @@
-/** One frame: depth of what is opaque, volumes marched up to it, the scene, the volumes over it. */
+/** One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. */
 import { type Camera, Matrix4, type Object3D, Vector3, type WebGLRenderer } from "three";
 import type { Hybrid } from "../hybrid/hybrid";
 import { makeSurfaceFrame } from "../mesh/blend";
@@ -17,7 +17,7 @@ export class Picture {
   private readonly cuts = new Cuts();
   private readonly depth = new DepthPass(this.cuts);
   /** What all volumes share. */
-  readonly marchFrame = makeFrame(this.depth.texture);
+  readonly marchFrame = makeFrame(this.depth.texture, this.depth.paneTexture);
   /** What all surfaces share. */
   readonly surfaceFrame = makeSurfaceFrame(this.marchFrame.uDisc, this.cuts);
   private readonly march = new MarchPass(this.marchFrame);
@@ -29,19 +29,21 @@ export class Picture {
     private readonly room: Room,
     private readonly hybrid: Hybrid,
   ) {
-    room.scene.add(this.march.overlay);
+    room.scene.add(...this.march.overlays);
   }
 
   /**
    * @param head its pose in the room
-   * @param translucent what is not opaque now, besides the room's overlays
+   * @param panes surfaces that are not opaque now
+   * @param overlays what else is not, besides the room's own
    * @param resolution pixels of the march to one of the picture, 0..1
    */
   draw(
     camera: Camera,
     head: Matrix4,
     volumes: VolumeSet,
-    translucent: readonly Object3D[],
+    panes: readonly Object3D[],
+    overlays: readonly Object3D[],
     clip: Clip,
     resolution: number,
   ): void {
@@ -53,14 +55,15 @@ export class Picture {
     this.surfaceFrame.uApex.value.copy(hybrid.apex);
     this.surfaceFrame.uAxis.value.copy(hybrid.axis);
     this.surfaceFrame.uDisc.value.set(...hybrid.cosines);
-    this.march.overlay.visible = !volumes.isEmpty;
+    this.march.hide();
     if (!volumes.isEmpty) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       volumes.placeAs(specimen);
       volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
-      const hidden = [...room.overlays, this.march.overlay, ...translucent];
-      this.depth.render(renderer, room.scene, this.eyes, hidden);
+      this.depth.render(renderer, room.scene, this.eyes, [...room.overlays, ...overlays, ...panes]);
+      this.marchFrame.uHasPane.value = panes.length > 0;
+      if (panes.length > 0) this.depth.renderPanes(renderer, room.scene, this.eyes);
       this.march.render(renderer, volumes.scene, this.eyes, resolution);
     }
     renderer.render(room.scene, camera);

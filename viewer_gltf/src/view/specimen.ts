@@ -21,7 +21,8 @@ export class Specimen {
   private start: SpecimenPose;
   /** 0..1: of the way from start to goal. */
   private way = 1;
-  private readonly anchor = new Vector3();
+  /** Where in the room the middle of what is shown is as long as nobody moves it. */
+  readonly anchor = new Vector3();
   private readonly base: Matrix4;
   private focus: Bounds | null = null;
 

@@ -39,6 +39,9 @@ const STEP_VOXELS = 1;
 /** What all tiles share in a frame: uniforms by reference. */
 export type MarchFrame = Readonly<{
   uSceneDepth: { value: DepthTexture };
+  /** Of the nearest translucent surface, if there is any. */
+  uPaneDepth: { value: DepthTexture };
+  uHasPane: { value: boolean };
   uNoise: { value: Texture };
   /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
   uEye: { value: Vector4 };
@@ -48,13 +51,16 @@ export type MarchFrame = Readonly<{
   uSteps: { value: number };
 }>;
 
-export function makeFrame(depth: DepthTexture): MarchFrame {
+/** Depth of what is opaque, and of the nearest that is translucent. */
+export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
   const noise = new DataTexture(blueNoise(), NOISE_SIZE, NOISE_SIZE, RedFormat, UnsignedByteType);
   noise.wrapS = noise.wrapT = RepeatWrapping;
   noise.minFilter = noise.magFilter = NearestFilter;
   noise.needsUpdate = true;
   return {
     uSceneDepth: { value: depth },
+    uPaneDepth: { value: pane },
+    uHasPane: { value: false },
     uNoise: { value: noise },
     uEye: { value: new Vector4(0, 0, 1, 1) },
     uPart: { value: new Vector4(0, 0, 1, 1) },

@@ -74,6 +74,11 @@ export class TileTexture {
     return this.failed.has(channel);
   }
 
+  /** With the next `want`, what has failed is loaded anew. */
+  retryFailed(): void {
+    this.failed.clear();
+  }
+
   /** Load these channels and levels, given coarse to fine; what is there already is kept. */
   want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     for (const [id, source] of this.sources) {

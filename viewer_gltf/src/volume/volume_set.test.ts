@@ -110,6 +110,54 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     expect(levelsNow()).toEqual(new Set([level + 1]));
   });
 
+  it("is not needed to know where a volume comes from", async () => {
+    makeSet(0);
+    set.follow(opened("off"), [], true);
+    expect(set.source("r0_c1", "B")).toBeNull();
+    const [source, again] = await Promise.all([
+      set.sourceOf("r0_c1", "B"),
+      set.sourceOf("r0_c1", "B"),
+    ]);
+    expect(source?.volume.tile).toBe("r0_c1");
+    expect(again).toBe(source);
+    expect(set.source("r0_c1", "B")).toBe(source);
+    expect(await set.sourceOf("nowhere", "B")).toBeNull();
+    expect(set.bytes).toBe(0);
+  });
+
+  it("is filled with what has failed, once that is tried again", async () => {
+    makeSet(Number.POSITIVE_INFINITY);
+    const { fetch } = globalThis;
+    const without = (part: string) =>
+      vi.stubGlobal("fetch", async (...request: Parameters<typeof fetch>) =>
+        String(request[0]).includes(part) ? new Response("", { status: 404 }) : fetch(...request),
+      );
+    const state = opened("all");
+    const [wanted] = wantedTiles(state, NOTHING_NEAR);
+    const follow = () => set.follow(state, [wanted], true);
+    const fails = async () => {
+      follow();
+      await vi.waitFor(() => expect(faults).toHaveLength(4));
+      follow();
+      expect(set.isLoading).toBe(false); // not by itself
+      faults.length = 0;
+      set.retryFailed();
+    };
+    without("volumes.json");
+    await fails();
+    without(".ktx2");
+    await fails();
+    vi.stubGlobal("fetch", fetch);
+    follow();
+    await vi.waitFor(
+      () => {
+        set.advance(0.05);
+        expect(set.status().map(({ level }) => level)).toEqual([0, 0, 0, 0]);
+      },
+      { timeout: 60_000 },
+    );
+  });
+
   it("is kept while one channel after another is shown", async () => {
     const budget = FADING * (TILES + KEPT_TILES) * bytesOf(0, 1);
     makeSet(budget);

@@ -52,7 +52,9 @@ export class VolumeSet {
   private readonly group = new Group();
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly occupancy = new OccupancyClient();
-  private readonly channels = new Map<string, ChannelVolumes | "loading" | "failed">();
+  private readonly channels = new Map<string, ChannelVolumes>();
+  private readonly channelsUnderWay = new Map<string, Promise<void>>();
+  private readonly failedChannels = new Set<string>();
   private readonly residents = new Map<string, Resident>();
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
@@ -76,7 +78,7 @@ export class VolumeSet {
   get isLoading(): boolean {
     return (
       this.leapsUnderWay > 0 ||
-      [...this.channels.values()].includes("loading") ||
+      this.channelsUnderWay.size > 0 ||
       [...this.residents.values()].some(({ texture }) => texture.isLoading)
     );
   }
@@ -110,9 +112,13 @@ export class VolumeSet {
 
   /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
   source(tile: string, channel: string): VolumeSource | null {
-    const volumes = this.channels.get(channel);
-    if (volumes === undefined || typeof volumes === "string") return null;
-    return volumes.sources.get(tile) ?? null;
+    return this.channels.get(channel)?.sources.get(tile) ?? null;
+  }
+
+  /** The same, once it is known; null also after a fault, which was told. */
+  async sourceOf(tile: string, channel: string): Promise<VolumeSource | null> {
+    await this.loadChannel(channel);
+    return this.source(tile, channel);
   }
 
   /** The channels of the tiles that are on screen. */
@@ -184,22 +190,26 @@ export class VolumeSet {
     this.turn++;
     for (const resident of this.residents.values()) resident.wanted = null;
     for (const each of wanted) this.want(each);
-    for (const [id, volumes] of this.channels) {
+    for (const id of this.failedChannels) {
       const isUsed = wanted.some(({ channels }) => channels.includes(id));
-      if (volumes === "failed" && !isUsed) this.channels.delete(id);
+      if (!isUsed) this.failedChannels.delete(id);
     }
     this.evict();
     for (const resident of this.residents.values()) this.dress(resident);
   }
 
+  /** With the next `follow`, what has failed is loaded anew. */
+  retryFailed(): void {
+    this.failedChannels.clear();
+    for (const { texture } of this.residents.values()) texture.retryFailed();
+  }
+
   private want(wanted: WantedTile): void {
     const sources = new Map<string, VolumeSource>();
     for (const id of wanted.channels) {
-      const volumes = this.channels.get(id);
-      if (volumes === undefined) void this.loadChannel(id);
-      if (volumes === undefined || typeof volumes === "string") continue;
-      const source = volumes.sources.get(wanted.tile);
-      if (source !== undefined) sources.set(id, source);
+      void this.loadChannel(id);
+      const source = this.source(wanted.tile, id);
+      if (source !== null) sources.set(id, source);
     }
     let resident = this.residents.get(wanted.tile);
     if (resident === undefined) {
@@ -269,15 +279,24 @@ export class VolumeSet {
 
   private canCome(channel: string, tile: string): boolean {
     const volumes = this.channels.get(channel);
-    if (volumes === "failed") return false;
-    if (volumes === undefined || volumes === "loading") return true;
+    if (volumes === undefined) return !this.failedChannels.has(channel);
     return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
   }
 
+  /** A channel's list of volumes, unless it is known or has failed. */
   private async loadChannel(id: string): Promise<void> {
+    if (this.channels.has(id) || this.failedChannels.has(id)) return;
+    let underWay = this.channelsUnderWay.get(id);
+    if (underWay === undefined) {
+      underWay = this.fetchChannel(id).finally(() => this.channelsUnderWay.delete(id));
+      this.channelsUnderWay.set(id, underWay);
+    }
+    await underWay;
+  }
+
+  private async fetchChannel(id: string): Promise<void> {
     const channel = this.bundle.manifest.channels.find((c) => c.id === id);
     if (channel === undefined) throw new Error(`the bundle has no channel ${id}`);
-    this.channels.set(id, "loading");
     try {
       const { base } = this.bundle;
       const [volumes, transferFunctions] = await Promise.all([
@@ -289,7 +308,7 @@ export class VolumeSet {
       );
       this.channels.set(id, { sources, transferFunctions });
     } catch (error) {
-      this.channels.set(id, "failed");
+      this.failedChannels.add(id);
       this.onError(error);
     }
     if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
@@ -332,7 +351,7 @@ export class VolumeSet {
   private look(state: ViewerState, id: string): Look {
     const channel = state.channels.find((c) => c.id === id);
     const volumes = this.channels.get(id);
-    if (channel === undefined || volumes === undefined || typeof volumes === "string") {
+    if (channel === undefined || volumes === undefined) {
       throw new Error(`channel ${id} has come without a look`);
     }
     const entries = volumes.transferFunctions.get(channel.transferFunction);

@@ -1,10 +1,12 @@
 /** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
 import { type Camera, Matrix4, type WebGLRenderer } from "three";
+import { BundleError } from "../bundle/errors";
 import type { ViewerState } from "../state";
 import type { Command } from "../ui/commands";
 import type { Eyes } from "../view/eyes";
 import type { Profile } from "./cardboard/profile";
 import type { SplitSession } from "./cardboard/split_session";
+import { askInTap } from "./cardboard/tap";
 import { Hands, type HandsOptions } from "./hands";
 import { betweenEyes } from "./head";
 import { XrSession } from "./session";
@@ -12,10 +14,16 @@ import { XrSession } from "./session";
 export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
   Readonly<{ onStart: () => void; onEnd: () => void }>;
 
+const NOT_LOADED =
+  "The part of the page that splits the screen could not be loaded. Check the connection, load " +
+  "the page again, and tap again.";
+
 export class Stereo {
   readonly headset: XrSession;
   readonly hands: Hands;
   private split: SplitSession | null = null;
+  /** A split screen that is being asked for. */
+  private starting: Promise<readonly string[]> | null = null;
   private readonly between = new Matrix4();
 
   constructor(
@@ -39,18 +47,36 @@ export class Stereo {
    * Split screen for a phone in a viewer without WebXR. Must be called from a tap. Throws
    * BundleError in words if the browser or the user refuses. Returns what could not be had.
    */
-  async startSplit(profile: Profile): Promise<readonly string[]> {
-    if (this.split === null) {
-      const { SplitSession } = await import("./cardboard/split_session");
-      this.split ??= new SplitSession(
-        this.renderer,
-        () => this.begin(null),
-        () => this.leave(),
-        () => this.hands.tap(),
-      );
+  startSplit(profile: Profile): Promise<readonly string[]> {
+    if (this.kind !== null) return Promise.resolve([]);
+    this.starting ??= this.askAndSplit(profile).finally(() => {
+      this.starting = null;
+    });
+    return this.starting;
+  }
+
+  private async askAndSplit(profile: Profile): Promise<readonly string[]> {
+    const asked = askInTap(this.renderer.domElement, () => this.end());
+    try {
+      this.split ??= await this.loadSplit();
+    } catch (error) {
+      void asked.screen.then(({ release }) => release());
+      throw error;
     }
-    await this.split.start(profile);
+    await this.split.start(profile, asked);
     return this.split.problems;
+  }
+
+  private async loadSplit(): Promise<SplitSession> {
+    const { SplitSession } = await import("./cardboard/split_session").catch((cause) => {
+      throw new BundleError(NOT_LOADED, { cause });
+    });
+    return new SplitSession(
+      this.renderer,
+      () => this.begin(null),
+      () => this.leave(),
+      () => this.hands.tap(),
+    );
   }
 
   /** Where the eyes are in this frame. Returns the camera to draw with; null: no stereo. */

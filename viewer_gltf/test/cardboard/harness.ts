@@ -14,6 +14,7 @@ import {
 } from "three";
 import { BUILT_IN, parseProfile } from "../../src/xr/cardboard/profile";
 import { SplitSession } from "../../src/xr/cardboard/split_session";
+import { askInTap } from "../../src/xr/cardboard/tap";
 
 /** Of an iPhone with pixel ratio 3; the page's own would be the desktop's. */
 export const PIXELS_PER_INCH = 153.3;
@@ -57,7 +58,8 @@ class Stand {
   async start(viewer: string): Promise<string> {
     const profile = viewer === "v1" || viewer === "v2" ? BUILT_IN[viewer] : parseProfile(viewer);
     try {
-      await this.split.start(profile);
+      const asked = askInTap(this.renderer.domElement, () => this.split.end());
+      await this.split.start(profile, asked);
       return "started";
     } catch (error) {
       return String(error);

@@ -92,7 +92,13 @@ class DecodingWorker extends EventTarget {
 Object.assign(window, { Worker: DecodingWorker });
 
 type Place = Readonly<{ x: number; y: number }>;
-type View = Readonly<{ position: Vec3; target: Vec3; isStereo?: boolean; dt_s?: number }>;
+type View = Readonly<{
+  position: Vec3;
+  target: Vec3;
+  isStereo?: boolean;
+  isPanelOpen?: boolean;
+  dt_s?: number;
+}>;
 
 class Bench {
   private readonly renderer = new WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
@@ -105,6 +111,8 @@ class Bench {
   state = initialState(MANIFEST);
   /** What would have turned the camera. */
   leaked = 0;
+  /** The list of volumes comes when it is asked for. */
+  private isKnown = false;
 
   constructor(private readonly stage: HTMLElement) {
     const { clientWidth, clientHeight } = stage;
@@ -127,7 +135,11 @@ class Bench {
       base: location.href,
       surfaces: () => surfaces,
       volumes: () => [],
-      source: (tile: string) => (tile === "r0_c1" ? VOLUME : null),
+      source: (tile: string) => (this.isKnown && tile === "r0_c1" ? VOLUME : null),
+      sourceOf: async (tile: string) => {
+        this.isKnown = true;
+        return tile === "r0_c1" ? VOLUME : null;
+      },
       dispatch,
       onChange: () => this.draw(),
       onError: (error: unknown) => {
@@ -174,19 +186,14 @@ class Bench {
     camera.position.set(...view.position);
     camera.lookAt(this.focus.set(...view.target));
     camera.updateMatrixWorld();
-    const { clientWidth, clientHeight } = this.stage;
-    const screen = {
-      camera,
-      width_px: clientWidth,
-      height_px: clientHeight,
-      focus: this.focus,
-    };
+    const screen = { camera, height_px: this.stage.clientHeight, focus: this.focus };
     this.marks.update({
       head: camera.matrixWorld,
       specimen: specimen.group.matrixWorld,
       screen: view.isStereo ? null : screen,
       gaze: rayAhead(camera.matrixWorld, specimen.group),
       disc: null,
+      isPanelOpen: view.isPanelOpen ?? false,
       dt_s: view.dt_s ?? 0,
     });
     this.renderer.render(this.scene, camera);
@@ -259,8 +266,10 @@ class Bench {
     this.marks.target.drag(key, gazeOf(this.camera.matrixWorld));
   }
 
-  ruler(): { length_um: number; isVisible: boolean } {
-    return { length_um: this.marks.ruler.length_um, isVisible: this.marks.ruler.group.visible };
+  ruler(): { length_um: number; isVisible: boolean; hasAxes: boolean } {
+    const { ruler, axes } = this.marks;
+    const { length_um, group } = ruler;
+    return { length_um, isVisible: group.visible, hasAxes: axes.group.visible };
   }
 
   name(): string {

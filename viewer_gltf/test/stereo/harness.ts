@@ -35,7 +35,7 @@ type Side = "left" | "right";
 const FACTS: Facts = {
   title: "Sample",
   subtitle: "",
-  specimen: SPECIMEN_BOX,
+  shown: SPECIMEN_BOX,
   ranges: new Map([["c0", [100, 1120]]]),
   gazed: null,
   isStereo: true,

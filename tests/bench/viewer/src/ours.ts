@@ -17,7 +17,7 @@ import { MarchPass } from "viewer/view/march_pass";
 import { brickCounts } from "viewer/volume/brick_counts";
 import { opacities } from "viewer/volume/luts";
 import { occupancyDistances } from "viewer/volume/occupancy";
-import { makeFrame, TileMarch, wholeSpecimen } from "viewer/volume/tile_march";
+import { makeFrame, TileMarch } from "viewer/volume/tile_march";
 import { serve } from "./page";
 import type { About, Camera, Renderer, Scene } from "./scene";
 
@@ -46,7 +46,7 @@ class Ours implements Renderer {
     const { material } = this.march.mesh;
     if (setting === 0) material.fragmentShader = unlit(material.fragmentShader);
     this.marched.add(this.march.mesh);
-    this.room.add(this.pass.overlay);
+    this.room.add(...this.pass.overlays);
     this.aim(camera, width / height);
   }
 
@@ -66,7 +66,7 @@ class Ours implements Renderer {
   /** All that the viewer does in a frame that has a volume. */
   draw(): void {
     this.eyes.followScreen(this.renderer, this.camera);
-    this.depth.render(this.renderer, this.room, this.eyes, [this.pass.overlay]);
+    this.depth.render(this.renderer, this.room, this.eyes, this.pass.overlays);
     this.pass.render(this.renderer, this.marched, this.eyes, 1);
     this.renderer.render(this.room, this.camera);
   }
@@ -109,7 +109,6 @@ function marchOf({ about, voxels, bricks }: Scene, frame: ReturnType<typeof make
   texture.unpackAlignment = 1;
   texture.needsUpdate = true;
   const march = new TileMarch(volume, 1, frame);
-  march.clip(wholeSpecimen());
   march.show({ channels: ["A"], level: 0, texture, bricks: [bricks] }, null, 1, 1);
   march.dress([{ color: about.color, table, isInDisc: false }]);
   const count = brickCounts(volume.size);

@@ -8,11 +8,21 @@ float distanceOf(float depth, float back) {
   return back * viewZ / vViewZ;
 }
 
+// This fragment's pixel in the whole picture.
+ivec2 pixelHere() {
+  return ivec2((gl_FragCoord.xy - uPart.xy) * uEye.zw / uPart.zw + uEye.xy);
+}
+
+// Where the nearest translucent surface is.
+float paneDistance(float back) {
+  return distanceOf(texelFetch(uPaneDepth, pixelHere(), 0).r, back);
+}
+
 // Where the opaque scene ends the ray: x at the pixel's centre, y beyond a silhouette that runs
 // through the pixel, z the share of the pixel that sees past it. The picture is multisampled and
 // its depth is not, so a pixel at a silhouette would else show the room between mesh and volume.
 vec3 sceneDistances(float back) {
-  ivec2 pixel = ivec2((gl_FragCoord.xy - uPart.xy) * uEye.zw / uPart.zw + uEye.xy);
+  ivec2 pixel = pixelHere();
   ivec2 first = ivec2(uEye.xy);  // the other eye's depth begins beside this one's
   ivec2 last = ivec2(uEye.xy + uEye.zw) - 1;
   float near = distanceOf(texelFetch(uSceneDepth, pixel, 0).r, back);

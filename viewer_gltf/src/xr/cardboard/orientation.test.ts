@@ -1,13 +1,6 @@
 import { Euler, type Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import {
-  askOrientation,
-  FREE_HEADING,
-  followHeading,
-  headPose,
-  type Reading,
-  toQuaternion,
-} from "./orientation";
+import { FREE_HEADING, followHeading, headPose, type Reading, toQuaternion } from "./orientation";
 
 const reading = (alpha_deg: number, beta_deg: number, gamma_deg: number): Reading => ({
   alpha_deg,
@@ -102,18 +95,5 @@ describe("the way ahead", () => {
     const heading = followHeading(FREE_HEADING, turned(0), true);
     const eyes = new Vector3().setFromMatrixPosition(headPose(turned(90), heading));
     expectVector(eyes.toArray(), [-0.08, 0, 0.08]); // from before the neck to left of it
-  });
-});
-
-describe("asking for the orientation", () => {
-  it("has three answers", async () => {
-    expect(await askOrientation({})).toBe("absent");
-    expect(await askOrientation({ DeviceOrientationEvent: {} })).toBe("granted");
-    const asking = (requestPermission: () => Promise<string>) =>
-      askOrientation({ DeviceOrientationEvent: { requestPermission } });
-    expect(await asking(async () => "granted")).toBe("granted");
-    expect(await asking(async () => "denied")).toBe("refused");
-    const late = () => Promise.reject(new DOMException("not in a tap", "NotAllowedError"));
-    expect(await asking(late)).toBe("refused");
   });
 });

@@ -62,28 +62,11 @@ export function headPose(head: Quaternion, heading: Heading, out = new Matrix4()
   return out.compose(vector, turn, unit.setScalar(1));
 }
 
-export type OrientationAnswer = "granted" | "refused" | "absent";
-
 export const ORIENTATION_REFUSED =
   "This browser was not allowed to tell how the phone is turned, so the picture can't follow your " +
   "head. Close this tab, open the page again, and allow motion and orientation when asked.";
 export const ORIENTATION_ABSENT =
   "This device doesn't tell how it is turned: the picture doesn't follow your head.";
-
-type AskingEvent = { requestPermission?: () => Promise<PermissionState> };
-
-/** Ask to read the orientation. Safari asks the user, and only within a tap's own call. */
-export async function askOrientation(scope: object = globalThis): Promise<OrientationAnswer> {
-  const { DeviceOrientationEvent } = scope as { DeviceOrientationEvent?: AskingEvent };
-  if (DeviceOrientationEvent === undefined) return "absent";
-  if (DeviceOrientationEvent.requestPermission === undefined) return "granted";
-  try {
-    return (await DeviceOrientationEvent.requestPermission()) === "granted" ? "granted" : "refused";
-  } catch (error) {
-    if (!(error instanceof Error)) throw error;
-    return "refused"; // NotAllowedError: not called within a tap
-  }
-}
 
 /** Listens to the phone, and knows which way is ahead. */
 export class HeadSensor {

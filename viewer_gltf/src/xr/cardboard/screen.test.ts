@@ -55,10 +55,10 @@ describe("the screen", () => {
     const { log, element, host } = fakePage();
     const hold = await holdScreen(element, () => log.push("left"), host);
     expect(hold.problems).toEqual([]);
-    expect(log).toEqual(["fill", "lock", "wake"]);
+    expect(log).toEqual(["wake", "fill", "lock"]);
     hold.release();
     hold.release();
-    expect(log).toEqual(["fill", "lock", "wake", "sleep", "unlock", "leave"]);
+    expect(log).toEqual(["wake", "fill", "lock", "sleep", "unlock", "leave"]);
   });
 
   it("tells what could not be had, each for itself", async () => {

@@ -39,17 +39,6 @@ export async function holdScreen(
   let sentinel: WakeLockSentinel | null = null;
   const matches = (query: string) => document.defaultView?.matchMedia(query).matches === true;
 
-  // A home screen's page is full without asking.
-  const isFull = await enterFullScreen(element);
-  if (!isFull && !matches("(display-mode: standalone)")) problems.push(NO_FULL_SCREEN);
-  for (const type of isFull ? ["fullscreenchange", "webkitfullscreenchange"] : []) {
-    document.addEventListener(type, () => fullElement(document) === null && onLeave(), { signal });
-  }
-
-  // Android locks in full screen only.
-  const isLocked = await succeeds(orientation?.lock?.call(orientation, "landscape"));
-  if (!isLocked && !matches("(orientation: landscape)")) problems.push(NO_LOCK);
-
   const stayAwake = async (): Promise<boolean> => {
     try {
       const fresh = await navigator.wakeLock?.request("screen");
@@ -62,7 +51,20 @@ export async function holdScreen(
       return false; // a low battery
     }
   };
-  if (!(await stayAwake())) problems.push(NO_WAKE_LOCK);
+  const awake = stayAwake(); // Safari wants the tap for it, which full screen uses up
+
+  // A home screen's page is full without asking.
+  const isFull = await enterFullScreen(element);
+  if (!isFull && !matches("(display-mode: standalone)")) problems.push(NO_FULL_SCREEN);
+  for (const type of isFull ? ["fullscreenchange", "webkitfullscreenchange"] : []) {
+    document.addEventListener(type, () => fullElement(document) === null && onLeave(), { signal });
+  }
+
+  // Android locks in full screen only.
+  const isLocked = await succeeds(orientation?.lock?.call(orientation, "landscape"));
+  if (!isLocked && !matches("(orientation: landscape)")) problems.push(NO_LOCK);
+
+  if (!(await awake)) problems.push(NO_WAKE_LOCK);
   // A page that was hidden has lost its lock.
   const renew = () => void (document.visibilityState === "visible" && stayAwake());
   document.addEventListener("visibilitychange", renew, { signal });

@@ -30,9 +30,10 @@ import { BundleError } from "../../bundle/errors";
 import { DistortionPass } from "./distortion_pass";
 import { type Eye, EyeCameras } from "./eyes";
 import { cssPixelsPerInch, screenOf } from "./lens";
-import { askOrientation, HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
+import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
 import { CARDBOARD_V2, type Profile } from "./profile";
-import { holdScreen, type ScreenHold } from "./screen";
+import type { ScreenHold } from "./screen";
+import type { Asked } from "./tap";
 
 const SAMPLES = 4;
 
@@ -90,19 +91,14 @@ export class SplitSession {
     return this.running?.problems ?? [];
   }
 
-  /** Must be called from a click or a tap. Throws BundleError if the orientation is refused. */
-  async start(profile: Profile): Promise<void> {
+  /** With what was asked for in a tap. Throws BundleError if the orientation is refused. */
+  async start(profile: Profile, asked: Asked): Promise<void> {
     if (this.running !== null) return;
     this.profile = profile;
     this.layout = "";
-    const stage = this.renderer.domElement.parentElement ?? this.renderer.domElement;
-    const running = new Running(stage, () => this.end(), this.onSelect);
+    const running = new Running(asked, () => this.end(), this.onSelect);
     this.running = running;
-    // Both are asked within the tap; Safari's question comes first, since a tap is used up.
-    const answer = askOrientation();
-    const hold = holdScreen(stage, () => this.end());
-    running.hold = hold;
-    const [found, { problems }] = await Promise.all([answer, hold]);
+    const [found, { problems }] = await Promise.all([asked.orientation, asked.screen]);
     if (this.running !== running) return; // ended while the browser asked
     if (found === "refused") {
       this.running = null;
@@ -168,18 +164,17 @@ class Running {
   problems: readonly string[] = [];
   /** False while the browser asks the user for the orientation. */
   hasStarted = false;
-  hold: Promise<ScreenHold> | null = null;
+  private readonly stage: HTMLElement;
+  private readonly hold: Promise<ScreenHold>;
   private readonly stopped = new AbortController();
   private readonly style: string;
   /** Its own number, since a page that was loaded again keeps the state of its last session. */
   private readonly step = Math.random();
 
-  constructor(
-    private readonly stage: HTMLElement,
-    end: () => void,
-    select: () => void,
-  ) {
+  constructor({ stage, screen }: Asked, end: () => void, select: () => void) {
     const { signal } = this.stopped;
+    this.stage = stage;
+    this.hold = screen;
     this.style = stage.style.cssText;
     // Over the whole page, where a browser has no full screen.
     const zIndex = "2147483647";
@@ -207,7 +202,7 @@ class Running {
     this.stopped.abort();
     this.sensor.dispose();
     this.stage.style.cssText = this.style;
-    void this.hold?.then(({ release }) => release());
+    void this.hold.then(({ release }) => release());
     // Not if the user went back, nor if the page has written another address over the step.
     if ((history.state as { split?: number } | null)?.split === this.step) history.back();
   }
