@@ -2,6 +2,7 @@
 import { expect, it } from "vitest";
 import type { Mode } from "../src/state";
 import { project } from "./driver/camera";
+import { addClock, holdFrames, tick } from "./driver/clock";
 import { isBackground, type Picture, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
@@ -55,6 +56,46 @@ describeInChromium("surface or volume", () => {
     // a few pixels of silhouettes are multisampled otherwise where surfaces are blended
     expect(apart(disc, off, 1.04 * DISC_DEG, 40)).toBeLessThan(20);
     expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the feather
+  });
+
+  it("takes another colour in the same frame, surface and volume", async () => {
+    const { page } = stand.viewer;
+    await addClock(page);
+    await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high`);
+    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Balls");
+    await stand.viewer.recolor("Balls", "#ff0000");
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
+    const count = async (channel: 0 | 1) =>
+      (await takePicture(page)).count((pixel) => pixel[channel] > 40 + pixel[1 - channel]);
+    const red = await count(0);
+    expect(red).toBeGreaterThan(1000);
+    await holdFrames(page);
+    const { frames } = await page.evaluate(() => ({ frames: window.stereocell?.frames }));
+    await page.locator('[data-channel="Balls"] [data-part="color"]').fill("#00ff00");
+    await tick(page, 16);
+    expect(await page.evaluate(() => window.stereocell?.frames)).toBe((frames ?? 0) + 1);
+    expect(await count(0)).toBe(0);
+    expect(Math.abs((await count(1)) - red)).toBeLessThan(red / 20);
+  });
+
+  it("is drawn with less while frames are late, and as well as can be at rest", async () => {
+    const { page } = stand.viewer;
+    await addClock(page);
+    await stand.open(`&mode=all${NEAR}`);
+    await stand.viewer.settled();
+    const settings = async () => (await stand.viewer.snapshot()).settings;
+    const best = await settings();
+    expect(best).toMatchObject({ steps: 100, resolution: 1 });
+    await holdFrames(page);
+    for (let i = 0; i < 60 && (await settings()).resolution === 1; i++) {
+      await page.keyboard.press("ArrowLeft");
+      await tick(page, 150);
+    }
+    const moving = await settings();
+    expect(moving.steps).toBeLessThan(100);
+    expect(moving.resolution).toBeLessThan(1);
+    await tick(page, 150, 3);
+    expect(await settings()).toEqual(best);
   });
 
   it("stays a surface beyond the switch distance", async () => {

@@ -46,12 +46,10 @@ export class Pace {
       const { timing } = this.quality;
       const budget_ms = frameBudget_ms(rate_hz, timing);
       const work_ms = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
-      if (work_ms !== null) {
-        // where the GPU waits for the page itself, its own time says nothing
-        const isLate = this.frame_ms > LATE * (1000 / rate_hz);
-        const spent_ms = isLate ? Math.max(work_ms, interval_ms) : work_ms;
-        this.quality = advanceQuality(this.quality, spent_ms, budget_ms);
-      }
+      // where frames are late, or no answer comes, the GPU's own time says nothing
+      const isLate = this.frame_ms > LATE * (1000 / rate_hz);
+      const spent_ms = isLate ? Math.max(work_ms ?? 0, interval_ms) : work_ms;
+      if (spent_ms !== null) this.quality = advanceQuality(this.quality, spent_ms, budget_ms);
     }
     this.wasMoving = isMoving;
     this.timer?.begin();
