@@ -151,7 +151,7 @@ describeInChromium("the viewer", () => {
 
   it("draws another picture for each eye", async () => {
     await addHeadset(stand.viewer.page);
-    await stand.open();
+    await stand.open("&mode=off");
     await stand.viewer.settled();
     await stand.viewer.enterStereo();
     const half = VIEWPORT.width / 2;
