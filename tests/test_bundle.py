@@ -137,8 +137,9 @@ def test_meshes_lie_where_the_stage_has_them_and_meet_without_a_crack(bundle):
             data = (bundle / f"channels/CD31/{tile}/lod{level}.glb").read_bytes()
             points = decoded_positions_m(data)
             away = np.linalg.norm(points * 1e6 - spheres.CENTER, axis=1)
-            coarse = 16 if level == 2 else 1  # the coarsest lattice has longer steps
-            assert np.abs(away - spheres.RADIUS).max() < 0.003 * coarse
+            step_um = read(data)[0]["nodes"][0]["scale"][0] * 1e6
+            moved_um = 0.75**0.5 * step_um if level == 2 else 0  # the coarsest has longer steps
+            assert np.abs(away - spheres.RADIUS).max() < 0.003 + moved_um
             edge = points[points[:, 0] == last(points[:, 0])]
             assert len(edge) > 10
             edges.append(np.unique(edge, axis=0).tobytes())
