@@ -10,14 +10,18 @@ ifeq ($(SAMPLE),brain-cells)
 OUT ?= out/brain-cells
 DEMO_INPUT := out/samples/brain-cells.ome.tif
 DEMO_ARGS := --preset lightsheet --grid 2x2
+else ifeq ($(SAMPLE),mri)
+OUT ?= out/mri-demo
+DEMO_INPUT := out/samples/head
+DEMO_ARGS := --preset mri
 else
 OUT ?= out/demo
 DEMO_INPUT := out/samples/cycif.ome.zarr
 DEMO_ARGS := --preset cycif --grid 5x2
 endif
 
-ifeq ($(filter $(SAMPLE),cycif brain-cells),)
-$(error SAMPLE is $(SAMPLE), expected cycif or brain-cells)
+ifeq ($(filter $(SAMPLE),cycif brain-cells mri),)
+$(error SAMPLE is $(SAMPLE), expected cycif, brain-cells or mri)
 endif
 
 VENV := .venv
@@ -35,7 +39,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view report check lint test test-fast test-blender bench bench-iso bench-wrap bench-viewer lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-fast test-blender bench bench-iso bench-wrap bench-serve bench-viewer lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -68,7 +72,7 @@ browser: ## Install Debian's chromium for the browser tests, if it is missing an
 	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
 	else echo "browser: no chromium, so the browser tests are skipped; get it by: sudo apt-get install chromium"; fi
 
-demo: setup ## Run it all on an embedded sample (SAMPLE=cycif or brain-cells)
+demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells or mri)
 	@mkdir -p out/samples
 	test -e $(DEMO_INPUT) || $(RUN) sample $(SAMPLE) $(DEMO_INPUT)
 	$(RUN) build $(DEMO_INPUT) -o $(OUT) --workers $(WORKERS) $(DEMO_ARGS) $(ARGS)
@@ -110,6 +114,9 @@ check: setup ## Hold OUT against schemas, USD, glTF and KTX2 rules
 view: setup ## Serve OUT's bundle on localhost and open a browser
 	$(RUN) view $(OUT)
 
+serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
+	$(RUN) serve $(OUT) $(ARGS)
+
 lint: setup ## ruff, mypy, biome, tsc
 	$(BIN)/ruff check pipeline tests
 	$(BIN)/ruff format --check pipeline tests
@@ -121,12 +128,12 @@ test-fast: setup ## Unit tests only
 	cd $(VIEWER) && npm run --silent test
 
 test: setup browser ## All tests, in headless Chromium too
-	$(BIN)/pytest
+	$(BIN)/pytest -n $(WORKERS)
 	cd $(VIEWER) && npm run --silent test
 	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
 	$(MAKE) --no-print-directory demo SAMPLE=brain-cells OUT=out/brain-cells
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
-	for kind in tif zarr; do $(RUN) build out/f/f.ome.$$kind -o out/f/$$kind --workers 0 || exit 1; done
+	for f in f.ome.tif f.ome.zarr f.nii.gz dicom; do $(RUN) build out/f/$$f -o out/f/of-$$f --workers 0 || exit 1; done
 	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit
 	$(MAKE) --no-print-directory bundle INPUT=out/edit/balls.ome.tif OUT=out/edit/built ARGS="--grid 3x2" WORKERS=0
 	cp -r out/edit/built/bundle out/edit/before
@@ -134,7 +141,7 @@ test: setup browser ## All tests, in headless Chromium too
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) \
 	  STEREOCELL_REAL_BUNDLE=$(abspath out/brain-cells/bundle) \
-	  STEREOCELL_F_BUNDLES=$(abspath out/f/tif/bundle):$(abspath out/f/zarr/bundle) \
+	  STEREOCELL_F_BUNDLES=$(abspath out/f)/of-f.ome.tif/bundle:$(abspath out/f)/of-f.ome.zarr/bundle:$(abspath out/f)/of-f.nii.gz/bundle:$(abspath out/f)/of-dicom/bundle \
 	  STEREOCELL_EDIT_BUNDLES=$(abspath out/edit/before):$(abspath out/edit/built/bundle) \
 	  npm run --silent test:browser
 
@@ -158,6 +165,10 @@ bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids
 
 bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
 	$(BIN)/python tests/bench/wrap.py
+
+bench-serve: setup ## The tree of bricks, its picture by bytes, and 50 clients for a minute
+	$(BIN)/python tests/bench/brick_curve.py
+	$(BIN)/python tests/bench/serve_load.py
 
 BENCH_VIEWER := tests/bench/viewer
 bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, and against float64

@@ -197,12 +197,19 @@ def write_ome_zarr(
 
 
 def write_f_everywhere(folder: Path) -> None:
-    """Write the F as f.ome.tif and f.ome.zarr: what the viewer's orientation tests are built of."""
+    """Write the F in every format: what the viewer's orientation tests are built of.
+
+    f.ome.tif, f.ome.zarr, f.nii.gz, and dicom/, all of the same voxels at the same place.
+    """
+    from dicom_series import write_f_dicom, write_f_nifti
+
     folder.mkdir(parents=True, exist_ok=True)
     spacing = (0.5, 0.2, 0.2)
     write_ome_tiff(folder / "f.ome.tif", f_phantom(), spacing=spacing, names=["F"])
     scale = dict(zip("zyx", spacing, strict=True))
     write_ome_zarr(folder / "f.ome.zarr", [f_phantom()], scales=[scale], channels=[{"label": "F"}])
+    write_f_dicom(folder / "dicom", f_phantom(), spacing)
+    write_f_nifti(folder / "f.nii.gz", f_phantom(), spacing)
 
 
 if __name__ == "__main__":

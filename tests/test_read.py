@@ -86,7 +86,7 @@ def test_tiff_planes_in_any_order_give_the_same_f(tmp_path: Path, order: str) ->
     np.testing.assert_array_equal(volume.voxels, tczyx[2, 1])
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32", ">u2", ">f4"])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "int16", "float32", ">u2", ">i2", ">f4"])
 @pytest.mark.parametrize("suffix", [".zarr", ".ome.tif"])
 def test_dtypes_are_kept_in_native_order(tmp_path: Path, dtype: str, suffix: str) -> None:
     body = (f_phantom() // 4).astype(dtype)

@@ -1,22 +1,31 @@
-"""The local server: byte ranges, types, and nothing outside the bundle."""
+"""The local server: byte ranges, types, nothing outside the bundle, nobody from elsewhere."""
 
 import http.client
+import os
+import signal
 import socket
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Thread
 
 import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
+from stereocell.cli import main
 from stereocell.errors import StereoCellError
-from stereocell.serve import HOST, make_server, parse_range
+from stereocell.serve import LOCALHOST, BundleServer
+from stereocell.serve_files import parse_range
 
 DATA = bytes(range(256)) * 1000
 
 
-@pytest.fixture
-def bundle(tmp_path: Path) -> Path:
-    folder = tmp_path / "bundle"
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("serve") / "out" / "bundle"
     (folder / "volumes" / "r0_c0").mkdir(parents=True)
     (folder / "assets").mkdir()
     (folder / "manifest.json").write_text("{}")
@@ -28,20 +37,22 @@ def bundle(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def port(bundle: Path) -> Iterator[int]:
-    with make_server(bundle, 0) as server:
-        thread = Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        yield server.server_port
-        server.shutdown()
-        thread.join()
+    server = BundleServer(bundle.parent, 0, lan=False)
+    thread = Thread(target=server.run)
+    thread.start()
+    while not server.has_started:
+        time.sleep(0.01)
+    yield server.port
+    server.stop()
+    thread.join()
 
 
 def ask(
     port: int, path: str, method: str = "GET", **headers: str
 ) -> tuple[http.client.HTTPResponse, bytes]:
-    connection = http.client.HTTPConnection(HOST, port, timeout=10)
+    connection = http.client.HTTPConnection(LOCALHOST, port, timeout=10)
     try:
         connection.request(method, path, headers=headers)
         response = connection.getresponse()
@@ -83,10 +94,50 @@ def test_a_range_behind_the_end_is_refused_with_the_size(port: int) -> None:
         ("bytes=-", None),
         ("bytes=0-1,5-6", None),
         ("pages=1-2", None),
+        ("bytes=\u0661-\u0662", None),
+        (f"bytes=0-{'9' * 5000}", None),
     ],
 )
 def test_ranges_mean_what_rfc_9110_says(header: str, expected: range | None) -> None:
     assert parse_range(header, 100) == expected
+
+
+@pytest.mark.parametrize(
+    ("header", "status", "expected"),
+    [
+        ("bytes=-10", 206, DATA[-10:]),
+        ("bytes=255990-", 206, DATA[-10:]),
+        ("bytes=5-5", 206, DATA[5:6]),
+        ("bytes=0-1,5-6", 200, DATA),
+        ("bytes=9-1", 200, DATA),
+        ("nonsense", 200, DATA),
+        ("bytes=256000-", 416, b""),
+        ("bytes=-0", 416, b""),
+    ],
+)
+def test_ranges_are_answered_as_they_mean(
+    port: int, header: str, status: int, expected: bytes
+) -> None:
+    response, body = ask(port, "/volumes/r0_c0/CD31.ktx2", Range=header)
+    assert (response.status, body) == (status, expected)
+
+
+def test_what_a_browser_has_is_not_sent_again(port: int, bundle: Path) -> None:
+    (bundle / "lod1.glb").write_bytes(b"glTF")
+    response, _ = ask(port, "/lod1.glb")
+    tag = response.headers["ETag"]
+    again, body = ask(port, "/lod1.glb", **{"If-None-Match": tag})
+    assert (again.status, body) == (304, b"")
+    (bundle / "lod1.glb").write_bytes(b"another one")
+    changed, body = ask(port, "/lod1.glb", **{"If-None-Match": tag})
+    assert (changed.status, body) == (200, b"another one")
+
+
+def test_caches_ask_each_time_and_pages_learn_of_the_bricks(port: int) -> None:
+    response, _ = ask(port, "/manifest.json")
+    assert response.headers["Cache-Control"] == "no-cache"
+    assert response.headers["X-Content-Type-Options"] == "nosniff"
+    assert response.headers["Stereocell-Bricks"] == "version=1"
 
 
 @pytest.mark.parametrize(
@@ -135,30 +186,109 @@ def test_a_link_that_leads_out_is_refused(port: int, bundle: Path) -> None:
     assert ask(port, "/folder/secret.txt")[0].status == 404
 
 
-def test_another_host_name_is_refused(port: int) -> None:
-    assert ask(port, "/manifest.json", Host="evil.example")[0].status == 403
-    assert ask(port, "/manifest.json", Host=f"localhost:{port}")[0].status == 200
+@pytest.mark.parametrize(
+    "host", ["evil.example", "localhost.evil.example", "127.0.0.1.evil.example:80", "", "[::1]"]
+)
+def test_another_host_name_is_refused(port: int, host: str) -> None:
+    assert ask(port, "/manifest.json", Host=host)[0].status == 403
+
+
+@pytest.mark.parametrize("host", ["localhost", "LOCALHOST:9", "127.0.0.1:8000"])
+def test_the_servers_own_names_are_answered_at_any_port(port: int, host: str) -> None:
+    assert ask(port, "/manifest.json", Host=host)[0].status == 200
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "https://evil.example",
+        "http://localhost:1",
+        "http://localhost",
+        "http://localhost:{port}.evil.example",
+        "http://evil@localhost:{port}",
+        "null",
+        "http://[",
+    ],
+)
+def test_pages_of_other_origins_get_no_websocket(port: int, origin: str) -> None:
+    origin = origin.format(port=port)
+    with (
+        pytest.raises(InvalidStatus) as refused,
+        connect(f"ws://localhost:{port}/bricks", origin=origin),
+    ):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_the_servers_own_page_and_programs_get_a_websocket(port: int) -> None:
+    for origin in (f"http://localhost:{port}", None):
+        with connect(f"ws://localhost:{port}/bricks", origin=origin) as client:
+            client.send('{"type": "hello", "version": 1}')
+            assert '"welcome"' in client.recv(timeout=10)
+
+
+def test_a_websocket_of_another_host_name_is_refused(port: int) -> None:
+    with (
+        socket.create_connection((LOCALHOST, port), timeout=10) as stream,
+        pytest.raises(InvalidStatus) as refused,
+        connect("ws://evil.example/bricks", sock=stream),
+    ):
+        pass
+    assert refused.value.response.status_code == 403
 
 
 def test_writing_is_not_offered(port: int) -> None:
-    assert ask(port, "/manifest.json", "PUT")[0].status == 501
+    assert ask(port, "/manifest.json", "PUT")[0].status == 405
 
 
-def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(tmp_path: Path) -> None:
-    with pytest.raises(StereoCellError, match=r"manifest\.json: expected a built bundle, found no"):
-        make_server(tmp_path, 0)
+def test_other_machines_get_no_answer(bundle: Path) -> None:
+    server = BundleServer(bundle.parent, 0, lan=False)
+    assert server._socket.getsockname()[0] == LOCALHOST
+    server._socket.close()
+
+
+def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command in ("view", "serve"):
+        assert main([command, str(tmp_path), "--port", "0"]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "manifest.json: expected a built bundle, found no such file" in line
+        assert "`stereocell bundle OUT`" in line
 
 
 def test_a_taken_port_is_named(bundle: Path) -> None:
     with socket.socket() as taken:
-        taken.bind((HOST, 0))
+        taken.bind((LOCALHOST, 0))
         taken.listen()
         with pytest.raises(StereoCellError, match="choose another"):
-            make_server(bundle, taken.getsockname()[1])
+            BundleServer(bundle.parent, taken.getsockname()[1], lan=False)
+    with pytest.raises(StereoCellError, match="port 70000: "):
+        BundleServer(bundle.parent, 70000, lan=False)
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_in_order_also_with_clients(bundle: Path, kind: signal.Signals) -> None:
+    command = [sys.executable, "-m", "stereocell.cli", "serve", str(bundle.parent), "--port", "0"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            address = process.stdout.readline().split()[0]
+            assert address.startswith("http://localhost:")
+            with connect(f"ws{address[4:]}bricks", open_timeout=20) as client:
+                client.send('{"type": "hello", "version": 1}')
+                client.recv(timeout=10)
+                os.kill(process.pid, kind)
+                _, said = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    assert (process.returncode, said) == (0, "")
 
 
 def test_a_client_that_goes_away_leaves_the_server_working(port: int) -> None:
-    with socket.create_connection((HOST, port), timeout=10) as client:
+    with socket.create_connection((LOCALHOST, port), timeout=10) as client:
         client.sendall(b"GET /volumes/r0_c0/CD31.ktx2 HTTP/1.1\r\nHost: localhost\r\n\r\n")
         client.recv(10)
     assert ask(port, "/lod0.glb")[0].status == 200

@@ -19,7 +19,7 @@ from stereocell.documents import write_json
 from stereocell.engine import Engine, console
 from stereocell.errors import OutputError
 from stereocell.lineage import key_of, libraries_of
-from stereocell.plan import PALETTE, Channel, Plan, choose_level, make_plan
+from stereocell.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
@@ -62,7 +62,7 @@ def settle(source: str, settings: Settings) -> Plan:
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
-    dataset = open_source(SourceRef(location, options.time, options.spacing_um))
+    dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
     for note in dataset.notes:
         console.print(f"plan: {note}", markup=False)
     indices = dataset.find_channels(options.channels) if options.channels else None
@@ -71,7 +71,7 @@ def settle(source: str, settings: Settings) -> Plan:
         Channel(
             index,
             dataset.channels[index].name,
-            dataset.channels[index].color or PALETTE[place % len(PALETTE)],
+            dataset.channels[index].color or choose_color(place, dataset.modality),
         )
         for place, index in enumerate(chosen)
     ]
@@ -79,7 +79,7 @@ def settle(source: str, settings: Settings) -> Plan:
     origin = dataset.levels[level[0]].origin_um
     return make_plan(
         location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
-        settings,
+        settings, modality=dataset.modality, placement=dataset.placement,
     )  # fmt: skip
 
 
@@ -93,7 +93,14 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
         "libraries": {**libraries_of(tasks), **libraries_of(staging)},
+        **_added(plan),
     }
+
+
+def _added(plan: Plan) -> dict[str, Any]:
+    """Return the channels that have a source of their own, and its fingerprint."""
+    added = {c.name: c.fingerprint for c in plan.channels if c.source}
+    return {"added_channels": added} if added else {}
 
 
 def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
@@ -121,7 +128,8 @@ def run_stage(out: Path, engine: Engine) -> None:
         looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
         tiles = [(tile.id, tile_task(store, plan, index, tile)) for tile in plan.tiles]
         about = provenance(plan)
-        depends = [index, [asdict(look) for look in looks], about, plan.name]
+        names = [plan.name, plan.modality]
+        depends = [index, [asdict(look) for look in looks], about, names, list(plan.placement)]
         folders = [store.stage_dir / "tiles" / tile.id for tile in plan.tiles]
         key = key_of(key_of(depends, staging), usdz)
         small = store.stage_dir / usdz.USDZ_NAME
@@ -132,7 +140,15 @@ def run_stage(out: Path, engine: Engine) -> None:
             usd.TileExtent(t.content.id, t.content.first_um, t.content.last_um, plan.spacing_um)
             for _, t in tiles
         ]
-        usd.write_stage(store.stage_dir, plan.name, looks, extents, about)
+        usd.write_stage(
+            store.stage_dir,
+            plan.name,
+            looks,
+            extents,
+            about,
+            modality=plan.modality,
+            placement=plan.placement,
+        )
         store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
         usdz.write_usdz(store.stage_file, small)
 

@@ -19,6 +19,7 @@ from stereocell.assets import find_asset
 from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.store import Store
+from stereocell.transfer2d import find_fault, shapes_from
 from stereocell.validate_usd import validate_stage, validate_usdz
 from stereocell.write.bundle import FILES, MANIFEST
 from stereocell.write.exr import check_exr
@@ -62,6 +63,7 @@ def check(out: Path) -> Iterator[CheckLine]:
         ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
+        ("2D transfer functions", lambda: _check_transfer2d(bundle)),
         ("tilesets", lambda: _check_tilesets(bundle)),
         ("hashes", lambda: _check_hashes(bundle)),
         ("glTF validator", lambda: _check_meshes(bundle)),
@@ -188,6 +190,35 @@ def _channels(bundle: Path) -> list[dict[str, Any]]:
     return channels
 
 
+def _transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
+    path = bundle / channel["transfer_functions_2d"]["file"]["path"]
+    content: dict[str, Any] = read_json(path, "transfer2d.schema.json", _RUN_BUNDLE)
+    return content
+
+
+def _check_transfer2d(bundle: Path) -> str:
+    """Check each transfer2d.json: its names, and what a schema can't say of its shapes."""
+    problems = []
+    count = 0
+    for channel in _channels(bundle):
+        listed, known = channel["transfer_functions_2d"], channel["transfer_functions"]
+        functions = _transfer2d(bundle, channel)["functions"]
+        if list(functions) != listed["names"] or not set(functions) <= set(known):
+            problems.append(
+                f"{listed['file']['path']}: functions are {', '.join(functions) or 'none'}, the "
+                f"manifest says {', '.join(listed['names']) or 'none'} of {', '.join(known)}"
+            )
+        for name, content in functions.items():
+            count += len(content)
+            problems += [
+                f"{listed['file']['path']}: {name}: shape {i}: {fault}"
+                for i, shape in enumerate(shapes_from(content))
+                if (fault := find_fault(shape))
+            ]
+    _raise_on(problems)
+    return f"{count} shapes"
+
+
 def _check_tilesets(bundle: Path) -> str:
     contents = 0
     problems = []
@@ -252,6 +283,7 @@ def _check_hashes(bundle: Path) -> str:
     for channel in _channels(bundle):
         path = bundle / channel["volumes"]["path"]
         references += _references(read_json(path, "volumes.schema.json", _RUN_BUNDLE))
+        references += _references(_transfer2d(bundle, channel))
     for reference in references:
         entry = {"bytes": reference["bytes"], "sha256": reference["sha256"]}
         expected = listed.get(reference["path"])

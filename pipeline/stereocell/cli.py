@@ -59,7 +59,11 @@ def _input(parser: argparse.ArgumentParser) -> None:
 
 
 def _source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address")
+    parser.add_argument(
+        "input",
+        help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
+        "file) or NIfTI: a path",
+    )
     parser.add_argument("--preset", help="cycif, lightsheet, mri, or a TOML file of your own")
     parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
     plan = parser.add_argument_group("what to build")
@@ -73,6 +77,12 @@ def _source(parser: argparse.ArgumentParser) -> None:
     plan.add_argument("--tile-size", help="z,y,x in voxels")
     plan.add_argument("--grid", help="columns x rows of equal tiles, as 5x2; not with --tile-size")
     plan.add_argument("--time", type=int, help="index into a time series")
+    plan.add_argument(
+        "--series",
+        metavar="N|list",
+        help="which series of a DICOM folder (default: the largest); `list` shows them and does "
+        "nothing else",
+    )
     plan.add_argument("--spacing-um", help="z,y,x voxel spacing in um, instead of the file's")
     plan.add_argument(
         "--iso-criterion", help="how iso-values are found: edges (default), pekar-mean, ..."
@@ -155,6 +165,12 @@ def _flags(options: argparse.Namespace) -> dict[str, Any]:
     for key in ("level", "region", "grid", "time"):
         if getattr(options, key) is not None:
             plan[key] = getattr(options, key)
+    if options.series is not None:
+        if not options.series.isdecimal() or int(options.series) < 1:
+            raise UsageError(
+                f"--series is {options.series!r}, expected a number from 1, or `list` to see them"
+            )
+        plan["series"] = int(options.series)
     if options.channels is not None:
         plan["channels"] = [name.strip() for name in options.channels.split(",")]
         if not all(plan["channels"]):
@@ -209,7 +225,19 @@ def _settings(options: argparse.Namespace) -> int:
     return 0
 
 
+def _lists_series(options: argparse.Namespace) -> bool:
+    """Print the series of a source if that is all that was asked for."""
+    if options.series != "list":
+        return False
+    from stereocell import read
+
+    print("\n".join(read.list_series(options.input)))
+    return True
+
+
 def _plan(options: argparse.Namespace) -> int:
+    if _lists_series(options):
+        return 0
     from stereocell import build, config
 
     settings = config.load(options.preset, options.config, _flags(options))
@@ -218,6 +246,8 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _iso(options: argparse.Namespace) -> int:
+    if _lists_series(options):
+        return 0
     from stereocell import config, iso_preview
 
     settings = config.load(options.preset, options.config, _flags(options))
@@ -249,7 +279,23 @@ def _phases(options: argparse.Namespace, *names: str) -> int:
     return 0
 
 
+def _slices(options: argparse.Namespace) -> int:
+    if _lists_series(options):
+        return 0
+    from stereocell import build, config
+    from stereocell.read.location import require_apart
+    from stereocell.slices import write_slices
+
+    settings = config.load(options.preset, options.config, _flags(options))
+    require_apart(options.input, options.out)
+    count = write_slices(build.settle(options.input, settings), options.out)
+    print(f"wrote {count} slices to {options.out}")
+    return 0
+
+
 def _build(options: argparse.Namespace) -> int:
+    if _lists_series(options):
+        return 0
     _plan(options)
     _phases(options, "units", "stage", "bundle", "report")
     print(f"stage    {options.out}/stage/stage.usda")
@@ -276,10 +322,20 @@ def _sample(options: argparse.Namespace) -> int:
             seed=options.seed,
             brightness_spread=options.brightness_spread,
         )
+    elif options.name == "mri":
+        samples.write_head(options.out, options.seed)
     else:
         samples.write_brain_cells(options.out)
     print(f"wrote {options.out}")
     return 0
+
+
+def _tissue(options: argparse.Namespace) -> int:
+    from stereocell.tissue_channels import TissueRequest, add_tissue, parse_classes
+
+    classes = None if options.classes is None else parse_classes(options.classes)
+    add_tissue(options.out, TissueRequest(classes, options.channel, options.model))
+    return _phases(options, "units", "stage", "bundle", "report")
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -295,7 +351,14 @@ def _check(options: argparse.Namespace) -> int:
 def _view(options: argparse.Namespace) -> int:
     from stereocell.serve import serve
 
-    serve(options.out / "bundle", options.port, not options.no_browser)
+    serve(options.out, options.port, lan=False, open_browser=not options.no_browser)
+    return 0
+
+
+def _serve(options: argparse.Namespace) -> int:
+    from stereocell.serve import serve
+
+    serve(options.out, options.port, lan=options.lan, open_browser=False)
     return 0
 
 
@@ -335,24 +398,53 @@ def _declare_bundle(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stage", type=Path, help="an edited stage, instead of OUT/stage")
 
 
+def _declare_tissue(parser: argparse.ArgumentParser) -> None:
+    _out(parser)
+    _workers(parser)
+    parser.add_argument(
+        "--classes", metavar="N|auto", help="how many (default auto: by the volume itself)"
+    )
+    parser.add_argument(
+        "--channel", default="", metavar="X", help="learn from this one, by name or index"
+    )
+    parser.add_argument(
+        "--model", type=Path, metavar="FILE.onnx", help="a network of your own (docs/tissue.md)"
+    )
+
+
 def _declare_sample(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", choices=["cycif", "brain-cells"])
+    parser.add_argument("name", choices=["cycif", "brain-cells", "mri"])
     parser.add_argument("out", type=Path, metavar="OUT", help="file or folder to write")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="cycif, mri: another seed, another block or noise"
+    )
     cycif = parser.add_argument_group("cycif")
     cycif.add_argument(
         "--grid", default="5x2", help="columns x rows of tiles (default %(default)s)"
     )
     cycif.add_argument("--tile-size", default="64,128,128", help="z,y,x (default %(default)s)")
-    cycif.add_argument("--seed", type=int, default=0, help="another seed, another block")
     cycif.add_argument(
         "--brightness-spread", type=float, default=1.0, help="cells are up to 1 + this as bright"
     )
 
 
 def _declare_view(parser: argparse.ArgumentParser) -> None:
+    _port(parser)
+    parser.add_argument("--no-browser", action="store_true", help="don't open a browser")
+
+
+def _declare_serve(parser: argparse.ArgumentParser) -> None:
+    _port(parser)
+    parser.add_argument(
+        "--lan",
+        action="store_true",
+        help="also for phones in this network: TLS, and a QR code that lets one device in",
+    )
+
+
+def _port(parser: argparse.ArgumentParser) -> None:
     _out(parser)
     parser.add_argument("--port", type=_count, default=8000, help="default 8000; 0: any free one")
-    parser.add_argument("--no-browser", action="store_true", help="don't open a browser")
 
 
 COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], Handler]] = {
@@ -373,6 +465,12 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         "iso my.ome.zarr --channel CD31 --tile r0_c0 -o cd31.png --preset cycif --grid 5x2",
         _declare_iso,
         _iso,
+    ),
+    "slices": (
+        "write 8-bit PNG slices of one channel, with a JSON of spacing and window",
+        "slices scans/head -o out/slices --preset mri --series 2",
+        _input,
+        _slices,
     ),
     "units": (
         "find iso-values, build meshes and volumes of every tile and channel",
@@ -398,6 +496,12 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         _out,
         lambda options: _phases(options, "report"),
     ),
+    "tissue": (
+        "find tissue classes, and build each as a channel of probabilities",
+        "tissue out/head --classes 3",
+        _declare_tissue,
+        _tissue,
+    ),
     "check": (
         "hold everything that was written against its format's rules",
         "check out/mine",
@@ -409,6 +513,12 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         "view out/mine",
         _declare_view,
         _view,
+    ),
+    "serve": (
+        "serve the bundle and stream its volumes by view, here or (--lan) to phones",
+        "serve out/mine --lan",
+        _declare_serve,
+        _serve,
     ),
     "sample": (
         "write a sample volume, with no network",

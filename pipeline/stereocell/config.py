@@ -40,6 +40,7 @@ class PlanOptions:
     tile_size: tuple[int, ...] = setting((194, 512, 512), "voxels z, y, x, clipped to the data")
     grid: str = setting("", "columns x rows of equal tiles, as 5x2; instead of tile_size")
     time: int = setting(0, "index into a time series")
+    series: int = setting(0, "which series of DICOM, from 1 as --series list counts; 0: largest")
     spacing_um: tuple[float, ...] = setting((), "voxel spacing z, y, x, instead of the file's")
 
     def __post_init__(self) -> None:
@@ -47,6 +48,8 @@ class PlanOptions:
             raise UsageError(f"plan.max_voxels is {self.max_voxels}, expected at least 1")
         if self.time < 0:
             raise UsageError(f"plan.time is {self.time}, expected 0 or more (--time)")
+        if self.series < 0:
+            raise UsageError(f"plan.series is {self.series}, expected 0 or more (--series)")
         if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(

@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 from stereocell.build import settle
 from stereocell.config import Settings
 from stereocell.errors import NoSurfaceError, UsageError
-from stereocell.isovalue import CRITERIA, IsoValue
+from stereocell.isovalue import ADAPTIVE, CRITERIA, IsoValue
 from stereocell.plan import Channel, Plan
 from stereocell.report.slices import VIEWS, Color, Slice, find_font, paint_slices
 from stereocell.rounds import display_task, iso_task
@@ -30,6 +30,7 @@ COLORS: dict[str, Color] = {
     "pekar-total": (110, 220, 110),
     "pekar-area": (190, 140, 255),
     "given": (255, 255, 255),
+    ADAPTIVE: (255, 255, 255),
 }
 _LONGEST_PX = 900
 _CHART_PX = 200
@@ -74,14 +75,15 @@ def preview(
     field = read_iso_field(task)
     try:
         chosen = field.find_iso_value(plan.settings.isovalue)
-        found = {plan.settings.isovalue.criterion: chosen}
+        found = {plan.settings.isovalue.curve: chosen}
         for name in CRITERIA:
             if name not in found:
                 options = replace(plan.settings.isovalue, criterion=name)
                 found[name] = field.find_iso_value(options)
     except NoSurfaceError as error:
         raise NoSurfaceError(f"{tile.id}/{channel.name}: {error}: no surface to look at") from None
-    candidates = _candidates(field, found, task.given)
+    is_users = channel.name in plan.settings.iso_values
+    candidates = _candidates(field, found, task.given, "given" if is_users else ADAPTIVE)
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
     picture = _compose(
         paint_slices(_slices(field, candidates, display.window, plan), _LONGEST_PX, _LONGEST_PX),
@@ -110,7 +112,7 @@ def table(candidates: Sequence[Candidate]) -> list[str]:
 
 def _note(candidates: Sequence[Candidate]) -> str:
     """Return what the star says: the neighbours, which a build hears too, aren't looked at here."""
-    if any(c.is_chosen and c.name == "given" for c in candidates):
+    if any(c.is_chosen and c.confidence is None for c in candidates):
         return "* given; a build takes it"
     return "* found; a build may draw it towards its neighbours'"
 
@@ -133,13 +135,13 @@ def _find_tile(plan: Plan, tile_id: str) -> Tile:
 
 
 def _candidates(
-    field: IsoField, found: dict[str, IsoValue], given: float | None
+    field: IsoField, found: dict[str, IsoValue], given: float | None, by: str
 ) -> list[Candidate]:
     levels: list[tuple[str, float, float | None]] = [
         (name, value.value, value.confidence) for name, value in found.items()
     ]
     if given is not None:
-        levels.insert(0, ("given", given, None))
+        levels.insert(0, (by, given, None))
     return [
         Candidate(
             name=name,

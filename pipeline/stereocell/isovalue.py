@@ -44,6 +44,7 @@ from stereocell.raggedness import find_raggedness
 from stereocell.surface import gradient_magnitude
 
 CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
+ADAPTIVE = "adaptive"  # the channel's threshold, in all tiles; its curves are those of `edges`
 NOISE_FACTOR = 8.0  # noise's own gradients rarely reach it; 3 to 16 choose alike
 DIM_PERCENTILE = 40.0  # of the voxels: taken as free of edges, where the noise is measured
 CHI = 0.789  # median over mean of a chi-square of three: of noise's squared gradient
@@ -55,16 +56,25 @@ PEAK_SHARE = 0.75  # of the best score: the summit of the curve, to which a para
 class IsoValueOptions:
     """How iso-values are found."""
 
-    criterion: str = setting("edges", "edges, compromise, pekar-mean, pekar-total, pekar-area")
+    criterion: str = setting(
+        "edges",
+        "edges, compromise, pekar-mean, pekar-total, pekar-area; adaptive: the channel's threshold",
+    )
     bins: int = setting(256, "levels tried over the range of a tile's voxels")
     clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
     min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
     min_confidence: float = setting(0.4, "of a clear surface, 0 to 1; see the report")
 
+    @property
+    def curve(self) -> str:
+        """Which of CRITERIA is the curve over the levels."""
+        return CRITERIA[0] if self.criterion == ADAPTIVE else self.criterion
+
     def __post_init__(self) -> None:
-        if self.criterion not in CRITERIA:
+        if self.criterion not in (*CRITERIA, ADAPTIVE):
             raise UsageError(
-                f"isovalue.criterion is {self.criterion!r}, expected one of {', '.join(CRITERIA)}"
+                f"isovalue.criterion is {self.criterion!r}, expected one of "
+                f"{', '.join((*CRITERIA, ADAPTIVE))}"
             )
         if not 16 <= self.bins <= 65536:
             raise UsageError(
@@ -122,7 +132,7 @@ def find_iso_value(
     gradient = gradient_magnitude(field, spacing_um)
     gradient /= np.float32(high - low)
     weights = gradient
-    if options.criterion == "edges":
+    if options.curve == "edges":
         noise = NOISE_FACTOR / CHI * float(np.median(gradient[field <= dim])) ** 2
         tiny = np.float32(1e-12)
         weights = gradient * np.maximum(0, 1 - noise / np.maximum(gradient**2, tiny))
@@ -161,11 +171,11 @@ def _score(
 ) -> NDArray[np.float64]:
     """Return the criterion over the levels; 0 for those that are out of the choice."""
     large = area >= options.min_area_share * area.max()
-    if options.criterion == "pekar-area":
+    if options.curve == "pekar-area":
         return np.where(large, area, 0.0)
-    exponent = {"pekar-total": 0.0, "pekar-mean": 1.0}.get(options.criterion, 0.5)
+    exponent = {"pekar-total": 0.0, "pekar-mean": 1.0}.get(options.curve, 0.5)
     score = np.where(large, total / np.where(large, area, 1.0) ** exponent, 0.0)
-    if options.criterion == "edges":
+    if options.curve == "edges":
         score = np.where(total >= EDGES_SHARE * total.max(), score, 0.0)
     return score
 

@@ -15,6 +15,7 @@ from stereocell.denoise import SMOOTHING_REACH
 from stereocell.errors import SourceError, UsageError
 from stereocell.names import to_identifier
 from stereocell.options import AUTO
+from stereocell.placement import IDENTITY, Matrix, to_matrix
 from stereocell.repair import RepairOptions
 from stereocell.tiling import Box, Tile, cut, cut_evenly
 
@@ -41,6 +42,18 @@ PALETTE = (
 )
 
 
+# of MR and CT: warm and neutral, as bone and tissue are drawn; a blue head is none
+FLESH = (0.78, 0.66, 0.55)
+BODY_MODALITIES = ("MR", "CT")
+
+
+def choose_color(place: int, modality: str) -> tuple[float, float, float]:
+    """Return the colour (linear RGB) of the channel at `place` of those built, if it has none."""
+    if place == 0 and modality in BODY_MODALITIES:
+        return FLESH
+    return PALETTE[place % len(PALETTE)]
+
+
 class LevelLike(Protocol):
     """One resolution level of a dataset."""
 
@@ -52,11 +65,18 @@ class LevelLike(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1."""
+    """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1.
+
+    source       of this channel alone, with one level, the planned one, and 8 bits that are shown
+                 as they are (0..255): what a command added to a plan; empty: the plan's
+    fingerprint  of that source
+    """
 
     index: int
     name: str
     color: tuple[float, float, float]
+    source: str = ""
+    fingerprint: str = ""
 
     @property
     def id(self) -> str:
@@ -67,7 +87,9 @@ class Channel:
 class Plan:
     """A build, settled. Boxes are voxels (z, y, x) of `level`; voxel (0, 0, 0) lies at the origin.
 
-    halo  voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
+    halo       voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
+    modality   what took the volume, as DICOM calls it: `MR`, `CT`, ...; empty: not known
+    placement  from the world of the voxels, um (volume.zyx_to_xyz), to where the specimen stands
     """
 
     source: str
@@ -82,6 +104,8 @@ class Plan:
     tiles: tuple[Tile, ...]
     channels: tuple[Channel, ...]
     settings: Settings
+    modality: str = ""
+    placement: Matrix = IDENTITY
 
     @property
     def repair(self) -> RepairOptions:
@@ -92,6 +116,10 @@ class Plan:
     def step(self) -> tuple[int, int, int]:
         """Every so many planes of voxels (z, y, x) carry the surface."""
         return _step(self.settings, self.spacing_um)
+
+    def level_of(self, channel: Channel) -> int:
+        """Return the level of its source that a channel is read at."""
+        return 0 if channel.source else self.level
 
     def painter(self, channel: Channel) -> Channel | None:
         """Return the channel that is painted on a channel's surface; None: none is."""
@@ -153,6 +181,9 @@ def make_plan(
     channels: Sequence[Channel],
     level: tuple[int, str],
     settings: Settings,
+    *,
+    modality: str = "",
+    placement: Matrix = IDENTITY,
 ) -> Plan:
     """Return the plan for these channels at this level (index and reason).
 
@@ -193,6 +224,8 @@ def make_plan(
         tiles=tiles,
         channels=tuple(channels),
         settings=settings,
+        modality=modality,
+        placement=placement,
     )
 
 
@@ -365,8 +398,10 @@ def to_json(plan: Plan) -> dict[str, Any]:
         "region": _box_json(plan.region),
         "halo": list(plan.halo),
         "tiles": [{"id": tile.id, **_box_json(tile.box)} for tile in plan.tiles],
-        "channels": [{**asdict(c), "color": list(c.color)} for c in plan.channels],
+        "channels": [_channel_json(c) for c in plan.channels],
         "settings": to_dict(plan.settings),
+        "modality": plan.modality,
+        "placement": [list(row) for row in plan.placement],
     }
 
 
@@ -384,10 +419,24 @@ def from_json(content: Mapping[str, Any]) -> Plan:
         halo=tuple(content["halo"]),
         tiles=tuple(Tile(tile["id"], _box(tile)) for tile in content["tiles"]),
         channels=tuple(
-            Channel(c["index"], c["name"], tuple(c["color"])) for c in content["channels"]
+            Channel(
+                c["index"],
+                c["name"],
+                tuple(c["color"]),
+                c.get("source", ""),
+                c.get("fingerprint", ""),
+            )
+            for c in content["channels"]
         ),
         settings=from_dict(content["settings"]),
+        modality=content["modality"],
+        placement=to_matrix(content["placement"]),
     )
+
+
+def _channel_json(channel: Channel) -> dict[str, Any]:
+    own = {k: v for k, v in asdict(channel).items() if v or k not in ("source", "fingerprint")}
+    return {**own, "color": list(channel.color)}
 
 
 def _box_json(box: Box) -> dict[str, list[int]]:

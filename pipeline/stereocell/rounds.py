@@ -15,6 +15,7 @@ from stereocell.calm import plan_for
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.engine import Engine
 from stereocell.errors import SourceError, UsageError
+from stereocell.isovalue import ADAPTIVE
 from stereocell.latticefield import LatticeField, make_iso_field
 from stereocell.lineage import key_of
 from stereocell.plan import Channel, Plan
@@ -89,6 +90,14 @@ def _run(
             f"{plan.name}: changed since it was planned (fingerprint {found[:12]}, expected "
             f"{plan.fingerprint[:12]}): plan into another OUT"
         )
+    for channel in plan.channels:
+        if channel.source and open_source(source_of(plan, channel)).fingerprint != (
+            channel.fingerprint
+        ):
+            raise SourceError(
+                f"{channel.source}: channel {channel.name!r} changed since it was planned: run the "
+                "command again that made it (`stereocell tissue OUT`)"
+            )
     return engine.run(label, function, tasks)
 
 
@@ -96,13 +105,18 @@ def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel]]:
     wanted = [(tile.id, channel) for tile in plan.tiles for channel in plan.channels]
     if only is None:
         return wanted
-    chosen = [(t, c) for t, c in wanted if only in {f"{t}/{n}" for n in (c.name, c.id, c.index)}]
+    chosen = [(t, c) for t, c in wanted if only in {f"{t}/{n}" for n in _names(c)}]
     if not chosen:
         raise UsageError(
             f"--only is {only!r}, expected TILE/CHANNEL with a tile from {plan.tiles[0].id} to "
             f"{plan.tiles[-1].id} and a channel of {', '.join(c.name for c in plan.channels)}"
         )
     return chosen
+
+
+def _names(channel: Channel) -> tuple[str | int, ...]:
+    """Return what a channel may be called; an index is one of the input's."""
+    return (channel.name, channel.id) + (() if channel.source else (channel.index,))
 
 
 def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
@@ -115,7 +129,7 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
         found = {tile.id: isos[tile.id, channel.id] for tile in plan.tiles}
         agreed = (
             _as_given(found)
-            if channel.name in plan.settings.iso_values
+            if _is_given(plan, channel)
             else agree(neighbours, found, plan.settings.isovalue.min_confidence)
         )
         display, painter = displays[channel.id], plan.painter(channel)
@@ -177,21 +191,36 @@ def display_task(plan: Plan, channel: Channel) -> DisplayTask:
     """Return the task that finds a channel's window and background."""
     settings = plan.settings
     # a value that is given speaks of the voxels as they are
-    subtracts = channel.name not in settings.iso_values and settings.surface.background_um != 0
-    return DisplayTask(source_of(plan), plan.level, channel.index, plan.region, settings, subtracts)
+    subtracts = not _is_given(plan, channel) and settings.surface.background_um != 0
+    level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
+    ref = source_of(plan, channel)
+    return DisplayTask(ref, level, channel.index, plan.region, settings, subtracts, window)
 
 
 def iso_task(plan: Plan, tile: Tile, channel: Channel, display: Display) -> IsoTask:
     """Return the task that finds one unit's iso-value."""
     return IsoTask(
-        source_of(plan),
-        plan.level,
+        source_of(plan, channel),
+        plan.level_of(channel),
         channel.index,
         tile.box,
         plan.settings,
-        plan.settings.iso_values.get(channel.name),
+        _given(plan, channel, display),
         _around(display.background, tile.box),
     )
+
+
+def _is_given(plan: Plan, channel: Channel) -> bool:
+    """Whether a channel's iso-value is not sought tile by tile: the user's, or its threshold."""
+    settings = plan.settings
+    return channel.name in settings.iso_values or settings.isovalue.criterion == ADAPTIVE
+
+
+def _given(plan: Plan, channel: Channel, display: Display) -> float | None:
+    given = plan.settings.iso_values.get(channel.name)
+    if given is None and _is_given(plan, channel) and display.threshold is not None:
+        return display.threshold.value
+    return given
 
 
 def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
@@ -199,7 +228,7 @@ def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
     for channel in plan.channels:
         task = display_task(plan, channel)
         depends = [
-            _input_key(plan),
+            _input_key(plan, channel),
             channel.index,
             _box(plan.region),
             asdict(plan.settings.window),
@@ -228,7 +257,7 @@ def _isos(
         for channel in plan.channels:
             task = iso_task(plan, tile, channel, displays[channel.id])
             depends = [
-                _input_key(plan),
+                _input_key(plan, channel),
                 channel.index,
                 _box(tile.box),
                 asdict(settings.isovalue) | {"min_confidence": None},  # nothing to this round
@@ -275,7 +304,7 @@ def _unit_task(
         painted=painted and painted[1],
     )
     depends = [
-        _input_key(plan),
+        _input_key(plan, channel),
         channel.index,
         [_box(box) for box in (given.window, given.lattice, given.region)],
         [None if f is None else f.to_json() for f in (given.iso, given.background)],
@@ -290,15 +319,17 @@ def _unit_task(
     ]
     key = key_of(depends, maker)
     directory = store.unit_dir(tile_id, channel.id, key)
-    ref, index = source_of(plan), painted and painted[0]
-    return UnitTask(ref, plan.level, channel.index, given, directory, index), key
+    ref, index = source_of(plan, channel), painted and painted[0]
+    return UnitTask(ref, plan.level_of(channel), channel.index, given, directory, index), key
 
 
 def _around(field: LatticeField | None, box: Box) -> LatticeField | None:
     return None if field is None else field.around(box)
 
 
-def _input_key(plan: Plan) -> list[Any]:
+def _input_key(plan: Plan, channel: Channel) -> list[Any]:
+    if channel.source:
+        return [channel.fingerprint, 0, plan.spacing_um, plan.origin_um, 0]
     return [plan.fingerprint, plan.level, plan.spacing_um, plan.origin_um, plan.settings.plan.time]
 
 

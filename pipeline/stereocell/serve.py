@@ -1,162 +1,165 @@
-"""Serve a built bundle on this machine alone, with HTTP byte ranges, for `stereocell view`.
+"""Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
-The standard library's file handler knows no ranges, by which the viewer fetches single mip levels
-(RFC 9110, section 14), and none of our dependencies serves files with them; hence this small
-handler. It listens on 127.0.0.1 only, answers GET and HEAD only, refuses every path that leads out
-of the directory (also by a symbolic link) and requests that name another host (DNS rebinding).
+The static bundle stands by itself and works on any web host; here it is served with byte ranges,
+and beside it the websocket `/bricks` sends volumes by view (serve_bricks.py). On localhost, or with
+`--lan` to the network: then by TLS, and to holders of a token only (serve_access.py). Nothing is
+logged but faults of the program itself and of the bundle.
 """
 
-import re
+import logging
+import signal
+import socket
+import ssl
+import sys
 import webbrowser
-from contextlib import suppress
-from functools import partial
-from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
-from urllib.parse import unquote, urlsplit
 
-from rich.console import Console
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp
 
 from stereocell.errors import StereoCellError
+from stereocell.serve_access import Access, Gate
+from stereocell.serve_bricks import BrickEndpoint
+from stereocell.serve_files import BundleFiles
+from stereocell.serve_lan import draw_qr, explain, find_addresses, find_names, make_certificate
+from stereocell.serve_library import BrickLibrary
+from stereocell.serve_limits import MESSAGE_BYTES
 
-HOST = "127.0.0.1"
-_OWN_NAMES = {HOST, "localhost"}  # any port: it may be forwarded
-_TYPES = {
-    ".css": "text/css; charset=utf-8",
-    ".glb": "model/gltf-binary",
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".ktx2": "image/ktx2",
-    ".png": "image/png",
-    ".svg": "image/svg+xml",
-    ".wasm": "application/wasm",
-    ".webmanifest": "application/manifest+json",
-}
-_RANGE = re.compile(r"bytes=(\d*)-(\d*)")
-_BLOCK = 1 << 16
+LOCALHOST = "127.0.0.1"
+_OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
+_STOP_S = 3  # for what is under way when the server is stopped
 
 
-def serve(directory: Path, port: int, open_browser: bool) -> None:
-    """Serve the bundle in `directory` until Ctrl+C; port 0 takes a free one.
+def serve(out: Path, port: int, lan: bool, open_browser: bool) -> None:
+    """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one.
 
-    Raises StereoCellError if there is no bundle, or the port is taken.
+    Raises StereoCellError if there is no bundle, the port is taken, or there is no network.
     """
-    with make_server(directory, port) as server:
-        address = f"http://localhost:{server.server_port}/"
-        Console().print(f"{address} shows {directory}; Ctrl+C ends it", soft_wrap=True)
-        if open_browser:
-            webbrowser.open(address)
-        with suppress(KeyboardInterrupt):
-            server.serve_forever()
-
-
-def make_server(directory: Path, port: int) -> ThreadingHTTPServer:
-    """Return a bound server of the bundle in `directory`; the caller runs and closes it.
-
-    Raises StereoCellError if there is no bundle, or the port is taken.
-    """
-    for name in ("manifest.json", "index.html"):
-        if not (directory / name).is_file():
-            raise StereoCellError(
-                f"{directory / name}: expected a built bundle, found no such file; "
-                "`stereocell bundle OUT` writes it"
-            )
+    server = BundleServer(out, port, lan)
+    print(f"{server.address} shows {out / 'bundle'}; Ctrl+C ends it", flush=True)
+    server.invite()
+    if open_browser:
+        webbrowser.open(server.address)
+    before = signal.signal(signal.SIGTERM, lambda *_: None)  # uvicorn ends by it, then repeats it
     try:
-        return ThreadingHTTPServer((HOST, port), partial(_Handler, root=directory.resolve()))
+        with suppress(KeyboardInterrupt):
+            server.run()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def make_app(
+    out: Path, names: tuple[str, ...], gate: Gate | None, library: BrickLibrary | None = None
+) -> ASGIApp:
+    """Return the application: OUT/bundle's files, and `/bricks`.
+
+    names  the hosts that it answers to
+    gate   who may ask on the LAN; None: everybody on this machine
+    """
+    endpoint = BrickEndpoint(library or BrickLibrary(out / "bundle", out / "bricks"))
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        yield
+        endpoint.close()
+
+    return Starlette(
+        routes=[
+            WebSocketRoute("/bricks", endpoint.talk),
+            Route("/{path:path}", BundleFiles(out / "bundle").answer, methods=["GET"]),
+        ],
+        middleware=[Middleware(Access, names=names, gate=gate)],
+        lifespan=lifespan,
+    )
+
+
+class BundleServer:
+    """A bound server: `address` is where it listens; run() until stop()."""
+
+    def __init__(self, out: Path, port: int, lan: bool) -> None:
+        """Raises StereoCellError if there is no bundle, the port is taken, or no network."""
+        bundle = out / "bundle"
+        for name in ("manifest.json", "index.html"):
+            if not (bundle / name).is_file():
+                raise StereoCellError(
+                    f"{bundle / name}: expected a built bundle, found no such file; "
+                    "`stereocell bundle OUT` writes it"
+                )
+        names: tuple[str, ...] = _OWN_NAMES
+        self.gate: Gate | None = None
+        self.fingerprint = ""
+        context: ssl.SSLContext | None = None
+        host, scheme = "localhost", "http"
+        if lan:
+            addresses = find_addresses()
+            names = tuple(find_names(addresses))
+            context, self.fingerprint = make_certificate(names)
+            self.gate = Gate(self.invite)
+            host, scheme = addresses[0], "https"
+        self._socket = _bind("0.0.0.0" if lan else LOCALHOST, port)
+        self.port: int = self._socket.getsockname()[1]
+        self.address = f"{scheme}://{host}:{self.port}/"
+        config = uvicorn.Config(
+            make_app(out, names, self.gate),
+            log_config=None,
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            http="h11",
+            ws="websockets-sansio",
+            ws_max_size=MESSAGE_BYTES,
+            ws_per_message_deflate=False,  # bricks are compressed
+            timeout_graceful_shutdown=_STOP_S,
+        )
+        config.load()
+        config.ssl = context
+        logging.getLogger("uvicorn.error").addFilter(_is_ours)
+        self._server = uvicorn.Server(config)
+
+    @property
+    def has_started(self) -> bool:
+        """Whether it answers."""
+        return self._server.started
+
+    def invite(self) -> None:
+        """Print the QR code for the next device on the LAN, and what to make of its warning."""
+        if self.gate is not None:
+            code = draw_qr(f"{self.address}?token={self.gate.token}")
+            print(explain(self.address, self.fingerprint, code), flush=True)
+
+    def run(self) -> None:
+        """Answer until stop(), or a signal in the main thread."""
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            self._socket.close()
+
+    def stop(self) -> None:
+        """Have run() end soon; may be called from any thread."""
+        self._server.should_exit = True
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        if sys.platform != "win32":  # there it would take a port that is in use
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(128)
     except (OSError, OverflowError) as error:
+        listener.close()
         raise StereoCellError(
             f"port {port}: {error}; choose another, or 0 for a free one"
         ) from error
+    return listener
 
 
-def parse_range(header: str, size: int) -> range | None:
-    """Return the bytes that a Range header asks for, clipped to a file of `size` bytes.
-
-    An empty range can't be satisfied. None: the header is to be ignored (it is malformed, in
-    another unit, or asks for several ranges, which a server may answer with the whole file).
-    """
-    match = _RANGE.fullmatch(header.strip())
-    if match is None:
-        return None
-    first, last = match.groups()
-    if first:
-        if last and int(last) < int(first):
-            return None
-        return range(int(first), min(int(last) + 1, size) if last else size)
-    if last:
-        return range(max(0, size - int(last)), size)
-    return None
-
-
-class _Handler(BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
-    server_version = "stereocell"
-
-    def __init__(self, *args: object, root: Path) -> None:
-        self.root = root
-        super().__init__(*args)  # type: ignore[arg-type]
-
-    def do_GET(self) -> None:
-        self._answer(with_body=True)
-
-    def do_HEAD(self) -> None:
-        self._answer(with_body=False)
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Say nothing: hundreds of tiles would hide the one line that matters."""
-
-    def _answer(self, with_body: bool) -> None:
-        # A browser that no longer wants a tile closes the connection in the middle of it.
-        with suppress(ConnectionError):
-            if self.headers.get("Host", "").rsplit(":", 1)[0] not in _OWN_NAMES:
-                self.send_error(HTTPStatus.FORBIDDEN, "this server answers to localhost only")
-                return
-            path = self._find()
-            if path is None:
-                self.send_error(HTTPStatus.NOT_FOUND)
-                return
-            with path.open("rb") as file:
-                self._send(path, file, with_body)
-
-    def _find(self) -> Path | None:
-        """Return the file that the request names; None: there is none inside the root."""
-        name = unquote(urlsplit(self.path).path)
-        if "\0" in name:
-            return None
-        path = (self.root / name.lstrip("/")).resolve()
-        if path.is_dir():
-            path = (path / "index.html").resolve()
-        if not path.is_relative_to(self.root) or not path.is_file():
-            return None
-        return path
-
-    def _send(self, path: Path, file: BinaryIO, with_body: bool) -> None:
-        size = path.stat().st_size
-        asked = parse_range(self.headers["Range"], size) if "Range" in self.headers else None
-        if asked is not None and len(asked) == 0:
-            self.send_response(HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE)
-            self.send_header("Content-Range", f"bytes */{size}")
-            self.send_header("Content-Length", "0")
-            self.end_headers()
-            return
-        part = range(size) if asked is None else asked
-        self.send_response(HTTPStatus.OK if asked is None else HTTPStatus.PARTIAL_CONTENT)
-        self.send_header("Content-Type", _TYPES.get(path.suffix, "application/octet-stream"))
-        self.send_header("Content-Length", str(len(part)))
-        if asked is not None:
-            self.send_header("Content-Range", f"bytes {part.start}-{part.stop - 1}/{size}")
-        self.send_header("Accept-Ranges", "bytes")
-        self.send_header("Cache-Control", "no-cache")  # the bundle may be built anew meanwhile
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.end_headers()
-        if with_body:
-            self._copy(file, part)
-
-    def _copy(self, file: BinaryIO, part: range) -> None:
-        file.seek(part.start)
-        left = len(part)
-        while left > 0 and (block := file.read(min(_BLOCK, left))):
-            self.wfile.write(block)
-            left -= len(block)
+def _is_ours(record: logging.LogRecord) -> bool:
+    """Leave out tracebacks of frames that a client got wrong: it was closed with a code."""
+    fault = record.exc_info[1] if record.exc_info else None
+    return not isinstance(fault, UnicodeDecodeError)

@@ -4,27 +4,35 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from stereocell import read
-from stereocell.plan import Plan
+from stereocell.plan import Channel, Plan
 
 
 @dataclass(frozen=True, slots=True)
 class SourceRef:
-    """An address and what was asked of it; (z, y, x) spacing in um, or empty for the file's own."""
+    """An address and what was asked of it.
+
+    spacing_um  (z, y, x), or empty for the file's own
+    series      of DICOM, from 1; 0: the largest
+    """
 
     source: str
     time: int
     spacing_um: tuple[float, ...]
+    series: int = 0
 
 
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
     if not ref.spacing_um:
-        return read.open(ref.source, time=ref.time)
+        return read.open(ref.source, time=ref.time, series=ref.series)
     z, y, x = ref.spacing_um
-    return read.open(ref.source, time=ref.time, spacing_um=(z, y, x))
+    return read.open(ref.source, time=ref.time, spacing_um=(z, y, x), series=ref.series)
 
 
-def source_of(plan: Plan) -> SourceRef:
-    """Return the reference to a plan's source."""
-    return SourceRef(plan.source, plan.settings.plan.time, plan.settings.plan.spacing_um)
+def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
+    """Return the reference to a plan's source, or to that of one of its channels."""
+    if channel is not None and channel.source:
+        return SourceRef(channel.source, 0, ())
+    options = plan.settings.plan
+    return SourceRef(plan.source, options.time, options.spacing_um, options.series)

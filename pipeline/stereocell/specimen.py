@@ -1,6 +1,6 @@
 """What the stages make of a volume, and the stage writer takes: looks, and the content of tiles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,6 +14,32 @@ APRON = 1  # voxels around the lattice's on every side of a volume: what triline
 # on a channel's surface; `unclear`: built where a level was found, and nothing to rely on
 Verdict = Literal["clear", "unclear", "none"]
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
+DEFAULT_GRADIENT_MAX = 0.5  # the fallback in schemas/usd: half of the window over two voxels
+ShapeKind = Literal["rectangle", "triangle"]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One shape of a 2D transfer function; see transfer2d.py and docs/transfer-functions.md.
+
+    values     its ends, 0..1 in the window; a triangle's at `gradients[1]`
+    gradients  its ends, 0..1 of the channel's gradient_max
+    tip        the value, 0..1, at which a triangle's sides meet at gradient 0; a rectangle has none
+    color      linear RGB 0..1, a factor to the channel's colour
+    opacity    0..1, what one finest voxel spacing absorbs
+    softness   0..1, the share of the way from its edges to its middle over which opacity rises
+    """
+
+    kind: ShapeKind
+    values: tuple[float, float]
+    gradients: tuple[float, float]
+    tip: float
+    color: tuple[float, float, float]
+    opacity: float
+    softness: float
+
+
+Shapes = tuple[Shape, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +53,9 @@ class Look:
     surface           the verdict on it
     painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
+    shapes            of those functions that are two-dimensional, by name
+    gradient_max      the gradient magnitude that is 1 to shapes; see histogram2d.py
+    threshold         where the body begins, in voxel values; see threshold.py; None: none was found
     """
 
     name: str
@@ -37,6 +66,9 @@ class Look:
     surface: Verdict
     transfer_functions: dict[str, OpacityPoints]
     painted_by: str = ""
+    shapes: dict[str, Shapes] = field(default_factory=dict)
+    gradient_max: float = DEFAULT_GRADIENT_MAX
+    threshold: float | None = None
 
     @property
     def id(self) -> str:
@@ -45,8 +77,18 @@ class Look:
     @property
     def iso_normalized(self) -> float | None:
         """The iso-value on the window's scale, 0..1."""
-        low, high = self.window
-        return None if self.iso_value is None else (self.iso_value - low) / (high - low)
+        return normalized(self.iso_value, self.window)
+
+    @property
+    def threshold_normalized(self) -> float | None:
+        """The threshold on the window's scale, 0..1."""
+        return normalized(self.threshold, self.window)
+
+
+def normalized(value: float | None, window: tuple[float, float]) -> float | None:
+    """Return a voxel value on a window's scale: 0 is its lower end, 1 its upper."""
+    low, high = window
+    return None if value is None else (value - low) / (high - low)
 
 
 @dataclass(frozen=True, slots=True)

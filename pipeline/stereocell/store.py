@@ -150,6 +150,8 @@ def _what_differs(there: Plan, plan: Plan) -> str:
     old, new = there.settings.plan, plan.settings.plan
     if there.source == plan.source and old.time != new.time:
         return f"{there.name!r} with --time {old.time}, not {new.time}"
+    if there.source == plan.source and old.series != new.series:
+        return f"{there.name!r} with --series {old.series}, not {new.series}"
     if there.source == plan.source and old.spacing_um != new.spacing_um:
         return f"{there.name!r} with {_spacing(old.spacing_um)}, not {_spacing(new.spacing_um)}"
     return (

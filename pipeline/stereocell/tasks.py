@@ -11,12 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.arcs import Proposal, propose
 from stereocell.background import find_background
 from stereocell.config import Settings
 from stereocell.denoise import denoise
 from stereocell.documents import write_json
 from stereocell.errors import NoSurfaceError
-from stereocell.isovalue import IsoValue, IsoValueOptions, find_iso_value
+from stereocell.histogram2d import (
+    COLUMNS,
+    FINE_ROWS,
+    STEEPEST,
+    count_joint,
+    sample_boxes,
+    to_eight_bits,
+)
+from stereocell.isovalue import ADAPTIVE, IsoValue, IsoValueOptions, find_iso_value
 from stereocell.latticefield import LatticeField
 from stereocell.read import Dataset
 from stereocell.sources import SourceRef, open_source
@@ -28,6 +37,7 @@ from stereocell.volume import Volume
 from stereocell.wrap import sum_solids
 
 SURVEY_VOXELS = 16_000_000  # a channel's window is found on at most about so many
+JOINT_VOXELS = 8_000_000  # and its boundaries on so many at full resolution
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +48,7 @@ class DisplayTask:
     region: Box
     settings: Settings
     subtracts: bool  # a background
+    window: tuple[float, float] | None = None  # None: it is found
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +103,19 @@ def run_display(task: DisplayTask) -> Display:
             dataset.levels[task.level].spacing_um,
             float(surface.background_um),
         )
-    return find_display(voxels, task.settings.window, background)
+    display = find_display(voxels, task.settings.window, background, task.window)
+    return replace(display, proposal=_propose(task, dataset, display.window))
+
+
+def _propose(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -> Proposal:
+    """Return a 2D function from blocks of the level that is built: coarse ones have no edges."""
+    spacing = dataset.levels[task.level].spacing_um
+    fine = np.zeros((FINE_ROWS, COLUMNS), np.int64)
+    for box in sample_boxes(task.region, JOINT_VOXELS):
+        around = box.grown((1, 1, 1), task.region)
+        voxels = dataset.read(task.channel, around, task.level).voxels
+        fine += count_joint(to_eight_bits(voxels, window), spacing, STEEPEST, FINE_ROWS)
+    return propose(fine)
 
 
 def _voxels(task: DisplayTask, dataset: Dataset, level: int) -> int:
@@ -154,6 +177,8 @@ def _find(task: IsoTask) -> dict[str, Any]:
         "value": None, "confidence": 0.0, "reason": "", "background": field.below
     }  # fmt: skip
     try:
+        if task.given is None and task.settings.isovalue.criterion == ADAPTIVE:
+            raise NoSurfaceError("the channel's histogram has no peak: it has no threshold")
         found = field.find_iso_value(task.settings.isovalue)
     except NoSurfaceError as error:
         result["reason"] = str(error)

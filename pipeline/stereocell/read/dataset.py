@@ -5,13 +5,13 @@ import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from stereocell.errors import SourceError, UsageError
+from stereocell.placement import IDENTITY, Matrix
 from stereocell.read.faults import one_line
 from stereocell.read.fingerprint import fingerprint_of
 from stereocell.read.spacing import Level
@@ -33,6 +33,18 @@ class ChannelInfo:
     is_named: bool = True
 
 
+class StoredArray(Protocol):
+    """What a Zarr array and a WholeArray have in common."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def chunks(self) -> tuple[int, ...]: ...
+    @property
+    def dtype(self) -> Any: ...
+    def __getitem__(self, key: Any, /) -> Any: ...
+
+
 @dataclass(frozen=True, slots=True)
 class VoxelArray:
     """One level's voxels as they are stored.
@@ -41,7 +53,7 @@ class VoxelArray:
           stands for a dimension of length 1
     """
 
-    array: zarr.Array[Any]
+    array: StoredArray
     axes: tuple[str, ...]
 
     @property
@@ -77,12 +89,17 @@ class VoxelArray:
 class Dataset:
     """One image of a source at one time point.
 
-    name         the file's name without its suffix, to show
-    dtype        uint8, uint16 or float32
+    name         to show: the file's name without its suffix, or for DICOM and NIfTI, whose names
+                 may tell whose they are, what kind of image it is
+    dtype        uint8, uint16, int16 or float32
     levels       finest first
     channels     in the source's order
     time_points  how many the source holds; `time` is the one that is read
     images       how many the source holds; the first is the one that is read
+    modality     what took it, as DICOM calls it: `MR`, `CT`, ...; empty: not known
+    placement    rows of a (4, 4) matrix for columns, um: from the world in which the centre of
+                 voxel (0, 0, 0) is the origin (volume.zyx_to_xyz) to the patient's; see anatomy.py
+    remarks      what the reader changed or left out, a sentence each
     """
 
     source: str
@@ -96,6 +113,9 @@ class Dataset:
     arrays: tuple[VoxelArray, ...] = field(repr=False)
     shown: str = field(repr=False)  # the source without secrets, for messages
     on_close: Callable[[], None] | None = field(repr=False, default=None)
+    modality: str = ""
+    placement: Matrix = IDENTITY
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.on_close is not None:
@@ -103,8 +123,8 @@ class Dataset:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the source is left out, a sentence each, for the user."""
-        notes = []
+        """What of the source is left out or changed, a sentence each, for the user."""
+        notes = list(self.remarks)
         if self.images > 1:
             notes.append(f"{self.images} images in the source; building the first alone")
         if self.time_points > 1:

@@ -29,6 +29,8 @@ def fingerprint_of(dataset: "Dataset") -> str:
         "time": dataset.time,
         "levels": [[level.shape, level.spacing_um, level.origin_um] for level in dataset.levels],
         "channels": [[channel.name, channel.color] for channel in dataset.channels],
+        "modality": dataset.modality,
+        "placement": dataset.placement,
     }
     digest = hashlib.sha256(json.dumps(metadata, sort_keys=True).encode())
     last = len(dataset.levels) - 1

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from stereocell.placement import IDENTITY, Matrix
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 
@@ -17,6 +18,8 @@ class Image:
     names, colors  one for each channel; None: not said. Colours are linear RGB, 0..1
     images         how many the source holds
     close          frees open files, or None
+    title          what the image is called in place of its file's name; None: by the file
+    modality, placement, notes  as in Dataset, whose `remarks` the notes are
     """
 
     arrays: tuple[VoxelArray, ...]
@@ -25,6 +28,10 @@ class Image:
     colors: tuple[Color | None, ...]
     images: int
     close: Callable[[], None] | None = None
+    title: str | None = None
+    modality: str = ""
+    placement: Matrix = IDENTITY
+    notes: tuple[str, ...] = ()
 
 
 def linear_color(rgb: tuple[int, int, int]) -> Color:

@@ -14,6 +14,8 @@ from stereocell.errors import UsageError
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
 _TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
+_NIFTI_SUFFIXES = (".nii", ".nii.gz")
+_DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
@@ -70,13 +72,23 @@ class Location:
 
     @property
     def format(self) -> str | None:
-        """`ome-zarr`, `ome-tiff`, or None where neither the name nor the folder tells."""
+        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content tells.
+
+        DICOM is any other folder on this machine, and a file that says so in its first bytes.
+        """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
         if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
             return "ome-tiff"
         if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
             return "ome-zarr"
+        if not self.is_local or not self.parts:
+            return None
+        if self.parts[-1].lower().endswith(_NIFTI_SUFFIXES):
+            return "nifti"
+        is_named = self.parts[-1].lower().endswith(_DICOM_SUFFIXES)
+        if is_named or os.path.isdir(self.source) or _begins_as_dicom(self.source):
+            return "dicom"
         return None
 
     @property
@@ -114,6 +126,16 @@ def require_apart(source: str | Path, out: Path) -> None:
             f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
             "it would write into the data"
         )
+
+
+def _begins_as_dicom(path: str) -> bool:
+    if not os.path.isfile(path):
+        return False
+    try:
+        with open(path, "rb") as file:
+            return file.read(132)[128:] == b"DICM"
+    except OSError:
+        return False
 
 
 def _stem(name: str) -> str:

@@ -12,7 +12,7 @@ from stereocell.read.image import Image
 from stereocell.read.location import Location
 from stereocell.read.spacing import Triple, levels_of
 
-DTYPES = ("uint8", "uint16", "float32")
+DTYPES = ("uint8", "uint16", "int16", "float32")
 MAX_CHUNK_BYTES = 4 << 30  # a chunk is decoded whole: a header that asks for more is refused
 
 
@@ -28,27 +28,54 @@ def _open_tiff(location: Location) -> Image:
     return read_image(location)
 
 
-READERS: dict[str, Callable[[Location], Image]] = {"ome-zarr": _open_zarr, "ome-tiff": _open_tiff}
+def _open_nifti(location: Location) -> Image:
+    from stereocell.read.nifti import read_image
+
+    return read_image(location)
 
 
-def open(source: str | Path, *, time: int = 0, spacing_um: Triple | None = None) -> Dataset:
-    """Open OME-Zarr 0.4 or 0.5, or OME-TIFF; no voxels are read yet.
+READERS: dict[str, Callable[[Location], Image]] = {
+    "ome-zarr": _open_zarr,
+    "ome-tiff": _open_tiff,
+    "nifti": _open_nifti,
+}
 
-    `source` is a local path or an address (`http://`, `https://`, `s3://`, or another one that
-    fsspec knows). `time` is the time point, from 0. `spacing_um` (z, y, x) replaces the voxel
-    spacing that the source states. Raises SourceError for a source that can't be read as a volume
-    (one line: what, where, what was expected), UsageError for a time point that it doesn't hold
-    or a spacing that is no length.
+
+def open(
+    source: str | Path, *, time: int = 0, spacing_um: Triple | None = None, series: int = 0
+) -> Dataset:
+    """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
+
+    No voxels are read yet; of DICOM at most slices that lie at one place, to tell copies.
+
+    `source` is a local path (DICOM and NIfTI only that) or an address (`http://`, `https://`,
+    `s3://`, or another one that fsspec knows). `time` is the time point, from 0. `spacing_um`
+    (z, y, x) replaces the voxel spacing that the source states. `series` picks one of DICOM's, from
+    1 as `list_series` counts; 0 is the largest.
+
+    Raises SourceError for a source that can't be read as a volume (one line: what, where, what was
+    expected), UsageError for a time point or a series that it doesn't hold, or a spacing that is no
+    length.
     """
     location = Location.of(source)
     if location.is_local and not Path(location.source).exists():
-        raise SourceError(f"{location.shown}: not found, expected an OME-Zarr or OME-TIFF file")
+        raise SourceError(
+            f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
+        )
     if location.format is None:
         raise SourceError(
             f"{location.shown}: unknown format, "
-            "expected OME-Zarr (NAME.zarr) or OME-TIFF (NAME.ome.tif)"
+            "expected OME-Zarr (NAME.zarr), OME-TIFF (NAME.ome.tif), NIfTI (NAME.nii, NAME.nii.gz) "
+            "or DICOM (a folder or a file, on this machine)"
         )
-    image = READERS[location.format](location)
+    if location.format == "dicom":
+        from stereocell.read.dicom import read_image
+
+        image = read_image(location, series)
+    elif series:
+        raise UsageError(f"{location.shown}: --series {series}: only DICOM holds series")
+    else:
+        image = READERS[location.format](location)
     try:
         return _dataset(location, image, time, spacing_um)
     except BaseException:
@@ -70,7 +97,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
         source=location.source,
-        name=location.name,
+        name=image.title or location.name,
         dtype=np.dtype(finest.array.dtype).newbyteorder("="),
         levels=levels_of(image.grids, spacing_um, where),
         channels=tuple(channels),
@@ -80,7 +107,24 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         arrays=image.arrays,
         shown=where,
         on_close=image.close,
+        modality=image.modality,
+        placement=image.placement,
+        remarks=image.notes,
     )
+
+
+def list_series(source: str | Path) -> tuple[str, ...]:
+    """Return a line for each series of a DICOM folder or file; line i is `series` = i.
+
+    A line holds modality, orientation, size and spacing, nothing that the files describe
+    themselves by. Raises SourceError, UsageError for a source of another format.
+    """
+    location = Location.of(source)
+    if location.format != "dicom":
+        raise UsageError(f"{location.shown}: --series list: expected DICOM, which holds series")
+    from stereocell.read.dicom import list_series as list_all
+
+    return list_all(location)
 
 
 def _check_arrays(where: str, image: Image) -> None:

@@ -2,5 +2,6 @@
 
 from stereocell.samples.brain_cells import write_brain_cells
 from stereocell.samples.cycif import write_cycif
+from stereocell.samples.head_dicom import write_head
 
-__all__ = ["write_brain_cells", "write_cycif"]
+__all__ = ["write_brain_cells", "write_cycif", "write_head"]

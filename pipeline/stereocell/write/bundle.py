@@ -2,6 +2,7 @@
 
     manifest.json  files.json                      written last: they hash all others
     channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb
+                       transfer2d.json  histogram2d.ktx2
     volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
     luts/<channel>.ktx2
     index.html  assets/                            the viewer
@@ -23,7 +24,14 @@ from stereocell.errors import OutputError, StageError
 from stereocell.specimen import evaluate
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
-from stereocell.write.composed import hinted_box, open_stage, specimen_name, tile_prims
+from stereocell.write.bundle_transfer2d import describe, encode_histogram, sum_tiles
+from stereocell.write.composed import (
+    hinted_box,
+    modality_of,
+    open_stage,
+    specimen_name,
+    tile_prims,
+)
 from stereocell.write.composed_look import ComposedLook, read_looks
 from stereocell.write.generator import GENERATOR
 from stereocell.write.gltf import choose_step
@@ -85,7 +93,11 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine
         "format": "stereocell-bundle",
         "version": 1,
         "generator": GENERATOR,
-        "specimen": {"name": specimen_name(stage), "bounds_um": _bounds(tiles)},
+        "specimen": {
+            "name": specimen_name(stage),
+            "modality": modality_of(stage),
+            "bounds_um": _bounds(tiles),
+        },
         "tiles": [
             {"id": tile.id, "representation": tile.representation, "bounds_um": _bounds([tile])}
             for tile in tiles
@@ -108,6 +120,10 @@ def _write_channel(
     entries = [channel.volume for _, channel in tiles if channel.volume is not None]
     volumes = write_file(root, f"{folder}/volumes.json", _compact({"volumes": entries}))
     lut = write_file(root, f"luts/{look.id}.ktx2", encode_2d(_bake(look)).data)
+    counts = sum_tiles(channel.joint for _, channel in tiles if channel.joint is not None)
+    histogram = write_file(root, f"{folder}/histogram2d.ktx2", encode_histogram(counts))
+    joint = _compact(describe(look, counts, asdict(histogram)))
+    transfer2d = write_file(root, f"{folder}/transfer2d.json", joint)
     entry = {
         "id": look.id,
         "name": look.name,
@@ -115,15 +131,18 @@ def _write_channel(
         "window": list(look.window),
         "iso_value": look.iso_value,
         "iso_normalized": look.iso_normalized,
+        "threshold_normalized": look.threshold_normalized,
         "surface": "none" if tileset is None else look.surface,
         "transfer_function": look.chosen,
         "transfer_functions": list(look.transfer_functions),
+        "transfer_functions_2d": {"names": list(look.shapes), "file": asdict(transfer2d)},
         "lut": asdict(lut),
         "tileset": None if tileset is None else asdict(tileset),
         "triangles": _totals([channel.triangles for _, channel in tiles]),
         "volumes": asdict(volumes),
     }
-    return entry, [ref for ref in (tileset, volumes, lut) if ref is not None]
+    written = (tileset, volumes, lut, histogram, transfer2d)
+    return entry, [ref for ref in written if ref is not None]
 
 
 def _bake(look: ComposedLook) -> np.ndarray[Any, np.dtype[np.uint8]]:

@@ -15,6 +15,7 @@ from stereocell.bricks import min_max_bricks, mip_levels
 from stereocell.errors import StageError
 from stereocell.mesh import Mesh
 from stereocell.write.atomic import write_bytes
+from stereocell.write.bundle_transfer2d import count_tile
 from stereocell.write.composed import (
     ComposedLod,
     ComposedVolume,
@@ -23,7 +24,6 @@ from stereocell.write.composed import (
     open_stage,
     read_lods,
     read_volume,
-    world_box,
 )
 from stereocell.write.composed_choice import Representation
 from stereocell.write.composed_look import ComposedLook
@@ -37,6 +37,7 @@ from stereocell.write.ktx2 import (
     encode_occlusion_map,
 )
 from stereocell.write.tiles3d import TileLod
+from stereocell.write.usd_layer import move_box
 
 _COARSE_STEPS = 16  # of the lattice, to one of the coarsest LODs': some 3/4 of a large tile's voxel
 _UM_PER_METRE = 1e6
@@ -59,6 +60,7 @@ class TileChannel:
     triangles  by level of detail; levels finer than the finest have as many as that
     volume     its entry in volumes.json, or None
     files      all that was written
+    joint      the volume's histogram of value and gradient, packed; see bundle_transfer2d.py
     """
 
     channel_id: str
@@ -66,6 +68,7 @@ class TileChannel:
     triangles: tuple[int, ...]
     volume: dict[str, Any] | None
     files: tuple[FileRef, ...]
+    joint: bytes | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +102,7 @@ def export_tile(
         for look in looks:
             volume = read_volume(tile, look.id)
             if volume is not None:
-                boxes.append(world_box(np.array(volume.low), np.array(volume.high), volume.matrix))
+                boxes.append(move_box(np.array(volume.low), np.array(volume.high), volume.matrix))
             channels.append(_export_channel(root, tile, look, volume, choice.finest_lod, step_m))
         low, high = (
             np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True)
@@ -140,11 +143,11 @@ def _export_channel(
         file = write_file(root, f"channels/{channel_id}/{uri}", glb.data)
         files.append(file)
         lods.append(TileLod(uri, file.sha256, lod.distance_um, glb.min_m, glb.max_m))
-    entry = None
+    entry = joint = None
     if volume is not None:
-        entry, written = _export_volume(root, tile.GetName(), look, volume)
+        entry, written, joint = _export_volume(root, tile.GetName(), look, volume)
         files += written
-    return TileChannel(channel_id, tuple(lods), tuple(triangles), entry, tuple(files))
+    return TileChannel(channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint)
 
 
 def _bare(lod: ComposedLod, step_m: float) -> ComposedLod:
@@ -218,7 +221,7 @@ def _read_image(path: Path) -> NDArray[np.uint8]:
 
 def _export_volume(
     root: Path, tile_id: str, look: ComposedLook, volume: ComposedVolume
-) -> tuple[dict[str, Any], list[FileRef]]:
+) -> tuple[dict[str, Any], list[FileRef], bytes]:
     voxels = read_atlas(volume.atlas)
     if voxels.shape != volume.size[::-1]:
         found = tuple(voxels.shape[::-1])
@@ -252,7 +255,7 @@ def _export_volume(
             for level in texture.levels
         ],
     }
-    return entry, files
+    return entry, files, count_tile(voxels, volume, look.gradient_max)
 
 
 def _point(values: Any) -> Point:

@@ -30,7 +30,7 @@ from stereocell.write.composed_values import (
     value_of,
 )
 from stereocell.write.gltf import Material
-from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES
+from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, move_box
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +102,12 @@ def specimen_name(stage: Usd.Stage) -> str:
     return str(root.GetDisplayName() or root.GetName())
 
 
+def modality_of(stage: Usd.Stage) -> str:
+    """Return what took the specimen, `MR` or the like; empty: the stage does not say."""
+    attribute = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality")
+    return str((attribute.Get() if attribute else None) or "")
+
+
 def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:
     """Return the tiles that are active and visible, loaded or not, in the stage's order."""
     kept = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
@@ -117,7 +123,7 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
     hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
     if not hint:
         raise StageError(f"{tile.GetPath()}.extentsHint: no value")
-    return world_box(np.array(hint[0]), np.array(hint[1]), _to_world(tile))
+    return move_box(np.array(hint[0]), np.array(hint[1]), _to_world(tile))
 
 
 @contextmanager
@@ -190,15 +196,6 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
         point_of(value_of(prim, "stereocell:boundsMax")),
         _to_world(prim),
     )
-
-
-def world_box(
-    low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the box along the world's axes around a box moved by a matrix for row vectors."""
-    picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
-    corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
-    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _check_composition(stage: Usd.Stage) -> None:

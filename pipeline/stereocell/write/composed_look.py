@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdShade
 
 from stereocell.errors import StageError
-from stereocell.specimen import OpacityPoints, Verdict
+from stereocell.specimen import OpacityPoints, Shapes, Verdict, normalized
 from stereocell.write.composed_maps import feeder
+from stereocell.write.composed_shapes import read_gradient_max, read_shapes
 from stereocell.write.composed_values import (
     color_of,
     select_variant,
@@ -33,6 +34,9 @@ class ComposedLook:
     volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
     surface        the verdict on it
     chosen         a transfer function
+    shapes         of those functions that are two-dimensional, by name
+    gradient_max   the gradient magnitude that is 1 to shapes
+    threshold      where the body begins, in voxel values; None: it is not known
     """
 
     id: str
@@ -44,12 +48,20 @@ class ComposedLook:
     surface: Verdict
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
+    shapes: dict[str, Shapes]
+    gradient_max: float
+    threshold: float | None = None
 
     @property
     def iso_normalized(self) -> float | None:
         """The iso-value on the window's scale; outside 0..1 where the window leaves it out."""
-        low, high = self.window
-        return None if self.iso_value is None else (self.iso_value - low) / (high - low)
+        return normalized(self.iso_value, self.window)
+
+    @property
+    def threshold_normalized(self) -> float | None:
+        """The threshold on the window's scale, 0..1: one beyond its ends is drawn at the end."""
+        share = normalized(self.threshold, self.window)
+        return None if share is None else min(max(share, 0.0), 1.0)
 
     def window_voxels(self, voxels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a volume of the stage, uint8 by `volume_window`, as uint8 by `window`."""
@@ -97,12 +109,13 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
     variants = prim.GetVariantSet("transferFunction")
     chosen = variants.GetVariantSelection() or DEFAULT_FUNCTION
     names = sorted(variants.GetVariantNames(), key=lambda name: (name != DEFAULT_FUNCTION, name))
-    functions = {}
-    for name in names:
-        select_variant(prim, "transferFunction", name)
+    functions, shapes = {}, {}
+    for name in names or [chosen]:  # a flattened stage has what was chosen, and no variants
+        if names:
+            select_variant(prim, "transferFunction", name)
         functions[name] = _opacity_points(prim)
-    if not names:  # a flattened stage has what was chosen, and no variants
-        functions[chosen] = _opacity_points(prim)
+        if found := read_shapes(prim):
+            shapes[name] = found
     if chosen not in functions:
         raise StageError(f"{prim.GetPath()}: no transferFunction variant {chosen!r}")
     window = _window(prim, "stereocell:window")
@@ -117,6 +130,9 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
         _verdict(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
+        shapes,
+        read_gradient_max(prim),
+        _number(prim, "stereocell:threshold"),
     )
 
 

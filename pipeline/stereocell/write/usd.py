@@ -20,19 +20,23 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Kind, Sdf, Usd, UsdGeom
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
 from stereocell.assets import find_asset
+from stereocell.placement import IDENTITY, Matrix
 from stereocell.specimen import Look, Provenance, TileContent
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.usd_cameras import define_cameras
 from stereocell.write.usd_layer import (
     LAYER_SUFFIXES,
     ROOT,
+    SPECIMEN_API,
     TILES,
     export,
     is_layer,
+    move_box,
     new_stage,
+    set_attribute,
     vec3f,
     world_box,
 )
@@ -73,6 +77,9 @@ def write_stage(
     looks: Sequence[Look],
     tiles: Sequence[TileExtent],
     provenance: Provenance,
+    *,
+    modality: str = "",
+    placement: Matrix = IDENTITY,
 ) -> None:
     """Write stage.usda and looks/ over tiles that `write_tile` has written.
 
@@ -81,6 +88,8 @@ def write_stage(
     name        the specimen's, kept as the display name of /Specimen
     provenance  settings and versions, kept in the layer's customLayerData; numbers, text and
                 dictionaries as they are, anything else as JSON text
+    modality    what took the specimen (`MR`, `CT`, ...), on /Specimen; empty: not known
+    placement   where the tiles stand, on /Specimen/Tiles; where that is no move, nothing is said
 
     Raises OutputError.
     """
@@ -91,9 +100,14 @@ def write_stage(
     stage = new_stage(".usda", ROOT.name)
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
     root.SetDisplayName(name)
+    root.AddAppliedSchema(SPECIMEN_API)
+    set_attribute(root, "stereocell:modality", Sdf.ValueTypeNames.Token, modality)
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
-    group = UsdGeom.Xform.Define(stage, TILES).GetPrim()
-    Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
+    group = UsdGeom.Xform.Define(stage, TILES)
+    Usd.ModelAPI(group.GetPrim()).SetKind(Kind.Tokens.group)
+    move = np.array(placement).T  # USD's matrices are for rows
+    if placement != IDENTITY:
+        group.AddTransformOp().Set(Gf.Matrix4d(*move.ravel().tolist()))
     boxes = np.zeros((len(tiles), 2, 3))
     for box, tile in zip(boxes, tiles, strict=True):
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
@@ -106,7 +120,8 @@ def write_stage(
         every = np.array([tile.drawn_box, *extents])
         box[:] = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
-    define_cameras(stage, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
+    moved = np.array([move_box(low, high, move) for low, high in boxes])
+    define_cameras(stage, moved[:, 0].min(axis=0), moved[:, 1].max(axis=0))
 
     layer = stage.GetRootLayer()
     layer.documentation = _NOTE

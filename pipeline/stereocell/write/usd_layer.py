@@ -23,6 +23,7 @@ CHANNELS = ROOT.AppendChild("Channels")
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
 CHANNEL_API = "StereoCellChannelAPI"
+SPECIMEN_API = "StereoCellSpecimenAPI"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 
 Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
@@ -78,6 +79,15 @@ def world_box(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the lower and upper corner (x, y, z) in world of a box between points (z, y, x)."""
     corners = zyx_to_xyz(np.stack([first_um, last_um])) + 0.0  # no negative zeros
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def move_box(
+    low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the box along the world's axes around a box moved by a (4, 4) matrix for rows."""
+    picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
+    corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
     return corners.min(axis=0), corners.max(axis=0)
 
 

@@ -2,7 +2,8 @@
 
 Each channel is a material below /Specimen/Channels that the materials of all tiles inherit. The
 colour is an input of the material: the surface shader is connected to it, volume renderers and the
-bundle read it. The opacity points are the transfer function; the LUT is baked from them.
+bundle read it. The opacity points are the transfer function; the LUT is baked from them. A variant
+with shapes is a 2D function, and its opacity points what stands for it where gradients are unknown.
 
 The material has no volume output: USD ships no volume shader that renderers agree on, only
 UsdPreviewSurface. So the binding of a Volume prim to its look hands over the channel's values
@@ -17,7 +18,7 @@ from pathlib import Path
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from stereocell.specimen import Look, OpacityPoints
+from stereocell.specimen import Look, OpacityPoints, Shapes
 from stereocell.write.exr import write_lut
 from stereocell.write.usd_layer import (
     CHANNEL_API,
@@ -61,10 +62,13 @@ def _author_look(material: UsdShade.Material, look: Look) -> None:
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*look.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, look.iso_confidence)
     set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, look.surface)
+    set_attribute(prim, "stereocell:gradientMax", _Types.Float, look.gradient_max)
     if look.painted_by:
         set_attribute(prim, "stereocell:paintedBy", _Types.String, look.painted_by, custom=True)
     if look.iso_value is not None:
         set_attribute(prim, "stereocell:isoValue", _Types.Float, look.iso_value)
+    if look.threshold is not None:
+        set_attribute(prim, "stereocell:threshold", _Types.Float, look.threshold)
 
 
 def _author_surface(material: UsdShade.Material, look: Look) -> None:
@@ -89,7 +93,23 @@ def _author_functions(prim: Usd.Prim, look: Look) -> None:
             pairs = _pairs(points)
             set_attribute(prim, "stereocell:opacityPoints", _Types.Float2Array, pairs)
             set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(look, name)}")
+            if name in look.shapes:
+                _author_shapes(prim, look.shapes[name])
     variants.SetVariantSelection(DEFAULT_FUNCTION)
+
+
+def _author_shapes(prim: Usd.Prim, shapes: Shapes) -> None:
+    """Write a 2D function as parallel arrays, see docs/transfer-functions.md."""
+    boxes = [Gf.Vec4f(*shape.values, *shape.gradients) for shape in shapes]
+    colors = [Gf.Vec4f(*shape.color, shape.opacity) for shape in shapes]
+    for name, kind, values in (
+        ("shapeKinds", _Types.TokenArray, Vt.TokenArray([shape.kind for shape in shapes])),
+        ("shapes", _Types.Float4Array, Vt.Vec4fArray(boxes)),
+        ("shapeTips", _Types.FloatArray, Vt.FloatArray([shape.tip for shape in shapes])),
+        ("shapeColors", _Types.Color4fArray, Vt.Vec4fArray(colors)),
+        ("shapeSoftness", _Types.FloatArray, Vt.FloatArray([s.softness for s in shapes])),
+    ):
+        set_attribute(prim, f"stereocell:{name}", kind, values)
 
 
 def _pairs(points: OpacityPoints) -> Vt.Vec2fArray:

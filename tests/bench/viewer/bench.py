@@ -26,7 +26,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from scene import SIZE_PX, Scene, brain_cells, nuclei, reference
+from scene import SIZE_PX, Scene, brain_cells, head, nuclei, reference
 
 from reference_march import encode, path_voxels, psnr
 
@@ -82,6 +82,34 @@ def lit(scene: str) -> Run:
     return Run(
         f"{scene}-ours-lit", "ours", scene, "perspective", 1, "ours, with its light", None, True
     )
+
+
+def runs_on_head(scene: str) -> list[Run]:
+    """Return what is timed on the real MRI: whole voxels a step, and one sample of each pixel."""
+    given = [
+        ("vtk", "perspective", 1, "vtk.js, step 1"),
+        ("three", "perspective", 1, "three's example, step 1"),
+        ("niivue", "parallel", 0, "NiiVue"),
+        ("ours", "perspective", 1, "ours, with its light"),
+        ("traced", "perspective", 0, "ours, a sample of light, once"),
+        ("traced", "perspective", 1, "ours, a sample of light, many"),
+        ("ours", "narrow", 0, "ours"),
+        ("ours", "perspective", 0, "ours"),
+    ]
+    return [
+        Run(f"{scene}-{renderer}-{camera}-{setting}", renderer, scene, camera, setting, says, 1)
+        for renderer, camera, setting, says in given
+    ]
+
+
+def head_row(run: Run, timings: dict[str, Timing], folder: Path) -> str:
+    """Return a run's line of the second table: time alone, as no two draw the same light."""
+    Image.fromarray(picture_of(run, folder)).save(folder / f"{run.name}.png")
+    ms = timings[run.name]["ms"]
+    rival = timings[f"{run.scene}-ours-{RIVALS.get(run.camera, run.camera)}-0"]["ms"]
+    ratio = statistics.median(its / ours for its, ours in zip(ms, rival, strict=True))
+    median = statistics.median(ms)
+    return f"{run.scene:15} {run.says:32} {run.camera:12} {median:7.0f} {ratio:7.2f}"
 
 
 def missing() -> str | None:
@@ -143,14 +171,17 @@ def main(folder: Path) -> None:
         print(f"bench-viewer: skipped: {reason}")
         return
     folder.mkdir(parents=True, exist_ok=True)
-    scenes = {scene.name: scene for scene in (*nuclei(), brain_cells())}
+    heads = head()
+    scenes = {scene.name: scene for scene in (*nuclei(), brain_cells(), *heads)}
     for scene in scenes.values():
         scene.write(folder)
     runs = [run for name in ("nuclei_soft", "nuclei_default") for run in runs_on(name)]
     runs += [Run("brain_cells-ours", "ours", "brain_cells", "perspective", 0, "ours", None)]
     runs += [lit("brain_cells")]
+    on_heads = [run for scene in heads for run in runs_on_head(scene.name)]
     job = folder / "job.json"
-    job.write_text(json.dumps({"rounds": ROUNDS, "runs": [asdict(run) for run in runs]}))
+    asked = [asdict(run) for run in (*runs, *on_heads)]
+    job.write_text(json.dumps({"rounds": ROUNDS, "runs": asked}))
     tsx = HERE / "node_modules" / ".bin" / "tsx"
     subprocess.run([tsx, HERE / "run.ts", job, folder], check=True)
     measured: list[Timing] = json.loads((folder / "timings.json").read_text())
@@ -160,6 +191,10 @@ def main(folder: Path) -> None:
         print(f"{line[4]:>8}", *(f"{text:>7}" for text in line[5:]))
     for run in runs:
         print(row(run, scenes[run.scene], timings, folder))
+    for run in on_heads:
+        print(head_row(run, timings, folder))
+    if not heads:
+        print("the real MRI: skipped: no STEREOCELL_DATA")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ a field of view of NARROW_DEG puts it, each against the reference of its own cam
 
 import hashlib
 import json
+import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -32,6 +33,7 @@ SPACING = SPACING_UM[0]  # um, of the cubes
 BORDER = 2
 WINDOW = (0.5, 0.998)  # shares of the voxels below 0 and 1
 ISO = 0.4  # of the window: half-way up the nuclei's flanks
+HEAD_ISO = 0.2  # of the window: between air and skin
 COLOR = (0.25, 0.55, 1.0)  # linear
 SIZE_PX = (512, 512)
 FOV_DEG = 30.0
@@ -128,6 +130,28 @@ def brain_cells() -> Scene:
     z, y, x = volume.spacing_um
     voxels = windowed(volume.voxels.astype(np.float64))
     return scene_of("brain_cells", voxels, np.array([x, y, z]), ISO, "default")
+
+
+def head() -> tuple[Scene, ...]:
+    """Return the real MRI of STEREOCELL_DATA, two voxels by two by two averaged; none without.
+
+    Its voxels are taken for cubes (.667, .667, .7 mm), as NiiVue wants them.
+    """
+    folder = Path(os.environ.get("STEREOCELL_DATA", "")) / "mri_t1_7t" / "dicoms"
+    if not folder.is_dir():
+        return ()
+    source = read.open(str(folder))
+    box = source.levels[0].box
+    values = source.read(0, box, 0).voxels.astype(np.float32)
+    even = values[tuple(slice(0, n // 2 * 2) for n in values.shape)]
+    z, y, x = (n // 2 for n in even.shape)
+    halved = even.reshape(z, 2, y, 2, x, 2).mean(axis=(1, 3, 5))
+    voxels = windowed(halved.astype(np.float64))
+    spacing = np.full(3, 2 * min(source.levels[0].spacing_um))
+    return (
+        scene_of("mri_soft", voxels, spacing, HEAD_ISO, "soft"),
+        scene_of("mri_default", voxels, spacing, HEAD_ISO, "default"),
+    )
 
 
 def windowed(values: Values) -> NDArray[np.uint8]:

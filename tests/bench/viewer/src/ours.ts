@@ -109,7 +109,7 @@ function marchOf({ about, voxels, bricks }: Scene, frame: ReturnType<typeof make
   texture.unpackAlignment = 1;
   texture.needsUpdate = true;
   const march = new TileMarch(volume, 1, frame);
-  march.show({ channels: ["A"], level: 0, texture, bricks: [bricks] }, null, 1, 1);
+  march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
   march.dress([{ color: about.color, table, isInDisc: false }]);
   const count = brickCounts(volume.size);
   march.leapBy(occupancyDistances({ bricks: [bricks], alphas: [opacities(table)], count }));

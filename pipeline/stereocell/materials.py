@@ -1,0 +1,93 @@
+"""Find noise and materials in a histogram of value and gradient magnitude; see histogram2d.py.
+
+Inside of a material the gradient is noise alone, the length of a vector of three noisy differences,
+and values pile up. So the gradients' modes tell the noise, and the peaks among the voxels that have
+no more gradient than noise has are the materials.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+NOISE_FACTOR = 1.9  # x the mode of the gradients: 93 % of such a vector's lengths lie below
+BRIGHT = 0.3  # values from which on noise is looked for that rises with the value
+RISING_PERCENTILE = 10.0
+FLAT_STEP = 3.0 / 255  # what rounding to 8 bits and a slow drift make
+LEAST_IN_COLUMN = 2e-5  # of all voxels, for a column's mode to be asked
+LEAST_SHARE = 0.004  # of the flat voxels, to a material
+LEAST_PROMINENCE = 0.2  # of its own height: a shoulder is no material
+MAX_MATERIALS = 6
+
+
+def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.float64]:
+    """Return the gradient magnitude, 0..1, below which it may be noise, for each column.
+
+    From the mode of each column's gradients. The floor is their median over the voxels, most of
+    which lie inside of a material; those at the window's ends, which it clips, have less noise than
+    they had. Counts of light are noisier the brighter: what the modes' squares rise by in nearly
+    all columns, in proportion to the value, is noise too.
+    """
+    rows, columns = counts.shape
+    inner = counts.copy()
+    if counts[:, 1:-1].any():
+        inner[:, [0, -1]] = 0
+    sums = inner.sum(axis=0)
+    modes = ndimage.gaussian_filter(inner.astype(np.float64), (0.7, 2.0), mode="nearest").argmax(0)
+    weight = np.cumsum(np.bincount(modes, sums, rows))
+    floor = float(np.searchsorted(weight, weight[-1] / 2)) / (rows - 1)
+    values = np.linspace(0, 1, columns)
+    rising = (values >= BRIGHT) & (sums >= max(8, LEAST_IN_COLUMN * sums.sum()))
+    slope = 0.0
+    if rising.any():
+        above = (modes[rising] / (rows - 1)) ** 2 - floor**2
+        slope = max(0.0, float(np.percentile(above / values[rising], RISING_PERCENTILE)))
+    level = NOISE_FACTOR * np.sqrt(floor**2 + slope * values)
+    return np.clip(level, FLAT_STEP / gradient_max, 1.0)
+
+
+def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return the values, 0..1, at which voxels without a boundary pile up."""
+    rows, columns = counts.shape
+    is_flat = np.arange(rows)[:, np.newaxis] <= noise * (rows - 1)
+    flat = np.where(is_flat, counts, 0).sum(axis=0).astype(np.float64)
+    if flat.sum() == 0:
+        return ()
+    # a source of few values leaves gaps between the columns
+    sigma = max(2.0, column_gap(counts))
+    pad = int(4 * sigma) + 2  # a peak may stand at an end of the window
+    smooth = ndimage.gaussian_filter1d(np.pad(flat, pad), sigma, mode="constant")
+    peaks, found = signal.find_peaks(smooth, prominence=0, height=0)
+    is_own = found["prominences"] >= LEAST_PROMINENCE * found["peak_heights"]
+    candidates = []
+    for peak, left, right in zip(
+        peaks[is_own], found["left_bases"][is_own], found["right_bases"][is_own], strict=True
+    ):
+        low, high = _foot(smooth, int(peak), int(left), int(right))
+        mass = smooth[low : high + 1].sum()
+        if mass >= LEAST_SHARE * flat.sum():
+            candidates.append((float(mass), _centre(smooth, int(peak), low, high) - pad))
+    heaviest = sorted(candidates, reverse=True)[:MAX_MATERIALS]
+    return tuple(sorted(float(np.clip(place / (columns - 1), 0, 1)) for _, place in heaviest))
+
+
+def column_gap(counts: NDArray[np.int64]) -> float:
+    """Return the mean distance, in columns, between those that hold voxels."""
+    held = np.flatnonzero(counts.any(axis=0))
+    return float(held[-1] - held[0]) / max(1, len(held) - 1) if len(held) else 1.0
+
+
+def _foot(smooth: NDArray[np.float64], peak: int, left: int, right: int) -> tuple[int, int]:
+    """Return where a peak falls to half of its height, inside its bases."""
+    low = high = peak
+    while low > left and smooth[low - 1] > 0.5 * smooth[peak]:
+        low -= 1
+    while high < right and smooth[high + 1] > 0.5 * smooth[peak]:
+        high += 1
+    return low, high
+
+
+def _centre(smooth: NDArray[np.float64], peak: int, low: int, high: int) -> float:
+    """Return the centre of a peak's upper half, as far to one side as to the other."""
+    reach = min(peak - low, high - peak) if peak not in (low, high) else 0
+    part = np.arange(peak - reach, peak + reach + 1)
+    return float(np.average(part, weights=smooth[part]))

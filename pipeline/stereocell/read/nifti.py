@@ -1,0 +1,145 @@
+"""NIfTI-1 and -2, .nii and .nii.gz: https://nifti.nimh.nih.gov/nifti-1/ by nibabel.
+
+The affine is the one that nibabel settles on: sform, else qform, else a guess by the shape, which
+is said. Texts in the header (`descrip`, `db_name`, ...) and the file's name may hold an identity
+and are not looked at.
+"""
+
+import logging
+import warnings
+import zlib
+from functools import partial
+from typing import Any
+
+import nibabel
+import numpy as np
+from nibabel.fileslice import fileslice
+from nibabel.openers import ImageOpener
+from numpy.typing import NDArray
+
+from stereocell.errors import SourceError
+from stereocell.read.anatomy import Canonical, canonical_of
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import Image
+from stereocell.read.location import Location
+from stereocell.read.resampling import orthogonal_grid, resample_sheared
+from stereocell.read.spacing import Grid
+from stereocell.read.stored_values import dtype_for, rescale
+from stereocell.read.whole import WholeArray
+
+NAME = "NIfTI"
+_RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+_MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
+_SKEW = 1e-3  # cosine between two axes: less is rounding
+_FAULTS = (
+    nibabel.filebasedimages.ImageFileError,
+    nibabel.spatialimages.HeaderDataError,
+    OSError,
+    EOFError,
+    ValueError,
+    TypeError,
+    KeyError,
+    ArithmeticError,
+    AttributeError,
+    MemoryError,
+    np.linalg.LinAlgError,
+    zlib.error,
+)
+
+
+def read_image(location: Location) -> Image:
+    """Return the volume of the file, with its points in time. Raises SourceError."""
+    where = location.shown
+    image = _open(location)
+    header = image.header
+    shape = tuple(int(n) for n in header.get_data_shape())
+    if len(shape) < 3 or any(n != 1 for n in shape[4:]) or min(shape) < 1:
+        raise SourceError(f"{where}: dim: found {shape}, expected x, y, z, or x, y, z, t")
+    stored = header.get_data_dtype()
+    if stored.kind not in "iuf":
+        raise SourceError(f"{where}: datatype: found {stored}, expected whole or real numbers")
+    dtype = _dtype(stored, image.dataobj.slope, image.dataobj.inter)
+    unit = header.get_xyzt_units()[0]
+    affine = _RAS_TO_LPS @ image.affine
+    affine[:3] *= _MM[unit]
+    lengths = np.linalg.norm(affine[:3, :3], axis=0)
+    is_sound = np.isfinite(affine).all() and lengths.min() > 0
+    if not is_sound or abs(np.linalg.det(affine[:3, :3] / lengths)) < 0.1:
+        raise SourceError(f"{where}: sform and qform: found no three axes, expected an affine")
+    notes = []
+    if not (header["sform_code"] or header["qform_code"]):
+        notes.append(
+            "neither sform nor qform: which side is left is a guess, x to the left of the patient"
+        )
+    if unit == "unknown":
+        notes.append("no unit of length in the header: mm are assumed")
+    grid, skewed = (shape[0], shape[1], shape[2]), None
+    axes = affine[:3, :3] / lengths
+    if np.abs(axes.T @ axes - np.eye(3)).max() > _SKEW:
+        skewed = affine
+        grid, affine = orthogonal_grid(grid, affine)
+        notes.append("the affine has skew axes: resampled onto an orthogonal grid")
+    canonical = canonical_of(affine, grid)
+    z, y, x = (grid[axis] for axis in canonical.order)
+    times = shape[3] if len(shape) > 3 else 1
+    load = partial(_load, location, canonical, skewed, dtype)
+    return Image(
+        arrays=(VoxelArray(WholeArray((times, z, y, x), dtype, load), ("t", "z", "y", "x")),),
+        grids=(Grid((z, y, x), canonical.spacing_um),),
+        names=(NAME,),
+        colors=(None,),
+        images=1,
+        title=NAME,
+        placement=canonical.placement,
+        notes=tuple(notes),
+    )
+
+
+def _open(location: Location) -> Any:
+    logging.getLogger("nibabel.global").disabled = True  # it quotes fields of the header
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            image: Any = nibabel.load(location.source, mmap=False)
+            if not isinstance(image, nibabel.nifti1.Nifti1Pair):
+                raise TypeError
+            # a quaternion, a unit, a type may be none: better here than later
+            header: Any = image.header
+            image.affine.sum()
+            header.get_xyzt_units()
+            header.get_data_dtype()
+            header.get_data_shape()
+            return image
+    except _FAULTS:
+        raise SourceError(
+            f"{location.shown}: not readable as NIfTI, expected a whole .nii or .nii.gz file"
+        ) from None
+
+
+def _dtype(stored: np.dtype[Any], slope: float, intercept: float) -> np.dtype[Any]:
+    if stored.kind == "f":
+        return np.dtype(np.float32)
+    limits = np.iinfo(stored)
+    return dtype_for([(float(limits.min), float(limits.max), float(slope), float(intercept))])
+
+
+def _load(
+    location: Location,
+    canonical: Canonical,
+    skewed: NDArray[np.float64] | None,
+    dtype: np.dtype[Any],
+    time: int,
+) -> NDArray[Any]:
+    try:
+        data = _open(location).dataobj
+        place = (slice(None),) * 3 + (time, 0, 0, 0)[: len(data.shape) - 3]
+        with ImageOpener(location.source) as file:
+            raw = fileslice(file, place, data.shape, data.dtype, data.offset, data.order)  # type: ignore[no-untyped-call]
+        values = rescale(raw, float(data.slope), float(data.inter), dtype)
+    except _FAULTS:
+        raise SourceError(
+            f"{location.shown}: its voxels can't be read, expected {NAME} that is whole"
+        ) from None
+    if skewed is not None:
+        values, _ = resample_sheared(values, skewed)
+    return canonical.apply(values)

@@ -1,0 +1,169 @@
+"""Where a stack of parallel planes lies, and the even, orthogonal grid that holds it.
+
+From each plane's position and the planes' orientation alone (ImagePositionPatient and
+ImageOrientationPatient of DICOM): SliceThickness and SpacingBetweenSlices may say anything. Planes
+are sorted along their normal. The median of the gaps says which gaps are regular. Where all are,
+or are whole multiples of it (planes are missing), the spacing is the mean over the length, so that
+rounded positions do not add up; else the length is divided into as many gaps as the median fits in,
+and all planes between are interpolated. Planes that drift sideways (a tilted gantry) are a sheared
+stack, and are moved within their planes onto an orthogonal grid.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+REGULAR = 0.02  # of the median gap: so far may a gap be off (rounded positions) and still be even
+DRIFT = 0.05  # pixels over the whole stack: planes that drift less stand still
+SAME_PLACE = 0.02  # pixels: planes this close lie on each other
+
+
+class NoStackError(Exception):
+    """Planes that make no volume; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class StackLayout:
+    """A grid of voxels for a stack of n planes. LPS, mm; voxels are (plane, row, column).
+
+    shape        of the grid
+    spacing_mm   of the grid, along its three axes
+    axes         unit vectors along them, one a row, orthogonal; (3, 3)
+    origin_mm    centre of voxel (0, 0, 0)
+    places       (n, 3): where in voxels of the grid each plane's first pixel lies, rising
+    stack        (4, 4): from (plane, row, column, 1) to mm for the planes as they are, evenly
+                 spread from the first to the last: sheared where the gantry was tilted
+    gaps_mm      (n - 1) along the normal
+    missing      planes of the grid that no plane of the stack lies on
+    is_even      the gaps are whole multiples of the spacing
+    tilt_deg     between the normal and the way from plane to plane; 0: none
+    """
+
+    shape: tuple[int, int, int]
+    spacing_mm: tuple[float, float, float]
+    axes: NDArray[np.float64]
+    origin_mm: NDArray[np.float64]
+    places: NDArray[np.float64]
+    stack: NDArray[np.float64]
+    gaps_mm: NDArray[np.float64]
+    missing: int
+    is_even: bool
+    tilt_deg: float
+
+    @property
+    def is_resampled(self) -> bool:
+        """Whether the grid's planes are others than the stack's own."""
+        return self.missing > 0 or not self.is_even or self.tilt_deg > 0
+
+    @property
+    def affine(self) -> NDArray[np.float64]:
+        """(4, 4) for columns: from (plane, row, column, 1) of the grid to mm."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = (self.axes * np.array(self.spacing_mm)[:, None]).T
+        matrix[:3, 3] = self.origin_mm
+        return matrix
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not as it was taken, a sentence each."""
+        notes = []
+        spacing = self.spacing_mm[0]
+        if not self.is_even:
+            notes.append(
+                f"uneven gaps of {self.gaps_mm.min():.4g} to {self.gaps_mm.max():.4g} mm between "
+                f"slices: interpolated to {spacing:.4g} mm"
+            )
+        elif self.missing:
+            wide = self.gaps_mm[self.gaps_mm > 1.5 * spacing]
+            shown = ", ".join(f"{gap:.4g}" for gap in wide[:6]) + (", ..." if len(wide) > 6 else "")
+            notes.append(
+                f"{self.missing} missing slices, gaps of {shown} mm among slices {spacing:.4g} mm "
+                "apart: interpolated"
+            )
+        if self.tilt_deg:
+            notes.append(
+                f"gantry tilt of {self.tilt_deg:.3g} degrees: resampled onto an orthogonal grid"
+            )
+        return tuple(notes)
+
+
+def normal_of(along_row: ArrayLike, along_column: ArrayLike) -> NDArray[np.float64]:
+    """Return the unit normal of a plane, right-handed to its row and its column."""
+    normal = np.cross(np.asarray(along_row, np.float64), np.asarray(along_column, np.float64))
+    return normal / np.linalg.norm(normal)
+
+
+def lay_out(
+    positions_mm: ArrayLike,
+    along_row: ArrayLike,
+    along_column: ArrayLike,
+    pixel_spacing_mm: tuple[float, float],
+    plane_shape: tuple[int, int],
+) -> StackLayout:
+    """Return the grid for planes whose first pixels lie at `positions_mm` (n, 3), LPS.
+
+    The positions rise along the normal, one plane at each place. `pixel_spacing_mm` is between
+    (rows, columns). Raises NoStackError for fewer than 2 planes, planes beside each other, or more
+    missing planes than there are.
+    """
+    positions = np.asarray(positions_mm, np.float64)
+    if len(positions) < 2:
+        raise NoStackError(f"a volume needs at least 2 slices: found {len(positions)}")
+    normal = normal_of(along_row, along_column)
+    across = np.asarray(along_row, np.float64)
+    down = np.cross(normal, across)  # orthogonal to both, whatever was rounded
+    axes = np.stack([normal, down, across])
+    local = (positions - positions[0]) @ axes.T  # mm along (normal, down, across)
+    gaps = np.diff(local[:, 0])
+    if gaps.min() <= SAME_PLACE * min(pixel_spacing_mm):
+        raise NoStackError("slices lie beside each other in one plane, expected one over the other")
+    count, is_even = _count_planes(gaps)
+    if count > 2 * len(positions):
+        raise NoStackError(
+            f"{count - len(positions)} of {count} slices are missing (gaps of {gaps.min():.4g} to "
+            f"{gaps.max():.4g} mm), expected fewer than there are"
+        )
+    spacing = local[-1, 0] / (count - 1)
+    places = local / np.array([spacing, *pixel_spacing_mm])
+    if is_even:
+        places[:, 0] = np.rint(places[:, 0])
+    sideways = local[-1, 1:]
+    tilt = 0.0
+    if np.abs(places[:, 1:]).max() > DRIFT:
+        tilt = math.degrees(math.atan2(float(np.linalg.norm(sideways)), local[-1, 0]))
+        tilt = max(tilt, 1e-3)  # planes that wander and come back are moved as well
+    else:
+        places[:, 1:] = 0.0
+    low = np.floor(places[:, 1:].min(axis=0) + 1e-6)
+    high = np.ceil(places[:, 1:].max(axis=0) - 1e-6)
+    places[:, 1:] -= low
+    rows, columns = (int(n + b - a) for n, a, b in zip(plane_shape, low, high, strict=True))
+    origin = positions[0] + (low * pixel_spacing_mm) @ axes[1:]
+    stack = np.eye(4)
+    stack[:3, 0] = (positions[-1] - positions[0]) / (count - 1)
+    stack[:3, 1] = np.asarray(along_column, np.float64) * pixel_spacing_mm[0]
+    stack[:3, 2] = across * pixel_spacing_mm[1]
+    stack[:3, 3] = positions[0]
+    return StackLayout(
+        (count, rows, columns),
+        (float(spacing), *pixel_spacing_mm),
+        axes,
+        origin,
+        places,
+        stack,
+        gaps,
+        count - len(positions) if is_even else count,
+        is_even,
+        tilt,
+    )
+
+
+def _count_planes(gaps: NDArray[np.float64]) -> tuple[int, bool]:
+    """Return the planes of an even grid over these gaps, and whether the gaps fit it."""
+    median = float(np.median(gaps))
+    steps = np.rint(gaps / median)
+    if steps.min() >= 1 and (np.abs(gaps - steps * median) <= REGULAR * median * steps).all():
+        return int(steps.sum()) + 1, True
+    return max(round(float(gaps.sum()) / median), 1) + 1, False

@@ -1,0 +1,44 @@
+"""Voxels that are decoded all at once, when the first of them is asked for, and kept.
+
+What lies in a file for each slice, or behind one stream of gzip, has no blocks. A tile's window is
+cut along canonical axes, which cross nearly every slice of nearly every series, so reading by
+slices would decode the whole series for each window; a volume of this kind is some hundred MB at
+most. So a process decodes it once and holds it. Its size is known from the headers and is checked
+(opening.py) before any memory is taken.
+"""
+
+from collections.abc import Callable
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class WholeArray:
+    """Points in time of one volume, (t, z, y, x); one of them is held.
+
+    load  returns the voxels (z, y, x) of a point in time; it may return a view
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int, int, int],
+        dtype: np.dtype[Any],
+        load: Callable[[int], NDArray[Any]],
+    ) -> None:
+        self.shape: tuple[int, ...] = shape
+        self.dtype = dtype
+        self.chunks: tuple[int, ...] = (1, *shape[1:])
+        self._load = load
+        self._lock = Lock()
+        self._held: tuple[int, NDArray[Any]] | None = None
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        """Return voxels by (t, z, y, x): a whole number, then slices or whole numbers."""
+        time, *place = key
+        with self._lock:
+            if self._held is None or self._held[0] != time:
+                self._held = None  # never two at once
+                self._held = (time, self._load(time))
+            return self._held[1][tuple(place)]

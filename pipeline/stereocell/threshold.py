@@ -1,0 +1,179 @@
+"""The adaptive binarisation threshold of a channel: between two peaks of its histogram.
+
+The rule, as the paper on streamed MRI states it: the histogram is smoothed by a moving window of
+10 % of its length, and the threshold lies between the second-highest peak and the peak before it.
+Where that is open it is read so:
+
+- window: the mean over an odd number of bins. At the histogram's ends it holds only the bins that
+  exist: no bins of zero are made up, which would push a peak at the end (the air round a head)
+  away from it.
+- peak: a bin that both sides fall away from; a plateau is one peak, at its middle; at an end of the
+  histogram one side is enough. Over a spike narrower than the window the mean is flat but for
+  chance, and chance has peaks of its own: one counts if the way up from the saddle to any higher
+  one is at least MIN_PROMINENCE of its height.
+- second-highest: by the smoothed height. Of equal ones the darker comes first, as air does.
+- the peak before it: the next one of lower intensity, whichever its height. In a head that is the
+  air, the highest of all. Where nothing lies before it (bright air, dark bodies) the threshold
+  lies between it and the next one of higher intensity.
+- between: at the lowest place of the smoothed histogram between the two, in the middle of a flat
+  one. Fewest voxels lie there, so that a threshold slightly off changes the fewest (the mode method
+  of Prewitt & Mendelsohn, "The analysis of cell images", Annals of the New York Academy of Sciences
+  128, 1966). The peaks' midpoint depends on how wide the peaks are, and cuts the broader one.
+- a single peak has nothing before it. The threshold is then the foot of its longer side: the bin
+  farthest below the line from the peak to that side's end (the triangle method of Zack, Rogers &
+  Latt, Journal of Histochemistry and Cytochemistry 25, 1977).
+- a flat histogram, or one of a single filled bin, has neither: no threshold.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+WINDOW_SHARE = 0.10  # of the histogram's length
+MIN_PROMINENCE = 0.05
+BINS = 256
+Reading = Literal["two peaks", "no peak before", "single peak"]
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """Voxel counts (bins,) in equal bins from `low` to `high`, in voxel values."""
+
+    counts: tuple[int, ...]
+    low: float
+    high: float
+
+    @property
+    def levels(self) -> NDArray[np.float64]:
+        """The middle of each bin, in voxel values."""
+        middles = np.arange(len(self.counts), dtype=np.float64) + 0.5
+        return np.asarray(self.low + middles * self.bin_width, np.float64)
+
+    @property
+    def bin_width(self) -> float:
+        return (self.high - self.low) / len(self.counts)
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """A threshold with all that it was read from, as it is drawn.
+
+    value     voxels at or above it are the body; in voxel values
+    peaks     levels of the peaks that count, rising
+    between   the two of them that the value lies between; one, if there is only one
+    smoothed  (bins,) the mean over the moving window
+    reading   how the rule applied
+    """
+
+    value: float
+    peaks: tuple[float, ...]
+    between: tuple[float, ...]
+    smoothed: NDArray[np.float64]
+    reading: Reading
+
+
+def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogram:
+    """Return the counts of the voxels within the window, at most BINS bins.
+
+    What lies outside is left out: hot voxels would stretch the histogram, and so the moving window,
+    as they please; clipped, they would make a peak of their own. Bins over whole numbers are whole
+    numbers wide: others hold now two, now three of them, and the histogram is a comb.
+    """
+    low, high = window
+    bins = BINS
+    if voxels.dtype.kind in "iub":
+        first, last = np.ceil(low), np.floor(high)
+        width = max(1.0, np.ceil((last - first + 1) / BINS))
+        bins = max(1, int(np.ceil((last - first + 1) / width)))
+        low, high = float(first - 0.5), float(first - 0.5 + bins * width)
+        inside = voxels[(voxels >= first) & (voxels <= last)]
+        counts, _ = np.histogram(inside, bins, (low, high))
+    else:
+        counts, _ = np.histogram(voxels, bins, (low, high))
+    return Histogram(tuple(int(n) for n in counts), float(low), float(high))
+
+
+def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
+    """Return the threshold; None for a flat histogram, as that of a constant channel."""
+    counts = np.asarray(histogram.counts, dtype=np.float64)
+    if np.count_nonzero(counts) < 2 or counts.min() == counts.max():
+        return None
+    smoothed = smooth(counts)
+    peaks = _find_peaks(smoothed)
+    if not peaks:
+        return None
+
+    def level(place: float) -> float:
+        return histogram.low + (place + 0.5) * histogram.bin_width
+
+    reading: Reading = "single peak"
+    between: tuple[float, ...]
+    if len(peaks) == 1:
+        between, place = (peaks[0],), _foot(smoothed, peaks[0])
+    else:
+        height = {peak: smoothed[int(peak)] for peak in peaks}
+        second = sorted(peaks, key=lambda peak: (-height[peak], peak))[1]
+        at = peaks.index(second)
+        reading = "two peaks" if at else "no peak before"
+        between = (peaks[at - 1], second) if at else (second, peaks[1])
+        place = _valley(smoothed, int(between[0]), int(between[1]))
+    return Threshold(
+        level(place),
+        tuple(level(peak) for peak in peaks),
+        tuple(level(peak) for peak in between),
+        smoothed,
+        reading,
+    )
+
+
+def smooth(counts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean over a window of WINDOW_SHARE of the bins, an odd number, at least one."""
+    half = int(WINDOW_SHARE * len(counts)) // 2
+    sums = np.concatenate([[0.0], np.cumsum(counts)])
+    bins = np.arange(len(counts))
+    first, stop = np.maximum(bins - half, 0), np.minimum(bins + half + 1, len(counts))
+    mean: NDArray[np.float64] = (sums[stop] - sums[first]) / (stop - first)
+    return mean
+
+
+def _find_peaks(heights: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return the middles (bins, halves too) of the peaks that stand out, rising."""
+    starts = np.flatnonzero(np.diff(heights, prepend=np.nan) != 0)  # of runs of equal heights
+    stops = np.append(starts[1:], len(heights))
+    runs = heights[starts]
+    if len(runs) == 1:
+        return ()
+    padded = np.concatenate([[-np.inf], runs, [-np.inf]])
+    tops = np.flatnonzero((runs > padded[:-2]) & (runs > padded[2:]))
+    found = []
+    for top in tops:
+        saddles = []
+        for side in (runs[top::-1], runs[top:]):
+            higher = np.flatnonzero(side > runs[top])
+            if len(higher):
+                saddles.append(side[: higher[0]].min())
+        saddle = max(saddles, default=0.0)
+        if runs[top] - saddle >= MIN_PROMINENCE * runs[top]:
+            found.append((starts[top] + stops[top] - 1) / 2)
+    return tuple(float(place) for place in found)
+
+
+def _valley(heights: NDArray[np.float64], first: int, last: int) -> float:
+    """Return the lowest place between two peaks; of several the first, in its run's middle."""
+    between = heights[first : last + 1]
+    start = int(between.argmin())
+    higher = np.flatnonzero(between[start:] > between[start])
+    stop = start + int(higher[0]) if len(higher) else len(between)
+    return first + (start + stop - 1) / 2
+
+
+def _foot(heights: NDArray[np.float64], peak: float) -> float:
+    """Return the bin farthest below the line from the peak to the end of its longer side."""
+    top, filled = int(peak), np.flatnonzero(heights)
+    end = int(max(filled[0], filled[-1], key=lambda bin_: abs(int(bin_) - top)))
+    bins = np.linspace(top, end, abs(end - top) + 1)
+    line = np.interp(np.arange(len(bins)), [0, len(bins) - 1], [heights[top], heights[end]])
+    # below the line, straight down: its distance across differs by a factor alone
+    return float(bins[int((line - heights[bins.astype(int)]).argmax())])

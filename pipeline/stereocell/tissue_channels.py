@@ -1,0 +1,226 @@
+"""Tissue classes as channels of a build: learned in the planned region, kept in OUT/tissue.
+
+Each class becomes a channel whose voxels are probabilities of 8 bits: OUT/tissue/classes.ome.zarr,
+a second source in the plan. The window is 0..255, the surface lies where the probability is a half.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell import network as network_module
+from stereocell import tissue
+from stereocell.build import provenance
+from stereocell.documents import find_json, write_json
+from stereocell.engine import console
+from stereocell.errors import SourceError, UsageError
+from stereocell.lineage import key_of, libraries_of
+from stereocell.network import Network, apply_network
+from stereocell.plan import PALETTE, Channel, Plan
+from stereocell.sources import SourceRef, open_source, source_of
+from stereocell.store import Store
+from stereocell.tissue import AUTO_CLASSES, TissueOptions, learn_tissue
+from stereocell.write.atomic import replacing_folder
+from stereocell.write.generator import GENERATOR
+from stereocell.write.ome_zarr import write_probabilities
+
+FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
+RECORD_SCHEMA = "tissue.schema.json"
+LEVEL = 127.5  # of 255: probability 1/2
+MOST_VOXELS = 250_000_000  # about 40 bytes each while learning
+# of three classes in a head, by rising T1 intensity; linear RGB
+HEAD = (
+    ("CSF", (0.03, 0.3, 1.0)),
+    ("grey matter", (1.0, 0.22, 0.1)),
+    ("white matter", (0.95, 0.85, 0.45)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TissueRequest:
+    """What is asked for. channel: name or index, empty: the first. model: an ONNX file, or None."""
+
+    classes: int | Literal["auto"] | None = None  # None: auto, or what the model has
+    channel: str = ""
+    model: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Class:
+    name: str
+    color: tuple[float, float, float]
+    intensity: float | None  # mean, bias removed; None: a network doesn't say
+    probabilities: NDArray[np.uint8]
+
+
+def parse_classes(text: str) -> int | Literal["auto"]:
+    """Return `--classes`. Raises UsageError."""
+    if text == "auto":
+        return "auto"
+    if not text.isdecimal() or int(text) not in AUTO_CLASSES:
+        ends = AUTO_CLASSES[0], AUTO_CLASSES[-1]
+        raise UsageError(f"--classes is {text!r}, expected {ends[0]} to {ends[1]}, or auto")
+    return int(text)
+
+
+def add_tissue(out: Path, request: TissueRequest) -> Plan:
+    """Learn the classes, write OUT/tissue, and put them into the plan in place of earlier ones.
+
+    Nothing is learned anew where OUT/tissue comes from the same voxels, options and code. Raises
+    StereoCellError; the plan is then as it was.
+    """
+    store = Store(out)
+    plan = without_tissue(store.plan())
+    channel = _find_channel(plan, request.channel)
+    voxels = math.prod(plan.region.shape)
+    if voxels > MOST_VOXELS:
+        raise UsageError(
+            f"tissue: the region holds {voxels:,} voxels, expected at most {MOST_VOXELS:,}: plan a "
+            "coarser --level or a smaller --region"
+        )
+    network = None if request.model is None else Network.load(request.model)
+    if network is not None and request.classes not in (None, "auto", network.count):
+        raise UsageError(
+            f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
+            "same, or no --classes"
+        )
+    options = TissueOptions(classes=request.classes or "auto", brain=plan.modality == "MR")
+    settings = asdict(options) if network is None else network.settings()
+    source = [plan.fingerprint, plan.level, plan.spacing_um, plan.settings.plan.time]
+    region = [plan.region.start, plan.region.stop]
+    depends = [source, region, channel.index, channel.name, settings]
+    key = key_of(key_of(depends, tissue), network_module)
+    record = find_json(out / FOLDER / RECORD, RECORD_SCHEMA)
+    if record is not None and record["key"] == key and (out / FOLDER / VOXELS).is_dir():
+        console.print("tissue: up to date")
+    else:
+        record = _learn(store, plan, channel, options, network, settings, key)
+    plan = with_tissue(plan, out, record)
+    store.save_plan(plan)
+    write_json(out / "provenance.json", provenance(plan))
+    return plan
+
+
+def without_tissue(plan: Plan) -> Plan:
+    """Return the plan of the input's own channels."""
+    own = tuple(channel for channel in plan.channels if not channel.source)
+    added = {channel.name for channel in plan.channels if channel.source}
+    values = {name: v for name, v in plan.settings.iso_values.items() if name not in added}
+    return replace(plan, channels=own, settings=replace(plan.settings, iso_values=values))
+
+
+def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
+    """Return the plan with a channel for each class of OUT/tissue."""
+    source = str((out / FOLDER / VOXELS).resolve())
+    fingerprint = open_source(SourceRef(source, 0, ())).fingerprint
+    taken = {channel.name for channel in plan.channels}
+    added = []
+    for index, one in enumerate(record["classes"]):
+        if one["name"] in taken:
+            raise SourceError(
+                f"{plan.name}: has a channel {one['name']!r} of its own, expected none of that name"
+            )
+        red, green, blue = one["color"]
+        added.append(Channel(index, one["name"], (red, green, blue), source, fingerprint))
+    values = {**plan.settings.iso_values, **{channel.name: LEVEL for channel in added}}
+    settings = replace(plan.settings, iso_values=values)
+    return replace(plan, channels=(*plan.channels, *added), settings=settings)
+
+
+def _learn(
+    store: Store,
+    plan: Plan,
+    channel: Channel,
+    options: TissueOptions,
+    network: Network | None,
+    settings: dict[str, Any],
+    key: str,
+) -> dict[str, Any]:
+    dataset = open_source(source_of(plan))
+    volume = dataset.read(channel.index, plan.region, plan.level)
+    if network is None:
+        learned = learn_tissue(volume.voxels, plan.spacing_um, options)
+        names = _names(plan, len(learned.means), options.brain)
+        bic = {str(count): value for count, value in learned.bic.items()}
+        intensities: Sequence[float | None] = [float(mean) for mean in learned.means[:, 0]]
+        found = learned.probabilities
+    else:
+        shown = apply_network(network, volume.voxels)
+        names = [name for name in network.classes if name]
+        found = shown[[k for k, name in enumerate(network.classes) if name]]
+        bic, intensities = {}, [None] * len(names)
+    classes = [
+        _Class(name, color, intensity, np.rint(255 * part).astype(np.uint8))
+        for (name, color), intensity, part in zip(
+            _colored(names, plan), intensities, found, strict=True
+        )
+    ]
+    voxel_mm3 = math.prod(length / 1000 for length in plan.spacing_um)
+    record: dict[str, Any] = {
+        "format": "stereocell-tissue",
+        "version": 1,
+        "generator": GENERATOR,
+        "key": key,
+        "fingerprint": plan.fingerprint,
+        "channel": channel.name,
+        "settings": settings,
+        "bic": bic,
+        "classes": [
+            {
+                "name": one.name,
+                "color": list(one.color),
+                "intensity": one.intensity,
+                "volume_mm3": float(one.probabilities.sum(dtype=np.float64) / 255 * voxel_mm3),
+            }
+            for one in classes
+        ],
+        "libraries": {**libraries_of(tissue), **libraries_of(network_module)},
+    }
+    shape = dataset.levels[plan.level].shape
+    with replacing_folder(store.out / FOLDER) as folder:
+        write_probabilities(
+            folder / VOXELS,
+            [one.probabilities for one in classes],
+            [(one.name, one.color) for one in classes],
+            plan.region.start,
+            shape,
+            plan.spacing_um,
+            plan.origin_um,
+        )
+        write_json(folder / RECORD, record)
+    open_source.cache_clear()  # another volume lies at the same address now
+    return record
+
+
+def _find_channel(plan: Plan, wanted: str) -> Channel:
+    if not wanted:
+        return plan.channels[0]
+    for channel in plan.channels:
+        if wanted in (channel.name, channel.id):
+            return channel
+    for channel in plan.channels:
+        if wanted == str(channel.index):
+            return channel
+    raise UsageError(
+        f"--channel is {wanted!r}, expected one of {', '.join(c.name for c in plan.channels)}, or "
+        f"an index of {', '.join(str(c.index) for c in plan.channels)}"
+    )
+
+
+def _names(plan: Plan, count: int, is_brain: bool) -> list[str]:
+    if is_brain and count == len(HEAD):
+        return [name for name, _ in HEAD]
+    return [f"tissue {k + 1}" for k in range(count)]
+
+
+def _colored(names: Sequence[str], plan: Plan) -> list[tuple[str, tuple[float, float, float]]]:
+    """Return each name with a colour that no other class and no channel of the input has."""
+    known = dict(HEAD)
+    taken = {channel.color for channel in plan.channels}
+    free = [color for color in PALETTE if color not in taken] or list(PALETTE)
+    return [(name, known.get(name, free[k % len(free)])) for k, name in enumerate(names)]

@@ -1,0 +1,132 @@
+"""How good a picture is after so many bytes: bricks by view against mip levels of the KTX2 file.
+
+    .venv/bin/python tests/bench/brick_curve.py [FOLDER OF DICOM FILES]
+
+Also: what building the tree takes, its size, and that it gives the volume back. PSNR is that of the
+volume as a client would sample it (tests/brick_client.py), against the volume, all in sight.
+"""
+
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from threading import Thread
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from websockets.sync.client import connect
+
+from brick_bundles import write_mri
+from brick_client import BrickClient, look_at, psnr, reconstruct
+from stereocell.brick_stream import encode_tree
+from stereocell.bricks import mip_levels
+from stereocell.read.ktx2 import decode_finest
+from stereocell.serve import BundleServer
+from stereocell.serve_library import BrickLibrary
+from stereocell.voxel_bvh import build, reassemble
+
+DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")) / "mri_t1_7t" / "dicoms"
+SHARES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
+
+
+def main(source: Path) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        out = write_mri(Path(folder) / "out", source)
+        volume = BrickLibrary(out / "bundle", out / "bricks").volumes()["r0_c0", "CD31"]
+        texture = (out / "bundle" / volume.entry["file"]["path"]).read_bytes()
+        voxels = decode_finest(texture)[..., 0]
+        tell_build(voxels, volume.threshold, len(texture))
+        shown = np.where(voxels > volume.threshold, voxels, 0)
+        print(f"\nmip levels of the KTX2 file, coarse to fine ({len(texture):,} bytes)")
+        print(f"{'bytes':>12} {'PSNR dB':>8}")
+        spent = 0
+        levels = mip_levels(voxels)
+        for level, place in reversed(list(zip(levels, volume.entry["levels"], strict=True))):
+            spent += place["length"]
+            if min(level.shape) >= 8:
+                print(f"{spent:12,} {psnr(stretch(level, voxels.shape), voxels):8.2f}")
+        tell_stream(out, voxels, volume.threshold, shown)
+
+
+def tell_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
+    times = []
+    for _ in range(3):
+        start = time.perf_counter()
+        bvh = build(voxels, threshold)
+        built = time.perf_counter()
+        data = encode_tree(bvh, bytes(16))
+        times.append((built - start, time.perf_counter() - built))
+    seconds = np.median(times, axis=0)
+    again = reassemble(bvh)
+    differs = again != voxels
+    above = int(np.count_nonzero(differs & ((voxels > threshold) | (again > threshold))))
+    print(f"volume {voxels.shape} (z, y, x), threshold {threshold}")
+    print(f"build {seconds[0]:.2f} s, serialise {seconds[1]:.2f} s (medians of 3)")
+    print(f"{len(bvh.nodes):,} nodes, {len(bvh.bricks):,} bricks, {len(data):,} bytes")
+    print(f"of the KTX2 file's bytes: {len(data) / ktx2_bytes:.2f}")
+    print(f"texels that came back otherwise: {differs.mean():.4f} of all, above threshold: {above}")
+
+
+def tell_stream(out: Path, voxels: np.ndarray, threshold: int, shown: np.ndarray) -> None:
+    server = BundleServer(out, 0, lan=False)
+    thread = Thread(target=server.run)
+    thread.start()
+    client = BrickClient()
+    middle = np.array([voxels.shape[2] / 2, -voxels.shape[1] / 2, voxels.shape[0] / 2])
+    camera = look_at(middle + np.array([0, 0, 2.0 * max(voxels.shape)]), middle)
+    while not server.has_started:
+        time.sleep(0.01)
+    try:
+        with connect(f"ws://localhost:{server.port}/bricks", compression=None) as stream:
+
+            def until(is_over) -> None:
+                while not is_over():
+                    for answer in client.take(stream.recv(timeout=60)):
+                        stream.send(json.dumps(answer))
+
+            stream.send('{"type": "hello", "version": 1}')
+            start = time.perf_counter()
+            stream.send('{"type": "open", "volumes": [{"tile": "r0_c0", "channel": "CD31"}]}')
+            until(lambda: client.is_ready(0))
+            tree = client.trees[0]
+            print(f"\nbricks by view, gaze in the middle (table {client.table_bytes:,} bytes,")
+            print(f"first `tree` after {time.perf_counter() - start:.2f} s, built then)")
+            print(f"{'bytes':>12} {'bricks':>7} {'PSNR dB':>8} {'above threshold':>16} {'s':>6}")
+            seconds = 0.0
+            for id, share in enumerate(SHARES, 1):
+                budget = int(share * tree.table.brick_bytes) - client.brick_bytes
+                view = {"type": "view", "id": id, "trees": [0], "budget": max(budget, 0)}
+                start = time.perf_counter()
+                stream.send(json.dumps(view | {"pixels_per_radian": 1e3, "texel_px": 0} | camera))
+                until(lambda id=id: id in client.done)
+                seconds += time.perf_counter() - start
+                drawn = reconstruct(tree.table, tree.frames)
+                seen = psnr(np.where(drawn > threshold, drawn, 0), shown)
+                print(
+                    f"{client.brick_bytes:12,} {len(tree.frames):7,} {psnr(drawn, voxels):8.2f}"
+                    f" {seen:16.2f} {seconds:6.2f}"
+                )
+    finally:
+        server.stop()
+        thread.join()
+
+
+def stretch(level: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return a mip level sampled trilinearly at finest texel centres; both cover the same box."""
+    values = level.astype(np.float32)
+    for axis, n in enumerate(shape):
+        m = values.shape[axis]
+        at = np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1)
+        low = np.minimum(at.astype(int), m - 1)
+        high = np.minimum(low + 1, m - 1)
+        weight = (at - low).astype(np.float32).reshape(-1, *[1] * (2 - axis))
+        values = np.take(values, low, axis) * (1 - weight) + np.take(values, high, axis) * weight
+    return values
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else DATA)

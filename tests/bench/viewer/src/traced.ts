@@ -1,0 +1,110 @@
+/** Ours, by paths of light: what one more sample of every pixel costs, with all that follows it. */
+import {
+  ClampToEdgeWrapping,
+  Data3DTexture,
+  LinearFilter,
+  Matrix4,
+  PerspectiveCamera,
+  RedFormat,
+  Scene as Room,
+  Vector3,
+  Vector4,
+  WebGLRenderer,
+} from "three";
+import { environmentTables } from "viewer/trace/environment";
+import { START_TRACE } from "viewer/trace/settings";
+import { Tracer } from "viewer/trace/tracer";
+import { Cuts } from "viewer/view/cuts";
+import { DepthPass } from "viewer/view/depth_pass";
+import { Eyes } from "viewer/view/eyes";
+import { LAST, Overlay } from "viewer/view/overlay";
+import { serve } from "./page";
+import type { Camera, Renderer, Scene } from "./scene";
+
+const WHITE = { width: 2, height: 1, rgb: new Float32Array(6).fill(1) };
+const NO_CLIP = {
+  min: new Vector3().setScalar(-1e9),
+  max: new Vector3().setScalar(1e9),
+  plane: new Vector4(0, 0, 0, 1),
+};
+
+class Traced implements Renderer {
+  private readonly renderer = new WebGLRenderer({ antialias: false });
+  private readonly depth = new DepthPass(new Cuts());
+  private readonly sceneDepth = { value: this.depth.texture };
+  private readonly tracer = new Tracer(this.sceneDepth);
+  private readonly overlay = new Overlay(this.tracer.picture.texture, this.sceneDepth, LAST);
+  private readonly eyes = new Eyes();
+  private readonly camera = new PerspectiveCamera();
+  private readonly room = new Room();
+  private bounds: { min: [number, number, number]; max: [number, number, number] } = {
+    min: [0, 0, 0],
+    max: [1, 1, 1],
+  };
+  private settings = START_TRACE;
+
+  get gl(): WebGL2RenderingContext {
+    return this.renderer.getContext() as WebGL2RenderingContext;
+  }
+
+  /** Setting: 1 with many scatterings, 0 with one. */
+  async setup(scene: Scene, camera: Camera, setting: number, parent: HTMLElement): Promise<void> {
+    const { about, voxels, bricks } = scene;
+    const [width, height] = about.size_px;
+    this.renderer.setPixelRatio(1);
+    this.renderer.setSize(width, height);
+    parent.append(this.renderer.domElement);
+    const texture = new Data3DTexture(voxels, ...about.size);
+    texture.format = RedFormat;
+    texture.minFilter = texture.magFilter = LinearFilter;
+    texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
+    texture.unpackAlignment = 1;
+    texture.needsUpdate = true;
+    const [min, max] = [about.low_um, about.high_um];
+    this.bounds = { min: [...min], max: [...max] };
+    this.settings = { ...START_TRACE, isMultiple: setting === 1 };
+    this.tracer.fill({
+      channels: ["A"],
+      frame: {
+        min: [...min],
+        max: [...max],
+        spacing_um: [...about.spacing_um],
+        matrix: new Matrix4().toArray(),
+        size: [...about.size],
+        apron: 1,
+        places: new Map(),
+      },
+      level: 0,
+      size: [...about.size],
+      texture,
+      index: null,
+      bricks: [bricks],
+      release: () => texture.dispose(),
+    });
+    this.tracer.dress([{ color: about.color, table: Uint8Array.from(about.table) }], this.settings);
+    this.tracer.lightBy(environmentTables(WHITE));
+    this.room.add(this.overlay.mesh);
+    const away = Math.hypot(...camera.eye_um.map((v, i) => v - camera.target_um[i]));
+    if (camera.fov_deg === null) throw new Error("the viewer has no parallel projection");
+    this.camera.fov = camera.fov_deg;
+    this.camera.aspect = width / height;
+    this.camera.near = away / 10;
+    this.camera.far = away * 4;
+    this.camera.position.set(...camera.eye_um);
+    this.camera.lookAt(...camera.target_um);
+    this.camera.updateProjectionMatrix();
+    this.camera.updateMatrixWorld();
+  }
+
+  draw(): void {
+    this.eyes.followScreen(this.renderer, this.camera);
+    this.overlay.hide();
+    this.depth.render(this.renderer, this.room, this.eyes, []);
+    const scene = { specimen: new Matrix4(), clip: NO_CLIP, solids: 0, bounds: this.bounds };
+    this.tracer.render(this.renderer, this.eyes, scene, this.settings, 1, 1);
+    this.overlay.show(this.eyes, 1);
+    this.renderer.render(this.room, this.camera);
+  }
+}
+
+serve(() => new Traced());
