@@ -26,7 +26,7 @@ function toOlderDraft(node: Json): Json {
 }
 
 await mkdir(OUT, { recursive: true });
-for (const name of ["bundle", "volumes"]) {
+for (const name of ["bundle", "volumes", "transfer2d"]) {
   const text = await readFile(new URL(`${name}.schema.json`, SCHEMAS), "utf8");
   const schema = toOlderDraft(JSON.parse(text)) as { [key: string]: Json };
   const types = await compile(schema, name, { format: false, unreachableDefinitions: false });

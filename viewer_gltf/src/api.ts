@@ -20,6 +20,8 @@ export type Snapshot = Readonly<{
   volumes: readonly VolumeStatus[];
   /** Of the GPU's memory. */
   volumeBytes: number;
+  /** Of the path-traced picture: samples a pixel, and the mip level; null: there is none. */
+  traced: Readonly<{ samples: number; level: number | null }>;
   /** The tile in the middle of the view, if it is near. */
   gazed: string | null;
   /** Of the disc as it is now; 0: closed. */

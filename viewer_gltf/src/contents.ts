@@ -1,5 +1,7 @@
 /** What is shown of a bundle: its surfaces, its volumes, and the marks on them. */
-import type { Camera, WebGLRenderer } from "three";
+import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
+import { BrickService } from "./bricks/brick_service";
+import type { BrickView } from "./bricks/wire";
 import type { Bundle } from "./bundle/load";
 import type { Hybrid } from "./hybrid/hybrid";
 import { wantedTiles } from "./hybrid/who";
@@ -7,8 +9,11 @@ import { Marks, type MarksView } from "./marks/marks";
 import { SurfaceLoader } from "./mesh/loader";
 import { SurfaceSet } from "./mesh/surface_set";
 import { memoryBudget } from "./quality/memory";
-import type { Action, ViewerState } from "./state";
+import { type Action, type ViewerState, volumeChannels } from "./state";
+import { TracedVolume } from "./trace/traced_volume";
 import type { Picture } from "./view/picture";
+import { isTwoD } from "./volume/functions2d";
+import { TransferPlanes } from "./volume/transfer_planes";
 import { VolumeSet } from "./volume/volume_set";
 
 export type ContentsOptions = Readonly<{
@@ -25,7 +30,15 @@ export type ContentsOptions = Readonly<{
 export class Contents {
   readonly surfaces: SurfaceSet;
   readonly volumes: VolumeSet;
+  /** The same volumes by paths of light, in the mode `traced`. */
+  readonly traced: TracedVolume;
+  /** Two-dimensional transfer functions. */
+  readonly planes: TransferPlanes;
   readonly marks: Marks;
+  private readonly bricks: BrickService | null;
+  private readonly clip = new Matrix4();
+  private readonly point = new Vector3();
+  private readonly ahead = new Vector3();
   private readonly loader: SurfaceLoader;
   /** Volumes come after the first picture of all tiles. */
   private hasOverview = false;
@@ -37,7 +50,22 @@ export class Contents {
     const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
     const budget = memoryBudget(navigator);
     const limits = { bytes: budget.volumes, side };
-    this.volumes = new VolumeSet(bundle, picture.marchFrame, limits, onChange, onError);
+    this.bricks =
+      bundle.bricks === undefined
+        ? null
+        : new BrickService(renderer, bundle.bricks, onChange, onError);
+    const { marchFrame } = picture;
+    this.volumes = new VolumeSet(bundle, marchFrame, limits, onChange, onError, this.bricks);
+    const { uSceneDepth } = marchFrame;
+    const { bricks } = this;
+    this.traced = new TracedVolume(this.volumes, bricks, limits, uSceneDepth, onChange, onError);
+    picture.add(this.traced.mesh);
+    this.planes = new TransferPlanes(
+      bundle,
+      (channel, plane) => options.dispatch({ type: "learn-plane", channel, plane }),
+      onChange,
+      onError,
+    );
     this.surfaces = new SurfaceSet(
       bundle,
       this.loader,
@@ -51,7 +79,7 @@ export class Contents {
       manifest: bundle.manifest,
       base: bundle.base,
       surfaces: () => this.surfaces.meshes,
-      volumes: () => this.volumes.shown(),
+      volumes: () => [...this.volumes.shown(), ...this.traced.shown()],
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
       sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
@@ -62,12 +90,20 @@ export class Contents {
   }
 
   get isLoading(): boolean {
-    return this.surfaces.isLoading || this.volumes.isLoading || !this.surfaces.overview.isComplete;
+    return (
+      this.surfaces.isLoading ||
+      this.volumes.isLoading ||
+      this.traced.isLoading ||
+      this.planes.isLoading ||
+      !this.surfaces.overview.isComplete
+    );
   }
 
   follow(state: ViewerState, { nearby, mayRefine }: Hybrid): void {
     const wanted = this.hasOverview ? wantedTiles(state, nearby) : [];
+    for (const channel of volumeChannels(state)) if (isTwoD(channel)) this.planes.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);
+    this.traced.follow(state);
     this.surfaces.follow(state, nearby);
     this.marks.follow(state);
   }
@@ -76,6 +112,8 @@ export class Contents {
   retryFailed(): void {
     this.surfaces.retryFailed();
     this.volumes.retryFailed();
+    this.traced.retryFailed();
+    this.planes.retryFailed();
     this.marks.readAnew();
   }
 
@@ -89,6 +127,7 @@ export class Contents {
   /** Go on with what fades; whether it does. */
   advance(view: MarksView): boolean {
     const isFading = this.volumes.advance(view.dt_s);
+    this.traced.advance(view.dt_s);
     this.marks.update(view);
     return isFading;
   }
@@ -97,12 +136,31 @@ export class Contents {
   stream(camera: Camera, width_px: number, height_px: number, target_px: number): void {
     this.surfaces.setErrorTarget(target_px);
     this.surfaces.update(camera, width_px, height_px);
+    this.bricks?.look(this.viewOf(camera, height_px));
+  }
+
+  /** What a camera sees, in the specimen's um. */
+  private viewOf(camera: Camera, height_px: number): BrickView {
+    const { surfaces, clip, point, ahead } = this;
+    const specimen = surfaces.group.matrixWorld;
+    clip.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(specimen);
+    const toSpecimen = specimen.clone().invert();
+    point.setFromMatrixPosition(camera.matrixWorld).applyMatrix4(toSpecimen);
+    ahead.set(0, 0, -1).transformDirection(camera.matrixWorld).transformDirection(toSpecimen);
+    return {
+      clip: clip.toArray(),
+      eye: point.toArray(),
+      gaze: ahead.toArray(),
+      pixels_per_radian: (camera.projectionMatrix.elements[5] * height_px) / 2,
+    };
   }
 
   dispose(): void {
     this.marks.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
+    this.traced.dispose();
+    this.bricks?.dispose();
     this.loader.dispose();
   }
 }

@@ -6,7 +6,10 @@ import type { Manifest } from "./bundle/generated/bundle";
 import type { Rgb } from "./color";
 import type { Vec3 } from "./gaze/pick";
 import type { QualityLevel } from "./quality/controller";
+import { type Lamp, START_TRACE, type TraceSettings, withLamp, withTrace } from "./trace/settings";
 import type { Clip } from "./view/clip";
+import { type Functions, type Plane, withShapes } from "./volume/functions2d";
+import type { Shapes } from "./volume/shapes2d";
 
 /**
  * So many channels show at once: one march samples as many from one texture. Of more, the one that
@@ -18,27 +21,29 @@ export const VOLUME_TILES_AT_START = 16;
 /** Metres of the room: nearer than a headset's specimen is at the start. */
 export const SWITCH_DISTANCE_M = 1.25;
 export const DISC_RADIUS_DEG = 12;
+const NO_FLOATS = "This device can't draw into textures of floats: light can't be gathered here.";
+/** DICOM's terms for scans of whole bodies, which are best seen as light passes through them. */
+const TRACED_MODALITIES: readonly string[] = ["MR", "CT"];
 
-export type ChannelState = Readonly<{
-  id: string;
-  name: string;
-  shown: boolean;
-  /** When it was shown: the lowest leaves first. */
-  turn: number;
-  color: Rgb;
-  original: Rgb;
-  /** Factor to the opacity of its surface and of its volume, 0..1. */
-  opacity: number;
-  /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
-  window: readonly [number, number];
-  /** Whether it may be drawn as a volume, where volumes are. */
-  volume: boolean;
-  transferFunction: string;
-  transferFunctions: readonly string[];
-  hasSurface: boolean;
-  /** Its surface can't be told from noise: as long as the volume is on, no surface is drawn. */
-  prefersVolume: boolean;
-}>;
+export type ChannelState = Functions &
+  Readonly<{
+    id: string;
+    name: string;
+    shown: boolean;
+    /** When it was shown: the lowest leaves first. */
+    turn: number;
+    color: Rgb;
+    original: Rgb;
+    /** Factor to the opacity of its surface and of its volume, 0..1. */
+    opacity: number;
+    /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
+    window: readonly [number, number];
+    /** Whether it may be drawn as a volume, where volumes are. */
+    volume: boolean;
+    hasSurface: boolean;
+    /** Its surface can't be told from noise: as long as the volume is on, no surface is drawn. */
+    prefersVolume: boolean;
+  }>;
 
 export type Representation = Manifest["tiles"][number]["representation"];
 
@@ -48,9 +53,9 @@ export type TileState = Readonly<{ id: string; representation: Representation }>
 /**
  * Where volumes are drawn. `disc`: round the gaze, across tiles. `tile`: in the gazed tile. `all`:
  * in all tiles. `stage`: as the stage has it; there are none of these unless an artist chose it.
- * `off`: nowhere. The first two hold within the switch distance.
+ * `traced`: in all tiles, by paths of light. `off`: nowhere. The first two hold within the switch distance.
  */
-export const MODES = ["disc", "tile", "all", "stage", "off"] as const;
+export const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
 export type Mode = (typeof MODES)[number];
 
 export type ViewerState = Readonly<{
@@ -75,6 +80,10 @@ export type ViewerState = Readonly<{
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: boolean;
   quality: QualityLevel;
+  /** Whether this device can gather light: draw into textures of floats. */
+  canTrace: boolean;
+  /** How the picture of the mode `traced` is made. */
+  trace: TraceSettings;
   /** Faults that leave the rest usable, newest last. */
   notices: readonly string[];
   /** Of these, what another try may mend. */
@@ -91,6 +100,10 @@ export type Action =
   | Readonly<{ type: "window"; channel: string; window: readonly [number, number] }>
   | Readonly<{ type: "draw-volume"; channel: string; volume: boolean }>
   | Readonly<{ type: "choose-transfer-function"; channel: string; name: string }>
+  /** Other shapes for a transfer function, which is chosen by that; `own` may be a new one. */
+  | Readonly<{ type: "set-shapes"; channel: string; name: string; shapes: Shapes }>
+  /** What the bundle has of a channel's two-dimensional functions has come. */
+  | Readonly<{ type: "learn-plane"; channel: string; plane: Plane }>
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "choose-mode"; mode: Mode }>
@@ -101,6 +114,8 @@ export type Action =
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
   | Readonly<{ type: "set-dwell"; isOn: boolean }>
   | Readonly<{ type: "choose-quality"; level: QualityLevel }>
+  | Readonly<{ type: "trace"; change: Partial<Omit<TraceSettings, "lamps">> }>
+  | Readonly<{ type: "move-lamp"; lamp: number; change: Partial<Lamp> }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
   | Readonly<{ type: "dismiss"; text: string }>;
 
@@ -118,7 +133,7 @@ function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number]
  * The state in which a bundle opens: the first channels, as surfaces from afar and as volumes in
  * the disc when near; in the tiles that the stage draws as volumes, as those.
  */
-export function initialState(manifest: Manifest): ViewerState {
+export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   const ordered = fromTheMiddle(manifest);
   const staged = ordered.filter((tile) => tile.representation !== "mesh");
   const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
@@ -136,6 +151,9 @@ export function initialState(manifest: Manifest): ViewerState {
       volume: true,
       transferFunction: channel.transfer_function,
       transferFunctions: channel.transfer_functions,
+      transferFunctions2d: channel.transfer_functions_2d.names,
+      plane: null,
+      shapes: {},
       hasSurface: channel.tileset !== null,
       prefersVolume: channel.surface === "unclear",
     })),
@@ -144,7 +162,7 @@ export function initialState(manifest: Manifest): ViewerState {
       representation: asStaged.has(tile) ? tile.representation : "mesh",
     })),
     middle: ordered[0].id,
-    mode: staged.length > 0 ? "stage" : "disc",
+    mode: startMode(manifest, canTrace, staged.length > 0),
     selected: null,
     isolated: null,
     switchDistance_m: SWITCH_DISTANCE_M,
@@ -154,6 +172,8 @@ export function initialState(manifest: Manifest): ViewerState {
     measured: [],
     isDwellOn: true,
     quality: "auto",
+    canTrace,
+    trace: START_TRACE,
     notices:
       staged.length > VOLUME_TILES_AT_START
         ? [
@@ -163,6 +183,12 @@ export function initialState(manifest: Manifest): ViewerState {
         : [],
     mendable: [],
   };
+}
+
+/** Scans of bodies open by paths of light; an artist's choice goes before the disc. */
+function startMode({ specimen }: Manifest, canTrace: boolean, isStaged: boolean): Mode {
+  if (TRACED_MODALITIES.includes(specimen.modality)) return canTrace ? "traced" : "all";
+  return isStaged ? "stage" : "disc";
 }
 
 function withChannel(
@@ -228,6 +254,10 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       return withChannel(state, action.channel, (c) =>
         c.transferFunctions.includes(action.name) ? { ...c, transferFunction: action.name } : c,
       );
+    case "set-shapes":
+      return withChannel(state, action.channel, (c) => withShapes(c, action.name, action.shapes));
+    case "learn-plane":
+      return withChannel(state, action.channel, (c) => ({ ...c, plane: action.plane }));
     case "select":
       return withTile(state, "selected", action.tile);
     case "isolate":
@@ -238,6 +268,7 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
         action.tile,
       );
     case "choose-mode":
+      if (action.mode === "traced" && !state.canTrace) return withNotice(state, NO_FLOATS);
       return action.mode === state.mode ? state : { ...state, mode: action.mode };
     case "set-switch-distance":
       return { ...state, switchDistance_m: clamp(action.distance_m, ...LIMITS.switchDistance_m) };
@@ -253,6 +284,10 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       return action.isOn === state.isDwellOn ? state : { ...state, isDwellOn: action.isOn };
     case "choose-quality":
       return action.level === state.quality ? state : { ...state, quality: action.level };
+    case "trace":
+      return { ...state, trace: withTrace(state.trace, action.change) };
+    case "move-lamp":
+      return { ...state, trace: withLamp(state.trace, action.lamp, action.change) };
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {
@@ -282,4 +317,9 @@ export function newNotice(before: ViewerState, after: ViewerState): string | nul
 /** The channels that may be marched, in the bundle's order. */
 export function volumeChannels(state: ViewerState): readonly ChannelState[] {
   return state.channels.filter((c) => c.shown && c.volume);
+}
+
+/** Whether volumes are drawn by paths of light. */
+export function isTraced({ mode }: ViewerState): boolean {
+  return mode === "traced";
 }

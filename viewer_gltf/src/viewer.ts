@@ -10,6 +10,7 @@ import { Hybrid } from "./hybrid/hybrid";
 import type { HandleId } from "./marks/handles";
 import { listenForHandles } from "./marks/pointer";
 import { ERROR_TARGET_PX } from "./mesh/surface_set";
+import { GatherPace } from "./quality/gather_pace";
 import { Pace } from "./quality/pace";
 import type { Look } from "./share/look";
 import { type Action, initialState, newNotice, reduce, type ViewerState } from "./state";
@@ -20,10 +21,11 @@ import { chosenTile } from "./ui/tile_layout";
 import { intoRoom, ontoScreen } from "./view/crossing";
 import type { HandPose, SpecimenPose } from "./view/grab";
 import { Navigation } from "./view/navigation";
-import { Picture } from "./view/picture";
+import { type FramePace, Picture } from "./view/picture";
 import { place, XR_DISTANCE_M } from "./view/placement";
 import { Room } from "./view/room";
 import { StageSize } from "./view/stage_size";
+import type { Histogram } from "./volume/transfer_planes";
 import type { Profile } from "./xr/cardboard/profile";
 import { ahead } from "./xr/head";
 import { Stereo } from "./xr/stereo";
@@ -49,6 +51,7 @@ export class Viewer {
   private readonly picture: Picture;
   private readonly hybrid: Hybrid;
   private pace: Pace;
+  private readonly gathering: GatherPace;
   private readonly contents: Contents;
   private readonly size: StageSize;
   private readonly disposed = new AbortController();
@@ -71,11 +74,11 @@ export class Viewer {
     private readonly onFrame: () => void,
   ) {
     const { manifest } = bundle;
-    this.state = initialState(manifest);
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
     this.renderer.info.autoReset = false;
     stage.append(this.renderer.domElement);
     const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.state = initialState(manifest, gl.getExtension("EXT_color_buffer_float") !== null);
     const canvas = this.renderer.domElement;
 
     const refresh = () => {
@@ -85,6 +88,7 @@ export class Viewer {
     this.hybrid = new Hybrid(manifest);
     this.picture = new Picture(this.renderer, this.room, this.hybrid);
     this.pace = new Pace(gl);
+    this.gathering = new GatherPace(gl);
     this.contents = new Contents({
       bundle,
       renderer: this.renderer,
@@ -134,9 +138,12 @@ export class Viewer {
     canvas.addEventListener("webglcontextlost", () => {
       this.dispatch({ type: "notify", text: lost });
       volumes.forget(); // their texels went with the context
+      this.contents.traced.forget();
+      this.gathering.forget();
     });
     canvas.addEventListener("webglcontextrestored", () => {
       volumes.forget(); // those that have come since
+      this.contents.traced.forget();
       this.pace = new Pace(gl); // the times that were asked for went, too
       this.follow();
       this.dispatch({ type: "dismiss", text: lost });
@@ -229,6 +236,7 @@ export class Viewer {
       triangles: surfaces.triangles,
       volumes: volumes.status(),
       volumeBytes: volumes.bytes,
+      traced: this.contents.traced.status(),
       gazed: this.hybrid.nearby.gazed,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.pace.frame_ms,
@@ -256,6 +264,17 @@ export class Viewer {
     // for each of a host's files it would be told anew
     if (isMendable && this.state.mendable.includes(text)) return;
     this.dispatch({ type: "notify", text, isMendable });
+  }
+
+  /** Light the traced picture by a file of the user's. Throws BundleError. */
+  async lightBy(file: File): Promise<void> {
+    await this.contents.traced.lightBy(file);
+    this.dispatch({ type: "trace", change: { environment: "own" } });
+  }
+
+  /** Voxels of a channel by value and gradient; null: not yet, it is being fetched. */
+  histogram(channel: string): Histogram | null {
+    return this.contents.planes.histogram(channel);
   }
 
   /** Ask again for all that has failed. */
@@ -290,10 +309,12 @@ export class Viewer {
     if (this.contents.hasJustBegun()) this.follow();
     const inRoom = this.stereo.pose(this.picture.eyes);
     const isStereo = inRoom !== null;
+    const { contents } = this;
     const camera = inRoom ?? this.poseMono();
     if (isStereo) this.stereo.hands.update(dt_s, this.head, this.state);
     const isChanging = this.advance(dt_s);
-    if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving) return;
+    const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
+    if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving && !isGathering) return;
     // a picture that came to rest is drawn once more, as well as can be
     const isMoving = isStereo || this.isStale;
     const settings = this.pace.begin(isMoving, interval_ms, this.stereo.headset.rate_hz);
@@ -309,9 +330,11 @@ export class Viewer {
         ERROR_TARGET_PX * settings.errorFactor,
       );
     }
-    if (isMoving || this.wasMoving) {
+    if (isMoving || this.wasMoving || isGathering) {
       this.isStale = isChanging;
-      this.draw(camera, settings.resolution);
+      const { passes } = this.gathering;
+      this.draw(camera, { resolution: settings.resolution, isMoving, passes });
+      if (isGathering) this.gathering.submit(time_ms);
       this.frames++;
       this.onFrame();
     }
@@ -357,14 +380,18 @@ export class Viewer {
     return isChanging;
   }
 
-  private draw(camera: Camera, resolution: number): void {
+  private draw(camera: Camera, pace: FramePace): void {
     const { contents, stereo, head, picture } = this;
-    const { volumes, surfaces, marks } = contents;
-    const overlays = [...marks.overlays, ...stereo.hands.overlays];
-    const { clip } = this.state;
-    stereo.present(() =>
-      picture.draw(camera, head, volumes, surfaces.blended, overlays, clip, resolution),
-    );
+    const { volumes, traced, surfaces, marks } = contents;
+    const drawn = {
+      volumes,
+      traced,
+      panes: surfaces.blended,
+      overlays: [...marks.overlays, ...stereo.hands.overlays],
+      bounds: this.bundle.manifest.specimen.bounds_um,
+      solids: surfaces.triangles,
+    };
+    stereo.present(() => picture.draw(camera, head, drawn, this.state.clip, pace));
   }
 
   /** Pose of the head, or of the mono camera. */

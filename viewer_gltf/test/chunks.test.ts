@@ -307,7 +307,7 @@ describeInChromium("the shader's chunks", () => {
           return vec4(0.5 + 0.25 * v, 0.0, 0.5 + 0.75 * v, 0.0);
         }`;
       const body = `oColor = vec4(shade(vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}));`;
-      return run(["shade"], head, body).then(([found]) => found);
+      return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
 
     const unit = (v: readonly number[]) => v.map((each) => each / Math.hypot(...v));
@@ -365,7 +365,7 @@ describeInChromium("the shader's chunks", () => {
       const call = `shade(vec3(0.5), ${vec(1 / 8, -1 / 8, 1 / 4)}, vec3(0.6, -0.8, 0.0))`;
       const textures = { uVolume };
       const [found] = await run(
-        ["intensities", "shade"],
+        ["intensities", "gradient", "shade"],
         head,
         `oColor = vec4(${call});`,
         textures,
@@ -485,8 +485,8 @@ describeInChromium("the shader's chunks", () => {
   });
 
   it("have a test each", async () => {
-    const tests = ["chunks.test.ts", "march.test.ts"].map((name) =>
-      readFile(new URL(name, import.meta.url), "utf8"),
+    const tests = ["chunks.test.ts", "trace_chunks.test.ts", "march.test.ts", "two_d.test.ts"].map(
+      (name) => readFile(new URL(name, import.meta.url), "utf8"),
     );
     const text = (await Promise.all(tests)).join("\n");
     const names = await readdir(new URL("../src/shaders/chunks/", import.meta.url));

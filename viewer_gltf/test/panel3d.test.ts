@@ -97,6 +97,71 @@ describeInChromium("the panel in the room", () => {
     expect(await hands().page.evaluate(() => window.hands.leaves)).toBe(1);
   });
 
+  it("places shapes by value and gradient, and draws them by their corners", async () => {
+    await hands().connect("left", false);
+    await hands().point("right", RIGHT, AWAY);
+    await hands().openPanel();
+    const choose = async (id: string) => {
+      await hands().point("right", RIGHT, await hands().controlAt(id));
+      await hands().press("right");
+    };
+    await choose("c0/open");
+    for (let page = 0; page < 2; page++) {
+      if (!(await hands().status()).regions.includes("c0/plane")) await choose("more");
+    }
+    await choose("c0/plane");
+    const reach = async (id: string) => {
+      for (let page = 0; page < 5; page++) {
+        if ((await hands().status()).regions.includes(id)) return;
+        await choose("more");
+      }
+    };
+    await reach("c0/add-rectangle");
+    await choose("c0/add-rectangle");
+    const shapes = async () => {
+      const made = (await hands().actions()).flatMap((action) =>
+        action.type === "set-shapes" ? [action] : [],
+      );
+      return made.map((action) => action.shapes[0]);
+    };
+    const [placed] = await shapes();
+    await reach("c0/shapes");
+    await picture("shapes");
+    const at = (value: number, gradient: number) =>
+      hands().controlAt("c0/shapes", value, 1 - gradient);
+    const drag = async (
+      from: readonly [number, number],
+      to: readonly [number, number],
+      by: "trigger" | "gaze" = "trigger",
+    ) => {
+      if (by === "gaze") {
+        await hands().lookAt(await at(...from));
+        await hands().tap(); // takes it up
+        await hands().lookAt(await at(...to));
+        await hands().wait(0.2);
+        await hands().tap(); // puts it down
+        return;
+      }
+      await hands().point("right", RIGHT, await at(...from));
+      await hands().button("right", "trigger", 1);
+      await hands().point("right", RIGHT, await at(...to));
+      await hands().wait(0.2);
+      await hands().button("right", "trigger", 0);
+    };
+    const corner = [placed.values[1], placed.gradients[1]] as const;
+    await drag(corner, [0.8, 0.9]);
+    const drawn = (await shapes()).at(-1);
+    expect(drawn?.values[0]).toBeCloseTo(placed.values[0], 2);
+    expect(drawn?.values[1]).toBeCloseTo(0.8, 2);
+    expect(drawn?.gradients[1]).toBeCloseTo(0.9, 2);
+    await picture("drawn");
+    await hands().gazeOnly();
+    await drag([0.5, 0.6], [0.6, 0.5], "gaze");
+    const moved = (await shapes()).at(-1);
+    expect(moved?.values[0]).toBeCloseTo(placed.values[0] + 0.1, 2);
+    expect(moved?.gradients[1]).toBeCloseTo(0.8, 2);
+  });
+
   it("says why a control refuses, under the gaze, for a while", async () => {
     await hands().gazeOnly();
     await hands().openPanel();

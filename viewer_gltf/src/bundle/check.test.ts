@@ -8,7 +8,7 @@ const MANIFEST = {
   format: "stereocell-bundle",
   version: 1,
   generator: "stereocell 0.1.0",
-  specimen: { name: "s", bounds_um: BOUNDS },
+  specimen: { name: "s", modality: "MR", bounds_um: BOUNDS },
   tiles: [{ id: "r0_c0", representation: "mesh", bounds_um: BOUNDS }],
   channels: [
     {
@@ -18,9 +18,11 @@ const MANIFEST = {
       window: [0, 10],
       iso_value: null,
       iso_normalized: null,
+      threshold_normalized: null,
       surface: "none",
       transfer_function: "default",
       transfer_functions: ["default"],
+      transfer_functions_2d: { names: [], file: FILE },
       lut: FILE,
       tileset: null,
       triangles: [],

@@ -1,9 +1,12 @@
 /** Check a bundle's JSON files against the schemas that the pipeline wrote them by. */
 import { type OutputUnit, type Schema, Validator } from "@cfworker/json-schema";
 import bundleSchema from "../../../schemas/bundle.schema.json";
+import transfer2dSchema from "../../../schemas/transfer2d.schema.json";
 import volumesSchema from "../../../schemas/volumes.schema.json";
+import { faultOf, MAX_SHAPES } from "../volume/shapes2d";
 import { BundleError } from "./errors";
 import type { Manifest } from "./generated/bundle";
+import type { ChannelTransfer2D } from "./generated/transfer2d";
 import type { ChannelVolumes } from "./generated/volumes";
 
 export const FORMAT = "stereocell-bundle";
@@ -56,4 +59,21 @@ export function checkManifest(value: unknown): Manifest {
 export function checkVolumes(value: unknown, path: string): ChannelVolumes {
   checkSchema(volumesSchema, value, path);
   return value as ChannelVolumes;
+}
+
+/** A channel's transfer2d.json, once its shape is right and its shapes are. Throws BundleError. */
+export function checkTransfer2d(value: unknown, path: string): ChannelTransfer2D {
+  checkSchema(transfer2dSchema, value, path);
+  const checked = value as ChannelTransfer2D;
+  for (const [name, shapes] of Object.entries(checked.functions)) {
+    if (shapes.length > MAX_SHAPES) {
+      const found = `expected at most ${MAX_SHAPES} shapes, found ${shapes.length}`;
+      throw new BundleError(`${path}: functions.${name}: ${found}`);
+    }
+    shapes.forEach((shape, i) => {
+      const fault = faultOf(shape);
+      if (fault !== null) throw new BundleError(`${path}: functions.${name}.${i}: ${fault}`);
+    });
+  }
+  return checked;
 }

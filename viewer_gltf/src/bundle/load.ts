@@ -1,17 +1,29 @@
-/** Load the small files of a bundle: the manifest, and a channel's list of volumes. */
-import { checkManifest, checkVolumes } from "./check";
+/** Load the small files of a bundle: the manifest, a channel's list of volumes and what it has in 2D. */
+
+import { bricksAddress } from "../bricks/address";
+import { readLevel, readTexture } from "../volume/ktx2";
+import { COLUMNS, ROWS } from "../volume/shapes2d";
+import { checkManifest, checkTransfer2d, checkVolumes } from "./check";
 import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";
 import type { FileRef, Manifest } from "./generated/bundle";
+import type { ChannelTransfer2D } from "./generated/transfer2d";
 import type { TileVolume } from "./generated/volumes";
 
-export type Bundle = Readonly<{ base: string; manifest: Manifest }>;
+export type Bundle = Readonly<{
+  base: string;
+  manifest: Manifest;
+  /** Address of the websocket that sends bricks by view; absent: volumes come as files. */
+  bricks?: string;
+}>;
 
 /** Load and check the bundle in the folder `base`. Throws BundleError. */
 export async function loadBundle(base: string): Promise<Bundle> {
   const path = "manifest.json";
   const response = await request(fileAddress(base, path), path, { cache: "no-cache" });
   const text = new TextDecoder().decode(await readBody(response, path));
-  return { base, manifest: checkManifest(parseJson(text, path)) };
+  const manifest = checkManifest(parseJson(text, path));
+  const bricks = bricksAddress(response.headers, base);
+  return bricks === null ? { base, manifest } : { base, manifest, bricks };
 }
 
 /** The volumes of one channel, by tile. Throws BundleError. */
@@ -22,4 +34,17 @@ export async function loadVolumes(
   const text = new TextDecoder().decode(await fetchFile(base, file));
   const { volumes } = checkVolumes(parseJson(text, file.path), file.path);
   return new Map(volumes.map((volume) => [volume.tile, volume]));
+}
+
+/** The two-dimensional transfer functions of one channel. Throws BundleError. */
+export async function loadTransfer2d(base: string, file: FileRef): Promise<ChannelTransfer2D> {
+  const text = new TextDecoder().decode(await fetchFile(base, file));
+  return checkTransfer2d(parseJson(text, file.path), file.path);
+}
+
+/** A histogram of value and gradient, COLUMNS x ROWS bytes, row 0 first. Throws BundleError. */
+export async function loadHistogram(base: string, file: FileRef): Promise<Uint8Array> {
+  const bytes = await fetchFile(base, file);
+  const texture = readTexture(bytes, file.path, "R8", [COLUMNS, ROWS, 1]);
+  return readLevel(texture, file.path, "R8", 0);
 }

@@ -1,6 +1,7 @@
 /** Who is drawn how: for each channel and tile, surface or volume. Pure. */
 import {
   type ChannelState,
+  isTraced,
   type Representation,
   type TileState,
   type ViewerState,
@@ -41,7 +42,7 @@ export function drawnAs(
   if (!channel.shown || (state.isolated !== null && tile.id !== state.isolated)) return null;
   if (!channel.volume || state.mode === "off") return "mesh";
   if (state.mode === "stage" && tile.representation !== "mesh") return tile.representation;
-  if (isMarched(state, tile.id, nearby)) return "volume";
+  if (isTraced(state) || isMarched(state, tile.id, nearby)) return "volume";
   if (!channel.prefersVolume) return "mesh";
   const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
   return isSmall || tile.id === (followedTile(state, nearby) ?? state.middle) ? "volume" : null;
@@ -56,6 +57,7 @@ function isMarched(state: ViewerState, tile: string, nearby: Nearby): boolean {
     case "all":
       return true;
     case "stage":
+    case "traced":
     case "off":
       return false;
   }
@@ -66,8 +68,9 @@ export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
   return state.mode === "disc" && !channel.prefersVolume;
 }
 
-/** The tiles that are drawn as volumes, those in the disc first. */
+/** The tiles that are marched, those in the disc first. */
 export function wantedTiles(state: ViewerState, nearby: Nearby): readonly WantedTile[] {
+  if (isTraced(state)) return [];
   const channels = volumeChannels(state);
   const wanted = state.tiles.flatMap((tile) => {
     const drawn = channels.filter((channel) => {
@@ -92,6 +95,7 @@ export function wantedTiles(state: ViewerState, nearby: Nearby): readonly Wanted
 /** Whether a channel's surfaces, if it has any, are drawn anywhere: else they aren't loaded. */
 export function wantsSurface(state: ViewerState, channel: ChannelState): boolean {
   if (!channel.shown) return false;
+  if (channel.volume && isTraced(state)) return false;
   if (!channel.volume || !channel.prefersVolume || state.mode === "off") return true;
   return state.mode === "stage" && state.tiles.some((tile) => tile.representation === "both");
 }
@@ -105,6 +109,6 @@ export function takenFrom(
   presence: number,
 ): number | null {
   const as = drawnAs(state, channel, tile, nearby);
-  if (as === null || (as === "volume" && channel.prefersVolume)) return null;
+  if (as === null || (as === "volume" && (channel.prefersVolume || isTraced(state)))) return null;
   return as === "both" ? 0 : presence;
 }

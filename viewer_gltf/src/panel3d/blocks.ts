@@ -5,6 +5,7 @@ import type { Control, Group, Toggle } from "../ui/controls";
 import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
 import { type Block, box, type Mark, type Rect, type Region, ROW, SMALL, text } from "./marks";
 import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
+import { planeBlock } from "./plane_block";
 import { sliderRow, windowRow } from "./tracks";
 
 /** What has no use in a headset: there is no keyboard, no clipboard, and stereo has begun. */
@@ -47,6 +48,8 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
       return item.palettes.length === 0 ? [nextSwatch(item, row)] : palettes(item, width);
     case "map":
       return [mapBlock(item, width)];
+    case "plane":
+      return [planeBlock(item, width)];
     case "text":
       return item.value === "" ? [] : [textBlock(item.label, item.value, width)];
     case "search":

@@ -1,5 +1,6 @@
 /** What the panel on a plane is made of: marks to paint and regions to point at. Pixels. Pure. */
 import type { Wish } from "../ui/controls";
+import type { Histogram } from "../volume/transfer_planes";
 
 /** From the upper left corner. */
 export type Rect = Readonly<{ x: number; y: number; width: number; height: number }>;
@@ -19,7 +20,23 @@ export type Mark =
       /** As many lines as may be broken into; the last one ends with an ellipsis. */
       lines: number;
     }>
-  | Readonly<{ kind: "tick"; rect: Rect; tone: Tone }>;
+  | Readonly<{ kind: "tick"; rect: Rect; tone: Tone }>
+  /** `corners` in the rect, 0..1 from its upper left corner. */
+  | Readonly<{
+      kind: "outline";
+      rect: Rect;
+      corners: readonly (readonly [number, number])[];
+      fill: Tone;
+      opacity: number;
+      stroke: Tone;
+    }>
+  /** `window`: the part of its values that the rect is as wide as. */
+  | Readonly<{
+      kind: "histogram";
+      rect: Rect;
+      histogram: Histogram;
+      window: readonly [number, number];
+    }>;
 
 /** What the plane keeps for itself, since it shows one section at a time, and a page of it. */
 export type PlaneChange =
@@ -32,14 +49,19 @@ export type PlaneChange =
 
 export type PlaneWish = Wish | PlaneChange;
 
-/** Where a ray does something. `to` gets where in the region it is, 0..1 from its left edge. */
+/**
+ * Where a ray does something. `to` gets where in the region it is, 0..1 from its left edge and from
+ * its upper one; null: nothing changes by it.
+ */
 export type Region = Readonly<{
   id: string;
   /** For tests and for whoever reads the panel aloud. */
   label: string;
   rect: Rect;
   isSlide: boolean;
-  to: (across: number) => PlaneWish;
+  to: (across: number, down?: number) => PlaneWish | null;
+  /** What taking hold of it does, where that is something else than to drag it. */
+  press?: (across: number, down: number) => PlaneWish;
 }>;
 
 /** A row, or what must not be broken; its upper left corner is 0, 0. */

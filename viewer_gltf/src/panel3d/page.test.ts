@@ -21,6 +21,7 @@ const FACTS: Facts = {
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 12_345,
   volumeLevel: 1,
+  samples: null,
   isLoading: false,
   values: [],
 };
@@ -28,7 +29,9 @@ const start = (channels = 12) => initialState(sampleManifest(channels));
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
   layOut(state, FACTS, { ...START_VIEW, ...view });
 
-const TABS = ["channels", "volumes", "tiles", "view", "stereo", "measure", "cut", "quality"];
+const TABS = [
+  ...["channels", "volumes", "light", "tiles", "view", "stereo", "measure", "cut", "quality"],
+];
 
 /** Every page of every section. */
 function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly Page[] {
@@ -38,7 +41,8 @@ function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly P
       const made = pageOf(laidOut(state, view), { tab, page });
       pages.push(made);
       const more = made.regions.find(({ id }) => id === "more")?.to(0);
-      if (typeof more !== "object" || !("plane" in more) || more.plane !== "page") break;
+      if (typeof more !== "object" || more === null || !("plane" in more) || more.plane !== "page")
+        break;
       if (more.page === 0) break;
     }
     return pages;
@@ -128,7 +132,7 @@ describe("its controls", () => {
     const opacity = find(page, "c0/opacity");
     const at = (across: number) => {
       const wish = opacity.to(across);
-      return typeof wish === "object" && "opacity" in wish ? wish.opacity : null;
+      return typeof wish === "object" && wish !== null && "opacity" in wish ? wish.opacity : null;
     };
     expect([at(0), at(0.5), at(1)]).toEqual([0, 0.5, 1]);
     expect(at(0.04)).toBe(0);

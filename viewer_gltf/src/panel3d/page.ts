@@ -140,8 +140,9 @@ function header({ title, status }: Layout): Block {
 function tabs(sections: readonly Section[], open: string): Block {
   const marks: Mark[] = [];
   const regions: Region[] = [];
+  const height = Math.min(ROW, Math.floor(CONTENT.height / sections.length));
   sections.forEach(({ id, label }, i) => {
-    const rect: Rect = { x: 0, y: i * ROW, width: TABS, height: ROW };
+    const rect: Rect = { x: 0, y: i * height, width: TABS, height };
     if (id === open) marks.push(box(rect, "raised", "accent"));
     marks.push(text(rect, label, { tone: id === open ? "text" : "dim", size: SMALL + 2 }));
     regions.push({
@@ -152,7 +153,7 @@ function tabs(sections: readonly Section[], open: string): Block {
       to: () => ({ plane: "tab", section: id }),
     });
   });
-  return { height: sections.length * ROW, marks, regions };
+  return { height: sections.length * height, marks, regions };
 }
 
 function pager(page: number, count: number): Block {

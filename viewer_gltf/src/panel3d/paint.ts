@@ -1,4 +1,5 @@
 /** Marks on a 2D canvas. */
+import { histogramPicture } from "./histogram_picture";
 import type { Mark, Rect, Tone } from "./marks";
 
 /** The page's own colours: see ui/page.css. */
@@ -21,6 +22,8 @@ export function paint(context: CanvasRenderingContext2D, marks: readonly Mark[])
   for (const mark of marks) {
     if (mark.kind === "box") paintBox(context, mark);
     else if (mark.kind === "text") paintText(context, mark);
+    else if (mark.kind === "outline") paintOutline(context, mark);
+    else if (mark.kind === "histogram") paintHistogram(context, mark);
     else paintTick(context, mark.rect, mark.tone);
   }
 }
@@ -40,6 +43,41 @@ function paintBox(context: Context, mark: Extract<Mark, { kind: "box" }>): void 
   context.lineWidth = 4;
   context.strokeStyle = colorOf(mark.stroke);
   context.stroke();
+}
+
+function paintOutline(context: Context, mark: Extract<Mark, { kind: "outline" }>): void {
+  const { x, y, width, height } = mark.rect;
+  context.beginPath();
+  mark.corners.forEach(([across, down], i) => {
+    const at = [x + across * width, y + down * height] as const;
+    if (i === 0) context.moveTo(...at);
+    else context.lineTo(...at);
+  });
+  context.closePath();
+  context.globalAlpha = mark.opacity;
+  context.fillStyle = colorOf(mark.fill);
+  context.fill();
+  context.globalAlpha = 1;
+  context.lineWidth = 3;
+  context.strokeStyle = colorOf(mark.stroke);
+  context.stroke();
+}
+
+/** A window cuts a part out of the plane: of the values as much as of the gradients. */
+function paintHistogram(context: Context, mark: Extract<Mark, { kind: "histogram" }>): void {
+  const picture = histogramPicture(mark.histogram);
+  const { x, y, width, height } = mark.rect;
+  const [low, high] = mark.window;
+  const share = high - low;
+  const { width: columns, height: rows } = picture;
+  context.drawImage(
+    picture,
+    low * columns,
+    (1 - share) * rows,
+    share * columns,
+    share * rows,
+    ...([x, y, width, height] as const),
+  );
 }
 
 function paintText(context: Context, mark: Extract<Mark, { kind: "text" }>): void {

@@ -137,7 +137,7 @@ export class RoomPanel {
   }
 
   /** Where the middle of a region is in the room; for tests. */
-  pointOf(id: string, across = 0.5): Vector3 | null {
+  pointOf(id: string, across = 0.5, down = 0.5): Vector3 | null {
     const region = this.regions.find((each) => each.id === id);
     if (id === OPENER_KEY) return this.opener.mesh.getWorldPosition(new Vector3());
     if (region === undefined) return null;
@@ -145,7 +145,7 @@ export class RoomPanel {
     return this.plane.mesh.localToWorld(
       new Vector3(
         (x + across * width - WIDTH / 2) / PX_PER_M,
-        (HEIGHT / 2 - y - height / 2) / PX_PER_M,
+        (HEIGHT / 2 - y - down * height) / PX_PER_M,
         0,
       ),
     );
@@ -189,7 +189,10 @@ export class RoomPanel {
     if (spot === null) return null;
     const region = this.regionAt(spot);
     const key = region && PANEL + region.id;
-    return { key, distance_m: spot.distance_m, ...(region?.isSlide ? { hold: "slide" } : {}) };
+    if (!region?.isSlide) return { key, distance_m: spot.distance_m };
+    // what is first taken hold of can be carried by the gaze alone
+    const hold = region.press === undefined ? "slide" : "carry";
+    return { key, distance_m: spot.distance_m, hold };
   }
 
   private meetOpener(ray: RoomRay): Hit | null {
@@ -198,14 +201,15 @@ export class RoomPanel {
   }
 
   private choose({ key }: Hit, ray: RoomRay): void {
-    const wish = key === null ? null : this.wishAt(key, ray);
+    const wish = key === null ? null : this.wishAt(key, ray, true);
     if (wish === null) return;
     this.dragged = JSON.stringify(wish);
     this.grant(wish);
   }
 
   private drag(key: string, ray: RoomRay): void {
-    const wish = this.wishAt(key, ray);
+    if (this.isStale) this.refresh(); // what was taken hold of is part of it by now
+    const wish = this.wishAt(key, ray, false);
     const text = JSON.stringify(wish);
     if (wish === null || text === this.dragged) return;
     this.dragged = text;
@@ -213,12 +217,14 @@ export class RoomPanel {
   }
 
   /** Beyond a region's ends is at its ends: a slider is dragged past them. */
-  private wishAt(key: string, ray: RoomRay): PlaneWish | null {
+  private wishAt(key: string, ray: RoomRay, isPress: boolean): PlaneWish | null {
     const region = this.page.regions.find(({ id }) => PANEL + id === key);
     const spot = this.plane.meet(ray);
     if (region === undefined || spot === null) return null;
-    const across = (spot.x - region.rect.x) / region.rect.width;
-    return region.to(Math.min(1, Math.max(0, across)));
+    const { x, y, width, height } = region.rect;
+    const inside = (share: number) => Math.min(1, Math.max(0, share));
+    const at = [inside((spot.x - x) / width), inside((spot.y - y) / height)] as const;
+    return isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
   }
 
   private grant(wish: PlaneWish): void {

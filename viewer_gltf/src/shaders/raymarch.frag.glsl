@@ -5,6 +5,8 @@
 // After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
 precision highp float;
 precision highp sampler3D;
+precision highp sampler2DArray;
+precision highp usampler3D;
 
 uniform vec3 uSize;  // um
 uniform vec3 uTexLow;  // texture coordinates at the box's low corner ...
@@ -31,10 +33,15 @@ uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;  // xyz unit normal, w um: nothing with dot(normal, p) > w is drawn
 uniform sampler3D uVolume;
+uniform usampler3D uIndex;  // with BRICKS
 uniform sampler3D uOldVolume;  // what the volume takes the place of, at another mip level
 uniform float uFresh;  // 0..1: share of the new one
 uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
 uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
+#ifdef TWO_D
+uniform sampler2DArray uPlanes;  // 256 x 64 x CHANNELS: the same by value and steepness
+uniform vec4 uGradientMax;  // steps of intensity over two voxels that are 1 to the tables
+#endif
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
 uniform bool uHasPane;  // whether any surface is translucent
@@ -63,6 +70,11 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/leap>
 #include <chunks/intensities>
 #include <chunks/classify>
+#ifdef TWO_D
+#include <chunks/plane>
+#include <chunks/classify2d>
+#endif
+#include <chunks/gradient>
 #include <chunks/shade>
 #include <chunks/jitter>
 #include <chunks/encoded>
@@ -139,14 +151,28 @@ void main() {
     float at = t + shift * here;
     vec3 p = texStart + at * texDir;
     vec4 v = sampleIntensities(p);
-    if (any(greaterThan(v, uFloor))) {
-#ifdef DISC
-      vec4 s = classify(v, here / uVoxel * weights(start + at * dir));
+#ifdef TWO_D
+    if (any(greaterThan(v, uFloor)) && mayShow(v)) {
 #else
-      vec4 s = classify(v, vec4(here / uVoxel * uPresence));
+    if (any(greaterThan(v, uFloor))) {
+#endif
+#ifdef DISC
+      vec4 voxels = here / uVoxel * weights(start + at * dir);
+#else
+      vec4 voxels = vec4(here / uVoxel * uPresence);
+#endif
+#ifdef TWO_D
+      Steps around = stepsAt(p, uVoxel * abs(texPerUm));
+      vec4 s = classify2d(v, steepnessOf(around), voxels);
+#else
+      vec4 s = classify(v, voxels);
 #endif
       if (s.a > 0.0) {
+#ifdef TWO_D
+        s.rgb *= shadeBy(gradientOf(around) * sign(texPerUm), dir);
+#else
         s.rgb *= shade(p, texPerUm, dir);
+#endif
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
     }

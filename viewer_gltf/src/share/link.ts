@@ -4,9 +4,11 @@
  *   #v=1&c=DAPI,CD8&l=DAPI:c3050ff:o0.5,CD8:n&mode=tile&eye=0,0,1.8,0,0,0
  *
  * What is as the bundle opens is left out. `c`: the channels shown; `l`: channels that look
- * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) t(ransfer function) n(o volume).
+ * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
+ * name_shapes: see shape_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
- * corner), cut (a plane's normal and offset), points (um), tool, dwell, quality, eye and pose.
+ * corner), cut (a plane's normal and offset), points (um), tool, dwell, quality, light (see
+ * trace_link.ts), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken, and what can't be read is told and left out.
  */
@@ -14,8 +16,11 @@ import { fromHex, toHex } from "../color";
 import type { Vec3 } from "../gaze/pick";
 import { type Action, type ChannelState, MAX_CHANNELS, MODES, type ViewerState } from "../state";
 import { AXES, type Box, type Clip, withinSpecimen } from "../view/clip";
+import { OWN } from "../volume/functions2d";
 import { type Look, readLook, writeLook } from "./look";
 import { readNumbers, written } from "./numbers";
+import { readShapes, writeShapes } from "./shape_link";
+import { readTrace, writeTrace } from "./trace_link";
 
 const VERSION = "1";
 /** Seventy channels that all look different take less. */
@@ -30,6 +35,17 @@ export type Shared = Readonly<{ actions: readonly Action[]; look: Look | null }>
  * @param look null: as the bundle opens
  */
 export function writeLink(state: ViewerState, start: ViewerState, look: Look | null): string {
+  const links = [isAnything, isChosen, isShown].map((has) => linkOf(state, start, look, has));
+  return links.find(({ length }) => length <= LONGEST) ?? links[links.length - 1];
+}
+
+/** Whether the shapes of a function are part of a link: where not all of them have room in one. */
+type HasShapes = (channel: ChannelState, name: string) => boolean;
+const isAnything: HasShapes = () => true;
+const isChosen: HasShapes = ({ transferFunction }, name) => name === transferFunction;
+const isShown: HasShapes = (channel, name) => channel.shown && isChosen(channel, name);
+
+function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: HasShapes): string {
   const parts: Record<string, string> = { v: VERSION };
   const shownOf = ({ channels }: ViewerState) =>
     channels
@@ -37,7 +53,9 @@ export function writeLink(state: ViewerState, start: ViewerState, look: Look | n
       .map(({ id }) => encodeURIComponent(id))
       .join(",");
   if (shownOf(state) !== shownOf(start)) parts.c = shownOf(state);
-  const looks = state.channels.flatMap((channel, i) => writeChannel(channel, start.channels[i]));
+  const looks = state.channels.flatMap((channel, i) =>
+    writeChannel(channel, start.channels[i], has),
+  );
   if (looks.length > 0) parts.l = looks.join(",");
   if (state.mode !== start.mode) parts.mode = state.mode;
   if (state.switchDistance_m !== start.switchDistance_m) {
@@ -53,6 +71,8 @@ export function writeLink(state: ViewerState, start: ViewerState, look: Look | n
   if (state.tool !== start.tool) parts.tool = state.tool;
   if (state.isDwellOn !== start.isDwellOn) parts.dwell = state.isDwellOn ? "on" : "off";
   if (state.quality !== start.quality) parts.quality = state.quality;
+  const light = writeTrace(state.trace);
+  if (light !== "") parts.light = light;
   Object.assign(parts, look === null ? {} : writeLook(look));
   return `#${Object.entries(parts)
     .map(([name, text]) => `${name}=${text}`)
@@ -60,14 +80,23 @@ export function writeLink(state: ViewerState, start: ViewerState, look: Look | n
 }
 
 /** Nothing, or the one entry of a channel that looks different. */
-function writeChannel(channel: ChannelState, start: ChannelState | undefined): string[] {
+function writeChannel(
+  channel: ChannelState,
+  start: ChannelState | undefined,
+  has: HasShapes,
+): string[] {
   const parts: string[] = [];
   const color = toHex(channel.color);
   if (color !== toHex(channel.original)) parts.push(`c${color.slice(1)}`);
   if (channel.opacity !== 1) parts.push(`o${written([channel.opacity])}`);
   const [low, high] = channel.window;
   if (low !== 0 || high !== 1) parts.push(`w${written([low])}_${written([high])}`);
-  if (channel.transferFunction !== start?.transferFunction) {
+  const shaped = Object.entries(channel.shapes).filter(([name]) => has(channel, name));
+  for (const [name, shapes] of shaped) {
+    parts.push(`s${encodeURIComponent(name)}_${writeShapes(shapes)}`);
+  }
+  // shapes that are read choose their function
+  if (shaped.length > 0 || channel.transferFunction !== start?.transferFunction) {
     parts.push(`t${encodeURIComponent(channel.transferFunction)}`);
   }
   if (!channel.volume) parts.push("n");
@@ -144,6 +173,7 @@ class LinkReader {
     this.word("tool", TOOLS, (tool) => ({ type: "choose-tool", tool }));
     this.word("dwell", ["on", "off"], (word) => ({ type: "set-dwell", isOn: word === "on" }));
     this.word("quality", QUALITIES, (level) => ({ type: "choose-quality", level }));
+    this.readLight();
     const eye = this.parts.get("eye");
     const look = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
     if (eye !== undefined && look === null) this.unread.push("eye");
@@ -181,6 +211,15 @@ class LinkReader {
     };
     show(false); // first, so that there is room
     show(true);
+  }
+
+  private readLight(): void {
+    const text = this.parts.get("light");
+    if (text === undefined) return;
+    readTrace(text).forEach((action, i) => {
+      if (action !== null) this.actions.push(action);
+      else this.unread.push(`light ${shortened(text.split(",")[i])}`);
+    });
   }
 
   private readLooks(): void {
@@ -288,9 +327,17 @@ function lookAction({ id, transferFunctions }: ChannelState, look: string): Acti
       const ends = readNumbers(value.replace("_", ","), 2);
       return ends && { type: "window", channel: id, window: [ends[0], ends[1]] };
     }
+    case "s": {
+      const at = value.lastIndexOf("_");
+      const name = decoded(value.slice(0, Math.max(0, at)));
+      const shapes = readShapes(value.slice(at + 1));
+      if (name === null || shapes === null) return null;
+      if (name !== OWN && !transferFunctions.includes(name)) return null;
+      return { type: "set-shapes", channel: id, name, shapes };
+    }
     case "t": {
       const name = decoded(value);
-      if (name === null || !transferFunctions.includes(name)) return null;
+      if (name === null || (name !== OWN && !transferFunctions.includes(name))) return null;
       return { type: "choose-transfer-function", channel: id, name };
     }
     case "n":

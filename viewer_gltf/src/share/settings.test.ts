@@ -16,7 +16,7 @@ describe("the page's address", () => {
     expect(settingsOf("?mode=cube&switch=&disc=wide")).toEqual([
       {
         type: "notify",
-        text: "address: mode: expected one of disc, tile, all, stage, off, found cube",
+        text: "address: mode: expected one of disc, tile, all, stage, traced, off, found cube",
       },
       { type: "notify", text: "address: switch: expected a number, found " },
       { type: "notify", text: "address: disc: expected a number, found wide" },

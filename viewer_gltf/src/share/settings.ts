@@ -1,5 +1,5 @@
 /**
- * What the page's address asks for: `mode` (disc, tile, all, stage, off), `quality` (auto, low,
+ * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
  * high), `switch` (metres of the room), `disc` (degrees). Pure.
  */
 import { QUALITY_LEVELS } from "../quality/controller";

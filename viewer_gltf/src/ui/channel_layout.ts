@@ -5,8 +5,11 @@
 import { fromHex, toHex } from "../color";
 import { valueText } from "../measure/measure";
 import type { ChannelState, ViewerState } from "../state";
+import { isTwoD } from "../volume/functions2d";
+import type { Histogram } from "../volume/transfer_planes";
 import type { Control, Group, PanelView, Section } from "./controls";
 import { PALETTES } from "./palettes";
+import { planeItems } from "./plane_layout";
 
 /** Channels of a page that are not shown; fewer need no search. */
 export const PAGE = 6;
@@ -39,9 +42,14 @@ export function intensityText(share: number, range: readonly [number, number] | 
   return valueText(range[0] + (range[1] - range[0]) * share, range);
 }
 
-function cardOf(channel: ChannelState, ranges: Ranges, picked: string | null): Group {
+function cardOf(
+  channel: ChannelState,
+  ranges: Ranges,
+  view: PanelView,
+  histogram: Histogram | null,
+): Group {
   const { id, name } = channel;
-  const isOpen = picked === id;
+  const isOpen = view.picked === id;
   const toWindow = (window: readonly [number, number]) =>
     ({ type: "window", channel: id, window }) as const;
   const recolor = (hex: string) => ({ type: "recolor", channel: id, color: fromHex(hex) }) as const;
@@ -79,7 +87,10 @@ function cardOf(channel: ChannelState, ranges: Ranges, picked: string | null): G
         label: "Transfer function",
         name: `Transfer function of ${name}`,
         value: channel.transferFunction,
-        options: channel.transferFunctions.map((each) => ({ value: each, label: each })),
+        options: channel.transferFunctions.map((each) => ({
+          value: each,
+          label: isTwoD(channel, each) ? `${each} (2D)` : each,
+        })),
         isInline: false,
         refusal: channel.volume ? "" : "Only volumes have one.",
         to: (each) => ({ type: "choose-transfer-function", channel: id, name: each }),
@@ -115,6 +126,7 @@ function cardOf(channel: ChannelState, ranges: Ranges, picked: string | null): G
         palettes: PALETTES,
         to: recolor,
       },
+      ...planeItems(channel, view, histogram, (share) => intensityText(share, range)),
     ],
   };
 }
@@ -183,9 +195,10 @@ export function channelItems(
   state: ViewerState,
   ranges: Ranges,
   view: PanelView,
+  histogram: Histogram | null = null,
 ): Section["items"] {
   const cards = state.channels
     .filter(({ shown }) => shown)
-    .map((channel) => cardOf(channel, ranges, view.picked));
+    .map((channel) => cardOf(channel, ranges, view, histogram));
   return [...cards, ...addingOf(state, view)];
 }

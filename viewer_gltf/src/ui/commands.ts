@@ -16,6 +16,8 @@ export type Command =
   | "press"
   /** To the panel's search among the channels that are not shown. */
   | "find"
+  /** Light the traced picture by a .hdr or .exr file. */
+  | "own-light"
   | "front"
   | "side"
   | "top"

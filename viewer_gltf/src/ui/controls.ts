@@ -3,9 +3,13 @@
  * plane in the room, shows the values and hands back the wish that a control's `to` makes of what
  * the user did. Pure.
  */
+import type { Rgb } from "../color";
 import type { Action } from "../state";
+import type { PlanePoint, Shapes } from "../volume/shapes2d";
+import type { Histogram } from "../volume/transfer_planes";
 import type { Command } from "./commands";
 import type { Grip } from "./grips";
+import type { Grasp, Meant } from "./plane_edit";
 
 /** Of the viewer that a phone is put into: Google's of 2014, of 2015, another. */
 export type Lenses = "v1" | "v2" | "own";
@@ -18,6 +22,14 @@ export type PanelChange =
   | Readonly<{ panel: "pick"; channel: string | null }>
   /** The part of the cuts that the keys move. */
   | Readonly<{ panel: "grip"; grip: Grip }>
+  /** The number of the light that the keys turn: see dials.ts. */
+  | Readonly<{ panel: "dial"; dial: string }>
+  /** Open or close the plane of value and gradient in a channel's card, which it opens. */
+  | Readonly<{ panel: "plane"; channel: string }>
+  /** The shape that is meant, and what a pointer has hold of. */
+  | Readonly<{ panel: "shape"; shape: Meant | null; grasp: Grasp | null }>
+  /** The number of a shape that the keys change: see plane_edit.ts. */
+  | Readonly<{ panel: "shape-number"; id: string }>
   | Readonly<{ panel: "unfold"; section: string }>
   | Readonly<{ panel: "lenses"; lenses: Lenses }>
   /** Of the phone viewer's lenses, as its QR code has it. */
@@ -34,6 +46,11 @@ export type PanelView = Readonly<{
   page: number;
   picked: string | null;
   grip: Grip | null;
+  dial: string | null;
+  isPlaneOpen: boolean;
+  shape: Meant | null;
+  grasp: Grasp | null;
+  shapeNumber: string | null;
   /** Sections that are open. */
   open: readonly string[];
   lenses: Lenses;
@@ -49,7 +66,12 @@ export const START_VIEW: PanelView = {
   page: 0,
   picked: null,
   grip: null,
-  open: ["channels", "volumes", "tiles", "view", "stereo"],
+  dial: null,
+  isPlaneOpen: false,
+  shape: null,
+  grasp: null,
+  shapeNumber: null,
+  open: ["channels", "volumes", "light", "tiles", "view", "stereo"],
   lenses: "v2",
   code: "",
   isHidden: false,
@@ -128,6 +150,25 @@ export type TileMap = Base &
     tiles: readonly MapTile[];
     to: (tile: string) => Wish;
   }>;
+/** Value to the right, gradient up: a histogram, and shapes that can be taken hold of. */
+export type PlaneEditor = Base &
+  Readonly<{
+    kind: "plane";
+    /** null: it has not come. */
+    histogram: Histogram | null;
+    /** The part of the histogram's values that the plane is as wide as. */
+    window: readonly [number, number];
+    shapes: Shapes;
+    selected: number | null;
+    /** The channel's, linear. */
+    color: Rgb;
+    /** The lower and the upper end of the values, and the steepest gradient. */
+    texts: readonly [string, string, string];
+    /** @param reach how far off a corner or an edge may be */
+    press: (at: PlanePoint, reach: PlanePoint) => Wish;
+    /** null: nothing has changed by it. */
+    drag: (at: PlanePoint) => Wish | null;
+  }>;
 /** What can only be read. */
 export type Text = Base & Readonly<{ kind: "text"; value: string }>;
 export type Search = Base & Readonly<{ kind: "search"; value: string; to: (text: string) => Wish }>;
@@ -142,6 +183,7 @@ export type Control =
   | Colour
   | Button
   | TileMap
+  | PlaneEditor
   | Text
   | Search
   | Link;
@@ -187,6 +229,17 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       return change.channel === view.picked ? view : { ...view, picked: change.channel };
     case "grip":
       return change.grip === view.grip ? view : { ...view, grip: change.grip };
+    case "dial":
+      return change.dial === view.dial ? view : { ...view, dial: change.dial };
+    case "plane": {
+      const { channel } = change;
+      const isOpen = view.isPlaneOpen && view.picked === channel;
+      return { ...view, picked: channel, isPlaneOpen: !isOpen, shape: null, grasp: null };
+    }
+    case "shape":
+      return { ...view, shape: change.shape, grasp: change.grasp };
+    case "shape-number":
+      return change.id === view.shapeNumber ? view : { ...view, shapeNumber: change.id };
     case "unfold": {
       const { section } = change;
       const isOpen = view.open.includes(section);

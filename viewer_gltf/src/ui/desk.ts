@@ -16,6 +16,7 @@ import type { XrSupport } from "../xr/support";
 import type { Ranges } from "./channel_layout";
 import { CANT, type Command } from "./commands";
 import { changePanel, type Layout, type PanelView, START_VIEW, type Wish } from "./controls";
+import { chooseFile } from "./file";
 import { handleOf } from "./grips";
 import { Help } from "./help";
 import { type KeyContext, listenForKeys, wishOf } from "./keys";
@@ -96,7 +97,7 @@ export class Desk {
 
   /** What a panel shows now; one that is drawn elsewhere has its own sections open. */
   layOut(view: PanelView = this.view): Layout {
-    return layOut(this.viewer.state, this.facts, view);
+    return layOut(this.viewer.state, this.factsFor(view), view);
   }
 
   setStereo(support: XrSupport): void {
@@ -145,6 +146,8 @@ export class Desk {
       this.splitScreen();
     } else if (command === "scan") {
       void this.scan();
+    } else if (command === "own-light") {
+      void this.lightByFile();
     } else if (command === "find") {
       const isLong = this.goTo("channels", "find-channel");
       if (!isLong) this.say("The panel lists all channels.");
@@ -191,6 +194,18 @@ export class Desk {
     }
   }
 
+  /** Light the traced picture by a file of the user's. */
+  private async lightByFile(): Promise<void> {
+    const file = await chooseFile(".hdr,.exr");
+    if (file === null) return;
+    try {
+      await this.viewer.lightBy(file);
+      this.say(`Lit by ${file.name}`);
+    } catch (error) {
+      this.viewer.report(error);
+    }
+  }
+
   private press(name: string): boolean {
     const { viewer, view } = this;
     const context: KeyContext = {
@@ -234,17 +249,21 @@ export class Desk {
     return shownBox(this.viewer.bundle.manifest, this.viewer.state.isolated);
   }
 
-  private get facts(): Facts {
+  /** A panel in the room has another view. */
+  private factsFor({ isPlaneOpen, picked }: PanelView): Facts {
     const { viewer, stereo } = this;
+    const hasPlane = isPlaneOpen && picked !== null && this.ranges.has(picked);
     const { specimen } = viewer.bundle.manifest;
-    const { triangles, volumes, isLoading, gazed, frame_ms, isStereo, settings } =
+    const { triangles, volumes, traced, isLoading, gazed, frame_ms, isStereo, settings } =
       viewer.snapshot();
-    const levels = volumes.flatMap(({ level }) => (level === null ? [] : [level]));
+    const drawn = [...volumes, traced];
+    const levels = drawn.flatMap(({ level }) => (level === null ? [] : [level]));
     return {
       title: specimen.name,
       subtitle: this.options.subtitle,
       shown: this.shown,
       ranges: this.ranges,
+      histogram: hasPlane ? viewer.histogram(picked) : null,
       gazed,
       isStereo,
       stereo,
@@ -254,6 +273,7 @@ export class Desk {
       settings,
       triangles,
       volumeLevel: levels.length > 0 ? Math.min(...levels) : null,
+      samples: traced.level === null ? null : traced.samples,
       isLoading,
       values: viewer.snapshot().measuredValues,
     };

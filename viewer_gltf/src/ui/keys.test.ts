@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/fixture/manifest";
 import { type Action, initialState, reduce } from "../state";
+import { makeShape } from "../volume/shapes2d";
 import type { Command } from "./commands";
 import { type PanelChange, START_VIEW } from "./controls";
 import { type Focus, firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
@@ -12,6 +13,17 @@ const CONTEXT: KeyContext = {
     { type: "measure", points: [[0, 0, 0]] } as const,
     { type: "notify", text: "a fault", isMendable: true } as const,
     { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
+    {
+      type: "set-shapes",
+      channel: "c0",
+      name: "own",
+      shapes: [makeShape("rectangle", { value: 0.5, gradient: 0.5 })],
+    } as const,
+    {
+      type: "learn-plane",
+      channel: "c0",
+      plane: { gradientMax: 0.5, functions: {} },
+    } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,
   shown: SPECIMEN_BOX,
@@ -39,6 +51,8 @@ describe("the keys", () => {
       window: true,
       "draw-volume": true,
       "choose-transfer-function": true,
+      "set-shapes": true,
+      "learn-plane": false, // the bundle's
       select: true,
       isolate: true,
       "choose-mode": true,
@@ -49,6 +63,8 @@ describe("the keys", () => {
       measure: true,
       "set-dwell": true,
       "choose-quality": true,
+      trace: true,
+      "move-lamp": true,
       dismiss: true,
       notify: false, // the viewer's own
     };
@@ -78,6 +94,7 @@ describe("the keys", () => {
       "pan-up": true,
       "pan-down": true,
       find: true,
+      "own-light": true,
     };
     const asked = wishes.filter((wish) => typeof wish === "string");
     expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));
@@ -94,6 +111,10 @@ describe("the keys", () => {
       page: true,
       pick: true,
       grip: true,
+      dial: true,
+      plane: true,
+      shape: true,
+      "shape-number": true,
       lenses: true,
       hide: true,
       help: true,

@@ -1,12 +1,16 @@
 /** Every key, what it asks for, and the words of the list that `?` opens. Pure but for the listener. */
 import { fromHex, toHex } from "../color";
-import { type ChannelState, LIMITS, type ViewerState } from "../state";
+import { type ChannelState, isTraced, LIMITS, type ViewerState } from "../state";
+import { DIALS, shareOf, valueAtShare } from "../trace/dials";
 import type { Box } from "../view/clip";
+import { MAX_SHAPES, removeShape, replaceShape, type Shape } from "../volume/shapes2d";
 import { pagesOf } from "./channel_layout";
 import type { PanelView, Wish } from "./controls";
 import { gripsOf, meantGrip, moveGrip } from "./grips";
 import { middleBox, middlePlane, modesOf } from "./layout";
 import { nextColour } from "./palettes";
+import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "./plane_edit";
+import { refusalOf, setShapes } from "./plane_layout";
 import { LENSES } from "./stereo_layout";
 import { chosenTile } from "./tile_layout";
 
@@ -123,6 +127,22 @@ function push(steps: number): Key["to"] {
   };
 }
 
+function nextDial(by: number): Key["to"] {
+  return ({ view }) => {
+    const ids = DIALS.map(({ id }) => id);
+    const dial = neighbour(ids, view.dial ?? undefined, by);
+    return dial === null ? null : { panel: "dial", dial };
+  };
+}
+
+function turn(steps: number): Key["to"] {
+  return ({ state: { trace }, view }) => {
+    const dial = DIALS.find(({ id }) => id === view.dial) ?? DIALS[0];
+    const at = shareOf(dial, dial.of(trace)) + (2 * steps) / dial.steps;
+    return dial.to(valueAtShare(dial, Math.min(1, Math.max(0, at))));
+  };
+}
+
 const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
 
 const CHANNEL_KEYS: readonly Key[] = [
@@ -161,6 +181,74 @@ const CHANNEL_KEYS: readonly Key[] = [
   ofChannel("E", "Window: upper end up", shift(0, WINDOW_STEP)),
 ];
 
+/** Of a shape's number: five cells of its table. */
+const SHAPE_STEP = 5 / 255;
+
+function addShapeOf(kind: Shape["kind"]) {
+  return (channel: ChannelState): Wish | null => {
+    if (refusalOf(channel) !== "") return null;
+    const shapes = withNewShape(channel, kind);
+    return shapes.length > MAX_SHAPES ? null : setShapes(channel, shapes);
+  };
+}
+
+/** A key of the meant shape of the meant channel; `shape` null: without it. */
+function ofShape(
+  name: string,
+  label: string,
+  to: (shape: Shape, view: PanelView) => Shape | null,
+): Key {
+  return key(name, label, (context) => {
+    const channel = meantChannel(context);
+    if (channel === undefined || refusalOf(channel) !== "") return null;
+    const shapes = editedShapes(channel);
+    const index = meantShape(context.view.shape, shapes);
+    if (index === null) return null;
+    const changed = to(shapes[index], context.view);
+    return setShapes(
+      channel,
+      changed === null ? removeShape(shapes, index) : replaceShape(shapes, index, changed),
+    );
+  });
+}
+
+function changeNumber(steps: number) {
+  return (shape: Shape, { shapeNumber }: PanelView): Shape => {
+    const [first] = SHAPE_NUMBERS;
+    const number = SHAPE_NUMBERS.find(({ id, isOf }) => id === shapeNumber && isOf(shape)) ?? first;
+    return number.by(shape, steps * SHAPE_STEP);
+  };
+}
+
+const SHAPE_KEYS: readonly Key[] = [
+  ofChannel("H", "Plane of value and gradient: open or close", ({ id }) => ({
+    panel: "plane",
+    channel: id,
+  })),
+  ofChannel("Q", "Add a rectangle", addShapeOf("rectangle")),
+  ofChannel("Y", "Add a triangle", addShapeOf("triangle")),
+  key("J", "Next shape: the keys below mean it", (context) => {
+    const channel = meantChannel(context);
+    const shapes = channel === undefined ? [] : editedShapes(channel);
+    const present = meantShape(context.view.shape, shapes);
+    if (present === null) return null;
+    const { length: count } = shapes;
+    return { panel: "shape", shape: { index: (present + 1) % count, count }, grasp: null };
+  }),
+  key(";", "Next number of the shape", ({ view }) => {
+    const ids = SHAPE_NUMBERS.map(({ id }) => id);
+    const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
+    return id === null ? null : { panel: "shape-number", id };
+  }),
+  ofShape("<", "Less of it", changeNumber(-1)),
+  ofShape(">", "More of it", changeNumber(1)),
+  ofShape("*", "Next colour of the shape", (shape) => ({
+    ...shape,
+    color: fromHex(nextColour(toHex(shape.color))),
+  })),
+  ofShape("Shift+Delete", "Remove the shape", () => null),
+];
+
 const VOLUME_KEYS: readonly Key[] = [
   key("m", "Next mode: where volumes show", ({ state }) => {
     const mode = neighbour(modesOf(state), state.mode, 1);
@@ -174,6 +262,34 @@ const VOLUME_KEYS: readonly Key[] = [
     const level = neighbour(QUALITIES, state.quality, 1);
     return level === null ? null : { type: "choose-quality", level };
   }),
+];
+
+const LIGHT_KEYS: readonly Key[] = [
+  key("G", "Paths of light on or off", ({ state }) => ({
+    type: "choose-mode",
+    mode: isTraced(state) ? "all" : "traced",
+  })),
+  key("F", "Next number of the light: the two keys below mean it", nextDial(1)),
+  key("X", "The number before", nextDial(-1)),
+  key("[", "Less of it", turn(-1)),
+  key("]", "More of it", turn(1)),
+  key("M", "Scattered once or many times", ({ state: { trace } }) => ({
+    type: "trace",
+    change: { isMultiple: !trace.isMultiple },
+  })),
+  key("I", "Next room", ({ state: { trace } }) => ({
+    type: "trace",
+    change: { environment: trace.environment === "studio" ? "sky" : "studio" },
+  })),
+  key("U", "Light of a .hdr or .exr file", "own-light"),
+  key(["!", "@", "#"], "Lamp 1, 2 or 3 on or off", ({ state: { trace } }, name) => {
+    const lamp = ["!", "@", "#"].indexOf(name);
+    return { type: "move-lamp", lamp, change: { isOn: !trace.lamps[lamp].isOn } };
+  }),
+  key("Z", "Before or after what comes after the light", ({ state: { trace } }) => ({
+    type: "trace",
+    change: { isPostOn: !trace.isPostOn },
+  })),
 ];
 
 const TILE_KEYS: readonly Key[] = [
@@ -255,7 +371,9 @@ const TOOL_KEYS: readonly Key[] = [
 export const KEYS: readonly KeyGroup[] = [
   { name: "View", keys: VIEW_KEYS },
   { name: "Channels", keys: CHANNEL_KEYS },
+  { name: "Value and gradient", keys: SHAPE_KEYS },
   { name: "Volumes", keys: VOLUME_KEYS },
+  { name: "Light", keys: LIGHT_KEYS },
   { name: "Tiles", keys: TILE_KEYS },
   { name: "Tools", keys: TOOL_KEYS },
 ];

@@ -28,6 +28,7 @@ const FACTS: Facts = {
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 12_345,
   volumeLevel: 1,
+  samples: null,
   isLoading: false,
   values: [],
 };

@@ -3,11 +3,13 @@ import { distanceBetween, distanceText } from "../measure/measure";
 import type { QualityLevel, QualitySettings } from "../quality/controller";
 import { LIMITS, MODES, type Mode, type Tool, type ViewerState } from "../state";
 import type { Box, ClipPlane } from "../view/clip";
+import type { Histogram } from "../volume/transfer_planes";
 import { channelItems, type Ranges } from "./channel_layout";
 import type { Control, Layout, PanelView, Section, Slider } from "./controls";
 import { command, inline } from "./shapes";
 import { type StereoSupport, stereoItems } from "./stereo_layout";
 import { tileItems } from "./tile_layout";
+import { lightItems } from "./trace_layout";
 
 export { chosenTile } from "./tile_layout";
 
@@ -19,6 +21,8 @@ export type Facts = StereoSupport &
     /** The specimen, or the isolated tile; um, world. */
     shown: Box;
     ranges: Ranges;
+    /** Of the channel whose plane of value and gradient is open, if it has come. */
+    histogram?: Histogram | null;
     /** The tile that is looked at. */
     gazed: string | null;
     isStereo: boolean;
@@ -28,6 +32,8 @@ export type Facts = StereoSupport &
     triangles: number;
     /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
     volumeLevel: number | null;
+    /** Of the path-traced picture, for each pixel; null: it is none. */
+    samples: number | null;
     isLoading: boolean;
     /** Of each measured point: the channels' values there, as `DAPI 1210`. */
     values: readonly (readonly string[])[];
@@ -41,6 +47,7 @@ const MODE_NAMES: Readonly<Record<Mode, string>> = {
   tile: "Tile",
   all: "All",
   stage: "Staged",
+  traced: "Traced",
   off: "Off",
 };
 const QUALITY_NAMES: Readonly<Record<QualityLevel, string>> = {
@@ -55,7 +62,9 @@ const SLIDER_STEPS = 100;
 /** The modes that can be chosen: as staged only where an artist has staged something. */
 export function modesOf(state: ViewerState): readonly Mode[] {
   const isStaged = state.tiles.some(({ representation }) => representation !== "mesh");
-  return MODES.filter((mode) => mode !== "stage" || isStaged);
+  return MODES.filter((mode) =>
+    mode === "stage" ? isStaged : mode !== "traced" || state.canTrace,
+  );
 }
 
 /** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
@@ -88,8 +97,9 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       ...(facts.isStereo && state.notices.length > 0
         ? [section("notices", "Notices", noticeItems(state))]
         : []),
-      section("channels", "Channels", channelItems(state, facts.ranges, view)),
+      section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
       section("volumes", "Volumes", volumeItems(state)),
+      section("light", "Light", lightItems(state, view, facts.isStereo)),
       section("tiles", "Tiles", tileItems(state, facts.gazed)),
       section("view", "View", [
         command("front", "Front"),
@@ -260,10 +270,11 @@ function frameText(frame_ms: number | null): string {
   return frame_ms === null ? "" : `${frame_ms.toFixed(frame_ms < 10 ? 1 : 0)} ms`;
 }
 
-function statusOf({ triangles, volumeLevel, frame_ms, isLoading }: Facts): string {
+function statusOf({ triangles, volumeLevel, samples, frame_ms, isLoading }: Facts): string {
   return [
     `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`,
     volumeLevel === null ? "" : `volume level ${volumeLevel}`,
+    samples === null ? "" : `${samples} samples`,
     frameText(frame_ms),
     isLoading ? "refining …" : "",
   ]

@@ -1,9 +1,13 @@
 /** What a key has done, in words: whoever uses keys may not see the control that it stands for. Pure. */
 import type { Action, ViewerState } from "../state";
+import { DIALS, dialName } from "../trace/dials";
+import type { TraceSettings } from "../trace/settings";
+import { shapesOf } from "../volume/functions2d";
 import { intensityText, type Ranges } from "./channel_layout";
 import type { Wish } from "./controls";
 import { cutText, gripName } from "./grips";
 import { measuredText } from "./layout";
+import { changeText, SHAPE_NUMBERS } from "./plane_edit";
 import { LENS_NAMES } from "./stereo_layout";
 
 /** @param state after the wish was granted; "" where the picture says it all */
@@ -11,12 +15,30 @@ export function told(wish: Wish, before: ViewerState, state: ViewerState, ranges
   if (typeof wish === "string") return "";
   if (!("panel" in wish)) {
     if (wish.type === "set-clip") return cutText(before.clip, state.clip);
+    if (wish.type === "set-shapes") return toldShapes(wish.channel, before, state);
     return toldAction(wish, state, ranges);
   }
   if (wish.panel === "grip") return gripName(wish.grip);
+  if (wish.panel === "dial") {
+    const dial = DIALS.find(({ id }) => id === wish.dial);
+    return dial === undefined ? "" : `${dialName(dial)}: ${dial.text(dial.of(state.trace))}`;
+  }
   if (wish.panel === "lenses") return `Phone viewer: ${LENS_NAMES[wish.lenses]}`;
+  if (wish.panel === "shape") {
+    return wish.shape === null ? "" : `Shape ${wish.shape.index + 1} of ${wish.shape.count}`;
+  }
+  if (wish.panel === "shape-number") {
+    return `Shapes: ${SHAPE_NUMBERS.find(({ id }) => id === wish.id)?.name ?? wish.id}`;
+  }
   if (wish.panel !== "pick" || wish.channel === null) return "";
   return `Channel ${nameOf(wish.channel, state)}`;
+}
+
+function toldShapes(id: string, before: ViewerState, state: ViewerState): string {
+  const [was, is] = [before, state].map(({ channels }) => channels.find((each) => each.id === id));
+  if (was === undefined || is === undefined) return "";
+  const text = changeText(shapesOf(was, is.transferFunction), shapesOf(is));
+  return `${is.name}, ${is.transferFunction}: ${text}`;
 }
 
 function nameOf(id: string, { channels }: ViewerState): string {
@@ -42,11 +64,32 @@ function toldAction(action: Action, state: ViewerState, ranges: Ranges): string 
       return measuredText(state);
     case "set-dwell":
       return `Choosing by gaze: ${state.isDwellOn ? "on" : "off"}`;
+    case "trace":
+    case "move-lamp":
+      return toldLight(action, state.trace);
     case "choose-quality":
       return `Quality: ${state.quality}`;
     default:
       return "";
   }
+}
+
+function toldLight(
+  action: Extract<Action, { type: "trace" | "move-lamp" }>,
+  trace: TraceSettings,
+): string {
+  const [changed] = Object.keys(action.change);
+  const id = action.type === "trace" ? changed : `lamp-${action.lamp}/${changed}`;
+  const dial = DIALS.find((each) => each.id === id);
+  if (dial !== undefined) return `${dialName(dial)}: ${dial.text(dial.of(trace))}`;
+  if (action.type === "move-lamp") {
+    const { isOn } = trace.lamps[action.lamp];
+    return `Lamp ${action.lamp + 1}: ${isOn ? "on" : "off"}`;
+  }
+  if (changed === "environment") return `Room: ${trace.environment}`;
+  if (changed === "isMultiple") return `Scattered ${trace.isMultiple ? "many times" : "once"}`;
+  if (changed === "isPostOn") return trace.isPostOn ? "After" : "Before";
+  return `Tone map: ${trace.toneMap}`;
 }
 
 function toldChannel(
@@ -69,6 +112,8 @@ function toldChannel(
     case "draw-volume":
       return `${name}: volume ${channel.volume ? "on" : "off"}`;
     case "choose-transfer-function":
+    case "set-shapes":
+    case "learn-plane":
       return `${name}: ${channel.transferFunction}`;
     case "recolor":
       return `${name}: another colour`;

@@ -7,6 +7,7 @@ import { element, setText } from "./dom";
 import { hooks, type Send, type Widget } from "./widget";
 import { makeColour } from "./widget_colour";
 import { makeMap } from "./widget_map";
+import { makePlane } from "./widget_plane";
 import { makeWindow } from "./widget_window";
 
 type Maker<C> = (first: C, send: Send) => Widget<C>;
@@ -21,6 +22,7 @@ const MAKERS: Readonly<{
   colour: makeColour,
   button: makeButton,
   map: makeMap,
+  plane: makePlane,
   text: makeText,
   search: makeSearch,
   link: makeLink,
@@ -183,7 +185,8 @@ function makeButton(first: Button, send: Send): Widget<Button> {
     },
     { ...hooks(first.id), action: first.id },
   );
-  const reason = element("p", { className: "hint" }, { [`${camel(first.id)}Reason`]: "" });
+  const data = first.tellsWhy ? { [`${camel(first.id)}Reason`]: "" } : {};
+  const reason = element("p", { className: "hint" }, data);
   return {
     root: first.tellsWhy ? element("div", { className: "told" }, {}, button, reason) : button,
     update(control) {

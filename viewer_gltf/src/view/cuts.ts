@@ -1,6 +1,6 @@
 /** What clip box and plane cut off, for the surfaces' shaders: planes in the room, by reference. */
 import { type Matrix4, Vector3, Vector4 } from "three";
-import type { MarchClip } from "../volume/tile_march";
+import type { MarchClip } from "../volume/clip_uniforms";
 import type { Clip } from "./clip";
 
 const MOST = 7; // six faces of the box, and the plane

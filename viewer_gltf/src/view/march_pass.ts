@@ -3,110 +3,51 @@
  * allows, and laid over the scene: what lies behind translucent surfaces before these are drawn,
  * the rest last of all.
  */
-import {
-  BufferAttribute,
-  BufferGeometry,
-  CustomBlending,
-  GLSL3,
-  Mesh,
-  NearestFilter,
-  OneFactor,
-  OneMinusSrcAlphaFactor,
-  type Scene,
-  ShaderMaterial,
-  type Texture,
-  Vector4,
-  type WebGLRenderer,
-  WebGLRenderTarget,
-} from "three";
-import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "../shaders/texts";
+import { type Mesh, NearestFilter, type Scene, type WebGLRenderer, WebGLRenderTarget } from "three";
 import type { MarchFrame } from "../volume/tile_march";
 import type { Eyes } from "./eyes";
 import { drawEyes } from "./offscreen";
-
-/** Order among all that is blended. */
-const FIRST = -1000;
-const LAST = 1000;
-
-type Overlay = Mesh<BufferGeometry, ShaderMaterial>;
+import { FIRST, LAST, Overlay } from "./overlay";
 
 export class MarchPass {
-  /** They lay the marched pictures over what was drawn before. */
-  private readonly front: Overlay;
-  private readonly behind: Overlay;
   private readonly target = new WebGLRenderTarget(1, 1, {
     count: 2,
     depthBuffer: false,
     minFilter: NearestFilter,
     magFilter: NearestFilter,
   });
-  private readonly eyes = {
-    uEyes: { value: [new Vector4(), new Vector4()] },
-    uParts: { value: [new Vector4(), new Vector4()] },
-    uEyeCount: { value: 1 },
-  };
+  private readonly front: Overlay;
+  private readonly behind: Overlay;
 
   constructor(private readonly frame: MarchFrame) {
-    const triangle = new BufferGeometry();
-    const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
-    triangle.setAttribute("position", new BufferAttribute(corners, 3));
-    const overlay = (marched: Texture, order: number): Overlay => {
-      const mesh = new Mesh(triangle, this.makeMaterial(marched));
-      mesh.name = "volumes";
-      mesh.frustumCulled = false;
-      mesh.renderOrder = order;
-      mesh.visible = false;
-      return mesh;
-    };
-    this.front = overlay(this.target.textures[0], LAST);
-    this.behind = overlay(this.target.textures[1], FIRST);
+    this.front = new Overlay(this.target.textures[0], frame.uSceneDepth, LAST);
+    this.behind = new Overlay(this.target.textures[1], frame.uSceneDepth, FIRST);
   }
 
-  get overlays(): readonly Overlay[] {
-    return [this.front, this.behind];
-  }
-
-  private makeMaterial(marched: Texture): ShaderMaterial {
-    return new ShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: COMPOSITE_VERTEX,
-      fragmentShader: COMPOSITE_FRAGMENT,
-      depthTest: false,
-      depthWrite: false,
-      transparent: true,
-      blending: CustomBlending,
-      blendSrc: OneFactor,
-      blendDst: OneMinusSrcAlphaFactor,
-      uniforms: {
-        ...this.eyes,
-        uMarched: { value: marched },
-        uSceneDepth: this.frame.uSceneDepth,
-      },
-    });
+  /** They lay the marched pictures over what was drawn before. */
+  get overlays(): readonly Mesh[] {
+    return [this.front.mesh, this.behind.mesh];
   }
 
   /** March what is in `scene`, at `scale` pixels to one of the picture, 0..1. */
   render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, scale: number): void {
-    const { uEyes, uParts, uEyeCount } = this.eyes;
-    uEyeCount.value = 0;
     drawEyes(renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
       this.frame.uEye.value.copy(viewport);
       this.frame.uPart.value.copy(part);
-      uEyes.value[uEyeCount.value].copy(viewport);
-      uParts.value[uEyeCount.value++].copy(part);
     });
-    this.front.visible = true;
-    this.behind.visible = this.frame.uHasPane.value;
+    this.front.show(eyes, scale);
+    if (this.frame.uHasPane.value) this.behind.show(eyes, scale);
   }
 
   /** Nothing is marched. */
   hide(): void {
-    this.front.visible = this.behind.visible = false;
+    this.front.hide();
+    this.behind.hide();
   }
 
   dispose(): void {
     this.target.dispose();
-    this.front.geometry.dispose();
-    for (const { material } of this.overlays) material.dispose();
+    this.front.dispose();
+    this.behind.dispose();
   }
 }

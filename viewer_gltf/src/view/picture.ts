@@ -1,7 +1,9 @@
 /** One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. */
 import { type Camera, Matrix4, type Object3D, Vector3, type WebGLRenderer } from "three";
+import type { Bounds } from "../bundle/generated/bundle";
 import type { Hybrid } from "../hybrid/hybrid";
 import { makeSurfaceFrame } from "../mesh/blend";
+import type { TracedVolume } from "../trace/traced_volume";
 import { makeFrame } from "../volume/tile_march";
 import type { VolumeSet } from "../volume/volume_set";
 import type { Clip } from "./clip";
@@ -10,6 +12,23 @@ import { DepthPass } from "./depth_pass";
 import { Eyes } from "./eyes";
 import { MarchPass } from "./march_pass";
 import type { Room } from "./room";
+
+/** What there is to draw. */
+export type Drawn = Readonly<{
+  volumes: VolumeSet;
+  traced: TracedVolume;
+  /** Surfaces that are not opaque now. */
+  panes: readonly Object3D[];
+  /** What else is not, besides the room's own. */
+  overlays: readonly Object3D[];
+  /** Of the specimen, um. */
+  bounds: Bounds;
+  /** A number that changes with the opaque surfaces. */
+  solids: number;
+}>;
+
+/** Pixels of the volumes to one of the picture, 0..1; samples of each that are traced. */
+export type FramePace = Readonly<{ resolution: number; isMoving: boolean; passes: number }>;
 
 export class Picture {
   /** Where they are in this frame. */
@@ -34,18 +53,15 @@ export class Picture {
 
   /**
    * @param head its pose in the room
-   * @param panes surfaces that are not opaque now
-   * @param overlays what else is not, besides the room's own
-   * @param resolution pixels of the march to one of the picture, 0..1
+   * @param clip what is cut away
+   * @param pace how much the frame's budget allows
    */
   draw(
     camera: Camera,
     head: Matrix4,
-    volumes: VolumeSet,
-    panes: readonly Object3D[],
-    overlays: readonly Object3D[],
+    { volumes, traced, panes, overlays, bounds, solids }: Drawn,
     clip: Clip,
-    resolution: number,
+    { resolution, isMoving, passes }: FramePace,
   ): void {
     const { renderer, room, hybrid } = this;
     const specimen = room.specimen.group.matrixWorld;
@@ -56,6 +72,12 @@ export class Picture {
     this.surfaceFrame.uAxis.value.copy(hybrid.axis);
     this.surfaceFrame.uDisc.value.set(...hybrid.cosines);
     this.march.hide();
+    traced.hide();
+    if (traced.isShown) {
+      this.depth.render(renderer, room.scene, this.eyes, [...room.overlays, ...overlays, ...panes]);
+      const scene = { specimen, clip: this.cuts.march, bounds, solids };
+      traced.render(renderer, this.eyes, scene, resolution, isMoving, passes);
+    }
     if (!volumes.isEmpty) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
@@ -67,6 +89,11 @@ export class Picture {
       this.march.render(renderer, volumes.scene, this.eyes, resolution);
     }
     renderer.render(room.scene, camera);
+  }
+
+  /** What is laid over the scene. */
+  add(overlay: Object3D): void {
+    this.room.scene.add(overlay);
   }
 
   dispose(): void {

@@ -3,6 +3,7 @@ import {
   BackSide,
   BoxGeometry,
   Data3DTexture,
+  DataArrayTexture,
   DataTexture,
   type DepthTexture,
   GLSL3,
@@ -25,8 +26,11 @@ import type { Rgb } from "../color";
 import { blueNoise, NOISE_SIZE } from "../shaders/blue_noise";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "../shaders/texts";
 import { brickCounts } from "./brick_counts";
+import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "./clip_uniforms";
 import { ENTRIES } from "./luts";
 import { distanceInGrid } from "./order";
+import { alikeRows, type PlaneTable } from "./plane_table";
+import { COLUMNS, ROWS } from "./shapes2d";
 import type { Packed } from "./tile_texture";
 
 /** Hard limit of a ray, whatever the volume's size and through however many tiles it goes. */
@@ -72,13 +76,12 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
 /** How one channel of a tile looks. */
 export type Look = Readonly<{
   color: Rgb;
-  /** 256 RGBA entries, of `lookUpTable`. */
+  /** 256 RGBA entries, of `lookUpTable`; beside a plane, what of it shows at any gradient. */
   table: Uint8Array;
+  /** A two-dimensional transfer function. */
+  plane?: PlaneTable | null;
   isInDisc: boolean;
 }>;
-
-/** Of the specimen, um: what is left of it. `plane`: unit normal and offset. */
-export type MarchClip = Readonly<{ min: Vector3; max: Vector3; plane: Vector4 }>;
 
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
 
@@ -89,6 +92,19 @@ function tableOfLeaps(leaps: Uint8Array<ArrayBuffer>, size: readonly [number, nu
   texture.minFilter = texture.magFilter = NearestFilter;
   texture.unpackAlignment = 1;
   texture.needsUpdate = true;
+  return texture;
+}
+
+function emptyPlanes(channels: number): DataArrayTexture {
+  const texture = new DataArrayTexture(
+    new Uint8Array(channels * ROWS * COLUMNS * 4),
+    COLUMNS,
+    ROWS,
+    channels,
+  );
+  texture.format = RGBAFormat;
+  texture.type = UnsignedByteType;
+  texture.minFilter = texture.magFilter = LinearFilter;
   return texture;
 }
 
@@ -108,9 +124,15 @@ export class TileMarch {
   private readonly leaps: Uint8Array<ArrayBuffer>;
   private readonly occupancy: Data3DTexture;
   private readonly lut: DataTexture;
+  /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
+  private planes: DataArrayTexture | null = null;
+  /** What each layer holds; null: a table that knows no gradients. */
+  private readonly layers: (Uint8Array | null)[] = [];
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
-  private readonly box = new Matrix4();
+  /** Between the world and the box from its low corner. */
+  private readonly fromBox: Matrix4;
+  private readonly toBox: Matrix4;
 
   constructor(
     readonly volume: TileVolume,
@@ -163,13 +185,19 @@ export class TileMarch {
         uClipHigh: { value: size.clone() },
         uClipPlane: { value: new Vector4(0, 0, 0, 1) },
         uVolume: { value: null },
+        uIndex: { value: null },
         uOldVolume: { value: null },
         uFresh: { value: 1 },
         uOccupancy: { value: this.occupancy },
         uLut: { value: this.lut },
+        uPlanes: { value: null },
+        uGradientMax: { value: new Vector4(1, 1, 1, 1) },
       },
     });
-    this.toTile = new Matrix4().fromArray(volume.matrix).invert();
+    const matrix = new Matrix4().fromArray(volume.matrix);
+    this.toTile = matrix.clone().invert();
+    this.fromBox = matrix.multiply(new Matrix4().makeTranslation(this.low));
+    this.toBox = this.fromBox.clone().invert();
     this.mesh = new Mesh(UNIT_CUBE, material);
     this.mesh.name = `volume of ${volume.tile}`;
     this.mesh.frustumCulled = false;
@@ -190,26 +218,20 @@ export class TileMarch {
   /** Where the disc's cone comes from and where to; um, world. */
   aim(apex: Vector3, axis: Vector3): void {
     const { uApex, uAxis } = this.mesh.material.uniforms;
-    uApex.value.copy(apex).applyMatrix4(this.toTile).sub(this.low);
-    uAxis.value.copy(axis).transformDirection(this.toTile);
+    uApex.value.copy(apex).applyMatrix4(this.toBox);
+    uAxis.value.copy(axis).transformDirection(this.toBox);
   }
 
   /** The box, um, world, round all tiles that are marched: they share a ray's steps by length. */
   shareWith(min: Vector3, max: Vector3, tiles: number): void {
     const { uniforms } = this.mesh.material;
-    toBox(min, max, this.toTile, this.low, uniforms.uAllLow.value, uniforms.uAllHigh.value);
+    boxAround(min, max, this.toBox, uniforms.uAllLow.value, uniforms.uAllHigh.value);
     // each tile takes a step at least, however short the ray's way through it
     uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
   }
 
-  clip({ min, max, plane }: MarchClip): void {
-    const { uniforms } = this.mesh.material;
-    toBox(min, max, this.toTile, this.low, uniforms.uClipLow.value, uniforms.uClipHigh.value);
-    // a plane n . p <= w of the world is n' . p' <= w' of the box
-    this.box.fromArray(this.volume.matrix).multiply(new Matrix4().makeTranslation(this.low));
-    const value: Vector4 = uniforms.uClipPlane.value;
-    value.set(plane.x, plane.y, plane.z, -plane.w).applyMatrix4(this.box.transpose());
-    value.w *= -1;
+  clip(clip: MarchClip): void {
+    clipInto(clip, this.fromBox, this.toBox, this.mesh.material.uniforms as ClipUniforms);
   }
 
   /** Show what has come. `presence` 0..1: how far it has faded in. */
@@ -222,10 +244,14 @@ export class TileMarch {
     const { uniforms } = this.mesh.material;
     uniforms.uVolume.value = shown.texture;
     uniforms.uOldVolume.value = (old ?? shown).texture;
+    uniforms.uIndex.value = shown.index;
+    this.define("BRICKS", shown.index !== null);
     uniforms.uFresh.value = fresh;
     uniforms.uPresence.value = presence;
     const coarsest = Math.max(shown.level, old?.level ?? 0);
-    uniforms.uBrickSlack.value = coarsest === 0 ? 0 : Math.ceil(2 ** coarsest / 8);
+    // ranges of bricks hold for what is drawn, however coarse
+    const isExact = coarsest === 0 || shown.index !== null;
+    uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / 8);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 
@@ -244,12 +270,39 @@ export class TileMarch {
       differs = true;
     });
     if (differs) this.lut.needsUpdate = true;
+    this.dressPlanes(looks);
     uniforms.uAllInDisc.value = looks.every((look) => look.isInDisc);
     this.define(
       "DISC",
       looks.some((look) => look.isInDisc),
     );
     return differs;
+  }
+
+  /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
+  private dressPlanes(looks: readonly Look[]): void {
+    const isTwoD = looks.some(({ plane }) => plane != null);
+    this.define("TWO_D", isTwoD);
+    if (!isTwoD) return;
+    const { uniforms } = this.mesh.material;
+    this.planes ??= emptyPlanes(this.channelCount);
+    uniforms.uPlanes.value = this.planes;
+    const cells = this.planes.image.data as Uint8Array;
+    const { length } = looks[0].table;
+    looks.forEach(({ table, plane }, c) => {
+      uniforms.uGradientMax.value.setComponent(c, plane?.gradientMax ?? 1);
+      const at = c * ROWS * length;
+      const isThere =
+        plane != null
+          ? this.layers[c] === plane.cells
+          : this.layers[c] === null && table.every((value, i) => value === cells[at + i]);
+      if (isThere) return;
+      cells.set(plane?.cells ?? alikeRows(table), at);
+      this.layers[c] = plane?.cells ?? null;
+      if (this.planes === null) return;
+      this.planes.addLayerUpdate(c); // the others stay as they are on the GPU
+      this.planes.needsUpdate = true;
+    });
   }
 
   /** Where rays may leap, one byte a brick, of `brickDistances`; null: nowhere, for now. */
@@ -271,33 +324,13 @@ export class TileMarch {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
     this.lut.dispose();
+    this.planes?.dispose();
     this.occupancy.dispose();
   }
 }
 
 /** The intensity 0..1 up to which a table shows nothing; it is linear between its entries. */
-function floorOf(table: Uint8Array): number {
+export function floorOf(table: Uint8Array): number {
   for (let i = 0; i < ENTRIES; i++) if (table[4 * i + 3] > 0) return (i - 1) / (ENTRIES - 1);
   return 1;
-}
-
-const corner = new Vector3();
-
-/** The box of the tile's own space, from its low corner, round one of the world. */
-function toBox(
-  min: Vector3,
-  max: Vector3,
-  toTile: Matrix4,
-  low: Vector3,
-  intoMin: Vector3,
-  intoMax: Vector3,
-): void {
-  intoMin.setScalar(Number.POSITIVE_INFINITY);
-  intoMax.setScalar(Number.NEGATIVE_INFINITY);
-  for (let i = 0; i < 8; i++) {
-    corner.set(i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z);
-    corner.applyMatrix4(toTile).sub(low);
-    intoMin.min(corner);
-    intoMax.max(corner);
-  }
 }

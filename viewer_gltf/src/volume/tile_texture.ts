@@ -23,6 +23,8 @@ export type Packed = Readonly<{
   channels: readonly string[];
   level: number;
   texture: Data3DTexture;
+  /** Where bricks are in the texture, which is an atlas of them then: see brick_tile.ts. */
+  index: Data3DTexture | null;
   /** Smallest and largest intensity of every brick of each channel, interleaved. */
   bricks: readonly Uint8Array[];
 }>;
@@ -185,7 +187,7 @@ export class TileTexture {
       texture.image.data = null;
       texture.onUpdate = null;
     };
-    return { channels, level, texture, bricks: whole.map(({ bricks }) => bricks) };
+    return { channels, level, texture, index: null, bricks: whole.map(({ bricks }) => bricks) };
   }
 
   private async fetch(id: string, level: number, signal: AbortSignal) {

@@ -1,18 +1,24 @@
 /** All volumes on screen: follows who is drawn how, loads what is missing, drops what is gone. */
 import { Group, Matrix4, Scene, Vector3 } from "three";
+import type { BrickService } from "../bricks/brick_service";
+import { BrickTile } from "../bricks/brick_tile";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
 import { isInDisc, type WantedTile } from "../hybrid/who";
 import type { ShownVolume } from "../marks/reading";
-import type { ViewerState } from "../state";
+import type { ChannelState, ViewerState } from "../state";
 import { brickCounts } from "./brick_counts";
+import type { MarchClip } from "./clip_uniforms";
+import { isTwoD, shapesOf } from "./functions2d";
 import { levelsToFetch } from "./levels";
 import { loadTransferFunctions, lookUpTable, opacities, type TransferFunction } from "./luts";
 import { OccupancyClient } from "./occupancy_client";
+import { NO_ENTRIES, type PlaneTable, planeTable } from "./plane_table";
 import { LoadQueue } from "./queue";
+import type { Shapes } from "./shapes2d";
 import { VolumeSource } from "./source";
-import { type Look, type MarchClip, type MarchFrame, TileMarch } from "./tile_march";
+import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_march";
 import { type Packed, stride, TileTexture } from "./tile_texture";
 
 const PARALLEL_LOADS = 4;
@@ -28,6 +34,14 @@ type ChannelVolumes = Readonly<{
   transferFunctions: ReadonlyMap<string, TransferFunction>;
 }>;
 
+type MadePlane = Readonly<{
+  shapes: Shapes;
+  gradientMax: number;
+  window: readonly [number, number];
+  opacity: number;
+  table: PlaneTable;
+}>;
+
 export type VolumeStatus = Readonly<{
   tile: string;
   channel: string;
@@ -36,7 +50,7 @@ export type VolumeStatus = Readonly<{
 }>;
 
 type Resident = {
-  readonly texture: TileTexture;
+  readonly texture: TileTexture | BrickTile;
   march: TileMarch | null;
   /** What the march's tables were made of. */
   packed: Packed | null;
@@ -56,6 +70,8 @@ export class VolumeSet {
   private readonly channelsUnderWay = new Map<string, Promise<void>>();
   private readonly failedChannels = new Set<string>();
   private readonly residents = new Map<string, Resident>();
+  /** The last table of each channel: all tiles ask for the same. */
+  private readonly planes = new Map<string, MadePlane>();
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
@@ -70,6 +86,8 @@ export class VolumeSet {
     private readonly limits: Readonly<{ bytes: number; side: number }>,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
+    /** From a host that sends bricks by view; null: volumes come as files. */
+    private readonly bricks: BrickService | null = null,
   ) {
     this.group.matrixAutoUpdate = false;
     this.scene.add(this.group);
@@ -113,6 +131,12 @@ export class VolumeSet {
   /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
   source(tile: string, channel: string): VolumeSource | null {
     return this.channels.get(channel)?.sources.get(tile) ?? null;
+  }
+
+  /** All volumes of a channel, by tile; null: its list has not come, which was told. */
+  async sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null> {
+    await this.loadChannel(channel);
+    return this.channels.get(channel)?.sources ?? null;
   }
 
   /** The same, once it is known; null also after a fault, which was told. */
@@ -221,10 +245,9 @@ export class VolumeSet {
     const [first] = sources.values();
     if (first === undefined) return;
     this.tellLimit(first);
-    const share = this.limits.bytes / (WITH_OLD_LEVEL * (this.wanted.length + KEPT_TILES));
     const levels = levelsToFetch(
       first.volume.levels,
-      share / stride(sources.size),
+      this.share / stride(sources.size),
       this.limits.side,
     );
     const finest = levels[levels.length - 1];
@@ -246,18 +269,34 @@ export class VolumeSet {
   }
 
   private addTile(tile: string): Resident {
-    const texture = new TileTexture(
-      this.queue,
-      () => {
-        const resident = this.residents.get(tile);
-        if (resident !== undefined) this.dress(resident);
-        this.onChange();
-      },
-      this.onError,
-    );
+    const onChange = () => {
+      const resident = this.residents.get(tile);
+      if (resident !== undefined) this.dress(resident);
+      this.onChange();
+    };
+    const limits = { bytes: this.share, side: this.limits.side };
+    const texture =
+      this.bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
+      new TileTexture(this.queue, onChange, this.onError);
     const resident = { texture, march: null, packed: null, wanted: null, presence: 0, turn: 0 };
     this.residents.set(tile, resident);
     return resident;
+  }
+
+  /** A tile that can't be had as bricks comes as files. */
+  private replace(tile: string): void {
+    const resident = this.residents.get(tile);
+    if (resident === undefined) return;
+    this.bricks?.refuse(tile);
+    resident.march?.dispose();
+    resident.texture.dispose();
+    this.residents.delete(tile);
+    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
+  }
+
+  /** Bytes of the GPU's memory for each tile. */
+  private get share(): number {
+    return this.limits.bytes / (WITH_OLD_LEVEL * (this.wanted.length + KEPT_TILES));
   }
 
   /** Drop what is no longer wanted and has faded out, but for the few that were wanted last. */
@@ -327,6 +366,11 @@ export class VolumeSet {
       return;
     }
     const looks = shown.channels.map((id) => this.look(state, id));
+    if (showsBelow(resident.texture, looks)) {
+      const [{ tile }] = [...resident.texture.kept.values()].map(({ volume }) => volume);
+      this.replace(tile);
+      return;
+    }
     const isNewSet = resident.packed?.channels.join() !== shown.channels.join();
     const { march: before } = resident;
     let march = before;
@@ -348,19 +392,46 @@ export class VolumeSet {
     return source.volume;
   }
 
-  private look(state: ViewerState, id: string): Look {
+  /** How a channel whose list has come is to look. */
+  look(state: ViewerState, id: string): Look {
     const channel = state.channels.find((c) => c.id === id);
     const volumes = this.channels.get(id);
     if (channel === undefined || volumes === undefined) {
       throw new Error(`channel ${id} has come without a look`);
     }
-    const entries = volumes.transferFunctions.get(channel.transferFunction);
-    if (entries === undefined) throw new Error(`no transfer function ${channel.transferFunction}`);
+    const plane = this.planeOf(channel);
+    if (plane !== null) {
+      const { color } = channel;
+      return { color, table: plane.envelope, plane, isInDisc: isInDisc(state, channel) };
+    }
+    const { transferFunction: name } = channel;
+    // one's own function has no one-dimensional one that stands for it
+    const entries =
+      volumes.transferFunctions.get(name) ?? (isTwoD(channel) ? NO_ENTRIES : undefined);
+    if (entries === undefined) throw new Error(`no transfer function ${name}`);
     return {
       color: channel.color,
       table: lookUpTable(entries, channel.window, channel.opacity),
       isInDisc: isInDisc(state, channel),
     };
+  }
+
+  /** The table of a two-dimensional function, as soon as its shapes have come. */
+  private planeOf(channel: ChannelState): PlaneTable | null {
+    const { id, plane, window, opacity } = channel;
+    const shapes = shapesOf(channel);
+    if (plane === null || shapes.length === 0) return null;
+    const { gradientMax } = plane;
+    const made = this.planes.get(id);
+    const isSame =
+      made?.shapes === shapes &&
+      made.gradientMax === gradientMax &&
+      made.window === window &&
+      made.opacity === opacity;
+    if (isSame) return made.table;
+    const table = planeTable(shapes, gradientMax, window, opacity);
+    this.planes.set(id, { shapes, gradientMax, window, opacity, table });
+    return table;
   }
 
   private async findLeaps(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
@@ -405,6 +476,13 @@ export class VolumeSet {
     this.forget();
     this.occupancy.dispose();
   }
+}
+
+/** Whether functions show what bricks leave out. */
+export function showsBelow(texture: TileTexture | BrickTile, looks: readonly Look[]): boolean {
+  if (!(texture instanceof BrickTile)) return false;
+  const { thresholds } = texture;
+  return looks.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
 }
 
 /** The box round several marched tiles, um, world. */

@@ -26,6 +26,8 @@ export class Host {
   /** Paths that are answered instead of the folder's file. */
   readonly overrides = new Map<string, Answer>();
   hasRanges = true;
+  /** Of every answer, beside its own. */
+  headers: Readonly<Record<string, string>> = {};
   /** Before every answer. */
   delay_ms = 0;
 
@@ -59,7 +61,8 @@ export class Host {
       content.then(
         async (bytes) => {
           if (host.delay_ms > 0) await new Promise((done) => setTimeout(done, host.delay_ms));
-          const headers = { "Content-Type": TYPES[extname(path)] ?? "text/html" };
+          const type = TYPES[extname(path)] ?? "text/html";
+          const headers = { ...host.headers, "Content-Type": type };
           const asked =
             host.hasRanges && answer === undefined ? /^bytes=(\d+)-(\d+)$/.exec(range ?? "") : null;
           if (asked === null) {
@@ -88,6 +91,7 @@ export class Host {
     this.requests.length = 0;
     this.overrides.clear();
     this.hasRanges = true;
+    this.headers = {};
     this.delay_ms = 0;
   }
 

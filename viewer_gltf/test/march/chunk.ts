@@ -11,12 +11,13 @@ export async function readChunks(...names: string[]): Promise<Record<string, str
   return Object.fromEntries(await Promise.all(names.map(read)));
 }
 
-/** A 2D or 3D texture of bytes, nearest unless linear; `size` has two or three parts. */
+/** A 2D or 3D texture of bytes or floats, nearest unless linear; `size` has two or three parts. */
 export type Texture = Readonly<{
   size: readonly number[];
   channels: 1 | 4;
   texels: number[];
   isLinear?: boolean;
+  isFloat?: boolean;
 }>;
 
 /**
@@ -67,11 +68,14 @@ export async function runProgram(
         }
       };
       gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-      Object.entries(textures).forEach(([name, { size, channels, texels, isLinear }], unit) => {
-        const [inside, format] = channels === 1 ? [gl.R8, gl.RED] : [gl.RGBA8, gl.RGBA];
+      Object.entries(textures).forEach(([name, given], unit) => {
+        const { size, channels, texels, isLinear, isFloat } = given;
+        const format = channels === 1 ? gl.RED : gl.RGBA;
+        const floats = channels === 1 ? gl.R32F : gl.RGBA32F;
+        const inside = isFloat ? floats : channels === 1 ? gl.R8 : gl.RGBA8;
         const [w, h, d] = size;
-        const bytes = Uint8Array.from(texels);
-        const type = gl.UNSIGNED_BYTE;
+        const bytes = isFloat ? Float32Array.from(texels) : Uint8Array.from(texels);
+        const type = isFloat ? gl.FLOAT : gl.UNSIGNED_BYTE;
         if (d === undefined) {
           bind(unit, gl.TEXTURE_2D, isLinear);
           gl.texImage2D(gl.TEXTURE_2D, 0, inside, w, h, 0, format, type, bytes);

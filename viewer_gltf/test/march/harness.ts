@@ -18,6 +18,7 @@ import { Eyes } from "../../src/view/eyes";
 import { brickCounts } from "../../src/volume/brick_counts";
 import { opacities } from "../../src/volume/luts";
 import { occupancyDistances } from "../../src/volume/occupancy";
+import type { PlaneTable } from "../../src/volume/plane_table";
 import { makeFrame, TileMarch } from "../../src/volume/tile_march";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
@@ -34,10 +35,10 @@ export type Run = Readonly<{
 /** Over the pixels that the volume covers. */
 export type Counts = Readonly<{ pixels: number; most: number; least: number; covered: number }>;
 
-const PIXELS = 64;
+export const PIXELS = 64;
 
 /** A cube of `side` texels along each edge; its low corner lies `left_um` along x. */
-function cube(side: number, left_um = 0): TileVolume {
+export function cube(side: number, left_um = 0): TileVolume {
   const file = { path: "x", bytes: 0, sha256: "" };
   const edge = side - 3; // lattice intervals without the apron, one um each
   return {
@@ -64,13 +65,14 @@ function texture3D(texels: Uint8Array<ArrayBuffer>, side: number): Data3DTexture
 }
 
 /** @param table 256 RGBA entries */
-function marchOf(
+export function marchOf(
   volume: TileVolume,
   texels: Uint8Array<ArrayBuffer>,
   bricks: Uint8Array,
   table: Uint8Array,
   hasLeaps: boolean,
   depth: DepthPass,
+  plane: PlaneTable | null = null,
 ): TileMarch {
   const [side] = volume.size;
   const frame = makeFrame(depth.texture);
@@ -78,8 +80,8 @@ function marchOf(
   frame.uPart.value.set(0, 0, PIXELS, PIXELS);
   const march = new TileMarch(volume, 1, frame);
   const texture = texture3D(texels, side);
-  march.show({ channels: ["A"], level: 0, texture, bricks: [bricks] }, null, 1, 1);
-  march.dress([{ color: [1, 1, 1], table, isInDisc: false }]);
+  march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
+  march.dress([{ color: [1, 1, 1], table, plane, isInDisc: false }]);
   const count = brickCounts(volume.size);
   const leaps = { bricks: [bricks], alphas: [opacities(table)], count };
   if (hasLeaps) march.leapBy(occupancyDistances(leaps));
@@ -106,7 +108,7 @@ function makeMarch(
 }
 
 /** Draw marches, one over the other, as `camera` sees them; the rows of pixels as they come. */
-function draw(
+export function draw(
   marches: readonly TileMarch[],
   camera: PerspectiveCamera,
   depth: DepthPass,
@@ -132,7 +134,7 @@ function draw(
 }
 
 /** Along the cube's space diagonal, its longest ray. */
-function diagonalCamera(edge: number): PerspectiveCamera {
+export function diagonalCamera(edge: number): PerspectiveCamera {
   const camera = new PerspectiveCamera(10, 1, edge / 10, edge * 40);
   const away = 6 * edge;
   camera.position.set(edge / 2 + away, -edge / 2 + away, edge / 2 + away);
@@ -188,7 +190,7 @@ function countThrough(run: Run, cubes: number): number {
 }
 
 /** Blobs of random intensity in a cube, and a random function that shows some intensities. */
-function randomScene(seed: number, side: number) {
+export function randomScene(seed: number, side: number) {
   const random = seeded(seed);
   const texels = new Uint8Array(side ** 3);
   for (let blob = 0; blob < 6; blob++) {

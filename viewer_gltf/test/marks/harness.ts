@@ -36,7 +36,7 @@ const MANIFEST: Manifest = {
   format: "stereocell-bundle",
   version: 1,
   generator: "test",
-  specimen: { name: "test", bounds_um: BOUNDS },
+  specimen: { name: "test", modality: "", bounds_um: BOUNDS },
   tiles: [
     { id: "r0_c0", representation: "mesh", bounds_um: { min: [0, -400, 0], max: [500, 0, 200] } },
     {
@@ -53,9 +53,11 @@ const MANIFEST: Manifest = {
       window: [0, 65535],
       iso_value: null,
       iso_normalized: null,
+      threshold_normalized: null,
       surface: "clear",
       transfer_function: "linear",
       transfer_functions: ["linear"],
+      transfer_functions_2d: { names: [], file: FILE },
       lut: FILE,
       tileset: FILE,
       triangles: [1],

@@ -46,6 +46,7 @@ const FACTS: Facts = {
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 123_456,
   volumeLevel: 1,
+  samples: null,
   isLoading: false,
   values: [],
 };
@@ -205,8 +206,8 @@ class Stand {
   }
 
   /** A control of the panel in the room. */
-  controlAt(id: string, across?: number): At {
-    const point = this.hands.panel.pointOf(id, across);
+  controlAt(id: string, across?: number, down?: number): At {
+    const point = this.hands.panel.pointOf(id, across, down);
     if (point === null) {
       throw new Error(`no ${id} among ${this.hands.panel.regions.map((region) => region.id)}`);
     }

@@ -30,8 +30,8 @@ export class HandsStand {
   button = (side: Side, id: "trigger" | "squeeze", value: number) =>
     this.page.evaluate(([s, i, v]) => window.hands.button(s, i, v), [side, id, value] as const);
   tileAt = (id: string) => this.page.evaluate((tile) => window.hands.tileAt(tile), id);
-  controlAt = (id: string, across?: number) =>
-    this.page.evaluate(([i, a]) => window.hands.controlAt(i, a), [id, across] as const);
+  controlAt = (id: string, across?: number, down?: number) =>
+    this.page.evaluate(([i, a, d]) => window.hands.controlAt(i, a, d), [id, across, down] as const);
   tap = () => this.page.evaluate(() => window.hands.tap());
 
   /** Seconds pass, in frames of a tenth at most, as a real frame counts. */

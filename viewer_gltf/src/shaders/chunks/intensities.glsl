@@ -1,5 +1,30 @@
+#ifdef BRICKS
+// Virtual texturing: uVolume is an atlas of bricks of 16^3 texels with an apron of one, uIndex says of
+// every cell of 16^3 texels (those of one channel behind those of the one before) where its brick is
+// (slot along x, y, z), and how coarse (a: level); a of 255: it is r / 255 throughout.
+vec4 sampleIntensities(vec3 p) {
+  ivec3 size = textureSize(uIndex, 0);
+  ivec3 cells = ivec3(size.xy, size.z / CHANNELS);
+  vec3 texel = clamp(p, 0.0, 1.0) * uTexels;
+  ivec3 cell = min(ivec3(texel / 16.0), cells - 1);
+  vec3 atlas = vec3(textureSize(uVolume, 0));
+  vec4 v = vec4(0.0);
+  for (int c = 0; c < CHANNELS; c++) {
+    uvec4 entry = texelFetch(uIndex, cell + ivec3(0, 0, c * cells.z), 0);
+    if (entry.a == 255u) {
+      v[c] = float(entry.r) / 255.0;
+      continue;
+    }
+    int level = int(entry.a);
+    vec3 inside = texel / float(1 << level) - 16.0 * vec3(cell >> level) + 1.0;
+    v[c] = texture(uVolume, (18.0 * vec3(entry.rgb) + clamp(inside, 1.0, 17.0)) / atlas).r;
+  }
+  return v;
+}
+#else
 // Intensity of each channel, 0..1, at a texture coordinate.
 vec4 sampleIntensities(vec3 p) {
   vec4 v = texture(uVolume, p);
   return uFresh < 1.0 ? mix(texture(uOldVolume, p), v, uFresh) : v;
 }
+#endif

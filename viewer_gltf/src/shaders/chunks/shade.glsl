@@ -6,21 +6,17 @@ const float NOISE_STEP = 0.03;
 const float BOUNDARY_STEP = 0.18;
 const float FLAT_STEP = 1e-4;  // less than one of 8 bits: no direction at all
 
-// Diffuse light by the gradient of the summed intensities (Levoy 1988), central differences one
-// voxel to either side. 1 where there is no gradient to tell a direction, or only noise.
-float shade(vec3 p, vec3 texPerUm, vec3 dir) {
-  vec3 h = uVoxel * abs(texPerUm);
-  vec3 gradient;
-  for (int axis = 0; axis < 3; axis++) {
-    vec3 e = vec3(0.0);
-    e[axis] = h[axis];
-    gradient[axis] = dot(sampleIntensities(p + e) - sampleIntensities(p - e), vec4(1.0));
-  }
-  gradient *= sign(texPerUm);
+// Diffuse light by the gradient (Levoy 1988). 1 where there is none to tell a direction, or only
+// noise.
+float shadeBy(vec3 gradient, vec3 dir) {
   float steepness = length(gradient);
   if (steepness < FLAT_STEP) return 1.0;
   vec3 normal = -gradient / steepness;
   if (dot(normal, dir) > 0.0) normal = -normal;
   float lit = AMBIENT + DIFFUSE * max(dot(normal, vLight), 0.0);
   return mix(1.0, lit, smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness));
+}
+
+float shade(vec3 p, vec3 texPerUm, vec3 dir) {
+  return shadeBy(gradientAt(p, texPerUm), dir);
 }

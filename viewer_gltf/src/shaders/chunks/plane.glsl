@@ -1,0 +1,27 @@
+// Two-dimensional transfer functions: value and gradient magnitude (Kniss, Kindlmann & Hansen 2002);
+// docs/transfer-functions.md says what the numbers are.
+
+// How the intensities change over two voxels, along the axes of the texture.
+struct Steps {
+  vec4 x;
+  vec4 y;
+  vec4 z;
+};
+
+// `p` is a texture coordinate, `h` a voxel in texture coordinates.
+Steps stepsAt(vec3 p, vec3 h) {
+  return Steps(
+    sampleIntensities(p + vec3(h.x, 0.0, 0.0)) - sampleIntensities(p - vec3(h.x, 0.0, 0.0)),
+    sampleIntensities(p + vec3(0.0, h.y, 0.0)) - sampleIntensities(p - vec3(0.0, h.y, 0.0)),
+    sampleIntensities(p + vec3(0.0, 0.0, h.z)) - sampleIntensities(p - vec3(0.0, 0.0, h.z)));
+}
+
+// Of each channel, 0..1 of what is 1 to its shapes.
+vec4 steepnessOf(Steps s) {
+  return min(sqrt(s.x * s.x + s.y * s.y + s.z * s.z) / uGradientMax, 1.0);
+}
+
+// Of the summed intensities, along the axes of the texture.
+vec3 gradientOf(Steps s) {
+  return vec3(dot(s.x, vec4(1.0)), dot(s.y, vec4(1.0)), dot(s.z, vec4(1.0)));
+}

@@ -1,0 +1,322 @@
+/** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
+import type { Mesh, Texture, WebGLRenderer } from "three";
+import type { BrickService } from "../bricks/brick_service";
+import type { BrickTile } from "../bricks/brick_tile";
+import { BundleError } from "../bundle/errors";
+import type { ShownVolume } from "../marks/reading";
+import { isTraced, type ViewerState, volumeChannels } from "../state";
+import type { Eyes } from "../view/eyes";
+import { LAST, Overlay } from "../view/overlay";
+import type { PlaneTable } from "../volume/plane_table";
+import type { VolumeSource } from "../volume/source";
+import type { Look } from "../volume/tile_march";
+import type { Packed } from "../volume/tile_texture";
+import { showsBelow } from "../volume/volume_set";
+import { frameOf } from "./frame";
+import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium";
+import { loadEnvironment, readEnvironment } from "./own_environment";
+import { gathersAnew, type TraceSettings } from "./settings";
+import { Tracer, type TraceScene } from "./tracer";
+
+/** A picture at rest gathers so many samples a pixel, and is done. */
+export const ENOUGH_SAMPLES = 1024;
+/** More pixels take more memory than a phone's browser gives. */
+const MOST_PIXELS = 2_000_000;
+const FIRST_SAMPLES = 6;
+/** While the picture moves: what the denoiser makes a whole of. */
+const MOST_MOVING_PIXELS = 160_000;
+
+/** What of the volumes is used. */
+export type Volumes = Readonly<{
+  sourcesOf: (channel: string) => Promise<ReadonlyMap<string, VolumeSource> | null>;
+  look: (state: ViewerState, channel: string) => Look;
+}>;
+
+export class TracedVolume {
+  private readonly loader = new MediumLoader();
+  private readonly tracer: Tracer;
+  private readonly overlay: Overlay;
+  private state: ViewerState | null = null;
+  private texels: MediumTexels | null = null;
+  private sources: readonly ChannelSources[] = [];
+  private loading: AbortController | null = null;
+  /** What is on the GPU or on its way there: channels and tiles. */
+  private wanted = "";
+  private hasFailed = false;
+  private hasLightFailed = false;
+  /** Where texels come from as bricks; null: as files. */
+  private brickTile: BrickTile | null = null;
+  private packed: Packed | null = null;
+  /** What the medium was dressed in. */
+  private dressed = "";
+  private planes: readonly (PlaneTable | null)[] = [];
+  private settings: TraceSettings | null = null;
+  private environment = "";
+  private isLightComing = false;
+  /** Whether the picture is the small one of a moving view, and how small. */
+  private isSmall = false;
+  private resolution = 1;
+  private resolutionAtRest = 1;
+
+  constructor(
+    private readonly volumes: Volumes,
+    private readonly bricks: BrickService | null,
+    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    sceneDepth: { value: Texture },
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {
+    this.tracer = new Tracer(sceneDepth);
+    this.overlay = new Overlay(this.tracer.picture.texture, sceneDepth, LAST);
+  }
+
+  get mesh(): Mesh {
+    return this.overlay.mesh;
+  }
+
+  get isLoading(): boolean {
+    return this.loading !== null || this.isLightComing || this.brickTile?.isLoading === true;
+  }
+
+  /** Whether there is anything to draw. */
+  get isShown(): boolean {
+    return this.state !== null && isTraced(this.state) && this.tracer.isReady;
+  }
+
+  /** Whether a picture at rest still gathers. */
+  get isGathering(): boolean {
+    return this.isShown && this.tracer.samples < ENOUGH_SAMPLES;
+  }
+
+  status(): Readonly<{ samples: number; level: number | null }> {
+    return { samples: this.tracer.samples, level: this.isShown ? (this.texels?.level ?? 0) : null };
+  }
+
+  /** The volumes on screen, for who asks what is at a point. */
+  shown(): readonly ShownVolume[] {
+    const { state } = this;
+    if (state === null || !this.isShown) return [];
+    return this.sources.flatMap(({ id, tiles }) => {
+      const { table } = this.volumes.look(state, id);
+      return [...tiles].flatMap(([tile, source]) => {
+        const isHidden = state.isolated !== null && tile !== state.isolated;
+        return isHidden ? [] : [{ tile, channel: id, source, table, isInDisc: false }];
+      });
+    });
+  }
+
+  follow(state: ViewerState): void {
+    this.state = state;
+    if (!isTraced(state)) {
+      this.drop();
+      return;
+    }
+    const channels = volumeChannels(state).map(({ id }) => id);
+    const tiles = state.isolated === null ? state.tiles.map(({ id }) => id) : [state.isolated];
+    const wanted = JSON.stringify([channels, tiles]);
+    if (wanted !== this.wanted) {
+      this.drop();
+      this.wanted = wanted;
+      if (channels.length > 0) void this.load(channels, tiles);
+    }
+    if (state.trace.environment !== "own" && state.trace.environment !== this.environment) {
+      void this.light(state.trace.environment);
+    }
+    this.dress();
+  }
+
+  /** Light by a file of the user's; the state then has to say "own". */
+  async lightBy(file: File): Promise<void> {
+    this.tracer.lightBy(await readEnvironment(file));
+    this.environment = "own";
+  }
+
+  retryFailed(): void {
+    if (this.hasFailed) this.drop();
+    if (this.hasLightFailed) this.environment = "";
+  }
+
+  /** What is on the GPU went with its context. */
+  forget(): void {
+    this.drop();
+    this.environment = "";
+  }
+
+  /**
+   * @param resolution of the march, 0..1: the frame's budget
+   * @param passes samples of every pixel
+   */
+  render(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    scene: TraceScene,
+    resolution: number,
+    isMoving: boolean,
+    passes: number,
+  ): void {
+    if (this.state === null) return;
+    // what comes after the light, and what is beside the volume, may change the picture of a view
+    const isOther = isMoving && (this.isSmall || !this.tracer.isOf(eyes, scene));
+    // what came to rest first clears up as it is, then is begun anew at its full size
+    const isFirst = isOther || (this.isSmall && this.tracer.samples < FIRST_SAMPLES);
+    this.isSmall = isFirst;
+    const most = isFirst ? MOST_MOVING_PIXELS : MOST_PIXELS;
+    const fits = Math.sqrt(most / (eyes.width_px * eyes.height_px));
+    if (isOther) this.resolution = resolution;
+    if (!isMoving) this.resolutionAtRest = resolution;
+    const scale = Math.min(isFirst ? this.resolution : this.resolutionAtRest, fits);
+    const samples = isFirst ? 1 : isMoving ? Math.min(1, passes) : passes;
+    this.tracer.render(renderer, eyes, scene, this.state.trace, scale, samples);
+    this.overlay.show(eyes, this.tracer.scale);
+  }
+
+  /** Show what has come of bricks; whether there is more. */
+  advance(dt_s: number): boolean {
+    return this.brickTile?.advance(dt_s) ?? false;
+  }
+
+  hide(): void {
+    this.overlay.hide();
+  }
+
+  private drop(): void {
+    this.loading?.abort();
+    this.loading = null;
+    this.wanted = this.dressed = "";
+    this.brickTile?.dispose();
+    this.brickTile = null;
+    this.packed = null;
+    this.hasFailed = false;
+    if (this.texels === null) return;
+    this.texels = null;
+    this.tracer.fill(null);
+  }
+
+  private async load(channels: readonly string[], tiles: readonly string[]): Promise<void> {
+    const abort = new AbortController();
+    this.loading = abort;
+    try {
+      const found = await Promise.all(
+        channels.map(async (id) => ({ id, tiles: await this.volumes.sourcesOf(id) })),
+      );
+      if (abort.signal.aborted) return;
+      // a channel whose list did not come has been told of
+      this.sources = found.flatMap((each) =>
+        each.tiles === null ? [] : [{ id: each.id, tiles: each.tiles }],
+      );
+      if (this.sources.length > 0 && !this.streams(tiles)) {
+        await this.loader.load(this.sources, tiles, this.limits, abort.signal, (texels) => {
+          this.texels = texels;
+          this.dressed = "";
+          this.tracer.fill(texels);
+          this.dress();
+          this.onChange();
+        });
+      }
+    } catch (error) {
+      if (abort.signal.aborted) return;
+      this.hasFailed = true;
+      this.onError(error);
+    } finally {
+      if (this.loading === abort) this.loading = null;
+      this.onChange();
+    }
+  }
+
+  /** Bricks by view, of a single tile, where the host sends them; whether it does. */
+  private streams(tiles: readonly string[]): boolean {
+    const [tile] = tiles;
+    const [first] = this.sources;
+    const volume = first.tiles.get(tile)?.volume;
+    if (tiles.length !== 1 || volume === undefined || this.bricks === null) return false;
+    const made = this.bricks.tile(
+      tile,
+      this.limits,
+      () => this.takeBricks(),
+      () => this.loadFiles(),
+    );
+    if (made === null) return false;
+    const sources = this.sources.flatMap(({ id, tiles: of }) => {
+      const source = of.get(tile);
+      return source === undefined ? [] : [[id, source] as const];
+    });
+    this.brickTile = made;
+    made.want(new Map(sources));
+    return true;
+  }
+
+  /** What has come of the bricks, from time to time. */
+  private takeBricks(): void {
+    const { brickTile } = this;
+    if (brickTile?.shown != null && brickTile.shown !== this.packed) {
+      const { shown } = brickTile;
+      this.packed = shown;
+      const [source] = brickTile.kept.values();
+      const frame = frameOf([source.volume]);
+      const { channels, level, texture, index, bricks } = shown;
+      const release = () => undefined; // the tile's own
+      this.texels = { channels, frame, level, size: frame.size, texture, index, bricks, release };
+      this.dressed = "";
+      this.tracer.fill(this.texels);
+      this.dress();
+    }
+    this.onChange();
+  }
+
+  /** The tile can't be had as bricks, or not for what it is to show. */
+  private loadFiles(): void {
+    if (this.brickTile === null) return;
+    const [{ tile }] = [...this.brickTile.kept.values()].map(({ volume }) => volume);
+    this.bricks?.refuse(tile);
+    this.drop();
+    if (this.state !== null) this.follow(this.state);
+  }
+
+  private async light(name: string): Promise<void> {
+    this.environment = name;
+    this.hasLightFailed = false;
+    this.isLightComing = true;
+    try {
+      const tables = await loadEnvironment(document.baseURI, name);
+      if (this.environment === name) this.tracer.lightBy(tables);
+    } catch (error) {
+      if (!(error instanceof BundleError)) throw error;
+      this.hasLightFailed = true;
+      this.onError(error);
+    } finally {
+      this.isLightComing = false;
+      this.onChange();
+    }
+  }
+
+  /** The medium in the colours and functions of the state, if they differ. */
+  private dress(): void {
+    const { state, texels } = this;
+    if (state === null || texels === null) return;
+    const looks = texels.channels.map((id) => this.volumes.look(state, id));
+    const { bias, density } = state.trace;
+    const { brickTile } = this;
+    if (brickTile !== null && (bias !== 0 || showsBelow(brickTile, looks))) {
+      this.loadFiles(); // what bricks leave out may show
+      return;
+    }
+    const dressed = JSON.stringify([looks.map(({ color }) => color), bias, density]);
+    const tables = looks.map(({ table }) => table.join()).join();
+    const planes = looks.map(({ plane }) => plane ?? null);
+    const isSame = planes.every((plane, c) => plane === (this.planes[c] ?? null));
+    if (dressed + tables !== this.dressed || !isSame) this.tracer.dress(looks, state.trace);
+    else if (this.settings === null || gathersAnew(this.settings, state.trace)) {
+      this.tracer.restart();
+    }
+    this.dressed = dressed + tables;
+    this.planes = planes;
+    this.settings = state.trace;
+  }
+
+  dispose(): void {
+    this.drop();
+    this.loader.dispose();
+    this.tracer.dispose();
+    this.overlay.dispose();
+  }
+}

@@ -1,0 +1,55 @@
+/** From where paths start: an eye in the space of the box, and how it moved since. Pure. */
+import { Matrix3, Matrix4, type PerspectiveCamera, Quaternion, Vector3 } from "three";
+
+export type TraceView = Readonly<{
+  /** From normalised device coordinates to um of the box, and back. */
+  toBox: Matrix4;
+  fromBox: Matrix4;
+  eye: Vector3;
+}>;
+
+/** @param box from um of the box to the room */
+export function viewOf(camera: PerspectiveCamera, box: Matrix4): TraceView {
+  const fromBox = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse).multiply(box);
+  const eye = new Vector3()
+    .setFromMatrixPosition(camera.matrixWorld)
+    .applyMatrix4(box.clone().invert());
+  return { toBox: fromBox.clone().invert(), fromBox, eye };
+}
+
+/** The turn of a matrix, without its scale. */
+export function turnOf(matrix: Matrix4): Matrix3 {
+  const turn = new Quaternion();
+  matrix.decompose(new Vector3(), turn, new Vector3());
+  return new Matrix3().setFromMatrix4(new Matrix4().makeRotationFromQuaternion(turn));
+}
+
+/** What earlier frames are worth: none is; all; as far as they show the same from aside. */
+export type History = "none" | "same" | "aside";
+
+/** A head that rests still trembles: by so much from frame to frame, at most. */
+const TREMBLE_DEG = 0.3;
+/** Of the distance to the box's middle. */
+const TREMBLE_SHARE = 0.006;
+
+/** How much a view has moved against the one of the frame before. */
+export function historyOf(before: TraceView | undefined, now: TraceView, middle: Vector3): History {
+  if (before === undefined) return "none";
+  const [a, b] = [before.fromBox.elements, now.fromBox.elements];
+  if (a.every((v, i) => v === b[i])) return "same";
+  const away = Math.max(now.eye.distanceTo(middle), 1e-9);
+  const aheadOf = ({ toBox, eye }: TraceView) =>
+    new Vector3(0, 0, 1).applyMatrix4(toBox).sub(eye).normalize();
+  const turned_deg = (aheadOf(before).angleTo(aheadOf(now)) * 180) / Math.PI;
+  const rolled = [before, now].map(({ toBox }) =>
+    new Vector3(1, 0, 1)
+      .applyMatrix4(toBox)
+      .sub(new Vector3(-1, 0, 1).applyMatrix4(toBox))
+      .normalize(),
+  );
+  const rolled_deg = (rolled[0].angleTo(rolled[1]) * 180) / Math.PI;
+  const isStill =
+    Math.max(turned_deg, rolled_deg) <= TREMBLE_DEG &&
+    before.eye.distanceTo(now.eye) <= TREMBLE_SHARE * away;
+  return isStill ? "aside" : "none";
+}

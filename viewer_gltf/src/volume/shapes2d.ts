@@ -1,0 +1,272 @@
+/**
+ * Two-dimensional transfer functions: shapes in the plane of value and gradient magnitude, the table
+ * that a shader reads, and what an editor does with them. Plain data and pure functions. The table
+ * has the bytes that the pipeline's evaluate2d has; docs/transfer-functions.md states the formula.
+ */
+
+export const ROWS = 64;
+export const COLUMNS = 256;
+export const MAX_SHAPES = 32;
+/** The least that a shape keeps, of the plane's width and height: a cell of the table. */
+export const LEAST_WIDTH = 1 / (COLUMNS - 1);
+export const LEAST_HEIGHT = 1 / (ROWS - 1);
+
+export type Range = readonly [number, number];
+export type ShapeKind = "rectangle" | "triangle";
+
+/** One shape, as transfer2d.schema.json describes it; all numbers 0..1. */
+export type Shape = Readonly<{
+  kind: ShapeKind;
+  values: Range;
+  gradients: Range;
+  tip: number;
+  color: readonly [number, number, number];
+  opacity: number;
+  softness: number;
+}>;
+export type Shapes = readonly Shape[];
+
+/** A place in the plane: value in the window, gradient magnitude of gradient_max. */
+export type PlanePoint = Readonly<{ value: number; gradient: number }>;
+
+/** What of a shape is taken hold of. Corners before edges before the body. */
+export type Part =
+  | "tip"
+  | "top-left"
+  | "top-right"
+  | "bottom-left"
+  | "bottom-right"
+  | "left"
+  | "right"
+  | "bottom"
+  | "top"
+  | "body";
+export type Hit = Readonly<{ index: number; part: Part }>;
+
+const clamp = (x: number, low: number, high: number) => Math.min(high, Math.max(low, x));
+
+/**
+ * The table of a function: RGBA of `rows` x `columns` cells, row 0 (gradient 0) first. RGB is a
+ * factor to the channel's colour, A what one finest voxel spacing absorbs.
+ */
+export function rasterise(shapes: Shapes, rows = ROWS, columns = COLUMNS): Uint8Array<ArrayBuffer> {
+  const table = new Uint8Array(rows * columns * 4);
+  const sums = {
+    clear: new Float64Array(columns),
+    weight: new Float64Array(columns),
+    r: new Float64Array(columns),
+    g: new Float64Array(columns),
+    b: new Float64Array(columns),
+  };
+  const { clear, weight, r, g, b } = sums;
+  for (let j = 0; j < rows; j++) {
+    clear.fill(1);
+    for (const sum of [weight, r, g, b]) sum.fill(0);
+    for (const shape of shapes) addRow(sums, shape, j / (rows - 1), columns);
+    for (let k = 0; k < columns; k++) {
+      const at = 4 * (j * columns + k);
+      const isEmpty = weight[k] === 0;
+      table[at] = isEmpty ? 255 : Math.floor(255 * (r[k] / weight[k]) + 0.5);
+      table[at + 1] = isEmpty ? 255 : Math.floor(255 * (g[k] / weight[k]) + 0.5);
+      table[at + 2] = isEmpty ? 255 : Math.floor(255 * (b[k] / weight[k]) + 0.5);
+      table[at + 3] = Math.floor(255 * (1 - clear[k]) + 0.5);
+    }
+  }
+  return table;
+}
+
+type Sums = Readonly<Record<"clear" | "weight" | "r" | "g" | "b", Float64Array>>;
+
+/** Add a shape to one row, in the columns that it has a part of. */
+function addRow({ clear, weight, r, g, b }: Sums, shape: Shape, gradient: number, columns: number) {
+  const [bottom, top] = shape.gradients;
+  const height = (top - bottom) / 2;
+  let depth = 1;
+  if (bottom > 0) depth = Math.min(depth, (gradient - bottom) / height);
+  if (top < 1) depth = Math.min(depth, (top - gradient) / height);
+  if (depth < 0) return;
+  const up = soften(depth, shape.softness);
+  const [left, right] = sidesAt(shape, gradient);
+  const half = Math.max((right - left) / 2, 0.5 / (columns - 1));
+  const middle = (left + right) / 2;
+  const first = Math.max(0, Math.floor((middle - half) * (columns - 1)));
+  const last = Math.min(columns - 1, Math.ceil((middle + half) * (columns - 1)));
+  // what is beyond an end of the window is clipped to it: no edge there
+  const isRectangle = shape.kind === "rectangle";
+  const isOpenBelow = isRectangle && shape.values[0] === 0;
+  const isOpenAbove = isRectangle && shape.values[1] === 1;
+  const [red, green, blue] = shape.color;
+  for (let k = first; k <= last; k++) {
+    const value = k / (columns - 1);
+    const isOpen = (isOpenBelow && value <= middle) || (isOpenAbove && value >= middle);
+    const across = isOpen ? 1 : soften(1 - Math.abs(value - middle) / half, shape.softness);
+    const opacity = shape.opacity * (across * up);
+    clear[k] *= 1 - opacity;
+    weight[k] += opacity;
+    r[k] += opacity * red;
+    g[k] += opacity * green;
+    b[k] += opacity * blue;
+  }
+}
+
+function soften(depth: number, softness: number): number {
+  if (softness === 0) return depth >= 0 ? 1 : 0;
+  return clamp(depth / softness, 0, 1);
+}
+
+/** The values between which a shape lies at a gradient magnitude. */
+export function sidesAt(shape: Shape, gradient: number): Range {
+  const [low, high] = shape.values;
+  if (shape.kind === "rectangle") return shape.values;
+  const share = gradient / shape.gradients[1];
+  return [shape.tip + (low - shape.tip) * share, shape.tip + (high - shape.tip) * share];
+}
+
+/** Corners in order round the shape, to draw it; a triangle is cut off below its lower gradient. */
+export function outline(shape: Shape): readonly PlanePoint[] {
+  const [bottom, top] = shape.gradients;
+  const [lowLeft, lowRight] = sidesAt(shape, bottom);
+  const [highLeft, highRight] = sidesAt(shape, top);
+  const corners = [
+    { value: lowLeft, gradient: bottom },
+    { value: lowRight, gradient: bottom },
+    { value: highRight, gradient: top },
+    { value: highLeft, gradient: top },
+  ];
+  return shape.kind === "triangle" && bottom === 0 ? corners.slice(1) : corners;
+}
+
+/** What is wrong with a shape that came from outside; null: nothing. */
+export function faultOf(shape: Shape): string | null {
+  if (shape.kind !== "rectangle" && shape.kind !== "triangle") return `kind is ${shape.kind}`;
+  for (const name of ["values", "gradients"] as const) {
+    const [low, high] = shape[name];
+    if (!(0 <= low && low < high && high <= 1)) {
+      return `${name} are (${low}, ${high}), expected them to rise within 0..1`;
+    }
+  }
+  const numbers = { tip: shape.tip, opacity: shape.opacity, softness: shape.softness };
+  const [r, g, b] = shape.color;
+  for (const [name, number] of Object.entries({ ...numbers, red: r, green: g, blue: b })) {
+    if (!(0 <= number && number <= 1)) return `${name} is ${number}, expected 0..1`;
+  }
+  return null;
+}
+
+/**
+ * What lies at a point: the shape on top, which is the last, and the part of it.
+ *
+ * @param reach how far off a corner or an edge may be, in each direction of the plane
+ * @param selected index of a shape whose corners and edges go before those of others
+ */
+export function hitTest(
+  shapes: Shapes,
+  point: PlanePoint,
+  reach: PlanePoint,
+  selected: number | null = null,
+): Hit | null {
+  const order = shapes.map((_, i) => i).reverse();
+  if (selected !== null && selected in shapes) order.unshift(selected);
+  for (const index of order) {
+    const part = partAt(shapes[index], point, reach);
+    if (part !== null) return { index, part };
+  }
+  return null;
+}
+
+function partAt(shape: Shape, point: PlanePoint, reach: PlanePoint): Part | null {
+  const [bottom, top] = shape.gradients;
+  const isNear = (value: number, gradient: number) =>
+    Math.abs(point.value - value) <= reach.value &&
+    Math.abs(point.gradient - gradient) <= reach.gradient;
+  const isTriangle = shape.kind === "triangle";
+  const [lowLeft, lowRight] = sidesAt(shape, bottom);
+  const [highLeft, highRight] = shape.values;
+  if (isNear(highLeft, top)) return "top-left";
+  if (isNear(highRight, top)) return "top-right";
+  if (isTriangle && isNear(shape.tip, 0)) return "tip";
+  if (!isTriangle && isNear(lowLeft, bottom)) return "bottom-left";
+  if (!isTriangle && isNear(lowRight, bottom)) return "bottom-right";
+  if (point.gradient < bottom - reach.gradient || point.gradient > top + reach.gradient)
+    return null;
+  const [left, right] = sidesAt(shape, clamp(point.gradient, bottom, top));
+  if (point.value < left - reach.value || point.value > right + reach.value) return null;
+  if (Math.abs(point.gradient - top) <= reach.gradient) return "top";
+  // a triangle that goes down to its tip has no lower edge
+  if (!(isTriangle && bottom === 0) && Math.abs(point.gradient - bottom) <= reach.gradient) {
+    return "bottom";
+  }
+  if (!isTriangle && Math.abs(point.value - left) <= reach.value) return "left";
+  if (!isTriangle && Math.abs(point.value - right) <= reach.value) return "right";
+  return left <= point.value && point.value <= right ? "body" : null;
+}
+
+/** The shape moved as a whole, as far as it stays inside the plane; its size stays. */
+export function move(shape: Shape, by: PlanePoint): Shape {
+  const [v0, v1] = shape.values;
+  const [g0, g1] = shape.gradients;
+  const isTriangle = shape.kind === "triangle";
+  const low = isTriangle ? Math.min(v0, shape.tip) : v0;
+  const high = isTriangle ? Math.max(v1, shape.tip) : v1;
+  const dv = clamp(by.value, -low, 1 - high);
+  const dg = clamp(by.gradient, -g0, 1 - g1);
+  return {
+    ...shape,
+    values: shifted(v0, v1, dv),
+    gradients: shifted(g0, g1, dg),
+    tip: clamp(shape.tip + dv, 0, 1),
+  };
+}
+
+/** Rounding must not leave the plane. */
+function shifted(low: number, high: number, by: number): Range {
+  return [clamp(low + by, 0, 1), clamp(high + by, 0, 1)];
+}
+
+/** The shape with one part drawn to a point; it stays inside the plane and keeps a least size. */
+export function resize(shape: Shape, part: Part, to: PlanePoint): Shape {
+  if (part === "body") return shape;
+  if (part === "tip") return { ...shape, tip: clamp(to.value, 0, 1) };
+  let [v0, v1] = shape.values;
+  let [g0, g1] = shape.gradients;
+  if (part.endsWith("left")) v0 = clamp(to.value, 0, v1 - LEAST_WIDTH);
+  if (part.endsWith("right")) v1 = clamp(to.value, v0 + LEAST_WIDTH, 1);
+  if (part.startsWith("bottom")) g0 = clamp(to.gradient, 0, g1 - LEAST_HEIGHT);
+  if (part.startsWith("top")) g1 = clamp(to.gradient, g0 + LEAST_HEIGHT, 1);
+  const resized = { ...shape, values: [v0, v1] as const, gradients: [g0, g1] as const };
+  return shape.kind === "rectangle" ? { ...resized, tip: (v0 + v1) / 2 } : resized;
+}
+
+/** A shape of a usual size about a point: a rectangle round it, a triangle's tip below it. */
+export function makeShape(kind: ShapeKind, at: PlanePoint): Shape {
+  const [width, height] = [0.2, 0.3];
+  const tip = clamp(at.value, 0, 1);
+  const [v0, g0] = [
+    clamp(at.value - width / 2, 0, 1 - width),
+    clamp(at.gradient - height / 2, 0, 1 - height),
+  ];
+  const shape = {
+    kind,
+    values: [v0, v0 + width] as const,
+    gradients: [g0, g0 + height] as const,
+    tip,
+    color: [1, 1, 1] as const,
+    opacity: 0.5,
+    softness: 0.5,
+  };
+  if (kind === "rectangle") return { ...shape, tip: (shape.values[0] + shape.values[1]) / 2 };
+  return { ...shape, gradients: [0.5 * shape.gradients[1], shape.gradients[1]] };
+}
+
+/** With one more shape, on top; as they were where there are MAX_SHAPES. */
+export function addShape(shapes: Shapes, shape: Shape): Shapes {
+  return shapes.length < MAX_SHAPES ? [...shapes, shape] : shapes;
+}
+
+export function removeShape(shapes: Shapes, index: number): Shapes {
+  return shapes.filter((_, i) => i !== index);
+}
+
+export function replaceShape(shapes: Shapes, index: number, shape: Shape): Shapes {
+  return shapes.map((old, i) => (i === index ? shape : old));
+}
