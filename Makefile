@@ -39,7 +39,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-fast test-blender bench bench-iso bench-wrap bench-serve bench-viewer lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender bench bench-iso bench-wrap bench-serve bench-viewer lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -127,8 +127,14 @@ test-fast: setup ## Unit tests only
 	$(BIN)/pytest -m "not slow"
 	cd $(VIEWER) && npm run --silent test
 
+# Side by side: browsers often wait, and then Python has the cores
 test: setup browser ## All tests, in headless Chromium too
-	$(BIN)/pytest -n $(WORKERS)
+	$(MAKE) --no-print-directory -j2 --output-sync=target test-python test-viewer
+
+test-python: setup
+	nice $(BIN)/pytest -n $(WORKERS)
+
+test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test
 	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
 	$(MAKE) --no-print-directory demo SAMPLE=brain-cells OUT=out/brain-cells
@@ -143,7 +149,7 @@ test: setup browser ## All tests, in headless Chromium too
 	  STEREOCELL_REAL_BUNDLE=$(abspath out/brain-cells/bundle) \
 	  STEREOCELL_F_BUNDLES=$(abspath out/f)/of-f.ome.tif/bundle:$(abspath out/f)/of-f.ome.zarr/bundle:$(abspath out/f)/of-f.nii.gz/bundle:$(abspath out/f)/of-dicom/bundle \
 	  STEREOCELL_EDIT_BUNDLES=$(abspath out/edit/before):$(abspath out/edit/built/bundle) \
-	  npm run --silent test:browser
+	  npm exec --silent -- vitest run --project browser
 
 # Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
 BLENDER := $(VENV)/blender
