@@ -60,7 +60,7 @@ const overlap = (a: Rect, b: Rect) =>
   Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y) > 1e-6;
 
 describe("the panel on a plane", () => {
-  const pages = allPages(start(), { picked: "c2" });
+  const pages = allPages(start(), { picked: "c2", isPlaneOpen: true });
 
   it("gives every control at least 1.2 degrees either way at 1.2 m", () => {
     const degrees = (px: number) => (2 * Math.atan(px / PX_PER_M / 2 / 1.2) * 180) / Math.PI;
@@ -90,7 +90,7 @@ describe("the panel on a plane", () => {
 
   it("leaves out no control that can be used in a headset", () => {
     const ids = new Set(pages.flatMap(({ regions }) => regions.map(({ id }) => id.split("=")[0])));
-    for (const { items } of laidOut(start(), { picked: "c2" }).sections) {
+    for (const { items } of laidOut(start(), { picked: "c2", isPlaneOpen: true }).sections) {
       for (const item of items) {
         const inRow = item.kind === "group" ? item.controls : [item];
         const isOpen = item.kind === "group" && item.isOpen;

@@ -16,7 +16,7 @@ export const FAR = 255;
 export type OccupancyRequest = Readonly<{
   /** Smallest and largest intensity of every brick, interleaved. */
   bricks: readonly Uint8Array[];
-  /** The transfer function's opacity, 0..255, at each of 256 intensities. */
+  /** The transfer function's opacity, 0..255, at each of 256 intensities: the largest over gradients. */
   alphas: readonly Uint8Array[];
   /** Bricks along x, y, z. */
   count: Size3;
