@@ -183,7 +183,9 @@ def trace(run: dict) -> dict:
         mirrored = before - 2 * cosine[:, None] * normal
         straight = 0.08 * settings["shine"]
         fresnel = (straight + (1 - straight) * (1 + cosine) ** 5) * (settings["shine"] > 0)
-        way = np.where(is_surface, np.where(rng.random(len(live)) < fresnel, GLOSSY, DIFFUSE), PHASE)
+        way = np.where(
+            is_surface, np.where(rng.random(len(live)) < fresnel, GLOSSY, DIFFUSE), PHASE
+        )
         weight[live] *= np.where((way == GLOSSY)[:, None], 1.0, medium.albedo)
         for lamp in settings.get("lamps", []):
             if not lamp["isOn"]:
