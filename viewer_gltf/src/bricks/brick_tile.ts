@@ -104,7 +104,10 @@ export class BrickTile {
       const taker: Taker = {
         onTable: (table) => this.begin(id, taker, table),
         onBricks: (bricks) => this.take(id, taker, bricks),
-        onRefused: () => this.onRefused(),
+        // what has come stays when the connection goes
+        onRefused: () => {
+          if (this.shown === null) this.onRefused();
+        },
       };
       const tree: Tree = { taker, table: null, present: NONE, slots: new Map(), waiting: [] };
       this.trees.set(id, tree);
@@ -130,6 +133,11 @@ export class BrickTile {
   private begin(id: string, taker: Taker, table: Table): void {
     const tree = this.treeOf(id, taker);
     if (tree === null) return;
+    if (tree.table !== null) {
+      // on a new connection: of the same volume all is here, of another nothing is
+      if (tree.table.nodes[0]?.hash !== table.nodes[0]?.hash) this.onRefused();
+      return;
+    }
     tree.table = table;
     tree.present = new Uint8Array(table.nodes.length);
     const tables = [...this.trees.values()].map((each) => each.table);
