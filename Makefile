@@ -39,7 +39,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender bench bench-iso bench-wrap bench-serve bench-viewer lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender bench bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -129,7 +129,7 @@ test-fast: setup ## Unit tests only
 
 # Side by side: browsers often wait, and then Python has the cores
 test: setup browser ## All tests, in headless Chromium too
-	$(MAKE) --no-print-directory -j2 --output-sync=target test-python test-viewer
+	$(MAKE) --no-print-directory -j2 --output-sync=line test-python test-viewer
 
 test-python: setup
 	nice $(BIN)/pytest -n $(WORKERS)
@@ -168,6 +168,12 @@ bench: setup ## Ratios of two things in one run, medians
 
 bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids are known
 	$(BIN)/python tests/bench/iso.py
+
+bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head phantom
+	$(BIN)/python tests/bench/threshold.py
+
+bench-tissue: setup ## Tissue classes and multi-Otsu on the head phantom
+	$(BIN)/python tests/bench/tissue.py
 
 bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
 	$(BIN)/python tests/bench/wrap.py

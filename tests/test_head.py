@@ -9,9 +9,13 @@ import pytest
 import SimpleITK as sitk
 from numpy.typing import NDArray
 
+from bundles import load
+from leaks import find
 from stereocell import read
+from stereocell.check import check
 from stereocell.cli import main
 from stereocell.errors import OutputError, UsageError
+from stereocell.plan import FLESH
 from stereocell.samples import write_head
 from stereocell.samples.head import (
     BACKGROUND,
@@ -233,3 +237,28 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     assert mine.read_text() == "mine"
     assert main(["sample", "mri", str(tmp_path / "x"), "--seed", "-1"]) == 2
     assert "--seed: found -1" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_build_opens_path_traced_and_holds_nothing_of_the_patient(
+    series: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    given = ["--preset", "mri", "--workers", "0"]
+    assert main(["build", str(series), "-o", str(out), *given]) == 0
+    manifest = load(out / "bundle" / "manifest.json")
+    assert manifest["specimen"]["modality"] == "MR"
+    (channel,) = manifest["channels"]
+    assert channel["color"] == list(FLESH)
+    assert channel["transfer_function"] == "default"
+    assert "threshold" in channel["transfer_functions"]
+    assert 0 < channel["threshold_normalized"] < 1
+    assert [line for line in check(out) if not line.ok] == []
+    image = pydicom.dcmread(series / "IM0001.dcm", stop_before_pixels=True)
+    uids = [image[f"{what}InstanceUID"].value for what in ("SOP", "Study", "Series")]
+    # short digits (a time of day) are in any number
+    words = [part for value in IDENTITY.values() for part in value.split("^") if len(part) > 6]
+    captured = capfd.readouterr()
+    told = {"stdout": captured.out, "stderr": captured.err}
+    assert find(out, [*words, *uids], told) == []
+    assert find(series, words)  # they are there to be found

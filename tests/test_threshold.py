@@ -1,18 +1,22 @@
 """The adaptive binarisation threshold, on histograms whose valley is known."""
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
+from skimage import filters
 
 import phantoms
 from stereocell.check import check
 from stereocell.cli import main
 from stereocell.config import WindowOptions
+from stereocell.report.thresholds import draw_cut, draw_threshold, find_peers
 from stereocell.specimen import evaluate
 from stereocell.survey import display_from_json, display_to_json, find_display, make_look
 from stereocell.threshold import (
@@ -199,6 +203,33 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     bare = make_look("MR", (1, 1, 1), flat, {}, 0.0, "none")
     assert bare.threshold is None
     assert THRESHOLD not in bare.transfer_functions
+
+
+def test_the_report_draws_it_beside_otsu_s_and_li_s() -> None:
+    voxels = two_bodies()
+    display = find_display(voxels, WindowOptions(0, 100))
+    otsu, li = find_peers(display.values)
+    assert otsu == pytest.approx(filters.threshold_otsu(voxels), abs=2 * display.values.bin_width)
+    assert li == pytest.approx(filters.threshold_li(voxels), abs=2 * display.values.bin_width)
+    figure = draw_threshold(display)
+    assert figure is not None
+    assert [row.name for row in figure.rows] == ["adaptive", "Otsu", "Li"]
+    for row in figure.rows:
+        assert row.above == pytest.approx((voxels >= row.value).mean(), abs=0.002)
+    for kind in ("mark", "otsu", "li", "curve", "area"):
+        assert figure.chart.count(f'class="{kind}"') == 1
+    assert figure.chart.count('class="peak"') == 2
+    assert draw_threshold(find_display(np.full(100, 7, np.uint8), WindowOptions())) is None
+
+
+def test_slices_are_black_below_the_threshold() -> None:
+    volume = np.full((20, 30, 30), 100, np.uint8)
+    volume[:, :, 15:] = 220
+    picture = draw_cut(volume, (1.0, 1.0, 1.0), 0.7)
+    grey = np.asarray(Image.open(io.BytesIO(picture.data)).convert("L"))
+    middle = grey[grey.shape[0] // 3, : picture.width // 2]
+    assert middle[:10].max() < 40
+    assert middle.max() > 190
 
 
 @pytest.fixture(scope="module")

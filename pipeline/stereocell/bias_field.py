@@ -23,6 +23,8 @@ class BiasField:
 
     def log_at(self, indices: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return log of the field at voxels, int (3, n) as (z, y, x); float32 (n,)."""
+        if not self.terms:
+            return np.zeros(indices.shape[1], np.float32)
         basis = _basis(indices, self.shape, self.terms)
         return np.asarray(basis @ np.array(self.weights), np.float32)
 

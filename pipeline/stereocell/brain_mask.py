@@ -63,7 +63,9 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
     tissue = head & (field > level)
     core = _within(tissue, -ERODED_UM, spacing_um)
     if not core.any():
-        raise SourceError("no brain: bright tissue is nowhere 9 mm thick, expected a head in MR")
+        raise SourceError(
+            "no brain: bright tissue is nowhere 9 mm thick, expected a head in MR (or --everywhere)"
+        )
     core = _within(_largest(core), ERODED_UM, spacing_um) & tissue
     mm = _mm(spacing_um)
     at = ndimage.center_of_mass(core)

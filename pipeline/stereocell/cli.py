@@ -85,7 +85,7 @@ def _source(parser: argparse.ArgumentParser) -> None:
     )
     plan.add_argument("--spacing-um", help="z,y,x voxel spacing in um, instead of the file's")
     plan.add_argument(
-        "--iso-criterion", help="how iso-values are found: edges (default), pekar-mean, ..."
+        "--iso-criterion", help="how iso-values are found: edges (default), adaptive, ..."
     )
     plan.add_argument(
         "--wrap", help="how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"
@@ -334,7 +334,8 @@ def _tissue(options: argparse.Namespace) -> int:
     from stereocell.tissue_channels import TissueRequest, add_tissue, parse_classes
 
     classes = None if options.classes is None else parse_classes(options.classes)
-    add_tissue(options.out, TissueRequest(classes, options.channel, options.model))
+    request = TissueRequest(classes, options.channel, options.model, options.everywhere)
+    add_tissue(options.out, request)
     return _phases(options, "units", "stage", "bundle", "report")
 
 
@@ -409,6 +410,11 @@ def _declare_tissue(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--model", type=Path, metavar="FILE.onnx", help="a network of your own (docs/tissue.md)"
+    )
+    parser.add_argument(
+        "--everywhere",
+        action="store_true",
+        help="learn in all that isn't background; by default in MR inside the brain alone",
     )
 
 

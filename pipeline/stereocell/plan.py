@@ -363,7 +363,7 @@ def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
             raise UsageError(
                 f"surface.grid_um is {settings.surface.grid_um:g}, which leaves {planes} of the "
                 f"{n} planes along {axis} of a tile, {h:g} um apart: expected {LEAST_PLANES} or "
-                "more of them"
+                "more of them: choose another --preset, or a smaller surface.grid_um"
             )
 
 

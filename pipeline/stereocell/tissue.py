@@ -7,6 +7,7 @@ samples are taken by rule: the same voxels give the same bytes.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +22,9 @@ from stereocell.spatial_prior import apply_potts_prior
 
 Field = NDArray[np.float32]
 AUTO_CLASSES = range(2, 7)
+MODE_BINS = 64
+SHALLOWEST_DIP = 0.9  # of the lower peak: between two modes the histogram falls below
+LEAST_SHARE = 0.01  # of the voxels: less is no tissue
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +78,19 @@ def learn_tissue(
     sampled, indices = sampled[calm], indices[:, calm]
 
     counts = AUTO_CLASSES if options.classes == "auto" else [options.classes]
-    field = flat_field(shape, options.bias_degree)
-    count, bic = _choose(sampled, counts)
-    field = _learn_field(field, sampled, indices, count, options)
+    flat = flat_field(shape, options.bias_degree)
+    # with each number of classes its own field: one is told from the other by both together
+    fields = {k: _learn_field(flat, sampled, indices, k, options) for k in counts}
+    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))  # voxels that the smoothing ties together
+    independent = min(1.0, int(inside.sum()) / len(calm) / max(scale, 1e-9))
+    bic, has_modes = {}, {}
+    for k, field in fields.items():
+        bic[k], has_modes[k] = _score(sampled, field.log_at(indices), k, independent)
+    told = [k for k in counts if has_modes[k]] or list(counts)[:1]
+    count = min(told, key=lambda k: bic[k])
+    field = fields[count]
     corrected = sampled / np.exp(field.log_at(indices))[:, None]
-    if len(counts) > 1:
-        count, bic = _choose(corrected, counts)  # a field makes more classes than there are
     mixture = _fit(corrected, count)
-    bic[count] = float(mixture.bic(corrected))
 
     gain = field.whole() if options.bias_degree else np.ones(shape, np.float32)
     blur_um = options.blur_voxels * float(spacing.min())
@@ -107,11 +116,17 @@ def _fit(samples: NDArray[Any], count: int) -> GaussianMixture:
     With a covariance for each, two classes would share one tissue's mean and part its gradients.
     """
     edges = np.quantile(samples[:, 0], np.linspace(0, 1, count + 1))
-    middles = ((edges[1:] + edges[:-1]) / 2)[:, None]
-    groups = KMeans(count, init=middles, n_init=1, max_iter=50).fit(samples[:, :1])
-    middle = np.full(count, np.median(samples[:, 1]))
-    start = np.stack([groups.cluster_centers_[:, 0], middle], axis=1)
-    spread = _spread(samples[:, 0], groups.labels_), float(samples[:, 1].var())
+    low, high = np.quantile(samples[:, 0], (0.005, 0.995))
+    # by shares and by range: a small class is missed by the one, a dim pair by the other
+    starts = ((edges[1:] + edges[:-1]) / 2, np.linspace(low, high, count))
+    fits = [
+        KMeans(count, init=start[:, None], n_init=1, max_iter=50).fit(samples[:, :1])
+        for start in starts
+    ]
+    groups = min(fits, key=lambda fit: float(fit.inertia_))
+    others = np.tile(np.median(samples[:, 1:], axis=0), (count, 1))
+    start = np.concatenate([groups.cluster_centers_, others], axis=1)
+    spread = [_spread(samples[:, 0], groups.labels_), *samples[:, 1:].var(axis=0)]
     mixture = GaussianMixture(
         count,
         covariance_type="tied",
@@ -131,9 +146,45 @@ def _spread(values: NDArray[Any], labels: NDArray[Any]) -> float:
     return float(np.mean((values - means[labels]) ** 2))
 
 
-def _choose(samples: NDArray[Any], counts: Any) -> tuple[int, dict[int, float]]:
-    bic = {k: float(_fit(samples, k).bic(samples)) for k in counts}
-    return min(bic, key=lambda k: bic[k]), bic
+def _score(
+    samples: NDArray[Any], log_field: Field, count: int, independent: float
+) -> tuple[float, bool]:
+    """Return BIC of so many classes, and whether each is a mode of its own.
+
+    Of intensity alone and the calmest voxels: gradients are no Gaussian, and voxels of mixed
+    content would be classes. `independent`: the share of the samples that smoothing left so. A
+    class without a mode in the histogram only mends the shape of another (Hennig, Advances in Data
+    Analysis and Classification 4, 2010).
+    """
+    calm = samples[:, 1] <= np.quantile(samples[:, 1], 0.5)
+    values = samples[calm, :1] / np.exp(log_field[calm])[:, None]
+    mixture = _fit(values, count)
+    # as a density of the voxels as they were
+    likelihood = float(mixture.score(values)) - float(log_field[calm].mean())
+    n = max(2.0, independent * len(values))
+    parameters = 2 * count  # means, shares but one, one variance
+    order = np.argsort(mixture.means_[:, 0])
+    means, shares = mixture.means_[order, 0], mixture.weights_[order]
+    are_modes = _dips(values[:, 0], means) < SHALLOWEST_DIP
+    bic = -2 * n * likelihood + parameters * np.log(n)
+    return float(bic), bool(are_modes.all() and shares.min() > LEAST_SHARE)
+
+
+def _dips(values: NDArray[Any], means: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return, between each two means, the least of the histogram over the lower one's peak."""
+    low, high = np.quantile(values, (0.002, 0.998))
+    counts, edges = np.histogram(values, MODE_BINS, (float(low), float(high)))
+    density = ndimage.gaussian_filter1d(counts.astype(np.float64), 1.5)
+    at = np.clip(np.searchsorted(edges, means) - 1, 0, MODE_BINS - 1)
+    ends = np.concatenate([[0], (at[1:] + at[:-1]) // 2, [MODE_BINS - 1]])
+    peaks = [density[a : b + 1].max() for a, b in pairwise(ends)]
+    tops = [a + int(density[a : b + 1].argmax()) for a, b in pairwise(ends)]
+    return np.array(
+        [
+            density[tops[k] : tops[k + 1] + 1].min() / max(min(peaks[k], peaks[k + 1]), 1e-9)
+            for k in range(len(means) - 1)
+        ]
+    )
 
 
 def _learn_field(

@@ -43,11 +43,18 @@ HEAD = (
 
 @dataclass(frozen=True, slots=True)
 class TissueRequest:
-    """What is asked for. channel: name or index, empty: the first. model: an ONNX file, or None."""
+    """What is asked for.
 
-    classes: int | Literal["auto"] | None = None  # None: auto, or what the model has
+    classes     how many; None: auto, or what the model has
+    channel     of the input, by name or index; empty: the first
+    model       an ONNX file of the user's own; None: they are learned
+    everywhere  learn in all that isn't background; else in MR inside the brain
+    """
+
+    classes: int | Literal["auto"] | None = None
     channel: str = ""
     model: Path | None = None
+    everywhere: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +96,8 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
             "same, or no --classes"
         )
-    options = TissueOptions(classes=request.classes or "auto", brain=plan.modality == "MR")
+    is_brain = plan.modality == "MR" and not request.everywhere
+    options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
     settings = asdict(options) if network is None else network.settings()
     source = [plan.fingerprint, plan.level, plan.spacing_um, plan.settings.plan.time]
     region = [plan.region.start, plan.region.stop]

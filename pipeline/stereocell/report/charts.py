@@ -51,6 +51,30 @@ def criterion(
     return _svg("criterion over levels", parts)
 
 
+def threshold(
+    counts: Sequence[int],
+    smoothed: NDArray[np.float64],
+    top: float,
+    peaks: Sequence[float],
+    rules: Mapping[str, float],
+) -> Markup:
+    """Return a histogram and its moving mean, with upright lines by their class.
+
+    top           the count at the top; what is more stops there
+    peaks, rules  places on the axis, 0..1; peaks are marked by ticks at the top
+    """
+    edges = np.linspace(0, 1, len(counts) + 1)
+    steps = _path(np.repeat(edges, 2)[1:-1], np.repeat(np.minimum(np.divide(counts, top), 1), 2))
+    middles = (edges[1:] + edges[:-1]) / 2
+    parts = [
+        f'<path class="area" d="{steps}V{HEIGHT:g}H0Z"/>',
+        f'<path class="curve" d="{_path(middles, np.minimum(smoothed / top, 1))}"/>',
+    ]
+    parts += [f'<path class="peak" d="M{at * WIDTH:.1f},0V9"/>' for at in peaks]
+    parts += [_rule(kind, at) for kind, at in rules.items()]
+    return _svg("histogram, smoothed, with thresholds", parts)
+
+
 def _path(x: ArrayLike, y: ArrayLike) -> str:
     """Return a path through points in 0..1, y upwards."""
     points = np.stack([np.asarray(x) * WIDTH, (1 - np.asarray(y)) * (HEIGHT - 4) + 4], axis=1)

@@ -26,6 +26,8 @@ from stereocell.report.maps import compare, sum_up_maps
 from stereocell.report.remarks import find_remarks
 from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
 from stereocell.report.slices import cut_unit, draw_slices
+from stereocell.report.thresholds import draw_cut, draw_threshold
+from stereocell.report.tissue import TissueFacts, find_tissue
 from stereocell.specimen import APRON
 from stereocell.store import Store
 from stereocell.survey import display_from_json, look_from
@@ -75,6 +77,7 @@ def render(store: Store, facts: Facts) -> str:
         pictures, refusal = drawing.result()
 
     pictured = [_inline(picture) for picture in pictures]
+    tissue = find_tissue(store.out, plan)
     environment = Environment(
         loader=FileSystemLoader(TEMPLATE.parent),
         autoescape=True,
@@ -89,10 +92,12 @@ def render(store: Store, facts: Facts) -> str:
         generator=GENERATOR,
         region_um=[n * s for n, s in zip(plan.region.shape, plan.spacing_um, strict=True)],
         refusal=refusal,
+        tissue=None if tissue is None else _tissue(tissue),
         whole=pictured[0] if pictured else None,
         whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES),
         remarks=find_remarks(facts),
         channels=_channels(facts),
+        thresholds=_thresholds(facts),
         tiles=[
             {
                 "id": tile.id,
@@ -117,6 +122,15 @@ def render(store: Store, facts: Facts) -> str:
         },
         settings=store.settings_file.read_text() if store.settings_file.is_file() else "",
     )
+
+
+def _tissue(found: TissueFacts) -> dict[str, Any]:
+    """Return what the page says of the tissue classes."""
+    return {
+        **found.record,
+        "picture": _inline(Picture(*found.picture)),
+        "colors": [css_color(one["color"]) for one in found.record["classes"]],
+    }
 
 
 def _channels(facts: Facts) -> list[dict[str, Any]]:
@@ -147,6 +161,34 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "painted_by": from_identifier(look.painted_by),
             }
         )
+    return rows
+
+
+def _thresholds(facts: Facts) -> list[dict[str, Any]]:
+    """Return what the page says of the thresholds, with slices of a tile in the middle."""
+    middle = facts.plan.tiles[len(facts.plan.tiles) // 2]
+    inner = slice(APRON, -APRON)
+    rows = []
+    # a tissue class has probabilities, not a histogram of bodies
+    for unit in (u for u in facts.units if u.tile == middle and not u.channel.source):
+        entry = facts.survey[unit.channel.id]
+        figure = draw_threshold(display_from_json(entry["display"]))
+        share = look_from(entry["look"]).threshold_normalized
+        if figure is None or share is None:
+            continue
+        volume = load_volume(unit.directory)[inner, inner, inner]
+        picture = _inline(draw_cut(volume, facts.plan.spacing_um, share))
+        rows.append(
+            {
+                "name": unit.channel.name,
+                "color": css_color(unit.channel.color),
+                "figure": figure,
+                "tile": middle.id,
+                "picture": picture,
+            }
+        )
+        if len(rows) == MOST_PICTURED:
+            break
     return rows
 
 

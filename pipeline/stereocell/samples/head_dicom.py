@@ -22,7 +22,7 @@ from stereocell.samples.head import HeadPhantom, make_head
 from stereocell.write.atomic import replacing_folder
 
 _UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # the namespace of this sample's UIDs
-PATIENT = "Ellipsoid^Emmeline"
+PATIENT = "Ovoidsen^Emmeline"
 IDENTITY = {  # nobody's
     "PatientName": PATIENT,
     "PatientID": "PHANTOM-1974-0613",

@@ -54,7 +54,7 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     )
     representation: EnumProperty(name="Show", items=_items("mesh", "volume", "both"))
     transfer_function: EnumProperty(
-        name="Transfer function", items=_items("default", "soft", "sharp", "surface")
+        name="Transfer function", items=_items("default", "soft", "sharp", "surface", "threshold")
     )
     size: EnumProperty(
         name="Size",

@@ -1,0 +1,107 @@
+"""A channel's adaptive threshold as the report shows it: the figure, its peers, slices behind it.
+
+Peers are thresholds of scikit-image on the same counts: Otsu, "A threshold selection method from
+gray-level histograms", IEEE Trans. Systems, Man, and Cybernetics 9 (1979); Li & Tam, "An iterative
+algorithm for minimum cross entropy thresholding", Pattern Recognition Letters 19 (1998).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+from skimage import filters
+
+from stereocell.report import charts
+from stereocell.report.scene import Picture
+from stereocell.report.slices import VIEWS, Slice, draw_slices
+from stereocell.survey import Display
+from stereocell.threshold import Histogram
+
+READINGS = {
+    "two peaks": "between the second-highest peak and the peak before it",
+    "no peak before": "between the second-highest peak, the darkest, and the next one",
+    "single peak": "at the foot of the only peak's longer side",
+}
+_ROOM = 1.6  # of the second-highest peak: the highest, air, would leave no room for the others
+_LI_VOXELS = 200_000  # Li's method wants voxels: about so many stand for the counts
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A threshold: its name, the class of its line, voxel value, share of the voxels above it."""
+
+    name: str
+    kind: str
+    value: float
+    above: float
+
+
+@dataclass(frozen=True, slots=True)
+class ThresholdFigure:
+    """chart: histogram, smoothed, peaks, thresholds; ends: the axis' ends, in voxel values."""
+
+    reading: str
+    rows: tuple[Row, ...]
+    chart: Markup
+    ends: tuple[float, float]
+
+
+def draw_threshold(display: Display) -> ThresholdFigure | None:
+    """Return a channel's figure; None where it has no threshold."""
+    found, values = display.threshold, display.values
+    if found is None:
+        return None
+    otsu, li = find_peers(values)
+    rows = tuple(
+        Row(name, kind, value, _share_above(display, value))
+        for name, kind, value in (
+            ("adaptive", "mark", found.value), ("Otsu", "otsu", otsu), ("Li", "li", li)
+        )
+    )  # fmt: skip
+    span = values.high - values.low
+
+    def place(level: float) -> float:
+        return (level - values.low) / span
+
+    heights = sorted(found.smoothed[int(place(p) * len(values.counts))] for p in found.peaks)
+    chart = charts.threshold(
+        values.counts,
+        found.smoothed,
+        _ROOM * float(heights[-2:][0]),
+        [place(level) for level in found.peaks],
+        {row.kind: place(row.value) for row in reversed(rows)},
+    )
+    return ThresholdFigure(READINGS[found.reading], rows, chart, (values.low, values.high))
+
+
+def find_peers(histogram: Histogram) -> tuple[float, float]:
+    """Return Otsu's and Li's thresholds, voxel values; of counts in at least two bins."""
+    counts, levels = np.asarray(histogram.counts), histogram.levels
+    otsu = filters.threshold_otsu(hist=(counts, levels))  # type: ignore[no-untyped-call]
+    fewer = np.ceil(counts * min(1.0, _LI_VOXELS / counts.sum())).astype(np.int64)
+    li = filters.threshold_li(np.repeat(levels, fewer))  # type: ignore[no-untyped-call]
+    return float(otsu), float(li)
+
+
+def draw_cut(
+    volume: NDArray[np.uint8], spacing_um: tuple[float, float, float], threshold: float
+) -> Picture:
+    """Return a volume's mid-slices with all below the threshold taken away.
+
+    volume  uint8 (z, y, x), window applied; threshold: 0..1 in the window
+    """
+    slices = []
+    for name, order in VIEWS.items():
+        plane = volume.transpose(order)[volume.shape[order[0]] // 2]
+        grey = np.where(plane >= 255 * threshold, plane, 0).astype(np.uint8)
+        spacing = (spacing_um[order[1]], spacing_um[order[2]])
+        slices.append(Slice(name, grey, spacing, np.zeros((0, 2, 2)), None))
+    return Picture(*draw_slices(slices))
+
+
+def _share_above(display: Display, value: float) -> float:
+    """Return the share of all voxels at or above a value, to within a bin of the window."""
+    counts = np.asarray(display.histogram)
+    upper = np.linspace(*display.window, len(counts) + 1)[1:]
+    return float(counts[upper > value].sum() / counts.sum())

@@ -1,0 +1,85 @@
+"""The report's picture of tissue classes: planes through their middle, coloured by probability."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from stereocell.documents import find_json
+from stereocell.plan import Plan
+from stereocell.report.slices import VIEWS, encode
+from stereocell.sources import open_source, source_of
+from stereocell.specimen import to_srgb8
+from stereocell.tiling import Box
+
+SHOWN_PX = 330  # the longest side of a plane
+_GAP_PX = 6
+
+
+@dataclass(frozen=True, slots=True)
+class TissueFacts:
+    """record: OUT/tissue/tissue.json. picture: WebP, its width and height."""
+
+    record: dict[str, Any]
+    picture: tuple[bytes, int, int]
+
+
+def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
+    """Return what to show of the plan's tissue channels; None where there are none."""
+    added = [channel for channel in plan.channels if channel.source]
+    record = find_json(out / "tissue" / "tissue.json", "tissue.schema.json")
+    if not added or record is None:
+        return None
+    dataset = open_source(source_of(plan, added[0]))
+    colors = np.array([channel.color for channel in added], np.float32)
+
+    def read(box: Box) -> NDArray[np.float32]:
+        parts = [dataset.read(channel.index, box).voxels for channel in added]
+        return np.stack(parts).astype(np.float32) / np.float32(255)
+
+    middle = _middle(read, plan.region)
+    panels = []
+    for axis, down, right in VIEWS.values():
+        shares = read(_plane(plan.region, axis, middle[axis])).transpose(
+            0, 1 + axis, 1 + down, 1 + right
+        )[:, 0]
+        rgb = to_srgb8(np.einsum("kyx,kc->yxc", shares, colors))
+        extent = [n * plan.spacing_um[k] for n, k in zip(rgb.shape, (down, right), strict=False)]
+        panels.append((Image.fromarray(rgb), extent))
+    return TissueFacts(record, _paint(panels))
+
+
+def _middle(read: Callable[[Box], NDArray[np.float32]], region: Box) -> list[int]:
+    """Return the voxel (z, y, x) in the middle of what has a class, by planes across the region."""
+    found = []
+    for axis in range(3):
+        first, last = region.start[axis], region.stop[axis] - 1
+        places = sorted({round(first + (last - first) * k / 16) for k in range(17)})
+        sums = [float(read(_plane(region, axis, at)).sum()) for at in places]
+        total = sum(sums)
+        mean = sum(a * s for a, s in zip(places, sums, strict=True)) / total if total else first
+        found.append(int(np.clip(round(mean), first, last)))
+    return found
+
+
+def _plane(region: Box, axis: int, at: int) -> Box:
+    start, stop = list(region.start), list(region.stop)
+    start[axis], stop[axis] = at, at + 1
+    return Box((start[0], start[1], start[2]), (stop[0], stop[1], stop[2]))
+
+
+def _paint(panels: list[tuple[Image.Image, list[float]]]) -> tuple[bytes, int, int]:
+    """Return the planes side by side, all at one scale, as WebP with its size."""
+    scale = SHOWN_PX / max(max(extent) for _, extent in panels)
+    sizes = [tuple(max(2, round(um * scale)) for um in extent) for _, extent in panels]
+    width = sum(right for _, right in sizes) + _GAP_PX * (len(sizes) - 1)
+    picture = Image.new("RGB", (width, max(down for down, _ in sizes)), (38, 43, 51))
+    left = 0
+    for (panel, _), (down, right) in zip(panels, sizes, strict=True):
+        picture.paste(panel.resize((right, down), Image.Resampling.BILINEAR), (left, 0))
+        left += right + _GAP_PX
+    return encode(picture), *picture.size
