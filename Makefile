@@ -129,10 +129,10 @@ test-fast: setup ## Unit tests only
 
 # Side by side: browsers often wait, and then Python has the cores
 test: setup browser ## All tests, in headless Chromium too
-	$(MAKE) --no-print-directory -j2 --output-sync=line test-python test-viewer
+	$(MAKE) --no-print-directory -j2 test-python test-viewer
 
 test-python: setup
-	nice $(BIN)/pytest -n $(WORKERS)
+	nice -n 19 $(BIN)/pytest -n $(WORKERS)
 
 test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test
