@@ -42,7 +42,7 @@ def _keys(checkout: Path) -> dict[str, str]:
     [
         ("pipeline/stereocell/cli.py", set()),
         ("pipeline/stereocell/lod.py", {"units", "stage", "report"}),
-        ("pipeline/stereocell/read/ome_zarr.py", {"units"}),
+        ("pipeline/stereocell/read/ome_zarr.py", {"units", "report"}),
         ("pipeline/stereocell/write/exr.py", {"stage", "bundle"}),
         ("pipeline/stereocell/write/gltf.py", {"bundle"}),
         ("pipeline/stereocell/staging.py", {"stage"}),
