@@ -35,10 +35,26 @@ function listViewerFiles(): Plugin {
   };
 }
 
+/** Shaders travel without their comments: the reader has the sources. */
+function stripShaders(): Plugin {
+  return {
+    name: "strip-shaders",
+    apply: "build",
+    enforce: "post",
+    transform(code, id) {
+      if (!id.endsWith(".glsl?raw")) return;
+      const text: unknown = JSON.parse(code.replace(/^export default /, "").replace(/;?\s*$/, ""));
+      if (typeof text !== "string") this.error(`${id}: expected the text of a shader`);
+      const bare = (text as string).replace(/\/\/.*$/gm, "").replace(/^[ \t]+|[ \t]+$/gm, "");
+      return { code: `export default ${JSON.stringify(bare.replace(/\n+/g, "\n"))}`, map: null };
+    },
+  };
+}
+
 export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
-  plugins: [listViewerFiles()],
+  plugins: [listViewerFiles(), stripShaders()],
   build: { target: "es2022", outDir: "dist", emptyOutDir: true, chunkSizeWarningLimit: 1500 },
   server: { fs: { allow: [".."] } }, // the schemas lie beside this folder
   worker: {

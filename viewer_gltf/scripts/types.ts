@@ -30,5 +30,8 @@ for (const name of ["bundle", "volumes", "transfer2d"]) {
   const text = await readFile(new URL(`${name}.schema.json`, SCHEMAS), "utf8");
   const schema = toOlderDraft(JSON.parse(text)) as { [key: string]: Json };
   const types = await compile(schema, name, { format: false, unreachableDefinitions: false });
-  await writeFile(new URL(`${name}.ts`, OUT), types);
+  const file = new URL(`${name}.ts`, OUT);
+  // make goes by dates: what is the same stays as old as it is
+  const before = await readFile(file, "utf8").catch(() => null);
+  if (before !== types) await writeFile(file, types);
 }

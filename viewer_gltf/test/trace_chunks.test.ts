@@ -337,6 +337,7 @@ describeInChromium("the path tracer's chunks", () => {
       const head = `
         const vec3 uTexLow = vec3(0.0, 1.0, 0.0);
         const vec3 uTexPerUm = ${vec(1 / SIZE, -1 / SIZE, 1 / SIZE)};
+        const vec3 uTexels = vec3(${number(SIZE)});
         const vec3 uBrick = vec3(${brick.toFixed(1)});
         vec4 mediumAt(vec3 p) { return vec4(1.0, 1.0, 1.0, ${extinction}); }`;
       const start = `seedRandom(uvec3(9u, 8u, 7u));

@@ -12,8 +12,8 @@ import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "./driver/stand";
 
 const CODE_GZIP_BYTES = 350_000;
 const FIRST_PICTURE_BYTES = 300_000;
-/** Basis Universal: fetched for surfaces with such textures only. */
-const OPTIONAL = /basis/;
+/** Fetched where they are wanted: textures of surfaces, bricks from a server, paths of light. */
+const OPTIONAL = /basis|link_worker|assemble_worker|EXRLoader|HDRLoader/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
