@@ -2,21 +2,13 @@
  * The texels that paths go through: all tiles of up to four channels in one texture, a coarse level
  * first, then the finest that there is room for.
  */
-import {
-  ClampToEdgeWrapping,
-  Data3DTexture,
-  LinearFilter,
-  RedFormat,
-  RGBAFormat,
-  RGFormat,
-  UnsignedByteType,
-} from "three";
+import type { Data3DTexture } from "three";
 import { decodeTexels } from "../volume/decode";
 import type { Size3 } from "../volume/ktx2";
 import { levelsToFetch, texels as texelsOf } from "../volume/levels";
 import { LoadQueue } from "../volume/queue";
 import type { VolumeSource } from "../volume/source";
-import { stride } from "../volume/tile_texture";
+import { stride, volumeTexture } from "../volume/volume_texture";
 import type { Assembled, AssembleRequest, Part } from "./assemble";
 import { type BlockFrame, frameOf } from "./frame";
 
@@ -82,7 +74,7 @@ export class MediumLoader {
         parts: made,
       });
       signal.throwIfAborted();
-      const texture = textureOf(texels, size, channels.length);
+      const texture = volumeTexture(texels, size, channels.length);
       onLevel({
         channels: channels.map(({ id }) => id),
         frame,
@@ -149,19 +141,4 @@ export class MediumLoader {
 function coarser(size: Size3, level: number): Size3 {
   const [x, y, z] = size.map((n) => Math.max(1, n >> level));
   return [x, y, z];
-}
-
-function textureOf(texels: Uint8Array<ArrayBuffer>, size: Size3, channels: number): Data3DTexture {
-  const texture = new Data3DTexture(texels, ...size);
-  texture.format = [RedFormat, RGFormat, RGBAFormat, RGBAFormat][channels - 1];
-  texture.type = UnsignedByteType;
-  texture.minFilter = texture.magFilter = LinearFilter;
-  texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
-  texture.unpackAlignment = 1;
-  texture.needsUpdate = true;
-  texture.onUpdate = () => {
-    texture.image.data = null; // the GPU has them
-    texture.onUpdate = null;
-  };
-  return texture;
 }

@@ -2,19 +2,12 @@
  * The GPU texture of one tile: up to four channels side by side, coarse first, replaced as finer
  * levels arrive. A replacement fades in; another set of channels takes its place at once.
  */
-import {
-  ClampToEdgeWrapping,
-  Data3DTexture,
-  LinearFilter,
-  RedFormat,
-  RGBAFormat,
-  RGFormat,
-  UnsignedByteType,
-} from "three";
+import type { Data3DTexture } from "three";
 import { DecodeError, decodeTexels } from "./decode";
 import { texels } from "./levels";
 import type { LoadQueue } from "./queue";
 import type { VolumeSource } from "./source";
+import { stride, volumeTexture } from "./volume_texture";
 
 export const LEVEL_FADE_S = 0.2;
 
@@ -28,11 +21,6 @@ export type Packed = Readonly<{
   /** Smallest and largest intensity of every brick of each channel, interleaved. */
   bricks: readonly Uint8Array[];
 }>;
-
-/** Bytes a texel takes on the GPU. */
-export function stride(channels: number): number {
-  return channels <= 2 ? channels : 4;
-}
 
 export class TileTexture {
   shown: Packed | null = null;
@@ -175,18 +163,7 @@ export class TileTexture {
       this.onError(error);
       return null;
     }
-    const texture = new Data3DTexture(data, ...size);
-    texture.format = [RedFormat, RGFormat, RGBAFormat, RGBAFormat][channels.length - 1];
-    texture.type = UnsignedByteType;
-    texture.minFilter = texture.magFilter = LinearFilter;
-    texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
-    texture.unpackAlignment = 1;
-    texture.needsUpdate = true;
-    // The texels need not stay in memory once the GPU has them.
-    texture.onUpdate = () => {
-      texture.image.data = null;
-      texture.onUpdate = null;
-    };
+    const texture = volumeTexture(data, size, channels.length);
     return { channels, level, texture, index: null, bricks: whole.map(({ bricks }) => bricks) };
   }
 

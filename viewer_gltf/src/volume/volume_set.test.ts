@@ -12,8 +12,8 @@ import { NOTHING_NEAR, wantedTiles } from "../hybrid/who";
 import { initialState, reduce, type ViewerState } from "../state";
 import { texels } from "./levels";
 import { makeFrame } from "./tile_march";
-import { stride } from "./tile_texture";
 import { VolumeSet } from "./volume_set";
+import { stride } from "./volume_texture";
 
 const TILES = 6;
 const SIDE = 2048;

@@ -19,7 +19,8 @@ import { LoadQueue } from "./queue";
 import type { Shapes } from "./shapes2d";
 import { VolumeSource } from "./source";
 import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_march";
-import { type Packed, stride, TileTexture } from "./tile_texture";
+import { type Packed, TileTexture } from "./tile_texture";
+import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
 /** A volume that has come fades in, one that goes fades out. */
