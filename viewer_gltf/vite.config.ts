@@ -77,6 +77,7 @@ export default defineConfig({
           environment: "node",
           testTimeout: 180_000,
           hookTimeout: 180_000,
+          expect: { poll: { timeout: 20_000 } }, // its usual second is short for a busy machine
           fileParallelism: false, // one software-rendering browser at a time
         },
       },

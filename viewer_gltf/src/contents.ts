@@ -59,7 +59,7 @@ export class Contents {
     const { uSceneDepth } = marchFrame;
     const { bricks } = this;
     this.traced = new TracedVolume(this.volumes, bricks, limits, uSceneDepth, onChange, onError);
-    picture.add(this.traced.mesh);
+    picture.add(this.traced.group);
     this.planes = new TransferPlanes(
       bundle,
       (channel, plane) => options.dispatch({ type: "learn-plane", channel, plane }),

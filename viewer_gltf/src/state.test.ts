@@ -296,3 +296,15 @@ describe("what the stage draws in a tile", () => {
     ]);
   });
 });
+
+describe("the lamps", () => {
+  it("are shown when they are asked for, whatever becomes of the mode", () => {
+    const start = initialState(sampleManifest(3));
+    expect(start.areLampsShown).toBe(false);
+    const shown = reduce(start, { type: "show-lamps", areShown: true });
+    expect(shown).toEqual({ ...start, areLampsShown: true });
+    expect(reduce(shown, { type: "show-lamps", areShown: true })).toBe(shown);
+    expect(reduce(shown, { type: "choose-mode", mode: "off" }).areLampsShown).toBe(true);
+    expect(reduce(shown, { type: "show-lamps", areShown: false })).toEqual(start);
+  });
+});

@@ -84,6 +84,8 @@ export type ViewerState = Readonly<{
   canTrace: boolean;
   /** How the picture of the mode `traced` is made. */
   trace: TraceSettings;
+  /** Whether its lamps can be seen, and taken hold of. */
+  areLampsShown: boolean;
   /** Faults that leave the rest usable, newest last. */
   notices: readonly string[];
   /** Of these, what another try may mend. */
@@ -116,6 +118,7 @@ export type Action =
   | Readonly<{ type: "choose-quality"; level: QualityLevel }>
   | Readonly<{ type: "trace"; change: Partial<Omit<TraceSettings, "lamps">> }>
   | Readonly<{ type: "move-lamp"; lamp: number; change: Partial<Lamp> }>
+  | Readonly<{ type: "show-lamps"; areShown: boolean }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
   | Readonly<{ type: "dismiss"; text: string }>;
 
@@ -174,6 +177,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     quality: "auto",
     canTrace,
     trace: START_TRACE,
+    areLampsShown: false,
     notices:
       staged.length > VOLUME_TILES_AT_START
         ? [
@@ -288,6 +292,9 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       return { ...state, trace: withTrace(state.trace, action.change) };
     case "move-lamp":
       return { ...state, trace: withLamp(state.trace, action.lamp, action.change) };
+    case "show-lamps":
+      if (action.areShown === state.areLampsShown) return state;
+      return { ...state, areLampsShown: action.areShown };
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {
@@ -320,6 +327,6 @@ export function volumeChannels(state: ViewerState): readonly ChannelState[] {
 }
 
 /** Whether volumes are drawn by paths of light. */
-export function isTraced({ mode }: ViewerState): boolean {
+export function isTraced({ mode }: Pick<ViewerState, "mode">): boolean {
   return mode === "traced";
 }

@@ -8,6 +8,7 @@ import { listenForClicks, rayAhead, rayUnder } from "./gaze/aim";
 import { pickTile, type Ray, shownBox, shownTiles } from "./gaze/pick";
 import { Hybrid } from "./hybrid/hybrid";
 import type { HandleId } from "./marks/handles";
+import { type LampHandle, lampHandles } from "./marks/lamp_handles";
 import { listenForHandles } from "./marks/pointer";
 import { ERROR_TARGET_PX } from "./mesh/surface_set";
 import { GatherPace } from "./quality/gather_pace";
@@ -160,10 +161,12 @@ export class Viewer {
     if (next === this.state) return;
     const notice = newNotice(this.state, next);
     const remark = remarkOn(this.state, next, this.bundle.manifest.tiles);
+    const before = this.lamps.length;
     this.state = next;
     if (notice !== null) this.stereo.tell(notice);
     if (remark !== null) this.onRemark(remark);
     this.follow();
+    if (this.lamps.length > before) this.bringLampsInSight();
     this.onState(next);
   }
 
@@ -198,7 +201,21 @@ export class Viewer {
     return true;
   }
 
-  /** Light up a handle of the cuts; null: none. */
+  /** Lamps may be beside and behind the eye. In stereo the head finds them. */
+  private bringLampsInSight(): void {
+    if (this.stereo.kind !== null) return;
+    const { matrixWorld } = this.room.specimen.group;
+    this.navigation.stepBackFor(
+      this.lamps.map(({ position }) => new Vector3(...position).applyMatrix4(matrixWorld)),
+    );
+  }
+
+  /** Those that can be taken hold of. */
+  private get lamps(): readonly LampHandle[] {
+    return lampHandles(this.state, this.bundle.manifest.specimen.bounds_um);
+  }
+
+  /** Light up a handle of the cuts or of the lamps; null: none. */
   mean(handle: HandleId | null): void {
     this.contents.marks.mean(handle);
   }

@@ -10,10 +10,12 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { writeShapes } from "../src/share/shape_link";
+import { makeShape, type Shape } from "../src/volume/shapes2d";
 import { type Browser, launch } from "./driver/chromium";
 import { Host } from "./driver/host";
 import { ViewerPage } from "./driver/page";
-import { difference, takePicture } from "./driver/picture";
+import { difference, type Picture, type Pixel, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
 import { DIST } from "./driver/stand";
 import { writeFixture } from "./fixture/bundle";
@@ -54,6 +56,26 @@ function count(page: Page) {
     if (isLevel && request.url().includes("/volumes/")) counted.files.push(request.url());
   });
   return counted;
+}
+
+/** Mean over blocks of 8 x 8 pixels of how far their means are apart, of 255: noise is no difference. */
+function apart(a: Picture, b: Picture): number {
+  const EDGE = 8;
+  let [sum, count] = [0, 0];
+  for (let y = 0; y + EDGE <= a.height; y += EDGE) {
+    for (let x = 0; x + EDGE <= a.width; x += EDGE) {
+      for (let k = 0; k < 3; k++) {
+        let difference = 0;
+        for (let i = 0; i < EDGE ** 2; i++) {
+          const at = [x + (i % EDGE), y + Math.floor(i / EDGE)] as const;
+          difference += a.at(...at)[k] - b.at(...at)[k];
+        }
+        sum += Math.abs(difference) / EDGE ** 2;
+        count++;
+      }
+    }
+  }
+  return sum / count;
 }
 
 describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
@@ -107,6 +129,37 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       expect(second.counted.bricks).toBe(0);
       expect(second.counted.files).toEqual([]);
       await second.page.close();
+    });
+
+    it("draw what files draw by value and gradient, marched and traced", async () => {
+      // above the value at which the authored function begins: bricks leave out what lies below
+      const slope: Shape = {
+        ...makeShape("rectangle", { value: 0.7, gradient: 0.55 }),
+        values: [0.4, 1],
+        gradients: [0.1, 1],
+      };
+      const link = `#v=1&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town`;
+      for (const mode of ["all", "traced"]) {
+        const drawn = async (address: string) => {
+          const { page, viewer, counted } = await open(`${address}?mode=${mode}${link}`);
+          const samples = async () => (await viewer.snapshot()).traced.samples;
+          if (mode === "traced") {
+            await expect.poll(samples, { timeout: 90_000 }).toBeGreaterThanOrEqual(3);
+          }
+          const picture = await takePicture(page);
+          const { state } = await viewer.snapshot();
+          await page.close();
+          return { picture, counted, state };
+        };
+        const files = await drawn(`${host.address}/`);
+        const bricks = await drawn(server.address);
+        expect(bricks.state.notices).toEqual([]);
+        expect(bricks.counted.files).toEqual([]);
+        expect(bricks.counted.sockets).toBeGreaterThan(0);
+        const isBlue = ([r, , b]: Pixel) => b > r + 40;
+        expect(files.picture.count(isBlue)).toBeGreaterThan(500);
+        expect(apart(bricks.picture, files.picture), mode).toBeLessThan(mode === "all" ? 0.5 : 4);
+      }
     });
 
     it("give way to files where a function shows what they leave out", async () => {

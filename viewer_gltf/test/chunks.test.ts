@@ -3,34 +3,16 @@
  * cut and end, how the disc weighs, what a sample is, how it is lit and how far it is shifted.
  */
 import { readdir, readFile } from "node:fs/promises";
-import type { Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { describe, expect, it } from "vitest";
 import { toHex } from "../src/color";
 import { blueNoise, NOISE_SIZE } from "../src/shaders/blue_noise";
-import { type Browser, launch } from "./driver/chromium";
+import { prepareBarePage } from "./driver/bare_page";
 import { describeInChromium } from "./driver/skip";
 import { readChunks, runProgram, type Texture } from "./march/chunk";
 
 describeInChromium("the shader's chunks", () => {
-  let browser: Browser;
-  let page: Page;
-
-  beforeAll(async () => {
-    browser = await launch({ width: 64, height: 64 });
-    page = await browser.context.newPage();
-  });
-  afterAll(() => browser?.close());
-
-  async function run(
-    names: readonly string[],
-    head: string,
-    body: string,
-    textures: Readonly<Record<string, Texture>> = {},
-  ) {
-    const chunks = await readChunks(...names);
-    const includes = names.map((name) => `#include <chunks/${name}>`).join("\n");
-    return runProgram(page, chunks, `${head}\n${includes}`, body, textures);
-  }
+  const bare = prepareBarePage();
+  const { run } = bare;
 
   const vec = (...v: number[]) => `vec${v.length}(${v.map((n) => n.toExponential(9)).join(", ")})`;
 
@@ -124,7 +106,12 @@ describeInChromium("the shader's chunks", () => {
         .replace("uniform vec4 uCuts[7];", "vec4 uCutsGiven[7];")
         .replace("uniform int uCutCount;", `const int uCutCount = ${planes.length};`)
         .replaceAll("uCuts[", "uCutsGiven[");
-      return runProgram(page, { "chunks/cut": text }, "#include <chunks/cut>", `${lines}\n${body}`);
+      return runProgram(
+        bare.page,
+        { "chunks/cut": text },
+        "#include <chunks/cut>",
+        `${lines}\n${body}`,
+      );
     };
     const front = [0, 0, 1, 2]; // gone is z > 2
     const isCut = (p: string) => cut([front], `oColor = vec4(isCut(${p}) ? 1.0 : 0.0);`);
@@ -175,7 +162,7 @@ describeInChromium("the shader's chunks", () => {
       const back = BACK.toFixed(1);
       const body = `oColor = vec4(sceneDistances(${back}), paneDistance(${back}));`;
       const program = { "chunks/scene_distance": text };
-      return runProgram(page, program, head, body, { uSceneDepth, uPaneDepth });
+      return runProgram(bare.page, program, head, body, { uSceneDepth, uPaneDepth });
     }
 
     const plain = (k: number) => [3, 3, 3].map((n) => new Array<number>(n).fill(k));

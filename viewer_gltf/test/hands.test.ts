@@ -3,14 +3,14 @@ import { beforeEach, expect, it } from "vitest";
 import { project } from "./driver/camera";
 import { difference, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
-import { DEMO_BUNDLE, prepareStand } from "./driver/stand";
+import { prepareStand } from "./driver/stand";
 
 /** Of the picture's pixels: the specimen fills a good part of it. */
 const TURNED = 0.02;
 
 describeInChromium("hands on the picture", () => {
   const viewport = { width: 504, height: 240 };
-  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport, hasTouch: true });
+  const stand = prepareStand({ viewport, hasTouch: true });
 
   beforeEach(async () => {
     await stand.open();

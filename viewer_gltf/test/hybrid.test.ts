@@ -17,7 +17,7 @@ describeInChromium("surface or volume", () => {
   const stand = prepareStand({ viewport: VIEWPORT });
 
   async function pictureOf(query: string): Promise<Picture> {
-    await stand.open(query);
+    await stand.open(`${query}&quality=high`);
     await stand.viewer.settled();
     return takePicture(stand.viewer.page);
   }
@@ -81,7 +81,7 @@ describeInChromium("surface or volume", () => {
   it("is drawn with less while frames are late, and as well as can be at rest", async () => {
     const { page } = stand.viewer;
     await addClock(page);
-    await stand.open(`&mode=all${NEAR}`);
+    await stand.open(`&mode=all${NEAR}&quality=auto`);
     await stand.viewer.settled();
     const settings = async () => (await stand.viewer.snapshot()).settings;
     const best = await settings();
@@ -94,7 +94,13 @@ describeInChromium("surface or volume", () => {
     const moving = await settings();
     expect(moving.steps).toBeLessThan(100);
     expect(moving.resolution).toBeLessThan(1);
-    await tick(page, 150, 3);
+    // what is still being fetched comes when it comes, fades in, and is movement too
+    const isLoading = async () => {
+      await tick(page, 150);
+      return (await stand.viewer.snapshot()).isLoading;
+    };
+    await expect.poll(isLoading).toBe(false);
+    await tick(page, 150, 8);
     expect(await settings()).toEqual(best);
   });
 

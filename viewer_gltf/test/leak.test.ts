@@ -49,7 +49,7 @@ describeInChromium("changing tiles", () => {
   it("leaks neither GPU objects nor memory", async () => {
     const { page } = stand.viewer;
     await page.addInitScript(countGpuObjects, [...KINDS]);
-    await stand.open("&mode=tile&switch=9&quality=high");
+    await stand.open("&mode=tile&switch=9");
     await stand.viewer.settled();
     for (const { id } of stand.manifest.channels.slice(0, 2)) {
       await stand.viewer.drawVolume(id, true);

@@ -1,41 +1,16 @@
 /** Numbers out of the ray-march: how many steps a ray takes, and what its chunks compute. */
-import type { Page } from "playwright-core";
-import { afterAll, beforeAll, expect, it } from "vitest";
+import { expect, it } from "vitest";
 import { MAX_STEPS } from "../src/volume/tile_march";
-import { type Browser, launch } from "./driver/chromium";
+import { prepareBarePage } from "./driver/bare_page";
 import { describeInChromium } from "./driver/skip";
-import { bundled } from "./march/bundled";
 import { readChunks, runProgram } from "./march/chunk";
 import type { Counts, Harness, Run } from "./march/harness";
 
 describeInChromium("the ray-march", () => {
-  let browser: Browser;
-  let page: Page;
-
-  beforeAll(async () => {
-    browser = await launch({ width: 64, height: 64 });
-    page = await browser.context.newPage();
-    await page.addScriptTag({
-      content: await bundled(new URL("./march/harness.ts", import.meta.url)),
-    });
-  });
-
-  afterAll(() => browser?.close());
-
-  async function inPage<K extends keyof Harness>(
-    name: K,
-    ...given: Parameters<Harness[K]>
-  ): Promise<ReturnType<Harness[K]>> {
-    const answer = await page.evaluate(
-      ([name, given]) => (window.march?.[name] as (...each: unknown[]) => unknown)?.(...given),
-      [name, given] as const,
-    );
-    if (answer === undefined) throw new Error("the page has no harness");
-    return answer as ReturnType<Harness[K]>;
-  }
+  const bare = prepareBarePage<Harness>(new URL("./march/harness.ts", import.meta.url));
 
   async function count(run: Run): Promise<Counts> {
-    const counts = await inPage("countSteps", run);
+    const counts = await bare.call("countSteps", run);
     expect(counts.pixels).toBeGreaterThan(300);
     return counts;
   }
@@ -68,7 +43,7 @@ describeInChromium("the ray-march", () => {
 
   it("takes no more steps where a ray goes through several tiles", async () => {
     for (const cubes of [2, 3, 7]) {
-      const most = await inPage("countThrough", { side: 51, opacity: 1, bricks: "all" }, cubes);
+      const most = await bare.call("countThrough", { side: 51, opacity: 1, bricks: "all" }, cubes);
       expect(most).toBeLessThanOrEqual(MAX_STEPS);
       expect(most).toBeGreaterThan(0.8 * MAX_STEPS);
     }
@@ -77,7 +52,7 @@ describeInChromium("the ray-march", () => {
   it("shows the same with leaps and without, whatever is drawn", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 30; seed++) {
-      const found = await inPage("compareLeaps", seed);
+      const found = await bare.call("compareLeaps", seed);
       expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
       drawn += found.drawn;
     }
@@ -92,7 +67,7 @@ describeInChromium("the ray-march", () => {
       log += Math.log(1 - ((opacity / 255) * (i + 0.5)) / 10_000);
     }
     const expected = 1 - Math.exp((log / 10_000) * (side - 3));
-    const found = await inPage("meanOpacity", "ramp", side, opacity);
+    const found = await bare.call("meanOpacity", "ramp", side, opacity);
     expect(Math.abs(found - expected)).toBeLessThan(2 / 255);
   });
 
@@ -101,7 +76,7 @@ describeInChromium("the ray-march", () => {
     for (const side of [67, 203]) {
       for (const opacity of [1, 5, 20]) {
         const expected = 1 - (1 - opacity / 255) ** (side - 3);
-        const found = await inPage("meanOpacity", "uniform", side, opacity);
+        const found = await bare.call("meanOpacity", "uniform", side, opacity);
         const ends = expected > 0.99 ? 0.01 : 2 / 255; // rays that are as opaque go no further
         expect(Math.abs(found - expected), `${side}, ${opacity}`).toBeLessThan(ends);
       }
@@ -114,7 +89,7 @@ describeInChromium("the ray-march", () => {
       const box = "vec3(0.0), vec3(4.0, 2.0, 8.0)";
       const call = `intersectBox(vec3(${eye}), 1.0 / vec3(${dir}), ${box})`;
       const head = "#include <chunks/intersect_box>";
-      return (await runProgram(page, chunks, head, `oColor = ${call}.xyxy;`)).slice(0, 2);
+      return (await runProgram(bare.page, chunks, head, `oColor = ${call}.xyxy;`)).slice(0, 2);
     };
     // Along z, a hair off the axes, since the reciprocal of 0 is not defined in GLSL.
     const [near, far] = await intersect("1.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
@@ -137,7 +112,7 @@ describeInChromium("the ray-march", () => {
     const ahead = async (start: number, dir: number, t: number) =>
       (
         await runProgram(
-          page,
+          bare.page,
           chunks,
           head,
           `vec3 dir = vec3(${dir.toFixed(3)}, 1e-9, 1e-9);
@@ -169,7 +144,7 @@ describeInChromium("the ray-march", () => {
     const uLut = { size: [256, 2], channels: 4, texels: [...row(51), ...row(102)] } as const;
     const classify = (intensity: string, voxels: string) =>
       runProgram(
-        page,
+        bare.page,
         chunks,
         head,
         `oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, vec4(${voxels}));`,

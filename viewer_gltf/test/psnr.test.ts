@@ -32,7 +32,7 @@ function run(script: string, given: readonly string[], input: string): Promise<s
 
 /** Show these channels alone, as volumes everywhere, from the front; how near that comes, in dB. */
 async function hold(stand: Stand, channels: readonly string[]) {
-  await stand.open("&mode=all");
+  await stand.open("&mode=all&quality=high");
   for (const { id } of stand.manifest.channels) {
     await stand.viewer.show(id, channels.includes(id));
   }

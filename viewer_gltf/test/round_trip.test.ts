@@ -221,7 +221,7 @@ describeInChromium("an artist's layer over the stage", () => {
     });
 
     it("draws a tile at the level of detail that was chosen, and the others at their finest", async () => {
-      await stand.open();
+      await stand.open("&quality=high");
       const picture = await only(stand, "Balls", "surface");
       const drawn = [AS_BOTH, AS_VOLUME, COARSE, MOVED, PLAIN].map((tile) =>
         trianglesOf(BUILT, tile, tile === COARSE ? COARSE_LOD : 0),

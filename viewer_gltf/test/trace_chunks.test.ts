@@ -3,14 +3,13 @@
  * random, how light is scattered and where it comes from, how far it flies, what a view that trembles
  * keeps, and how colours are toned.
  */
-import type { Page } from "playwright-core";
 import { type Matrix4, PerspectiveCamera, type Vector3 } from "three";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { describe, expect, it } from "vitest";
 import { environmentTables } from "../src/trace/environment";
 import { viewOf } from "../src/trace/view";
-import { type Browser, launch } from "./driver/chromium";
+import { prepareBarePage } from "./driver/bare_page";
 import { describeInChromium } from "./driver/skip";
-import { readChunks, runProgram, type Texture } from "./march/chunk";
+import type { Texture } from "./march/chunk";
 import { seeded } from "./seeded";
 
 const number = (v: number) => v.toExponential(9);
@@ -25,28 +24,18 @@ const floats = (size: readonly number[], texels: readonly number[]): Texture => 
 });
 
 describeInChromium("the path tracer's chunks", () => {
-  let browser: Browser;
-  let page: Page;
+  const bare = prepareBarePage();
 
-  beforeAll(async () => {
-    browser = await launch({ width: 64, height: 64 });
-    page = await browser.context.newPage();
-  });
-  afterAll(() => browser?.close());
-
-  async function run(
+  function run(
     names: readonly string[],
     head: string,
     body: string,
     textures: Readonly<Record<string, Texture>> = {},
   ) {
-    const chunks = await readChunks(...names);
-    const includes = names.map((name) => `#include <chunks/${name}>`).join("\n");
     const samplers = Object.entries(textures)
       .map(([name, { size }]) => `uniform sampler${size.length}D ${name};`)
       .join("\n");
-    const whole = `precision highp int;\n${samplers}\n${head}\n${includes}`;
-    return runProgram(page, chunks, whole, body, textures);
+    return bare.run(names, `precision highp int;\n${samplers}\n${head}`, body, textures);
   }
 
   /** Means of the four numbers that `body` adds to `sum`, over so many turns of a loop. */
@@ -437,7 +426,7 @@ describeInChromium("the path tracer's chunks", () => {
         const vec3 uEyeAt = ${at(now.eye)}; const vec3 uEyeBefore = ${at(before.eye)};
         const vec2 uTurn = vec2(0.0, 1.0); const float uCalm = 0.0; const uint uSample = 1u;`;
       const call = `oColor = historyAt(ivec2(${x}, ${y}), ${vec(x + 0.5, y + 0.5)}).${part};`;
-      return run(["random", "history"], head, call, {
+      return run(["random", "seek", "history"], head, call, {
         uSums: floats(
           [N, N],
           pixels.flatMap(({ sums }) => sums),
@@ -484,21 +473,29 @@ describeInChromium("the path tracer's chunks", () => {
       expectClose(await history(1, 0, [1, 2], many, "sums"), many[9].sums); // a still view keeps all
     });
 
-    it("is left where something else was seen, or nothing", async () => {
+    it("is left where something else was seen, or was not looked at", async () => {
       const nearer = plane.map((pixel, i) =>
         i % N === 2 ? { ...pixel, moments: [0, 10, 10 * (awayOf(i) - 2), 10] } : pixel,
       );
       // between column 1, which is the same surface, and column 2, which isn't
       expectClose(await history(2, 0.25, [1, 2], nearer, "sums"), [20, 0, 0, 10]);
-      const edge = plane.map((pixel, i) => (i % N === 2 ? empty(10) : pixel));
-      expectClose(await history(2, 0.25, [1, 2], edge, "sums"), [20, 0, 0, 10]);
-      expect(await history(2, 1, [1, 2], edge, "sums")).toEqual([0, 0, 0, 0]); // all of it
       expect(await history(2, 2, [3, 2], plane, "sums")).toEqual([0, 0, 0, 0]); // out of the picture
+    });
+
+    it("is nothing where nothing was met, and an edge stays where it is", async () => {
+      const edge = plane.map((pixel, i) => (i % N >= 2 ? empty(10) : pixel));
+      expectClose(await history(2, 0.25, [1, 2], edge, "sums"), [15, 0, 0, 7.5]);
+      expect((await history(2, 0.25, [1, 2], edge, "moments"))[1]).toBeCloseTo(10, 3);
+      // an edge has gone by: it is found from this side, too
+      // by what is near the box's middle, where nothing tells how far to look
+      expect((await history(2, -1, [2, 2], edge, "sums"))[0]).toBeCloseTo(20, 0);
+      expect(await history(2, 1, [1, 2], edge, "sums")).toEqual([0, 0, 0, 0]);
+      expect((await history(2, 1, [1, 2], edge, "moments"))[1]).toBeCloseTo(10, 3);
     });
 
     const share = (turn: readonly number[], calm: number, noisiness: number) =>
       run(
-        ["random", "history"],
+        ["random", "seek", "history"],
         `const vec3 uSize = vec3(1.0); const int uHistory = 0; const vec4 uPart = vec4(0.0);
          const float uMostHistory = 1.0; const mat4 uToBox = mat4(1.0); const mat4 uToBefore = mat4(1.0);
          const vec3 uEyeAt = vec3(0.0); const vec3 uEyeBefore = vec3(0.0);

@@ -1,11 +1,9 @@
 /** What comes after the light: the picture's every pixel, worked out of what was gathered. */
-import type { Page } from "playwright-core";
-import { afterAll, beforeAll, expect, it } from "vitest";
+import { expect, it } from "vitest";
 import type { TraceSettings } from "../src/trace/settings";
-import { type Browser, launch } from "./driver/chromium";
+import { prepareBarePage } from "./driver/bare_page";
 import { describeInChromium } from "./driver/skip";
-import { bundled } from "./march/bundled";
-import type { Gathered, Run } from "./trace/harness";
+import type { Gathered, Harness, Run } from "./trace/harness";
 import { BASE } from "./trace/phantom";
 
 /** So many that nothing is denoised any more. */
@@ -107,27 +105,9 @@ const ALL: Partial<TraceSettings> = {
 };
 
 describeInChromium("what comes after the light", () => {
-  let browser: Browser;
-  let page: Page;
-
-  beforeAll(async () => {
-    browser = await launch({ width: 64, height: 64 });
-    page = await browser.context.newPage();
-    await page.addScriptTag({
-      content: await bundled(new URL("./trace/harness.ts", import.meta.url)),
-    });
-  });
-  afterAll(() => browser?.close());
-
-  async function gather(
-    settings: Partial<TraceSettings>,
-    change: Partial<Run> = {},
-  ): Promise<Gathered> {
-    const run = { ...RUN, settings, ...change };
-    const found = await page.evaluate((given) => window.trace?.gather(given), run);
-    if (found === undefined) throw new Error("the page has no harness");
-    return found;
-  }
+  const { call } = prepareBarePage<Harness>(new URL("./trace/harness.ts", import.meta.url));
+  const gather = (settings: Partial<TraceSettings>, change: Partial<Run> = {}) =>
+    call("gather", { ...RUN, settings, ...change });
 
   it.each([
     ["nothing, where all is at rest", PLAIN],

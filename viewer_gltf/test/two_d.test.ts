@@ -1,38 +1,13 @@
 /** Numbers out of the march and the paths by two-dimensional transfer functions. */
-import type { Page } from "playwright-core";
-import { afterAll, beforeAll, expect, it } from "vitest";
-import { type Browser, launch } from "./driver/chromium";
+import { expect, it } from "vitest";
+import { prepareBarePage } from "./driver/bare_page";
 import { describeInChromium } from "./driver/skip";
-import { bundled } from "./march/bundled";
 import { readChunks, runProgram, type Texture } from "./march/chunk";
 import type { Harness2d } from "./march/harness2d";
 import { seeded } from "./seeded";
 
 describeInChromium("two-dimensional transfer functions", () => {
-  let browser: Browser;
-  let page: Page;
-
-  beforeAll(async () => {
-    browser = await launch({ width: 64, height: 64 });
-    page = await browser.context.newPage();
-    await page.addScriptTag({
-      content: await bundled(new URL("./march/harness2d.ts", import.meta.url)),
-    });
-  });
-
-  afterAll(() => browser?.close());
-
-  async function inPage<K extends keyof Harness2d>(
-    name: K,
-    ...given: Parameters<Harness2d[K]>
-  ): Promise<ReturnType<Harness2d[K]>> {
-    const answer = await page.evaluate(
-      ([name, given]) => (window.march2d?.[name] as (...each: unknown[]) => unknown)?.(...given),
-      [name, given] as const,
-    );
-    if (answer === undefined) throw new Error("the page has no harness");
-    return answer as ReturnType<Harness2d[K]>;
-  }
+  const bare = prepareBarePage<Harness2d>(new URL("./march/harness2d.ts", import.meta.url));
 
   // The slope climbs from 0 at 20 to 1 at 28 of 48 voxels: two voxels on it differ by a quarter,
   // which is half of the steepest, 0.5; at its ends by half of that.
@@ -47,7 +22,7 @@ describeInChromium("two-dimensional transfer functions", () => {
     });
 
   it("show a boundary by its gradient, and nothing of what is uniform", async () => {
-    const columns = await inPage("showSlope", [0, 1], [0.4, 0.6], OPACITY);
+    const columns = await bare.call("showSlope", [0, 1], [0.4, 0.6], OPACITY);
     const [from, to] = SLOPE_AT;
     const onSlope = between(columns, from + 1.2, to - 1.2);
     expect(onSlope.length).toBeGreaterThan(5);
@@ -58,7 +33,7 @@ describeInChromium("two-dimensional transfer functions", () => {
   });
 
   it("show what is uniform, and nothing of its boundary, though the values are alike", async () => {
-    const columns = await inPage("showSlope", [0.1, 1], [0, 0.2], OPACITY);
+    const columns = await bare.call("showSlope", [0.1, 1], [0, 0.2], OPACITY);
     const [from, to] = SLOPE_AT;
     for (const found of between(columns, to + 1, 47)) {
       expect(Math.abs(found - through)).toBeLessThan(0.02);
@@ -71,7 +46,7 @@ describeInChromium("two-dimensional transfer functions", () => {
   it("that know no gradients give the picture of a one-dimensional one", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 6; seed++) {
-      const found = await inPage("compareAlike", seed);
+      const found = await bare.call("compareAlike", seed);
       expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
       drawn += found.drawn;
     }
@@ -81,7 +56,7 @@ describeInChromium("two-dimensional transfer functions", () => {
   it("show the same with leaps and without", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 8; seed++) {
-      const found = await inPage("compareLeaps2d", seed);
+      const found = await bare.call("compareLeaps2d", seed);
       expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
       drawn += found.drawn;
     }
@@ -106,7 +81,7 @@ describeInChromium("two-dimensional transfer functions", () => {
       }
       #include <chunks/plane>`;
     const found = await runProgram(
-      page,
+      bare.page,
       chunks,
       head,
       `oColor = steepnessOf(stepsAt(vec3(0.3, 0.4, 0.5), ${vec(voxel)}));`,
@@ -138,7 +113,7 @@ describeInChromium("two-dimensional transfer functions", () => {
     ];
     const at = (v: readonly number[]) => `vec4(${v.map((n) => n.toFixed(6)).join(", ")}, 0.0, 0.0)`;
     const body = `oColor = mediumOf2d(${at(values)}, ${at(gradients)});`;
-    const found = await runProgram(page, chunks, head, body, { uMedium });
+    const found = await runProgram(bare.page, chunks, head, body, { uMedium });
     const entries = [0, 1].map((c) => entryOf(c, values[c], gradients[c]));
     const sum = entries[0][3] + entries[1][3];
     for (let k = 0; k < 3; k++) {

@@ -1,20 +1,59 @@
-/**
- * The built viewer in headless Chromium. The bundle is the one in STEREOCELL_TEST_BUNDLE (`make
- * test` gives the demo's), or the synthetic fixture.
- */
+/** The built viewer in headless Chromium, on the synthetic fixture and on the demo's bundle. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { expect, it } from "vitest";
 import { addHeadset } from "./driver/chromium";
 import { hasColor, isBackground, type Pixel, takePicture } from "./driver/picture";
 import { describeInChromium } from "./driver/skip";
-import { DEMO_BUNDLE, DIST, prepareStand } from "./driver/stand";
+import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "./driver/stand";
 
-const VIEWPORT = { width: 640, height: 360 };
+const VIEWPORT = { width: 480, height: 270 };
+
+const withSurface = ({ manifest }: Stand) =>
+  manifest.channels.filter(({ tileset }) => tileset !== null);
+
+async function showOnly({ viewer }: Stand, id: string): Promise<void> {
+  const { state } = await viewer.snapshot();
+  for (const channel of state.channels) {
+    const isShown = channel.id === id;
+    if (channel.shown !== isShown) await viewer.show(channel.id, isShown);
+  }
+}
+
+describeInChromium("the demo", () => {
+  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: VIEWPORT });
+
+  it("loads the bundle and draws each channel in its colour", async () => {
+    await stand.open();
+    const { overview } = await stand.viewer.snapshot();
+    expect(overview.isComplete).toBe(true);
+    expect(overview.total).toBeGreaterThan(0);
+    await stand.viewer.settled();
+    const all = await takePicture(stand.viewer.page);
+    expect(all.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    for (const { id, color } of withSurface(stand)) {
+      await showOnly(stand, id);
+      expect((await takePicture(stand.viewer.page)).count(hasColor(color)), id).toBeGreaterThan(
+        100,
+      );
+    }
+  });
+
+  it("fetches every tile's coarsest surface before any finer one", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const lods = stand.host.requests.flatMap(
+      ({ path }) => /\/lod(\d+)\.glb$/.exec(path)?.[1] ?? [],
+    );
+    const coarsest = Math.max(...lods.map(Number));
+    const first = lods.findIndex((lod) => Number(lod) < coarsest);
+    const overview = first === -1 ? lods : lods.slice(0, first);
+    expect(overview.length).toBe(lods.filter((lod) => Number(lod) === coarsest).length);
+  });
+});
 
 describeInChromium("the viewer", () => {
   const stand = prepareStand({
-    bundle: DEMO_BUNDLE,
     viewport: VIEWPORT,
     mounts: (bundle) => ({
       "/some/folder/": bundle,
@@ -23,29 +62,6 @@ describeInChromium("the viewer", () => {
   });
 
   const picture = () => takePicture(stand.viewer.page);
-  const withSurface = () => stand.manifest.channels.filter(({ tileset }) => tileset !== null);
-
-  async function showOnly(id: string): Promise<void> {
-    const { state } = await stand.viewer.snapshot();
-    for (const channel of state.channels) {
-      const isShown = channel.id === id;
-      if (channel.shown !== isShown) await stand.viewer.show(channel.id, isShown);
-    }
-  }
-
-  it("loads the bundle and draws each channel in its colour", async () => {
-    await stand.open();
-    const { overview } = await stand.viewer.snapshot();
-    expect(overview.isComplete).toBe(true);
-    expect(overview.total).toBeGreaterThan(0);
-    await stand.viewer.settled();
-    const all = await picture();
-    expect(all.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
-    for (const { id, color } of withSurface()) {
-      await showOnly(id);
-      expect((await picture()).count(hasColor(color)), id).toBeGreaterThan(100);
-    }
-  });
 
   it("opens the bundle beside it, in any folder of a host", async () => {
     const body = await readFile(join(DIST, "index.html"));
@@ -66,34 +82,22 @@ describeInChromium("the viewer", () => {
     expect(addresses.filter((url) => !local(url))).toEqual([]);
   });
 
-  it("fetches every tile's coarsest surface before any finer one", async () => {
-    await stand.open();
-    await stand.viewer.settled();
-    const lods = stand.host.requests.flatMap(
-      ({ path }) => /\/lod(\d+)\.glb$/.exec(path)?.[1] ?? [],
-    );
-    const coarsest = Math.max(...lods.map(Number));
-    const first = lods.findIndex((lod) => Number(lod) < coarsest);
-    const overview = first === -1 ? lods : lods.slice(0, first);
-    expect(overview.length).toBe(lods.filter((lod) => Number(lod) === coarsest).length);
-  });
-
   it("takes a channel's colour away when the channel is turned off", async () => {
-    const { id, color } = withSurface()[0];
+    const { id, color } = withSurface(stand)[0];
     await stand.open();
     await stand.viewer.settled();
-    await showOnly(id);
+    await showOnly(stand, id);
     expect((await picture()).count(hasColor(color))).toBeGreaterThan(100);
     await stand.viewer.show(id, false);
     expect((await picture()).count((pixel) => !isBackground(pixel))).toBe(0);
   });
 
   it("recolours the surface and the volume, with no volume fetched again", async () => {
-    const { id, color } = withSurface()[0];
+    const { id, color } = withSurface(stand)[0];
     const chosen: Pixel = [1, 0, 1];
     await stand.open();
     await stand.viewer.settled();
-    await showOnly(id);
+    await showOnly(stand, id);
     await stand.viewer.recolor(id, "#ff00ff");
     const surface = await picture();
     expect(surface.count(hasColor(chosen))).toBeGreaterThan(100);
@@ -116,10 +120,11 @@ describeInChromium("the viewer", () => {
 
   /** One channel, as a volume in one tile alone. */
   async function openTileOf(id: string): Promise<string> {
-    await stand.open("&mode=tile&switch=9");
-    await showOnly(id);
+    await stand.open("&mode=off&switch=9"); // else it may have begun to load others, and this one
+    await showOnly(stand, id);
     const [{ id: tile }] = stand.manifest.tiles;
     await stand.viewer.chooseTile(tile);
+    await stand.viewer.chooseMode("tile");
     return tile;
   }
 

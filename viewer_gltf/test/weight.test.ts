@@ -13,7 +13,7 @@ import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "./driver/stand";
 const CODE_GZIP_BYTES = 350_000;
 const FIRST_PICTURE_BYTES = 300_000;
 /** Fetched where they are wanted: textures of surfaces, bricks from a server, paths of light. */
-const OPTIONAL = /basis|link_worker|assemble_worker|EXRLoader|HDRLoader/;
+const OPTIONAL = /basis|link_worker|assemble_worker|tracer|EXRLoader|HDRLoader/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
@@ -41,8 +41,11 @@ async function sentBefore(
   await stand.viewer.page.waitForFunction(() => window.stereocell !== undefined);
   return stand.viewer.page.evaluate(async (until) => {
     const isFirst = () => {
-      const isOpen = document.querySelector(".stage canvas") !== null;
-      return isOpen && window.stereocell?.snapshot().hasFirstPicture === true;
+      try {
+        return window.stereocell?.snapshot().hasFirstPicture === true;
+      } catch {
+        return false; // nothing is open yet
+      }
     };
     while (until === "first" && !isFirst()) {
       await new Promise((resolve) => requestAnimationFrame(resolve));

@@ -13,7 +13,14 @@ import {
 } from "three";
 import type { Vec3 } from "../gaze/pick";
 import type { Box, Clip, ClipPlane } from "../view/clip";
-import { BOX_HANDLES, boxWithin, type HandleId, handlesOf, PLANE_HANDLES } from "./handles";
+import {
+  BOX_HANDLES,
+  boxWithin,
+  type ClipHandleId,
+  type HandleId,
+  handlesOf,
+  PLANE_HANDLES,
+} from "./handles";
 import {
   ACCENT,
   BRIGHT,
@@ -23,6 +30,7 @@ import {
   lengthAt,
   MARKS_ORDER,
   type MarkMesh,
+  MEANT,
   markLine,
   markMesh,
   PLANE,
@@ -31,13 +39,11 @@ import {
 } from "./look";
 import { MOST_CORNERS, planeSection } from "./section";
 
-/** A handle that is meant or held is so much larger. */
-const MEANT = 1.35;
 const UP = new Vector3(0, 1, 0);
 
 export class ClipMark {
   readonly group = new Object3D();
-  private readonly handles = new Map<HandleId, MarkMesh>();
+  private readonly handles = new Map<ClipHandleId, MarkMesh>();
   private readonly edges = markLine(new EdgesGeometry(new BoxGeometry()), DIM, { opacity: 0.8 });
   private readonly rim = markLine(points(MOST_CORNERS), PLANE, { isLoop: true, opacity: 0.9 });
   private readonly sheet = markMesh(fan(this.rim.geometry), PLANE, 0.08);

@@ -1,4 +1,4 @@
-/** The clip's handles as what a ray of the gaze or of a hand meets and carries in the room. */
+/** The handles as what a ray of the gaze or of a hand meets and carries in the room. */
 import { Matrix4, Vector3 } from "three";
 import { rayAlong } from "../gaze/aim";
 import type { Hit, RoomRay, Target } from "../gaze/pointer";
@@ -39,7 +39,7 @@ export class HandleTarget implements Target {
 
   drag(key: string, ray: RoomRay): void {
     const handle = this.handles.find(({ id }) => HANDLE + id === key);
-    if (handle === undefined) return; // the cut was turned off meanwhile
+    if (handle === undefined) return; // the cut or the lamp was turned off meanwhile
     this.seen = handle.id;
     this.onDrag(handle.id, this.into(ray));
   }

@@ -1,4 +1,7 @@
-/** The handles of clip box and plane: where they are, which one a ray means, what a drag does. Pure. */
+/**
+ * The handles of clip box and plane: where they are, what a drag does; and which handle of all, the
+ * lamps' too, a ray means. Pure.
+ */
 import { Vector3 } from "three";
 import type { Ray, Vec3 } from "../gaze/pick";
 import type { Action } from "../state";
@@ -15,13 +18,16 @@ import {
   slidePlane,
   turnPlane,
 } from "../view/clip";
+import type { LampHandleId } from "./lamp_handles";
 import { HANDLE_RADIUS } from "./look";
 
 export const BOX_HANDLES = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"] as const;
 export const PLANE_HANDLES = ["plane-middle", "plane-tip"] as const;
 export type BoxHandleId = (typeof BOX_HANDLES)[number];
 export type Face = Pick<BoxHandle, "axis" | "side">;
-export type HandleId = BoxHandleId | (typeof PLANE_HANDLES)[number];
+export type ClipHandleId = BoxHandleId | (typeof PLANE_HANDLES)[number];
+export type ClipHandle = Readonly<{ id: ClipHandleId; position: Vec3 }>;
+export type HandleId = ClipHandleId | LampHandleId;
 export type Handle = Readonly<{ id: HandleId; position: Vec3 }>;
 
 /** A ray means a handle within this angle of its middle, by what points. */
@@ -48,9 +54,9 @@ export function boxWithin(box: Box, shown: Box): Box {
   return { min: [min[0], min[1], min[2]], max: [max[0], max[1], max[2]] };
 }
 
-/** All handles there are. `shown`: box of what is shown, um: the specimen, or the isolated tile. */
-export function handlesOf({ box, plane }: Clip, shown: Box): readonly Handle[] {
-  const found: Handle[] = [];
+/** All handles of the clip. `shown`: box of what is shown, um: the specimen, or the isolated tile. */
+export function handlesOf({ box, plane }: Clip, shown: Box): readonly ClipHandle[] {
+  const found: ClipHandle[] = [];
   if (box !== null) {
     for (const { axis, side, position } of boxHandles(boxWithin(box, shown))) {
       found.push({ id: idOf(axis, side), position });
@@ -83,7 +89,7 @@ export function pickHandle(
 }
 
 /** What dragging a handle to a ray (um) makes of the clip; null: nothing. */
-export function dragHandle(id: HandleId, ray: Ray, clip: Clip, shown: Box): Action | null {
+export function dragHandle(id: ClipHandleId, ray: Ray, clip: Clip, shown: Box): Action | null {
   if (id === "plane-middle") return changePlane(clip, (plane) => slidePlane(plane, ray, shown));
   if (id === "plane-tip") {
     return changePlane(clip, (plane) => turnPlane(plane, ray, shown, armOf(shown)));

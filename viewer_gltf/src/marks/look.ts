@@ -35,6 +35,8 @@ export const AXIS_COLORS = ["#e8743b", "#35b98c", "#6cb8f0"] as const;
 
 /** Radians, in a headset. */
 export const HANDLE_RADIUS = 0.7 * RADIANS;
+/** A handle that is meant or held is so much larger. */
+export const MEANT = 1.35;
 export const POINT_RADIUS = 0.28 * RADIANS;
 export const LINE_RADIUS = 0.06 * RADIANS;
 /** Of a label's line. */

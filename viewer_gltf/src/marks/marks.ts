@@ -1,6 +1,6 @@
 /**
- * All that is drawn on the specimen and is no part of it: handles of the clip, measured points,
- * scale bar, orientation, names. And what a ray means among them.
+ * All that is drawn on the specimen and is no part of it: handles of the clip and of the lamps,
+ * measured points, scale bar, orientation, names. And what a ray means among them.
  */
 import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
 import { type Ray, shownBox } from "../gaze/pick";
@@ -16,6 +16,8 @@ import {
   pickHandle,
   TOLERANCE_RAD,
 } from "./handles";
+import { dragLamp, isLampHandle, lampHandles } from "./lamp_handles";
+import { LampMark } from "./lamp_mark";
 import { type Sight, screenZoom } from "./look";
 import { MeasureMark } from "./measure_mark";
 import { type Named, NameMark } from "./name_mark";
@@ -65,6 +67,7 @@ export class Marks {
   /** Child of the specimen's group: um, world. */
   readonly group = new Object3D();
   readonly handles = new ClipMark();
+  readonly lamps = new LampMark();
   /** The handles, for gaze and hands in stereo. */
   readonly target: HandleTarget;
   readonly measured: MeasureMark;
@@ -76,7 +79,9 @@ export class Marks {
   private readonly reading: Reading;
   private readonly toSpecimen = new Matrix4();
   private sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
-  /** How many are on screen. */
+  /** The lamp that the ray which drags it has lost over its rim. */
+  private beside: HandleId | null = null;
+  /** How many surfaces are on screen. */
   private surfaces = 0;
   private isDisposed = false;
 
@@ -87,9 +92,10 @@ export class Marks {
     this.reading = new Reading(options, state);
     this.target = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
     this.measured = new MeasureMark((point) => this.reading.valuesAt(point), options.onChange);
-    const { handles, measured, ruler, axes, name } = this;
+    const { handles, lamps, measured, ruler, axes, name } = this;
     this.group.name = "marks";
-    this.group.add(handles.group, measured.group, ruler.group, axes.group, name.group);
+    this.group.add(handles.group, lamps.group, measured.group);
+    this.group.add(ruler.group, axes.group, name.group);
     this.follow(state);
   }
 
@@ -107,7 +113,9 @@ export class Marks {
     this.state = state;
     this.reading.state = state;
     this.handles.show(state.clip, this.shown);
-    this.target.handles = handlesOf(state.clip, this.shown);
+    this.lamps.show(state, this.specimen);
+    const cuts = handlesOf(state.clip, this.shown);
+    this.target.handles = [...cuts, ...lampHandles(state, this.specimen)];
     this.showMeasured();
     this.name.forget();
   }
@@ -132,6 +140,7 @@ export class Marks {
     if (view.screen === null) this.updateInRoom(view.isPanelOpen);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.sight);
+    this.lamps.update(this.sight);
     this.measured.update(this.sight);
   }
 
@@ -157,13 +166,24 @@ export class Marks {
 
   /** Bring a handle to a ray (um). */
   drag(id: HandleId, ray: Ray): void {
-    const action = dragHandle(id, ray, this.state.clip, this.shown);
-    if (action !== null) this.options.dispatch(action);
+    const { state } = this;
+    if (!isLampHandle(id)) {
+      const action = dragHandle(id, ray, state.clip, this.shown);
+      if (action !== null) this.options.dispatch(action);
+      return;
+    }
+    const drag = dragLamp(id, ray, state, this.specimen, this.beside === id);
+    if (drag === null) return;
+    this.beside = drag.isBeside ? id : null;
+    if (drag.action !== null) this.options.dispatch(drag.action);
   }
 
   /** Light up what is pointed at, or held. */
   mean(id: HandleId | null): void {
-    if (this.handles.mean(id)) this.options.onChange();
+    if (!this.handles.mean(id)) return;
+    this.lamps.mean(id);
+    this.lamps.show(this.state, this.specimen);
+    this.options.onChange();
   }
 
   /** Measure from or to what a ray (um) means: the first point, the second, a first one again. */
@@ -178,6 +198,10 @@ export class Marks {
   /** Box of what is shown: the specimen, or the isolated tile. */
   private get shown(): Box {
     return shownBox(this.options.manifest, this.state.isolated);
+  }
+
+  private get specimen(): Box {
+    return this.options.manifest.specimen.bounds_um;
   }
 
   private updateInRoom(isPanelOpen: boolean): void {
@@ -223,6 +247,7 @@ export class Marks {
     this.isDisposed = true;
     this.reading.dispose();
     this.handles.dispose();
+    this.lamps.dispose();
     this.measured.dispose();
     this.scaleBar.dispose();
     this.orientation.dispose();

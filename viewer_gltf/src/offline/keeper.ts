@@ -75,9 +75,16 @@ export class Keeper {
       later(fetch(bare, seen).then((response) => this.keep(this.keys.page, response)));
     }
     const base = ownBundle(page);
-    if (base !== null && !this.listed.has(base)) {
+    if (base !== null && (await this.listedOf(base)) === null) {
+      // known at once as coming: what the page asks for from now on waits for it, and is kept
       const request = new Request(fileAddress(base, "manifest.json"), { cache: "no-cache" });
-      await this.manifest(base, request, later);
+      const listed = this.networkFirst(this.keys.manifest(base), request, later)
+        .then(async (response) =>
+          response.ok ? this.readListed(base, await response.text()) : null,
+        )
+        .catch(() => null);
+      this.listed.set(base, listed);
+      await listed;
     }
     for (const { url, range } of asked) {
       const plan = this.plan(url, page);
@@ -183,8 +190,8 @@ export class Keeper {
     await this.store.put(this.keys.file(base, ref.sha256, range), { body, type, range: found });
   }
 
-  /** After a restart of this worker the kept manifest tells. */
-  private listedOf(base: string): Promise<Listed | null> {
+  /** After a restart of this worker the kept manifest tells; that there is none is not for good. */
+  private async listedOf(base: string): Promise<Listed | null> {
     let listed = this.listed.get(base);
     if (listed === undefined) {
       listed = this.store
@@ -192,7 +199,9 @@ export class Keeper {
         .then(async (kept) => (kept === null ? null : this.readListed(base, await kept.text())));
       this.listed.set(base, listed);
     }
-    return listed;
+    const found = await listed;
+    if (found === null && this.listed.get(base) === listed) this.listed.delete(base);
+    return found;
   }
 
   /** Fetch files.json where it isn't kept, and drop the files that it no longer names. */

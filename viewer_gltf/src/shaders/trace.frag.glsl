@@ -27,6 +27,7 @@ uniform vec4 uClipPlane;
 
 uniform mat4 uToBox;  // from normalised device coordinates
 uniform vec3 uEyeAt;  // um, box
+uniform mat4 uSceneToBox;  // the same from where the eye is by now: it may have moved a little
 uniform mat3 uToRoom;  // turns directions of the box into the environment's
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels ...
 uniform vec4 uEye;  // ... and of the picture
@@ -38,7 +39,8 @@ uniform float uEnvironmentLight;  // factor
 uniform int uLampCount;
 uniform vec4 uLamps[3];  // um, box: centre, radius
 uniform vec3 uLampLight[3];  // radiant intensity, um^2: irradiance is this by squared distance
-uniform int uScatters;  // a path is scattered so many times at most
+uniform int uScatters;  // a path is scattered so many times at most ...
+uniform vec3 uBeyond;  // ... and meets this radiance then
 uniform float uAnisotropy;  // Henyey-Greenstein g
 uniform float uSurface;  // 0..1: how readily a gradient makes a surface
 uniform float uShine;  // 0..1: reflection of a surface seen straight on, in 8 % of it
@@ -73,6 +75,7 @@ layout(location = 1) out vec4 oMoments;
 #endif
 #include <chunks/medium>
 #include <chunks/track>
+#include <chunks/seek>
 #include <chunks/history>
 
 // The part of a ray in what is left of the box.
@@ -161,7 +164,7 @@ vec3 follow(vec3 p, vec3 dir, vec4 medium, out float open) {
     sum += weight * lightAt(p, dir, s);
     float survives = min(1.0, max(weight.r, max(weight.g, weight.b)));
     if (i > 3) {  // Russian roulette
-      if (random() >= survives) break;
+      if (random() >= survives) return sum;
       weight /= survives;
     }
     vec3 to = withoutZeros(sampleScatter(s, dir));
@@ -172,13 +175,12 @@ vec3 follow(vec3 p, vec3 dir, vec4 medium, out float open) {
       vec4 found = environmentAt(uToRoom * to);
       float density = scatterDensity(s, dir, to);
       float drawn = found.a / float(uLampCount + 1);
-      sum += weight * uEnvironmentLight * found.rgb * density / max(density + drawn, 1e-12);
-      break;
+      return sum + weight * uEnvironmentLight * found.rgb * density / max(density + drawn, 1e-12);
     }
     p += t * to;
     dir = to;
   }
-  return sum;
+  return sum + weight * uBeyond;
 }
 
 void main() {
@@ -196,7 +198,7 @@ void main() {
   vec3 dir = withoutZeros(normalize(far.xyz / far.w - uEyeAt));
   vec2 span = spanOf(uEyeAt, dir);
   ivec2 shown = ivec2(at * uEye.zw / uPart.zw + uEye.xy);
-  vec4 scene = uToBox * vec4(place, 2.0 * texelFetch(uSceneDepth, shown, 0).r - 1.0, 1.0);
+  vec4 scene = uSceneToBox * vec4(place, 2.0 * texelFetch(uSceneDepth, shown, 0).r - 1.0, 1.0);
   span.y = min(span.y, length(scene.xyz / scene.w - uEyeAt));
   oSums = before.sums;
   oMoments = before.moments + vec4(0.0, 1.0, 0.0, 0.0);

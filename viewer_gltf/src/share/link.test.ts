@@ -43,6 +43,7 @@ const CHANGES: readonly Action[] = [
   { type: "choose-tool", tool: "measure" },
   { type: "set-dwell", isOn: false },
   { type: "choose-quality", level: "low" },
+  { type: "show-lamps", areShown: true },
 ];
 const LOOK: Look = {
   position: [0.5, -0.25, 1.75],

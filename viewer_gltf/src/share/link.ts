@@ -8,7 +8,7 @@
  * name_shapes: see shape_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
  * corner), cut (a plane's normal and offset), points (um), tool, dwell, quality, light (see
- * trace_link.ts), eye and pose.
+ * trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken, and what can't be read is told and left out.
  */
@@ -73,6 +73,7 @@ function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: 
   if (state.quality !== start.quality) parts.quality = state.quality;
   const light = writeTrace(state.trace);
   if (light !== "") parts.light = light;
+  if (state.areLampsShown !== start.areLampsShown) parts.lamps = state.areLampsShown ? "on" : "off";
   Object.assign(parts, look === null ? {} : writeLook(look));
   return `#${Object.entries(parts)
     .map(([name, text]) => `${name}=${text}`)
@@ -174,6 +175,7 @@ class LinkReader {
     this.word("dwell", ["on", "off"], (word) => ({ type: "set-dwell", isOn: word === "on" }));
     this.word("quality", QUALITIES, (level) => ({ type: "choose-quality", level }));
     this.readLight();
+    this.word("lamps", ["on", "off"], (word) => ({ type: "show-lamps", areShown: word === "on" }));
     const eye = this.parts.get("eye");
     const look = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
     if (eye !== undefined && look === null) this.unread.push("eye");

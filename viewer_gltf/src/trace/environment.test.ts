@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/seeded";
-import { environmentTables } from "./environment";
+import { asBrightAs, environmentTables } from "./environment";
 import { reduced } from "./own_environment";
 
 const luminance = (rgb: ArrayLike<number>, i: number) =>
@@ -57,12 +57,34 @@ describe("light from all around", () => {
   }
 
   it("is none where there is none, and what is no light counts as none", () => {
+    const half = environmentTables({
+      width: 2,
+      height: 4,
+      rgb: Float32Array.from({ length: 24 }, (_, i) => (i < 12 ? [2, 1, 0.5][i % 3] : 0)),
+    });
+    half.mean.forEach((v, k) => {
+      expect(v).toBeCloseTo([1, 0.5, 0.25][k], 6); // bright above, dark below
+    });
     const dark = environmentTables({ width: 2, height: 2, rgb: new Float32Array(12) });
     expect([...dark.light].every((v) => v === 0)).toBe(true);
     const rgb = Float32Array.from([1, 1, 1, Number.NaN, -3, Number.POSITIVE_INFINITY]);
     const { light } = environmentTables({ width: 2, height: 1, rgb });
     expect([...light.slice(4)]).toEqual([0, 0, 0, 0]);
     expect(light[3]).toBeCloseTo(1 / (2 * Math.PI), 5); // half of the sphere has it all
+  });
+
+  it("is made as bright as another room, whatever its unit", () => {
+    const rgb = Float32Array.from({ length: 24 }, (_, i) => 4000 * (1 + (i % 7)));
+    const tables = environmentTables({ width: 2, height: 4, rgb });
+    const { light, mean } = asBrightAs(tables, 1);
+    expect(0.2126 * mean[0] + 0.7152 * mean[1] + 0.0722 * mean[2]).toBeCloseTo(1, 6);
+    const factor = light[0] / rgb[0];
+    [1, 2, 4, 5].forEach((i) => {
+      expect(light[i] / tables.light[i]).toBeCloseTo(factor, 6);
+    });
+    expect(light[3]).toBe(tables.light[3]); // as likely as before
+    const dark = environmentTables({ width: 1, height: 1, rgb: new Float32Array(3) });
+    expect(asBrightAs(dark, 1)).toBe(dark);
   });
 
   it("is refused where its numbers are too few", () => {

@@ -13,6 +13,8 @@ export type EnvironmentTables = Readonly<{
   light: Float32Array<ArrayBuffer>;
   /** Probability to keep a texel, and the texel that is taken instead. */
   aliases: Float32Array<ArrayBuffer>;
+  /** Radiance from all around, in the mean. */
+  mean: readonly [number, number, number];
 }>;
 
 export function environmentTables({ width, height, rgb }: Radiance): EnvironmentTables {
@@ -22,6 +24,7 @@ export function environmentTables({ width, height, rgb }: Radiance): Environment
   }
   const weights = new Float64Array(count);
   const light = new Float32Array(4 * count);
+  const mean: [number, number, number] = [0, 0, 0];
   let sum = 0;
   for (let i = 0; i < count; i++) {
     const row = Math.floor(i / width);
@@ -32,14 +35,25 @@ export function environmentTables({ width, height, rgb }: Radiance): Environment
       return Number.isFinite(value) ? Math.max(0, value) : 0;
     });
     light.set([r, g, b, 0], 4 * i);
+    for (const k of [0, 1, 2]) mean[k] += (light[4 * i + k] * solidAngle) / (4 * Math.PI);
     const luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
     weights[i] = luminance * solidAngle;
     sum += weights[i];
     light[4 * i + 3] = luminance;
   }
-  if (sum <= 0) return { width, height, light, aliases: unaliased(count) };
+  if (sum <= 0) return { width, height, light, aliases: unaliased(count), mean };
   for (let i = 0; i < count; i++) light[4 * i + 3] /= sum;
-  return { width, height, light, aliases: aliasesOf(weights, sum) };
+  return { width, height, light, aliases: aliasesOf(weights, sum), mean };
+}
+
+/** The same light, whose luminance in the mean is `luminance`; darkness stays. */
+export function asBrightAs(tables: EnvironmentTables, luminance: number): EnvironmentTables {
+  const [r, g, b] = tables.mean;
+  const found = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  if (found <= 0) return tables;
+  const factor = luminance / found;
+  const light = tables.light.map((v, i) => (i % 4 === 3 ? v : factor * v)); // densities stay
+  return { ...tables, light, mean: [factor * r, factor * g, factor * b] };
 }
 
 function unaliased(count: number): Float32Array<ArrayBuffer> {

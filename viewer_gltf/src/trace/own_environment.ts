@@ -2,7 +2,12 @@
 import { FloatType } from "three";
 import { BundleError } from "../bundle/errors";
 import { fileAddress, readBody, request } from "../bundle/fetch";
-import { type EnvironmentTables, environmentTables, type Radiance } from "./environment";
+import {
+  asBrightAs,
+  type EnvironmentTables,
+  environmentTables,
+  type Radiance,
+} from "./environment";
 
 /** Finer, a room's light differs from a coarser one's by nothing that a volume shows. */
 const MOST_COLUMNS = 512;
@@ -16,12 +21,15 @@ export async function loadEnvironment(base: string, name: string): Promise<Envir
   return environmentTables(await parseHdr(await readBody(response, path), path));
 }
 
-/** A file of the user's. Throws BundleError. */
+/**
+ * A file of the user's, of whatever unit: in the mean it becomes as bright as a white room. Throws
+ * BundleError.
+ */
 export async function readEnvironment(file: File): Promise<EnvironmentTables> {
   const bytes = new Uint8Array(await file.arrayBuffer());
   const isExr = new DataView(bytes.buffer).byteLength > 4 && bytes[0] === 0x76 && bytes[1] === 0x2f;
   const radiance = await (isExr ? parseExr(bytes, file.name) : parseHdr(bytes, file.name));
-  return environmentTables(radiance);
+  return asBrightAs(environmentTables(radiance), 1);
 }
 
 async function parseHdr(bytes: Uint8Array<ArrayBuffer>, name: string): Promise<Radiance> {

@@ -53,6 +53,9 @@ export type TraceSettings = Readonly<{
   sharpness: number;
 }>;
 
+/** A picture with so many samples of each pixel is done. */
+export const ENOUGH_SAMPLES = 1024;
+
 export const LAMPS = 3;
 
 /** From the left above, from the right, from behind: the key, the fill, the rim. */

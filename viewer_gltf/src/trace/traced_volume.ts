@@ -1,8 +1,8 @@
 /** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
-import type { Mesh, Texture, WebGLRenderer } from "three";
+import { Group, type Texture, type WebGLRenderer } from "three";
 import type { BrickService } from "../bricks/brick_service";
 import type { BrickTile } from "../bricks/brick_tile";
-import { BundleError } from "../bundle/errors";
+import { BundleError, TemporaryError } from "../bundle/errors";
 import type { ShownVolume } from "../marks/reading";
 import { isTraced, type ViewerState, volumeChannels } from "../state";
 import type { Eyes } from "../view/eyes";
@@ -15,11 +15,10 @@ import { showsBelow } from "../volume/volume_set";
 import { frameOf } from "./frame";
 import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium";
 import { loadEnvironment, readEnvironment } from "./own_environment";
-import { gathersAnew, type TraceSettings } from "./settings";
-import { Tracer, type TraceScene } from "./tracer";
+import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "./settings";
+import type { Tracer, TraceScene } from "./tracer";
 
-/** A picture at rest gathers so many samples a pixel, and is done. */
-export const ENOUGH_SAMPLES = 1024;
+const NOT_LOADED = "The part of the page that follows light could not be had.";
 /** More pixels take more memory than a phone's browser gives. */
 const MOST_PIXELS = 2_000_000;
 const FIRST_SAMPLES = 6;
@@ -34,8 +33,13 @@ export type Volumes = Readonly<{
 
 export class TracedVolume {
   private readonly loader = new MediumLoader();
-  private readonly tracer: Tracer;
-  private readonly overlay: Overlay;
+  /** What is drawn of it. */
+  readonly group = new Group();
+  /** null: not asked for yet, or on its way. */
+  private tracer: Tracer | null = null;
+  private overlay: Overlay | null = null;
+  private coming: Promise<Tracer> | null = null;
+  private isDisposed = false;
   private state: ViewerState | null = null;
   private texels: MediumTexels | null = null;
   private sources: readonly ChannelSources[] = [];
@@ -62,34 +66,33 @@ export class TracedVolume {
     private readonly volumes: Volumes,
     private readonly bricks: BrickService | null,
     private readonly limits: Readonly<{ bytes: number; side: number }>,
-    sceneDepth: { value: Texture },
+    private readonly sceneDepth: { value: Texture },
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
-  ) {
-    this.tracer = new Tracer(sceneDepth);
-    this.overlay = new Overlay(this.tracer.picture.texture, sceneDepth, LAST);
-  }
-
-  get mesh(): Mesh {
-    return this.overlay.mesh;
-  }
+  ) {}
 
   get isLoading(): boolean {
-    return this.loading !== null || this.isLightComing || this.brickTile?.isLoading === true;
+    const isPreparing = this.coming !== null && this.tracer === null;
+    const isComing = this.loading !== null || this.brickTile?.isLoading === true;
+    return isPreparing || isComing || this.isLightComing;
   }
 
   /** Whether there is anything to draw. */
   get isShown(): boolean {
-    return this.state !== null && isTraced(this.state) && this.tracer.isReady;
+    return this.state !== null && isTraced(this.state) && this.tracer?.isReady === true;
   }
 
   /** Whether a picture at rest still gathers. */
   get isGathering(): boolean {
-    return this.isShown && this.tracer.samples < ENOUGH_SAMPLES;
+    return this.isShown && this.samples < ENOUGH_SAMPLES;
   }
 
   status(): Readonly<{ samples: number; level: number | null }> {
-    return { samples: this.tracer.samples, level: this.isShown ? (this.texels?.level ?? 0) : null };
+    return { samples: this.samples, level: this.isShown ? (this.texels?.level ?? 0) : null };
+  }
+
+  private get samples(): number {
+    return this.tracer?.samples ?? 0;
   }
 
   /** The volumes on screen, for who asks what is at a point. */
@@ -111,6 +114,10 @@ export class TracedVolume {
       this.drop();
       return;
     }
+    if (this.tracer === null) {
+      if (!this.hasFailed) void this.prepare().catch((error) => this.fail(error));
+      return;
+    }
     const channels = volumeChannels(state).map(({ id }) => id);
     const tiles = state.isolated === null ? state.tiles.map(({ id }) => id) : [state.isolated];
     const wanted = JSON.stringify([channels, tiles]);
@@ -127,7 +134,8 @@ export class TracedVolume {
 
   /** Light by a file of the user's; the state then has to say "own". */
   async lightBy(file: File): Promise<void> {
-    this.tracer.lightBy(await readEnvironment(file));
+    const [tables, tracer] = await Promise.all([readEnvironment(file), this.prepare()]);
+    tracer.lightBy(tables);
     this.environment = "own";
   }
 
@@ -154,20 +162,25 @@ export class TracedVolume {
     isMoving: boolean,
     passes: number,
   ): void {
-    if (this.state === null) return;
-    // what comes after the light, and what is beside the volume, may change the picture of a view
-    const isOther = isMoving && (this.isSmall || !this.tracer.isOf(eyes, scene));
+    const { tracer, overlay } = this;
+    if (this.state === null || tracer === null || overlay === null) return;
+    const isWorn = eyes.all.length > 1; // by a head, which never rests
+    const isOther = isMoving && !tracer.goesOn(eyes, scene, isWorn);
     // what came to rest first clears up as it is, then is begun anew at its full size
-    const isFirst = isOther || (this.isSmall && this.tracer.samples < FIRST_SAMPLES);
+    const isFirst = isOther || (this.isSmall && tracer.rested < FIRST_SAMPLES);
     this.isSmall = isFirst;
     const most = isFirst ? MOST_MOVING_PIXELS : MOST_PIXELS;
     const fits = Math.sqrt(most / (eyes.width_px * eyes.height_px));
     if (isOther) this.resolution = resolution;
     if (!isMoving) this.resolutionAtRest = resolution;
     const scale = Math.min(isFirst ? this.resolution : this.resolutionAtRest, fits);
-    const samples = isFirst ? 1 : isMoving ? Math.min(1, passes) : passes;
-    this.tracer.render(renderer, eyes, scene, this.state.trace, scale, samples);
-    this.overlay.show(eyes, this.tracer.scale);
+    tracer.render(renderer, eyes, scene, this.state.trace, {
+      scale,
+      passes: isFirst ? 1 : isMoving ? Math.min(1, passes) : passes,
+      mayTremble: isWorn,
+      isDraft: isFirst,
+    });
+    overlay.show(eyes, tracer.scale);
   }
 
   /** Show what has come of bricks; whether there is more. */
@@ -176,7 +189,36 @@ export class TracedVolume {
   }
 
   hide(): void {
-    this.overlay.hide();
+    this.overlay?.hide();
+  }
+
+  /** What follows the paths: a part of the page that is fetched when it is first asked for. */
+  private prepare(): Promise<Tracer> {
+    this.coming ??= import("./tracer")
+      .catch((cause) => {
+        this.coming = null;
+        throw new TemporaryError(NOT_LOADED, { cause });
+      })
+      .then(({ Tracer }) => {
+        const tracer = new Tracer(this.sceneDepth);
+        if (this.isDisposed) {
+          tracer.dispose();
+          return tracer;
+        }
+        this.tracer = tracer;
+        this.overlay = new Overlay(tracer.picture.texture, this.sceneDepth, LAST);
+        this.group.add(this.overlay.mesh);
+        if (this.state !== null) this.follow(this.state);
+        this.onChange();
+        return tracer;
+      });
+    return this.coming;
+  }
+
+  private fail(error: unknown): void {
+    this.hasFailed = true;
+    this.onError(error);
+    this.onChange();
   }
 
   private drop(): void {
@@ -189,7 +231,7 @@ export class TracedVolume {
     this.hasFailed = false;
     if (this.texels === null) return;
     this.texels = null;
-    this.tracer.fill(null);
+    this.tracer?.fill(null);
   }
 
   private async load(channels: readonly string[], tiles: readonly string[]): Promise<void> {
@@ -208,15 +250,13 @@ export class TracedVolume {
         await this.loader.load(this.sources, tiles, this.limits, abort.signal, (texels) => {
           this.texels = texels;
           this.dressed = "";
-          this.tracer.fill(texels);
+          this.tracer?.fill(texels);
           this.dress();
           this.onChange();
         });
       }
     } catch (error) {
-      if (abort.signal.aborted) return;
-      this.hasFailed = true;
-      this.onError(error);
+      if (!abort.signal.aborted) this.fail(error);
     } finally {
       if (this.loading === abort) this.loading = null;
       this.onChange();
@@ -257,7 +297,7 @@ export class TracedVolume {
       const release = () => undefined; // the tile's own
       this.texels = { channels, frame, level, size: frame.size, texture, index, bricks, release };
       this.dressed = "";
-      this.tracer.fill(this.texels);
+      this.tracer?.fill(this.texels);
       this.dress();
     }
     this.onChange();
@@ -278,7 +318,7 @@ export class TracedVolume {
     this.isLightComing = true;
     try {
       const tables = await loadEnvironment(document.baseURI, name);
-      if (this.environment === name) this.tracer.lightBy(tables);
+      if (this.environment === name) this.tracer?.lightBy(tables);
     } catch (error) {
       if (!(error instanceof BundleError)) throw error;
       this.hasLightFailed = true;
@@ -304,9 +344,9 @@ export class TracedVolume {
     const tables = looks.map(({ table }) => table.join()).join();
     const planes = looks.map(({ plane }) => plane ?? null);
     const isSame = planes.every((plane, c) => plane === (this.planes[c] ?? null));
-    if (dressed + tables !== this.dressed || !isSame) this.tracer.dress(looks, state.trace);
+    if (dressed + tables !== this.dressed || !isSame) this.tracer?.dress(looks, state.trace);
     else if (this.settings === null || gathersAnew(this.settings, state.trace)) {
-      this.tracer.restart();
+      this.tracer?.restart();
     }
     this.dressed = dressed + tables;
     this.planes = planes;
@@ -316,7 +356,8 @@ export class TracedVolume {
   dispose(): void {
     this.drop();
     this.loader.dispose();
-    this.tracer.dispose();
-    this.overlay.dispose();
+    this.isDisposed = true;
+    this.tracer?.dispose();
+    this.overlay?.dispose();
   }
 }

@@ -4,44 +4,35 @@
  * anew.
  */
 import {
-  Camera,
-  Data3DTexture,
-  DataTexture,
+  type Data3DTexture,
+  type DataTexture,
   FloatType,
-  HalfFloatType,
   Matrix3,
   Matrix4,
-  NearestFilter,
-  RedFormat,
   RGBAFormat,
   RGFormat,
-  type Scene,
   type Texture,
   Vector2,
   Vector3,
   Vector4,
   type WebGLRenderer,
-  WebGLRenderTarget,
+  type WebGLRenderTarget,
 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
-import {
-  TRACE_DENOISE,
-  TRACE_FRAGMENT,
-  TRACE_MEAN,
-  TRACE_NOISE,
-  TRACE_SHOW,
-} from "../shaders/texts";
+import { TRACE_FRAGMENT, TRACE_NOISE } from "../shaders/trace_texts";
 import type { Eyes } from "../view/eyes";
 import { drawEyes } from "../view/offscreen";
 import { brickCounts } from "../volume/brick_counts";
 import { clipInto, type MarchClip } from "../volume/clip_uniforms";
 import { ENTRIES } from "../volume/luts";
+import { Developer } from "./developer";
 import type { EnvironmentTables } from "./environment";
 import { coarserMajorants, type MediumLook, majorants, mediumTable, rowsOf } from "./extinction";
 import type { MediumTexels } from "./medium";
 import { ScreenPass } from "./screen_pass";
-import { LAMPS, type TraceSettings } from "./settings";
-import { historyOf, type TraceView, turnOf, viewOf } from "./view";
+import { ENOUGH_SAMPLES, LAMPS, type TraceSettings } from "./settings";
+import { drawWhole, float3D, floatTarget, floatTexture, nothing } from "./targets";
+import { areNear, areSame, type History, type TraceView, turnOf, viewOf } from "./view";
 
 /** Pixels along the edge of a tile that rests or is sampled as a whole. */
 export const NOISE_TILE = 16;
@@ -51,16 +42,16 @@ const NOISE_EVERY = 8;
 const CALM = 0.004;
 /** Samples that are kept of a view a little aside. */
 const MOST_ASIDE = 48;
-/** A path that is lit more brightly counts as one that is lit so. */
-const MOST_LIGHT = 200;
+/** A path that is lit more brightly counts as one that is lit so: halves of floats end at 65504 ... */
+const MOST_LIGHT = 60_000;
+/** ... and a picture of few samples would sparkle. */
+const MOST_LIGHT_MOVING = 200;
 /** More often no path is scattered, in a medium that swallows nothing. */
 const MOST_SCATTERS = 512;
+/** ... in a picture that moves: what the paths would still have met is taken for the room's mean. */
+const FEW_SCATTERS = 16;
 /** Exponent of a shiny surface's lobe. */
 const GLOSS = 60;
-/** With so many samples a pixel is left as it is: see trace_denoise.frag.glsl. */
-const DENOISED = 192;
-const DENOISE_GAPS = [1, 2, 4] as const;
-const NOBODY = new Camera();
 /** Texels along an edge of the bricks whose ranges come with the texels. */
 const BRICK = 8;
 
@@ -78,39 +69,48 @@ export type TraceScene = Readonly<{
   bounds: Bounds;
 }>;
 
+/** How a frame is gathered. */
+export type Gathering = Readonly<{
+  /** Pixels of the picture to one of the frame buffer, 0..1. */
+  scale: number;
+  /** Samples of every pixel, or of a share of them. */
+  passes: number;
+  /**
+   * Eyes that hardly move see what was gathered, from where they are; else paths begin at the very
+   * eye.
+   */
+  mayTremble: boolean;
+  /** Paths are shorter: a picture that moves has to be quick. */
+  isDraft: boolean;
+}>;
+
 export class Tracer {
-  /** Pixels of the picture to one of the frame buffer. */
-  scale = 1;
   /** Samples of a pixel since the picture began anew; tiles that rest have fewer. */
   samples = 0;
-  private readonly sums = [sumsTarget(), sumsTarget()];
+  /** Those of them whose paths begin where they do now. */
+  rested = 0;
+  private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
   private readonly noise = floatTarget(1, FloatType);
-  private readonly mean = floatTarget(2, HalfFloatType);
-  private readonly spares = [floatTarget(1, HalfFloatType), floatTarget(1, HalfFloatType)];
-  private readonly shown = new WebGLRenderTarget(1, 1, {
-    depthBuffer: false,
-    minFilter: NearestFilter,
-    magFilter: NearestFilter,
-  });
+  private readonly developer = new Developer();
   private readonly medium = floatTexture(ENTRIES, 1, RGBAFormat);
   private majorantTexture: Data3DTexture = float3D(new Float32Array(1), [1, 1, 1]);
   private environment: DataTexture = floatTexture(1, 1, RGBAFormat);
   private aliases: DataTexture = floatTexture(1, 1, RGFormat);
+  private roomLight: readonly [number, number, number] = [0, 0, 0];
   private texels: MediumTexels | null = null;
-  private views: TraceView[] = [];
+  /** From where paths begin: where the eyes were, as long as they only tremble. */
+  private anchors: readonly TraceView[] = [];
+  /** Where the eyes were in the frame before. */
+  private seen: readonly TraceView[] = [];
   private drawn = 0;
   private shownWith: TraceSettings | null = null;
   /** Where among the tiles the next turn begins, 0..1. */
   private turn = 0;
   private key = "";
   private gatheredScale = 1;
-  /** Whether samples have been carried along from a view aside: there are never many then. */
-  private isTrembling = false;
+  private isDraft = false;
   private readonly pathPass: ScreenPass<ReturnType<typeof traceUniforms>>;
-  private readonly noisePass: ScreenPass<ReturnType<typeof sumUniforms>>;
-  private readonly meanPass;
-  private readonly denoisePass;
-  private readonly showPass;
+  private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
 
   /**
    * @param brick texels along an edge of a brick of majorants: 8 or a multiple
@@ -125,29 +125,16 @@ export class Tracer {
       CHANNELS: 1,
       NOISE_TILE,
     });
-    this.noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
-    this.meanPass = new ScreenPass(TRACE_MEAN, {
-      ...sumUniforms(),
-      uEdge: { value: 1 },
-      uOcclusion: { value: 0 },
-    });
-    this.denoisePass = new ScreenPass(TRACE_DENOISE, {
-      uColor: nothing(),
-      uGuide: nothing(),
-      uGap: { value: 1 },
-    });
-    this.showPass = new ScreenPass(TRACE_SHOW, {
-      uColor: nothing(),
-      uExposure: { value: 1 },
-      uSharpness: { value: 0 },
-      uIsFilmic: { value: true },
-      uTone: { value: new Vector3(0, 1, 0) },
-    });
   }
 
   /** The picture, encoded and premultiplied. */
   get picture(): WebGLRenderTarget {
-    return this.shown;
+    return this.developer.picture;
+  }
+
+  /** Pixels of the picture to one of the frame buffer. */
+  get scale(): number {
+    return this.developer.scale;
   }
 
   /** Sums of colour and coverage, and of squared luminance, samples, distance and openness. */
@@ -160,8 +147,9 @@ export class Tracer {
   }
 
   restart(): void {
-    this.views = [];
-    this.samples = 0;
+    this.anchors = [];
+    this.samples = this.rested = this.turn = 0;
+    this.shownWith = null;
   }
 
   /** What paths go through; takes over the texture. */
@@ -189,7 +177,7 @@ export class Tracer {
       (last[2] - first[2]) / Math.max(size[2], 1e-9),
     );
     uniforms.uOcclusionReach.value = OCCLUSION_REACH * Math.max(...size);
-    this.meanPass.uniforms.uEdge.value = Math.max(...size);
+    this.developer.expect(uniforms.uSize.value);
   }
 
   /** @param looks of the channels, in the order of the texture's */
@@ -217,7 +205,8 @@ export class Tracer {
     this.restart();
   }
 
-  lightBy({ width, height, light, aliases }: EnvironmentTables): void {
+  lightBy({ width, height, light, aliases, mean }: EnvironmentTables): void {
+    this.roomLight = mean;
     this.environment.dispose();
     this.aliases.dispose();
     this.environment = floatTexture(width, height, RGBAFormat, light);
@@ -227,72 +216,104 @@ export class Tracer {
     this.restart();
   }
 
-  /** Whether the picture that is gathered is one of this very view. */
-  isOf(eyes: Eyes, scene: TraceScene): boolean {
-    if (this.texels === null || this.views.length !== eyes.all.length) return false;
-    if (keyOf(eyes, scene, this.gatheredScale) !== this.key) return false;
-    const box = this.boxMatrix(scene.specimen);
-    const middle = this.pathPass.uniforms.uSize.value.clone().multiplyScalar(0.5);
-    return eyes.all.every(
-      ({ camera }, k) => historyOf(this.views[k], viewOf(camera, box), middle) === "same",
-    );
+  /**
+   * Whether what is gathered is worth anything to these eyes.
+   *
+   * @param mayTremble see `render`
+   */
+  goesOn(eyes: Eyes, scene: TraceScene, mayTremble: boolean): boolean {
+    if (this.texels === null) return false;
+    if (keyOf(eyes, scene, this.gatheredScale, this.isDraft) !== this.key) {
+      return false;
+    }
+    const history = this.historyFor(this.viewsOf(eyes, scene), mayTremble);
+    return history === "same" || (mayTremble && history === "aside");
   }
 
   /**
    * Gather so many more samples of every pixel, or of a share of them, and make the picture, as soon
-   * as each pixel has one.
+   * as each pixel has one. A picture with enough of them only follows the eyes.
    *
-   * @param scale pixels of the picture to one of the frame buffer, 0..1
    */
   render(
     renderer: WebGLRenderer,
     eyes: Eyes,
     scene: TraceScene,
     settings: TraceSettings,
-    scale: number,
-    passes: number,
+    { scale, passes, mayTremble, isDraft }: Gathering,
   ): void {
     if (this.texels === null) return;
-    this.follow(scene, settings);
-    const key = keyOf(eyes, scene, scale);
+    this.follow(scene, settings, isDraft);
+    const key = keyOf(eyes, scene, scale, isDraft);
     if (key !== this.key) this.restart();
     this.key = key;
     this.gatheredScale = scale;
-    const box = this.boxMatrix(scene.specimen);
-    const middle = this.pathPass.uniforms.uSize.value.clone().multiplyScalar(0.5);
+    this.isDraft = isDraft;
+    const views = this.viewsOf(eyes, scene);
+    let history = this.historyFor(views, mayTremble);
+    this.seen = views;
+    if (history === "none") this.restart();
+    if (history === "aside") {
+      this.samples = Math.min(this.samples, MOST_ASIDE);
+      this.rested = 0;
+    }
+    const begins = history === "same" ? this.anchors : views;
     const share = Math.min(1, passes);
     const started = this.samples;
     for (let i = 0; i < Math.max(1, Math.floor(passes)); i++) {
-      const views = eyes.all.map(({ camera }) => viewOf(camera, box));
-      const histories = views.map((view, k) => historyOf(this.views[k], view, middle));
-      if (this.views.length !== views.length || histories.includes("none")) {
-        this.samples = this.turn = 0;
-        this.shownWith = null;
-      }
-      this.isTrembling = histories.includes("aside");
+      if (this.samples >= ENOUGH_SAMPLES) break;
       this.pathPass.uniforms.uTurn.value.set(this.turn, share);
-      this.gather(renderer, eyes, scale, views, histories);
-      this.views = views;
+      this.gather(renderer, eyes, views, begins, history);
+      this.anchors = begins;
+      history = "same";
       const before = this.samples;
       this.samples = Math.round(1e6 * (before + share)) / 1e6;
+      this.rested += share;
       this.turn = (this.turn + share) % 1;
       const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
       if (isDue) this.judge(renderer, this.gathered);
     }
     // a part of the pixels alone is not shown: until all have their turn, the picture before stays
     const isRound = Math.floor(this.samples) > Math.floor(started);
-    if (this.samples < 1 || !(isRound || settings !== this.shownWith)) return;
-    this.show(renderer, eyes, scale, settings);
-    this.shownWith = settings;
-    this.scale = scale;
+    const isOther = this.samples >= 1 && (isRound || settings !== this.shownWith);
+    if (isOther) {
+      const { developer, gathered, samples } = this;
+      developer.develop(renderer, eyes, gathered, samples, begins, scale, settings);
+      this.shownWith = settings;
+    }
+    this.developer.show(renderer, eyes, views, settings, isOther);
   }
 
+  private viewsOf(eyes: Eyes, { specimen }: TraceScene): TraceView[] {
+    const box = this.boxMatrix(specimen);
+    return eyes.all.map(({ camera }) => viewOf(camera, box));
+  }
+
+  /** Of the box, um. */
+  private get middle(): Vector3 {
+    return this.pathPass.uniforms.uSize.value.clone().multiplyScalar(0.5);
+  }
+
+  /** What was gathered is worth to the paths that come. */
+  private historyFor(views: readonly TraceView[], mayTremble: boolean): History {
+    const { anchors, seen, middle } = this;
+    if (anchors.length !== views.length) return "none";
+    if (areSame(anchors, views)) return "same";
+    if (areNear(anchors, views, middle)) return mayTremble ? "same" : "aside";
+    // eyes also sway, slowly
+    return this.rested >= 1 && areNear(seen, views, middle) ? "aside" : "none";
+  }
+
+  /**
+   * @param views where the eyes are
+   * @param begins where the paths begin
+   */
   private gather(
     renderer: WebGLRenderer,
     eyes: Eyes,
-    scale: number,
     views: readonly TraceView[],
-    histories: readonly ("none" | "same" | "aside")[],
+    begins: readonly TraceView[],
+    history: History,
   ): void {
     const { uniforms, uPart, scene } = this.pathPass;
     const before = this.gathered;
@@ -302,17 +323,17 @@ export class Tracer {
     uniforms.uCalm.value = this.samples > NOISE_EVERY ? this.calm : 0;
     this.drawn++;
     uniforms.uSample.value = this.drawn;
+    uniforms.uHistory.value = { none: 0, same: 1, aside: 2 }[history];
     let k = 0;
-    drawEyes(renderer, scene, eyes, this.gathered, scale, ({ viewport }, part) => {
+    drawEyes(renderer, scene, eyes, this.gathered, this.gatheredScale, ({ viewport }, part) => {
       uPart.value.copy(part);
       uniforms.uEye.value.copy(viewport);
-      const [view, old] = [views[k], this.views[k]];
-      uniforms.uToBox.value.copy(view.toBox);
-      uniforms.uEyeAt.value.copy(view.eye);
-      uniforms.uHistory.value = { none: 0, same: 1, aside: 2 }[histories[k]];
-      if (old !== undefined) {
-        uniforms.uToBefore.value.copy(old.fromBox);
-        uniforms.uEyeBefore.value.copy(old.eye);
+      uniforms.uSceneToBox.value.copy(views[k].toBox);
+      uniforms.uToBox.value.copy(begins[k].toBox);
+      uniforms.uEyeAt.value.copy(begins[k].eye);
+      if (history === "aside") {
+        uniforms.uToBefore.value.copy(this.anchors[k].fromBox);
+        uniforms.uEyeBefore.value.copy(this.anchors[k].eye);
       }
       k++;
     });
@@ -332,43 +353,11 @@ export class Tracer {
     );
   }
 
-  /** Mean, denoised where few paths have been gathered, and what comes after. */
-  private show(renderer: WebGLRenderer, eyes: Eyes, scale: number, settings: TraceSettings): void {
-    const { gathered, meanPass, denoisePass, showPass } = this;
-    const { isPostOn } = settings;
-    meanPass.uniforms.uSums.value = gathered.textures[0];
-    meanPass.uniforms.uMoments.value = gathered.textures[1];
-    meanPass.uniforms.uOcclusion.value = isPostOn ? settings.occlusion : 0;
-    drawEyes(renderer, meanPass.scene, eyes, this.mean, scale);
-    let color = this.mean.textures[0];
-    if (this.isTrembling || this.samples < DENOISED) {
-      denoisePass.uniforms.uGuide.value = this.mean.textures[1];
-      for (const gap of DENOISE_GAPS) {
-        const [one, other] = this.spares;
-        const target = color === one.texture ? other : one;
-        denoisePass.uniforms.uGap.value = gap;
-        denoisePass.uniforms.uColor.value = color;
-        drawEyes(renderer, denoisePass.scene, eyes, target, scale, (_, part) => {
-          denoisePass.uPart.value.copy(part);
-        });
-        color = target.texture;
-      }
-    }
-    const { uniforms } = showPass;
-    uniforms.uColor.value = color;
-    uniforms.uExposure.value = isPostOn ? 2 ** settings.exposure : 1;
-    uniforms.uSharpness.value = isPostOn ? settings.sharpness : 0;
-    uniforms.uIsFilmic.value = isPostOn && settings.toneMap === "filmic";
-    uniforms.uTone.value.set(0, 1, 0);
-    if (isPostOn) {
-      uniforms.uTone.value.set(settings.hue / 360, settings.saturation, settings.lightness);
-    }
-    drawEyes(renderer, showPass.scene, eyes, this.shown, scale, (_, part) => {
-      showPass.uPart.value.copy(part);
-    });
-  }
-
-  private follow({ specimen, clip, bounds }: TraceScene, settings: TraceSettings): void {
+  private follow(
+    { specimen, clip, bounds }: TraceScene,
+    settings: TraceSettings,
+    isDraft: boolean,
+  ): void {
     if (this.texels === null) return;
     const { uniforms } = this.pathPass;
     const { frame } = this.texels;
@@ -378,7 +367,11 @@ export class Tracer {
     const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);
     uniforms.uToRoom.value.copy(turnOf(turn.multiply(this.boxMatrix(specimen))));
     uniforms.uEnvironmentLight.value = settings.environmentLight;
-    uniforms.uScatters.value = settings.isMultiple ? MOST_SCATTERS : 1;
+    uniforms.uMostLight.value = isDraft ? MOST_LIGHT_MOVING : MOST_LIGHT;
+    const most = isDraft ? FEW_SCATTERS : MOST_SCATTERS;
+    uniforms.uScatters.value = settings.isMultiple ? most : 1;
+    const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
+    uniforms.uBeyond.value.set(...this.roomLight).multiplyScalar(beyond);
     uniforms.uAnisotropy.value = settings.anisotropy;
     uniforms.uSurface.value = settings.surface;
     uniforms.uShine.value = settings.shine;
@@ -409,32 +402,25 @@ export class Tracer {
   }
 
   dispose(): void {
-    for (const target of [...this.sums, ...this.spares, this.noise, this.mean, this.shown]) {
-      target.dispose();
-    }
+    for (const target of [...this.sums, this.noise]) target.dispose();
     for (const texture of [this.medium, this.majorantTexture, this.environment, this.aliases]) {
       texture.dispose();
     }
     this.texels?.release();
-    for (const pass of [
-      this.pathPass,
-      this.noisePass,
-      this.meanPass,
-      this.denoisePass,
-      this.showPass,
-    ]) {
-      pass.dispose();
-    }
+    this.pathPass.dispose();
+    this.noisePass.dispose();
+    this.developer.dispose();
   }
 }
 
 /** What a picture can't be gathered on without: another one begins anew. */
-function keyOf({ width_px, height_px }: Eyes, { solids, clip }: TraceScene, scale: number): string {
-  return `${width_px} ${height_px} ${scale} ${solids} ${JSON.stringify(clip)}`;
-}
-
-function nothing(): { value: Texture | null } {
-  return { value: null };
+function keyOf(
+  { width_px, height_px }: Eyes,
+  { solids, clip }: TraceScene,
+  scale: number,
+  isDraft: boolean,
+): string {
+  return `${width_px} ${height_px} ${scale} ${isDraft} ${solids} ${JSON.stringify(clip)}`;
 }
 
 function sumUniforms() {
@@ -462,6 +448,7 @@ function traceUniforms(uSceneDepth: { value: Texture }) {
     uClipHigh: { value: new Vector3() },
     uClipPlane: { value: new Vector4(0, 0, 0, 1) },
     uToBox: { value: new Matrix4() },
+    uSceneToBox: { value: new Matrix4() },
     uEyeAt: { value: new Vector3() },
     uToRoom: { value: new Matrix3() },
     uEye: { value: new Vector4(0, 0, 1, 1) },
@@ -473,6 +460,7 @@ function traceUniforms(uSceneDepth: { value: Texture }) {
     uLamps: { value: Array.from({ length: LAMPS }, () => new Vector4()) },
     uLampLight: { value: Array.from({ length: LAMPS }, () => new Vector3()) },
     uScatters: { value: MOST_SCATTERS },
+    uBeyond: { value: new Vector3() },
     uAnisotropy: { value: 0 },
     uSurface: { value: 0 },
     uShine: { value: 0 },
@@ -491,57 +479,4 @@ function traceUniforms(uSceneDepth: { value: Texture }) {
 
 function lowCorner([x, y, z]: readonly [number, number, number]): Matrix4 {
   return new Matrix4().makeTranslation(x, y, z);
-}
-
-const EXACT = { minFilter: NearestFilter, magFilter: NearestFilter } as const;
-
-function floatTarget(count: number, type: typeof FloatType | typeof HalfFloatType) {
-  return new WebGLRenderTarget(1, 1, { count, type, depthBuffer: false, ...EXACT });
-}
-
-function sumsTarget(): WebGLRenderTarget {
-  return floatTarget(2, FloatType);
-}
-
-function floatTexture(
-  width: number,
-  height: number,
-  format: typeof RGBAFormat | typeof RGFormat,
-  data?: Float32Array<ArrayBuffer>,
-): DataTexture {
-  const parts = format === RGBAFormat ? 4 : 2;
-  const texels = data ?? new Float32Array(width * height * parts);
-  const texture = new DataTexture(texels, width, height, format, FloatType);
-  Object.assign(texture, EXACT);
-  texture.needsUpdate = true;
-  return texture;
-}
-
-function float3D(data: Float32Array<ArrayBuffer>, size: readonly [number, number, number]) {
-  const texture = new Data3DTexture(data, ...size);
-  texture.format = RedFormat;
-  texture.type = FloatType;
-  Object.assign(texture, EXACT);
-  texture.unpackAlignment = 4;
-  texture.needsUpdate = true;
-  return texture;
-}
-
-/** Draw over a target that becomes so large. */
-function drawWhole(
-  renderer: WebGLRenderer,
-  scene: Scene,
-  target: WebGLRenderTarget,
-  width: number,
-  height: number,
-): void {
-  const before = renderer.getRenderTarget();
-  const { enabled } = renderer.xr;
-  renderer.xr.enabled = false;
-  target.setSize(width, height);
-  target.viewport.set(0, 0, width, height);
-  renderer.setRenderTarget(target);
-  renderer.render(scene, NOBODY);
-  renderer.setRenderTarget(before);
-  renderer.xr.enabled = enabled;
 }

@@ -1,6 +1,6 @@
 import { Euler, Matrix4, PerspectiveCamera, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { historyOf, turnOf, viewOf } from "./view";
+import { areNear, areSame, turnOf, viewOf } from "./view";
 
 const AWAY = 100;
 const MIDDLE = new Vector3(0, 0, 0);
@@ -15,8 +15,8 @@ function eye(aside: readonly number[] = [0, 0, 0], turned_deg: readonly number[]
   return camera;
 }
 const IDENTITY = new Matrix4();
-const history = (a: PerspectiveCamera, b: PerspectiveCamera, box = IDENTITY) =>
-  historyOf(viewOf(a, box), viewOf(b, box), MIDDLE.clone().applyMatrix4(box.clone().invert()));
+const views = (a: PerspectiveCamera, b: PerspectiveCamera, box: Matrix4) =>
+  [a, b].map((camera) => [viewOf(camera, box)]);
 
 describe("a view", () => {
   it("leads from the picture to the box and back", () => {
@@ -34,28 +34,35 @@ describe("a view", () => {
     expect(view.eye.clone().applyMatrix4(box).distanceTo(camera.position)).toBeLessThan(1e-9);
   });
 
-  it("has no history at first, all of it while it stays", () => {
-    expect(historyOf(undefined, viewOf(eye(), IDENTITY), MIDDLE)).toBe("none");
-    expect(history(eye(), eye())).toBe("same");
+  it.each([
+    ["nothing", [0, 0, 0], [0, 0, 0], true],
+    ["hardly anything", [1e-6, 0, 0], [0, 0, 0], true],
+    ["a step to the side", [0.5, 0, 0], [0, 0, 0], true],
+    ["a large step to the side", [0.7, 0, 0], [0, 0, 0], false],
+    ["a step ahead", [0, 0, 0.5], [0, 0, 0], true],
+    ["a large step ahead", [0, 0, 3], [0, 0, 0], false],
+    ["a nod", [0, 0, 0], [0.25, 0, 0], true],
+    ["a large nod", [0, 0, 0], [0.35, 0, 0], false],
+    ["a turn", [0, 0, 0], [0, -0.25, 0], true],
+    ["a large turn", [0, 0, 0], [0, 0.35, 0], false],
+    ["a roll", [0, 0, 0], [0, 0, 0.25], true],
+    ["a large roll", [0, 0, 0], [0, 0, 0.4], false],
+  ] as const)("is near the one before after %s, or not", (name, aside, turned, expected) => {
+    // whatever the box's own size and place
+    for (const box of [IDENTITY, new Matrix4().makeScale(0.01, 0.01, 0.01).setPosition(1, 2, 3)]) {
+      const [before, now] = views(eye(), eye(aside, turned), box);
+      const middle = MIDDLE.clone().applyMatrix4(box.clone().invert());
+      expect(areNear(before, now, middle)).toBe(expected);
+      expect(areSame(before, now)).toBe(name === "nothing");
+    }
   });
 
-  it.each([
-    ["a step to the side", [0.5, 0, 0], [0, 0, 0], "aside"],
-    ["a large step to the side", [0.7, 0, 0], [0, 0, 0], "none"],
-    ["a step ahead", [0, 0, 0.5], [0, 0, 0], "aside"],
-    ["a large step ahead", [0, 0, 3], [0, 0, 0], "none"],
-    ["a nod", [0, 0, 0], [0.25, 0, 0], "aside"],
-    ["a large nod", [0, 0, 0], [0.35, 0, 0], "none"],
-    ["a turn", [0, 0, 0], [0, -0.25, 0], "aside"],
-    ["a large turn", [0, 0, 0], [0, 0.35, 0], "none"],
-    ["a roll", [0, 0, 0], [0, 0, 0.25], "aside"],
-    ["a large roll", [0, 0, 0], [0, 0, 0.4], "none"],
-    ["hardly anything", [1e-6, 0, 0], [0, 0, 0], "aside"],
-  ] as const)("after %s", (_, aside, turned, expected) => {
-    expect(history(eye(), eye(aside, turned))).toBe(expected);
-    // whatever the box's own size and place
-    const box = new Matrix4().makeScale(0.01, 0.01, 0.01).setPosition(1, 2, 3);
-    expect(history(eye(), eye(aside, turned), box)).toBe(expected);
+  it("is another for other eyes", () => {
+    const one = viewOf(eye(), IDENTITY);
+    expect(areNear([one], [one, one], MIDDLE)).toBe(false);
+    expect(areSame([], [one])).toBe(false);
+    const far = viewOf(eye([5, 0, 0]), IDENTITY);
+    expect(areNear([one, one], [one, far], MIDDLE)).toBe(false);
   });
 
   it("turns directions without stretching them", () => {

@@ -24,19 +24,31 @@ export function turnOf(matrix: Matrix4): Matrix3 {
   return new Matrix3().setFromMatrix4(new Matrix4().makeRotationFromQuaternion(turn));
 }
 
-/** What earlier frames are worth: none is; all; as far as they show the same from aside. */
+/**
+ * What earlier frames are worth to paths that begin here: nothing; all; as far as they show the same
+ * from aside.
+ */
 export type History = "none" | "same" | "aside";
 
-/** A head that rests still trembles: by so much from frame to frame, at most. */
+export function areSame(a: readonly TraceView[], b: readonly TraceView[]): boolean {
+  return a.length === b.length && a.every(({ fromBox }, k) => fromBox.equals(b[k].fromBox));
+}
+
+/** A head that rests still trembles: by so much, at most. */
 const TREMBLE_DEG = 0.3;
 /** Of the distance to the box's middle. */
 const TREMBLE_SHARE = 0.006;
 
-/** How much a view has moved against the one of the frame before. */
-export function historyOf(before: TraceView | undefined, now: TraceView, middle: Vector3): History {
-  if (before === undefined) return "none";
-  const [a, b] = [before.fromBox.elements, now.fromBox.elements];
-  if (a.every((v, i) => v === b[i])) return "same";
+/** Whether eyes have moved by no more than a head that rests. */
+export function areNear(
+  before: readonly TraceView[],
+  now: readonly TraceView[],
+  middle: Vector3,
+): boolean {
+  return before.length === now.length && now.every((view, k) => isNear(before[k], view, middle));
+}
+
+function isNear(before: TraceView, now: TraceView, middle: Vector3): boolean {
   const away = Math.max(now.eye.distanceTo(middle), 1e-9);
   const aheadOf = ({ toBox, eye }: TraceView) =>
     new Vector3(0, 0, 1).applyMatrix4(toBox).sub(eye).normalize();
@@ -48,8 +60,8 @@ export function historyOf(before: TraceView | undefined, now: TraceView, middle:
       .normalize(),
   );
   const rolled_deg = (rolled[0].angleTo(rolled[1]) * 180) / Math.PI;
-  const isStill =
+  return (
     Math.max(turned_deg, rolled_deg) <= TREMBLE_DEG &&
-    before.eye.distanceTo(now.eye) <= TREMBLE_SHARE * away;
-  return isStill ? "aside" : "none";
+    before.eye.distanceTo(now.eye) <= TREMBLE_SHARE * away
+  );
 }

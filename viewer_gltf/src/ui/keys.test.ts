@@ -24,6 +24,7 @@ const CONTEXT: KeyContext = {
       channel: "c0",
       plane: { gradientMax: 0.5, functions: {} },
     } as const,
+    { type: "choose-mode", mode: "traced" } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,
   shown: SPECIMEN_BOX,
@@ -65,6 +66,7 @@ describe("the keys", () => {
       "choose-quality": true,
       trace: true,
       "move-lamp": true,
+      "show-lamps": true,
       dismiss: true,
       notify: false, // the viewer's own
     };
@@ -168,6 +170,17 @@ describe("the keys", () => {
       panel: "pick",
       channel: "c3",
     });
+  });
+
+  it("show the lamps where they light something", () => {
+    expect(wishOf("$", CONTEXT)).toEqual({ type: "show-lamps", areShown: true });
+    const shown = reduce(CONTEXT.state, { type: "show-lamps", areShown: true });
+    expect(wishOf("$", { ...CONTEXT, state: shown })).toEqual({
+      type: "show-lamps",
+      areShown: false,
+    });
+    const marched = reduce(shown, { type: "choose-mode", mode: "all" });
+    expect(wishOf("$", { ...CONTEXT, state: marched })).toBeNull();
   });
 
   it("do nothing where there is nothing to do", () => {

@@ -286,6 +286,9 @@ const LIGHT_KEYS: readonly Key[] = [
     const lamp = ["!", "@", "#"].indexOf(name);
     return { type: "move-lamp", lamp, change: { isOn: !trace.lamps[lamp].isOn } };
   }),
+  key("$", "Show or hide the lamps, to be dragged", ({ state }) =>
+    isTraced(state) ? { type: "show-lamps", areShown: !state.areLampsShown } : null,
+  ),
   key("Z", "Before or after what comes after the light", ({ state: { trace } }) => ({
     type: "trace",
     change: { isPostOn: !trace.isPostOn },

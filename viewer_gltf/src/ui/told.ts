@@ -67,6 +67,8 @@ function toldAction(action: Action, state: ViewerState, ranges: Ranges): string 
     case "trace":
     case "move-lamp":
       return toldLight(action, state.trace);
+    case "show-lamps":
+      return toldLamps(state);
     case "choose-quality":
       return `Quality: ${state.quality}`;
     default:
@@ -78,18 +80,25 @@ function toldLight(
   action: Extract<Action, { type: "trace" | "move-lamp" }>,
   trace: TraceSettings,
 ): string {
-  const [changed] = Object.keys(action.change);
+  const [changed, ...others] = Object.keys(action.change);
+  if (action.type === "move-lamp") {
+    const lamp = `Lamp ${action.lamp + 1}`;
+    if (changed === "isOn") return `${lamp}: ${trace.lamps[action.lamp].isOn ? "on" : "off"}`;
+    if (changed === "color") return `${lamp}: another colour`;
+    if (others.length > 0) return `${lamp}: moved`;
+  }
   const id = action.type === "trace" ? changed : `lamp-${action.lamp}/${changed}`;
   const dial = DIALS.find((each) => each.id === id);
   if (dial !== undefined) return `${dialName(dial)}: ${dial.text(dial.of(trace))}`;
-  if (action.type === "move-lamp") {
-    const { isOn } = trace.lamps[action.lamp];
-    return `Lamp ${action.lamp + 1}: ${isOn ? "on" : "off"}`;
-  }
   if (changed === "environment") return `Room: ${trace.environment}`;
   if (changed === "isMultiple") return `Scattered ${trace.isMultiple ? "many times" : "once"}`;
   if (changed === "isPostOn") return trace.isPostOn ? "After" : "Before";
   return `Tone map: ${trace.toneMap}`;
+}
+
+function toldLamps({ areLampsShown, trace }: ViewerState): string {
+  if (!areLampsShown) return "Lamps hidden";
+  return trace.lamps.some(({ isOn }) => isOn) ? "Lamps shown: drag them" : "No lamp is on";
 }
 
 function toldChannel(

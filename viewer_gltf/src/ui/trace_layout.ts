@@ -121,6 +121,14 @@ export function lightItems(
     })),
     ...(isStereo ? [] : [command("own-light", "Light of a .hdr or .exr file")]),
     ...ROOM_DIALS.map((dial) => slider(dial, trace)),
+    {
+      kind: "toggle",
+      id: "trace/lamps",
+      label: "Show lamps",
+      name: "Show the lamps, to be dragged",
+      value: state.areLampsShown,
+      to: (areShown) => ({ type: "show-lamps", areShown }),
+    },
     ...trace.lamps.map((_, lamp) => lampGroup(lamp, state, view)),
     ...postItems(trace),
   ];

@@ -7,7 +7,7 @@
 import { PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Command } from "../ui/commands";
-import { framingDistance, type Placement } from "./placement";
+import { distanceToSee, framingDistance, type Placement } from "./placement";
 
 const FIELD_OF_VIEW_DEG = 40;
 const NEAREST_M = 0.05;
@@ -84,6 +84,19 @@ export class Navigation {
     this.camera.position.fromArray(position);
     this.camera.up.set(0, 1, 0);
     this.controls.update();
+  }
+
+  /** Go straight back, as far as there is need, until these points of the room are in sight. */
+  stepBackFor(points: readonly Vector3[]): void {
+    const { target } = this.controls;
+    const { position, quaternion, aspect } = this.camera;
+    const turn = quaternion.clone().invert();
+    const about = points.map((p) => p.clone().sub(target).applyQuaternion(turn).toArray());
+    const needed = distanceToSee(about, (FIELD_OF_VIEW_DEG * Math.PI) / 180, aspect);
+    const back = position.clone().sub(target);
+    if (!(needed > back.length())) return;
+    const eye = back.setLength(Math.min(FARTHEST_M, needed)).add(target);
+    this.lookFrom({ position: eye.toArray(), target: target.toArray() });
   }
 
   /** Whether the command was one of the camera's. */

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { framingDistance, LONGEST_EDGE_M, place } from "./placement";
+import { distanceToSee, framingDistance, LONGEST_EDGE_M, place } from "./placement";
 
 describe("the specimen's place", () => {
   it("has its longest edge as long as the room wants it", () => {
@@ -17,5 +17,33 @@ describe("the specimen's place", () => {
     expect(front([4, 2, 0], 1) * 0.88).toBeCloseTo(2);
     expect(front([4, 2, 0], 2) * 0.88).toBeCloseTo(1);
     expect(front([2, 2, 3], 1) * 0.88).toBeCloseTo(1);
+  });
+});
+
+describe("the distance from which points are seen", () => {
+  const fov = Math.PI / 2; // half the height at distance 1 is 1
+
+  it("has them all within the picture, the nearest to its rim the most", () => {
+    expect(distanceToSee([[0, 3, 0]], fov, 1)).toBeCloseTo(3.75); // so near to the middle, else 3.4
+    expect(distanceToSee([[0, 3, 1]], fov, 1)).toBeCloseTo(1 + 3 / 0.88);
+    expect(distanceToSee([[-3, 0, 1]], fov, 2)).toBeCloseTo(1.25 * Math.sqrt(10)); // 2.7 of width
+    expect(distanceToSee([[-3, 0, 1]], fov, 0.5)).toBeCloseTo(1 + 6 / 0.88);
+    const both = distanceToSee(
+      [
+        [0, 1, 0],
+        [0, -3, 1],
+      ],
+      fov,
+      1,
+    );
+    expect(both).toBeCloseTo(1 + 3 / 0.88);
+  });
+
+  it("has a point on the way to the eye before it", () => {
+    expect(distanceToSee([[0, 0, 2]], fov, 1)).toBeCloseTo(2.5);
+  });
+
+  it("is none without points", () => {
+    expect(distanceToSee([], fov, 1)).toBe(0);
   });
 });

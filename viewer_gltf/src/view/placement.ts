@@ -10,6 +10,8 @@ export const LONGEST_EDGE_M = 1.2;
 export const XR_DISTANCE_M = 1.1;
 /** Share of the picture that the specimen may fill at the start. */
 const FILL = 0.88;
+/** What is to be seen lies at least so far before the eye: farther than what it is turned about. */
+const BEFORE = 1.25;
 
 export type Placement = Readonly<{
   /** Metres of the room per um of the specimen. */
@@ -42,4 +44,19 @@ export function place(bounds: Bounds): Placement {
 export function framingDistance(size: Vec3, fov_rad: number, aspect: number): number {
   const half = Math.tan(fov_rad / 2);
   return size[2] / 2 + Math.max(size[1], size[0] / aspect) / (2 * FILL * half);
+}
+
+/**
+ * Distance from the point that is looked at to an eye that sees other points as well, and has each
+ * before it by a part of how far that is from there.
+ *
+ * @param points about the one that is looked at, in the eye's axes: x right, y up, z towards the eye
+ * @param fov_rad vertical field of view
+ */
+export function distanceToSee(points: readonly Vec3[], fov_rad: number, aspect: number): number {
+  const half = FILL * Math.tan(fov_rad / 2);
+  const needed = points.map(([x, y, z]) =>
+    Math.max(z + Math.max(Math.abs(y), Math.abs(x) / aspect) / half, BEFORE * Math.hypot(x, y, z)),
+  );
+  return Math.max(0, ...needed);
 }

@@ -81,6 +81,9 @@ export function prepareStand({ bundle: given, viewport, hasTouch, mounts }: Stan
     get viewer() {
       return viewer;
     },
-    open: (query = "") => viewer.open(`${host.address}/app/?bundle=../bundle/${query}`),
+    open: (query = "") => {
+      const quality = query.includes("&quality=") ? "" : "&quality=low";
+      return viewer.open(`${host.address}/app/?bundle=../bundle/${query}${quality}`);
+    },
   };
 }

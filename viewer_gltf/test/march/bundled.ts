@@ -8,7 +8,7 @@ export async function bundled(entry: URL): Promise<string> {
     build: {
       write: false,
       target: "es2022",
-      lib: { entry: entry.pathname, formats: ["iife"], name: "harness" },
+      lib: { entry: entry.pathname, formats: ["iife"], name: "exported" },
     },
   });
   for (const { output } of [built].flat() as { output: { type: string; code?: string }[] }[]) {

@@ -1,6 +1,11 @@
 // What earlier frames have gathered for a pixel. Seen from a little aside, it is looked up where
-// this pixel's surface was before, if it is the same surface there; so much of it is kept that the
-// picture can follow.
+// this pixel's surface was before, without what lies nearer or farther there; so much of it is kept
+// that the picture can follow.
+float metAt(ivec2 pixel) {
+  float covered = texelFetch(uSums, pixel, 0).a;
+  return covered > 0.0 ? texelFetch(uMoments, pixel, 0).z / covered : 0.0;
+}
+
 struct History {
   vec4 sums;
   vec4 moments;
@@ -21,21 +26,15 @@ bool isDrawn(ivec2 tile) {
 History historyAt(ivec2 pixel, vec2 at) {
   History none = History(vec4(0.0), vec4(0.0));
   if (uHistory == 0) return none;
-  vec4 sums = texelFetch(uSums, pixel, 0);
-  vec4 moments = texelFetch(uMoments, pixel, 0);
-  if (uHistory == 1) return History(sums, moments);
-  vec2 device = 2.0 * at / uPart.zw - 1.0;
-  vec4 far = uToBox * vec4(device, 1.0, 1.0);
+  if (uHistory == 1) return History(texelFetch(uSums, pixel, 0), texelFetch(uMoments, pixel, 0));
+  vec4 far = uToBox * vec4(2.0 * at / uPart.zw - 1.0, 1.0, 1.0);
   vec3 dir = normalize(far.xyz / far.w - uEyeAt);
-  bool isMet = sums.a > 0.0;
-  float away = isMet ? moments.z / sums.a : 1e3 * length(uSize);  // what is empty is far away
-  vec3 point = uEyeAt + away * dir;
-  vec4 there = uToBefore * vec4(point, 1.0);
-  vec2 was = (0.5 * there.xy / there.w + 0.5) * uPart.zw - 0.5;
-  if (there.w <= 0.0) return none;
+  float away = distance(uEyeAt, 0.5 * uSize);
+  bool isMet;
+  vec2 was = seek(uEyeAt, dir, uToBefore, uEyeBefore, uPart, away, isMet) - 0.5;
   vec2 corner = floor(was);
   vec2 share = was - corner;
-  float expected = distance(point, uEyeBefore);
+  float expected = distance(uEyeAt + away * dir, uEyeBefore);
   History sum = none;
   float total = 0.0;
   for (int k = 0; k < 4; k++) {
@@ -43,15 +42,12 @@ History historyAt(ivec2 pixel, vec2 at) {
     vec2 tap = corner + side;
     if (any(lessThan(tap, vec2(0.0))) || any(greaterThanEqual(tap, uPart.zw))) continue;
     ivec2 source = ivec2(tap + uPart.xy);
-    vec4 s = texelFetch(uSums, source, 0);
-    vec4 m = texelFetch(uMoments, source, 0);
-    bool isMetThere = s.a > 0.0;
-    if (isMet != isMetThere) continue;
-    if (isMet && abs(m.z / s.a - expected) > 0.02 * length(uSize)) continue;
+    float met = metAt(source);
+    if (isMet && met > 0.0 && abs(met - expected) > 0.02 * length(uSize)) continue;
     vec2 near = mix(1.0 - share, share, side);
     float weight = near.x * near.y;
-    sum.sums += weight * s;
-    sum.moments += weight * m;
+    sum.sums += weight * texelFetch(uSums, source, 0);
+    sum.moments += weight * texelFetch(uMoments, source, 0);
     total += weight;
   }
   if (total < 0.05) return none;
