@@ -70,8 +70,10 @@ def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0
     manifest.write_text(text)
 
 
-def replace_transfer_functions(bundle: Path, opacities: np.ndarray, channel="CD31") -> None:
-    """Put other opacities, (rows, 256) from 0 to 1, in a channel's table."""
+def replace_transfer_functions(
+    bundle: Path, opacities: np.ndarray, channel="CD31", names=("default",), chosen="default"
+) -> None:
+    """Put other functions in a channel: opacities, (functions, 256) from 0 to 1; none is 2D."""
     manifest = bundle / "manifest.json"
     content = json.loads(manifest.read_text())
     (entry,) = (c for c in content["channels"] if c["id"] == channel)
@@ -80,6 +82,8 @@ def replace_transfer_functions(bundle: Path, opacities: np.ndarray, channel="CD3
     data = encode_2d(table).data
     (bundle / entry["lut"]["path"]).write_bytes(data)
     entry["lut"] |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    entry |= {"transfer_functions": list(names), "transfer_function": chosen}
+    entry["transfer_functions_2d"]["names"] = []
     manifest.unlink()
     manifest.write_text(json.dumps(content))
 
@@ -106,5 +110,5 @@ def write_mri(folder: Path, source: Path) -> Path:
     functions = make_transfer_functions(histogram, None)
     write_out(folder, volume)
     rows = np.array([evaluate(points) for points in functions.values()])
-    replace_transfer_functions(folder / "bundle", rows)
+    replace_transfer_functions(folder / "bundle", rows, names=list(functions))
     return folder

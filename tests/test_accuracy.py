@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 import phantoms
-from stereocell import build, config
+from stereocell import config, phases
 from stereocell.engine import Engine
 from stereocell.mesh import Mesh
 from stereocell.samples import write_cycif
@@ -20,9 +20,9 @@ VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
 
 
 def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[Store, list[Mesh]]:
-    build.make(str(source), out, config.load("cycif", None, {"plan": plan}))
+    phases.make(str(source), out, config.load("cycif", None, {"plan": plan}))
     engine = Engine(0)
-    build.run_units(out, engine)
+    phases.run_units(out, engine)
     store = Store(out)
     meshes = [
         load_lods(store.unit_dir(*unit.split("/"), key))[0].mesh

@@ -171,7 +171,7 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
     ):
         write_bundle(stage, tmp_path / "bundle", None, Engine(0))
     for line in capfd.readouterr().err.splitlines():  # OpenEXR's own words would come on top
-        assert line.startswith("bundle ")
+        assert line.startswith("bundle: ")
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
         write_bundle(stage, tmp_path / "bundle", None, Engine(0))
     assert "\n" not in str(caught.value)
     for line in capfd.readouterr().err.splitlines():  # USD's own warnings would come on top
-        assert line.startswith("bundle ")
+        assert line.startswith("bundle: ")
     assert [p.name for p in tmp_path.iterdir()] == ["stage"]
 
 

@@ -1,6 +1,9 @@
 """The command line: what contradicts itself, what is missing, and the exit codes."""
 
+import json
 import os
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -116,3 +119,44 @@ def test_help_says_what_a_region_counts(capsys: pytest.CaptureFixture[str]) -> N
         main(["build", "--help"])
     assert "voxels of the level that is built" in " ".join(capsys.readouterr().out.split())
     assert "build" in COMMANDS
+
+
+def test_a_machine_is_answered_in_json(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert main(["plan", str(source), "-o", out, "--grid", "2x1", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["out"] == out
+    assert answer["tiles"] == ["r0_c0", "r0_c1"]
+    assert answer["channels"] == ["F body", "F again"]
+    assert main(["settings", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["plan"]["grid"] == ""
+    assert main(["plan", str(tmp_path / "none.tif"), "-o", out, "--json"]) == 1
+    told = capsys.readouterr()
+    answer = json.loads(told.out)
+    assert answer["exit_code"] == 1
+    assert told.err == f"stereocell: {answer['error']}\n"
+    assert main(["plan", str(source), "-o", out, "--level", "9", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["exit_code"] == 2
+
+
+def test_without_a_terminal_progress_is_a_line_a_unit_without_colours(
+    source: Path, tmp_path: Path
+) -> None:
+    out = str(tmp_path / "out")
+    assert main(["plan", str(source), "-o", out, "--grid", "2x1"]) == 0
+    command = [sys.executable, "-m", "stereocell.cli", "units", out, "--workers", "0"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = told.stderr.splitlines()
+    assert "units: 1/4 r0_c0/F body" in lines
+    assert "units: 4/4 r0_c1/F again" in lines
+    assert "\x1b" not in told.stderr
+    assert told.stdout == ""
+
+
+def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    told = capsys.readouterr().out
+    assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130"))

@@ -80,6 +80,7 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[plan]\ntime = -1\n", "plan.time is -1, expected 0 or more"),
         ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um: found 1,0,1, expected z,y,x in um"),
         ("[plan]\nspacing_um = [1, 2]\n", "spacing_um: found 1,2, expected z,y,x in um"),
+        ('[plan]\nmodality = "MRI"\n', "plan.modality is 'MRI', expected one of AR, AU, BDUS"),
         ("[surface]\nclosed_tiles = 1\n", "closed_tiles is 1, expected true or false"),
         ("[surface]\nwrap = 3\n", "surface.wrap is 3, expected text"),
         ('[surface]\ngrid_um = "auto"\n', "surface.grid_um is 'auto', expected a number"),

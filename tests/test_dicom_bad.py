@@ -12,12 +12,14 @@ import pytest
 from pydicom.encaps import encapsulate, generate_frames
 from pydicom.uid import (
     MPEG2MPML,
+    BasicTextSRStorage,
     DeflatedExplicitVRLittleEndian,
     JPEG2000Lossless,
     JPEGBaseline8Bit,
     JPEGLosslessSV1,
     JPEGLSLossless,
     RLELossless,
+    RTStructureSetStorage,
 )
 
 from dicom_series import compress, grid, image, save, write_enhanced, write_series
@@ -84,6 +86,9 @@ REFUSED: dict[str, tuple[Change, str]] = {
     ),
     "two numbers for a place": (setting(ImagePositionPatient=[1, 2]), "6 without a place"),
     "all at one place": (setting(ImagePositionPatient=[0, 0, 0]), "at least 2 slices: found 1"),
+    "absurd spacing": (
+        setting(PixelSpacing=[1e9, 1e9]), r"6 of an absurd PixelSpacing \(1e\+09 and 1e\+09 mm\)"
+    ),
     "colours": (colours, "6 of colours"),
     "no pixels": (without("PixelData"), "6 without pixels"),
     "one bit": (setting(BitsAllocated=1, BitsStored=1, HighBit=0), "6 of 1 bits a pixel"),
@@ -190,6 +195,20 @@ def test_folder_without_dicom_is_refused(tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "b").write_bytes(bytes(3000))
     assert "found 2 files: 2 not DICOM" in refusal(tmp_path)
+
+
+def test_files_without_images_are_named_by_their_kind(tmp_path: Path) -> None:
+    for name, kind in (("a", RTStructureSetStorage), ("b", BasicTextSRStorage), ("c", "1.2.3.4.5")):
+        ds = image(np.zeros((8, 9), np.int16), grid(), 0)
+        del ds.PixelData, ds.Rows, ds.Columns
+        ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = kind
+        save(ds, tmp_path / "s" / name)
+    line = refusal(tmp_path / "s")
+    assert "1 without pixels (RT Structure Set Storage)" in line
+    assert "1 without pixels (Basic Text SR Storage)" in line
+    assert "1 without pixels;" in line
+    assert "1.2.3.4.5" not in line  # what is private may tell whose it is
+    assert "found 1 file: 1 without pixels" in refusal(save(ds, tmp_path / "t" / "a").parent)
 
 
 def test_empty_folder_is_refused(tmp_path: Path) -> None:

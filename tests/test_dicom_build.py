@@ -1,5 +1,6 @@
 """Builds from DICOM and NIfTI: bodies lie at their place in the world, in every file."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from dicom_series import BODIES, BRIGHTEST, grid, sample, turn, write_enhanced, 
 from glbs import decoded_positions_m
 from stereocell.check import check
 from stereocell.cli import main
+from stereocell.plan import FLESH
 from test_nifti import write as write_nifti
 
 SHAPE = (24, 40, 36)
@@ -44,7 +46,10 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     folder = tmp_path_factory.mktemp("build")
     source, out = make(folder / "source"), folder / "out"
     level = f"CT={LEVEL + AIR}" if make is dicom else f"NIfTI={LEVEL}"
+    config = folder / "mine.toml"
+    config.write_text('[plan]\nmodality = "PT"\n')  # NIfTI has none of its own
     given = [str(source), "-o", str(out), "--iso-value", level, "--grid", "2x1"]
+    given += ["--config", str(config)]
     assert main(["plan", *given]) == 0
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0
@@ -122,12 +127,23 @@ def test_the_bundle_s_volumes_have_the_bright_body_at_its_place(built: Path) -> 
 def test_the_manifest_knows_the_modality_and_check_finds_nothing(built: Path) -> None:
     specimen = load(built / "bundle" / "manifest.json")["specimen"]
     is_dicom = load(built / "plan.json")["name"] == "CT"
-    assert specimen["modality"] == ("CT" if is_dicom else "")
+    assert specimen["modality"] == ("CT" if is_dicom else "PT")
     stage = Usd.Stage.Open(str(built / "stage" / "stage.usda"))
     root = stage.GetDefaultPrim()
     assert root.HasAPI("StereoCellSpecimenAPI")
     assert root.GetAttribute("stereocell:modality").Get() == specimen["modality"]
     assert [line for line in check(built) if not line.ok] == []
+
+
+@pytest.mark.parametrize(("write", "modality"), [(nifti, "MR"), (dicom, "CT")])
+def test_the_preset_s_modality_holds_where_the_input_says_none(
+    write: Callable[[Path], Path], modality: str, tmp_path: Path
+) -> None:
+    source = write(tmp_path / "s")
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", "mri"]) == 0
+    plan = json.loads((tmp_path / "out" / "plan.json").read_text())
+    assert plan["modality"] == modality
+    assert plan["channels"][0]["color"] == list(FLESH)
 
 
 def test_series_are_listed_and_chosen_by_number(

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import nibabel
 import numpy as np
 import pydicom
 import pytest
@@ -18,12 +19,14 @@ from PIL import Image, PngImagePlugin
 from pxr import Sdf
 from pydicom.datadict import DicomDictionary
 from pydicom.dataset import Dataset
+from pydicom.uid import JPEGLosslessSV1
 
 import leaks
-from dicom_series import grid, write_enhanced, write_series
+from dicom_series import compress, grid, write_enhanced, write_series
 from stereocell import read
 from stereocell.cli import main
 from stereocell.errors import SourceError
+from stereocell.serve_library import BrickLibrary
 from stereocell.sources import open_source
 
 # Every text has TEXT in it, every UID NUMBER, every date and time its own; a count follows.
@@ -89,6 +92,75 @@ def series(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def enhanced(folder: Path) -> None:
+    path = write_enhanced(folder / f"{TEXT}.dcm", grid(shape=(4, 8, 9)), (4, 8, 9))
+    ds = pydicom.dcmread(path)
+    mark_all(ds)
+    shared = ds.SharedFunctionalGroupsSequence[0]
+    for group in [shared, *ds.PerFrameFunctionalGroupsSequence]:
+        for sequence in [group, *(item for element in group for item in element.value)]:
+            mark(sequence, lambda number: number in (8, 0x10, 0x40))
+    for group in ds.PerFrameFunctionalGroupsSequence:
+        content = group.FrameContentSequence[0]
+        content.StackID, content.FrameLabel = TEXT, f"{TEXT} label"
+    ds.save_as(path)
+
+
+def jpeg(folder: Path) -> None:
+    shape = (4, 20, 18)
+    paths = write_series(
+        folder,
+        grid(shape=shape),
+        shape,
+        dtype=np.uint16,
+        change=mark_all,
+        name=f"{TEXT}_{{}}".format,
+    )
+    for path in paths:
+        compress(path, JPEGLosslessSV1)
+        packed = pydicom.dcmread(path)
+        mark_all(packed)  # GDCM drops some
+        packed.save_as(path)
+
+
+def packed_nifti(folder: Path) -> None:
+    values = np.arange(8 * 9 * 10, dtype=np.float32).reshape(8, 9, 10)
+    values[0, 0, 0] = np.nan  # that is said
+    nifti = nibabel.Nifti1Image(values, np.eye(4))
+    for field in ("descrip", "db_name", "aux_file", "intent_name"):
+        nifti.header[field] = TEXT
+    for code in ("comment", "dicom", "afni"):
+        nifti.header.extensions.append(
+            nibabel.nifti1.Nifti1Extension(code, f"{TEXT} {NUMBER} {DATE} {TIME}.7719".encode())
+        )
+    nibabel.save(nifti, folder / "a.nii.gz")
+
+
+@pytest.mark.parametrize("write", [enhanced, jpeg, packed_nifti])
+def test_no_identity_is_in_what_is_made_of_other_kinds_of_file(
+    write: Callable[[Path], None],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    write(folder)
+    source = str(folder)
+    if write is packed_nifti:  # the path that is typed stays in plan.json
+        source = str(folder / "a.nii.gz")
+    assert main(["plan", source, "-o", str(out)]) == 0
+    assert main(["slices", source, "-o", str(out / "slices")]) == 0
+    if write is not packed_nifti:
+        assert main(["plan", source, "-o", str(out), "--series", "list"]) == 0
+    told = capfd.readouterr()
+    assert (write is packed_nifti) == ("NaN" in told.out + told.err)
+    texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}
+    assert leaks.find(out, WORDS, texts) == []
+    assert {hit.split(" ")[0] for hit in leaks.find(folder, WORDS)} == set(WORDS)
+
+
 @pytest.mark.slow
 def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
     series: Path,
@@ -101,6 +173,10 @@ def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
     assert main(["build", str(series), "-o", str(out), "--workers", "1", "--grid", "2x1"]) == 0
     assert main(["slices", str(series), "-o", str(out / "slices")]) == 0
     assert main(["build", str(series), "-o", str(out), "--series", "list"]) == 0
+    library = BrickLibrary(out / "bundle", out / "bricks")  # as `serve` caches it
+    for tile, channel in library.volumes():
+        library.open(tile, channel)
+    assert list((out / "bricks").iterdir())
     told = capfd.readouterr()
     texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}
     assert "MR, coronal" in told.out
@@ -230,8 +306,6 @@ def test_messages_about_spoilt_files_hold_no_identity(
 
 
 def test_texts_of_nifti_and_its_name_stay_behind(tmp_path: Path) -> None:
-    import nibabel
-
     nifti = nibabel.Nifti1Image(np.arange(8 * 9 * 10, dtype=np.int16).reshape(8, 9, 10), np.eye(4))
     nifti.header["descrip"] = nifti.header["db_name"] = nifti.header["aux_file"] = TEXT
     nifti.header["intent_name"] = TEXT
@@ -240,17 +314,3 @@ def test_texts_of_nifti_and_its_name_stay_behind(tmp_path: Path) -> None:
     dataset = read.open(tmp_path / "in" / f"{TEXT}.nii")
     told = repr((dataset.name, dataset.modality, dataset.channels, dataset.notes))
     assert TEXT not in told
-
-
-def test_frames_of_enhanced_images_leave_nothing_either(tmp_path: Path) -> None:
-    path = write_enhanced(tmp_path / f"{TEXT}.dcm", grid(shape=(4, 8, 9)), (4, 8, 9))
-    ds = pydicom.dcmread(path)
-    for group in ds.PerFrameFunctionalGroupsSequence:
-        group.FrameContentSequence[0].FrameLabel = f"{TEXT} label"
-    ds.save_as(path)
-    open_source.cache_clear()
-    folder = tmp_path / "in"
-    folder.mkdir()
-    path.rename(folder / path.name)
-    assert main(["plan", str(folder), "-o", str(tmp_path / "out")]) == 0
-    assert leaks.find(tmp_path / "out", WORDS) == []

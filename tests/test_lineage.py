@@ -1,19 +1,15 @@
 """A result's key follows all the code, files and libraries that make it, and nothing else."""
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
-ASK = """
-from stereocell import lineage, report, staging, tasks
+from stereocell import assets, lineage, report, staging, tasks
 from stereocell.write import bundle
-print(*(lineage.key_of("x", maker) for maker in (tasks, staging, bundle, report)))
-"""
-MAKERS = ("units", "stage", "bundle", "report")
+
+ROOT = Path(__file__).parents[1]
+MAKERS = {"units": tasks, "stage": staging, "bundle": bundle, "report": report}
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +24,26 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def before(copy: Path) -> dict[str, str]:
-    return _keys(copy)
+    return keys(copy)
 
 
-def _keys(checkout: Path) -> dict[str, str]:
-    code = f"import sys; sys.path.insert(0, {str(checkout / 'pipeline')!r})\n{ASK}"
-    answer = subprocess.check_output([sys.executable, "-c", code], text=True)
-    return dict(zip(MAKERS, answer.split(), strict=True))
+def keys(checkout: Path) -> dict[str, str]:
+    """Each maker's key, as if the package lay in that checkout: only its files are read."""
+    package = checkout / "pipeline" / "stereocell"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lineage, "_PACKAGE", package)
+        patch.setattr(assets, "_HOMES", (package, checkout))
+        try:
+            _forget()
+            return {name: lineage.key_of("x", maker) for name, maker in MAKERS.items()}
+        finally:
+            _forget()
+
+
+def _forget() -> None:
+    lineage._digest.cache_clear()
+    lineage._lineage.cache_clear()
+    lineage._needs.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -51,18 +60,15 @@ def _keys(checkout: Path) -> dict[str, str]:
         ("pipeline/stereocell/report/charts.py", {"report"}),
     ],
 )
-def test_key_changes_with_what_makes_the_result(
-    copy: Path, before: dict[str, str], file: str, reached: set[str]
-) -> None:
+def test_key_changes_with_what_makes_the_result(copy: Path, file: str, reached: set[str]) -> None:
+    before = keys(copy)
     content = (copy / file).read_bytes()
     (copy / file).write_bytes(content + b"\n# changed\n")
-    after = _keys(copy)
+    after = keys(copy)
     (copy / file).write_bytes(content)
     assert {maker for maker in MAKERS if before[maker] != after[maker]} == reached
 
 
 def test_versions_of_libraries_count_those_of_lone_extension_modules_too() -> None:
-    from stereocell import lineage, staging, tasks
-
     assert {"numpy", "vtk", "xatlas", "edt", "zarr"} <= lineage.libraries_of(tasks).keys()
     assert {"usd-core", "OpenEXR"} <= lineage.libraries_of(staging).keys()

@@ -121,9 +121,11 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "m.onnx"
     with pytest.raises(SourceError, match=r"m\.onnx: No such file"):
         Network.load(path)
-    path.write_bytes(b"no protobuf at all")
-    with pytest.raises(SourceError, match="expected an ONNX model"):
-        Network.load(path)
+    for content in (b"root:x:0:0:root:/root:/bin/bash\n", b"", b"GIF89a"):
+        path.write_bytes(content)
+        with pytest.raises(SourceError) as error:
+            Network.load(path)
+        assert str(error.value) == f"{path}: found another kind of file, expected an ONNX model"
 
 
 def test_without_onnxruntime_the_remedy_is_said(

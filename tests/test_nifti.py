@@ -1,5 +1,6 @@
 """NIfTI files become volumes in the patient's world."""
 
+import gzip
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from dicom_series import grid, sample, tilted, turn
 from stereocell import read
 from stereocell.errors import SourceError
+from stereocell.tiling import Box
 from test_dicom import error, interpolation_bound, lps_mm, whole
 
 SHAPE = (22, 30, 26)
@@ -134,6 +136,60 @@ def test_skew_axes_are_resampled_onto_an_orthogonal_grid(tmp_path: Path) -> None
     assert wrong < 3 * interpolation_bound(2.5)  # along three axes
 
 
+def test_nan_is_the_smallest_finite_value_and_is_told(tmp_path: Path) -> None:
+    """A brain that was cut out has NaN all round."""
+    values = sample(grid(), SHAPE).astype(np.float32) + 7
+    bare = values.copy()
+    bare[:, :5] = np.nan
+    dataset = read.open(write(tmp_path / "a.nii.gz", grid(), bare))
+    assert dataset.notes == (f"{22 * 5 * 26:,} voxels are NaN: read as the smallest finite value",)
+    expected = np.nan_to_num(bare, nan=float(np.nanmin(bare)))
+    write(tmp_path / "b.nii.gz", grid(), expected)
+    voxels = whole(read.open(tmp_path / "b.nii.gz"))
+    assert np.array_equal(whole(dataset), voxels)
+    box = Box((0, 3, 2), (6, 9, 20))  # NaN alone
+    part = read.open(tmp_path / "a.nii.gz").read(0, box).voxels
+    assert np.array_equal(part, voxels[box.slices])
+
+
+def test_nan_is_told_of_the_point_in_time_that_is_read(tmp_path: Path) -> None:
+    values = np.stack([sample(grid(), SHAPE)] * 2, axis=-1).astype(np.float32)
+    values[3, 4, 5, 1] = np.nan
+    path = write(tmp_path / "a.nii", grid(), values)
+    assert not any("NaN" in note for note in read.open(path).notes)
+    assert any("1 voxels are NaN" in note for note in read.open(path, time=1).notes)
+
+
+def patch(path: Path, start: int, values: NDArray[Any]) -> None:
+    """Overwrite what the header has at a place, packed or not."""
+    is_packed = path.suffix == ".gz"
+    content = gzip.decompress(path.read_bytes()) if is_packed else path.read_bytes()
+    changed = content[:start] + values.tobytes() + content[start + values.nbytes :]
+    path.write_bytes(gzip.compress(changed) if is_packed else changed)
+
+
+def stretched(path: Path) -> None:
+    write(path, grid(), scene_on(grid()))
+    patch(path, 112, np.array([1e38, 0], "<f4"))  # scl_slope, scl_inter
+
+
+def endless(path: Path) -> None:
+    values = np.zeros((4, 5, 6), np.float32)
+    values[1, 2, 3], values[0, 0, 0] = np.inf, np.nan
+    nibabel.save(nibabel.Nifti1Image(values, np.eye(4)), path)
+
+
+def empty(path: Path) -> None:
+    nibabel.save(nibabel.Nifti1Image(np.full((4, 5, 6), np.nan, np.float32), np.eye(4)), path)
+
+
+def a_little_too_large(path: Path) -> None:
+    """A header that claims 1 MiB more than 4 GiB, and little behind it."""
+    nifti = nibabel.Nifti1Image(np.zeros((4, 5, 6), np.uint8), np.eye(4))
+    nibabel.save(nifti, path)
+    patch(path, 42, np.array([1024, 1024, 4097], "<i2"))  # dim
+
+
 def nothing(path: Path) -> None:
     path.write_bytes(b"")
 
@@ -179,6 +235,10 @@ def huge(path: Path) -> None:
         (vectors, "dim: found"),
         (collapsed, "three axes"),
         (huge, "expected at most 4 GiB"),
+        (a_little_too_large, "found 4.01 GiB, expected at most 4 GiB"),
+        (stretched, "NaN or infinite"),
+        (endless, "found 1 NaN or infinite"),
+        (empty, "found no finite voxel"),
     ],
 )
 @pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])

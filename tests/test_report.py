@@ -7,6 +7,7 @@ import shutil
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -313,6 +314,36 @@ def test_page_tells_of_each_unit(built: Path) -> None:
     assert "as the test has it" not in html  # it starts a sentence
     assert "As the test has it." in html
     assert "there is no bundle yet" in html
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_page_says_of_each_channel_why_its_2d_function_is_empty(
+    built: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+
+    survey = json.loads(Store(out).survey_file.read_text())
+    proposals = [entry["display"]["proposal"] for entry in survey.values()]
+    triangle = {
+        "kind": "triangle",
+        "values": [0.0, 1.0],
+        "gradients": [0.2, 1.0],
+        "tip": 0.45,
+        "color": [1.0, 1.0, 1.0],
+        "opacity": 0.7,
+        "softness": 0.5,
+    }
+    proposals[0].update(shapes=[], reason="too <dim>")
+    proposals[1].update(shapes=[triangle] * 2, reason="")
+    Store(out).survey_file.write_text(json.dumps(survey))
+    _, parsed = _write(out)
+    assert [b for a, b in pairwise(parsed.texts) if a == "2D function"] == [
+        "none: too <dim>",
+        "2 boundaries between materials",
+        # one value is one material, and a boundary takes two
+        "none: materials found: 1, expected at least 2",
+    ]
 
 
 @pytest.mark.usefixtures("no_drawing")

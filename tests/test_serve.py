@@ -210,7 +210,9 @@ def test_the_servers_own_names_are_answered_at_any_port(port: int, host: str) ->
         "http://[",
     ],
 )
-def test_pages_of_other_origins_get_no_websocket(port: int, origin: str) -> None:
+def test_pages_of_other_origins_get_no_websocket(
+    port: int, origin: str, caplog: pytest.LogCaptureFixture
+) -> None:
     origin = origin.format(port=port)
     with (
         pytest.raises(InvalidStatus) as refused,
@@ -218,6 +220,8 @@ def test_pages_of_other_origins_get_no_websocket(port: int, origin: str) -> None
     ):
         pass
     assert refused.value.response.status_code == 403
+    ask(port, "/manifest.json")  # by now the server has done with the other one
+    assert caplog.records == []  # what is refused is no fault, and fills no terminal
 
 
 def test_the_servers_own_page_and_programs_get_a_websocket(port: int) -> None:

@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from brick_bundles import phantom, replace_volume, write_out
+from brick_bundles import phantom, replace_transfer_functions, replace_volume, write_out
 from stereocell.errors import OutputError, SourceError, StereoCellError
 from stereocell.read.ktx2 import decode_finest
 from stereocell.serve_library import BrickLibrary, UnknownVolumeError, invisible_below
@@ -41,18 +41,40 @@ def test_a_tree_is_that_of_the_bundles_volume(out):
     assert file.table.source.hex() == entry["file"]["sha256"][:32]
 
 
-def test_the_threshold_is_what_no_transfer_function_shows(out):
-    """CD31: `default` shows from 0 on, `sharp` from 0.3: only 0 is invisible with both."""
-    volumes = library(out).volumes()
-    assert volumes["r0_c0", "CD31"].threshold == 0
-    rows = np.zeros((2, 256, 4), np.uint8)
-    assert invisible_below(rows) == 254
-    rows[0, 100:, 3] = 9
-    assert invisible_below(rows) == 99
-    rows[1, 40:50, 3] = 1
-    assert invisible_below(rows) == 39
-    rows[1, 0, 3] = 1
-    assert invisible_below(rows) == -1
+def test_the_threshold_is_what_a_row_leaves_invisible():
+    row = np.zeros((256, 4), np.uint8)
+    row[:, :3] = 255
+    assert invisible_below(row) == 254
+    row[100:, 3] = 9
+    assert invisible_below(row) == 99
+    row[40:50, 3] = 1
+    assert invisible_below(row) == 39
+    row[0, 3] = 1
+    assert invisible_below(row) == -1
+
+
+@pytest.mark.parametrize(("chosen", "threshold"), [("default", 99), ("sharp", 199), ("soft", -1)])
+def test_trees_are_those_of_the_function_that_the_stage_opens_with(out, chosen, threshold):
+    """`soft` shows everything: no reason to send what is dark to one who looks at `sharp`."""
+    opacities = np.zeros((3, 256))
+    opacities[0, 100:] = opacities[1, 200:] = opacities[2] = 0.5
+    names = ["default", "sharp", "soft"]
+    replace_transfer_functions(out / "bundle", opacities, names=names, chosen=chosen)
+    files = library(out)
+    assert files.volumes()["r0_c0", "CD31"].threshold == threshold
+    assert files.open("r0_c0", "CD31").table.threshold == threshold
+    expected = build(VOLUME, threshold)
+    assert len(files.open("r0_c0", "CD31").table.nodes) == len(expected.nodes)
+
+
+def test_a_table_of_other_functions_than_the_manifest_s_is_one_line(out):
+    replace_transfer_functions(out / "bundle", np.zeros((3, 256)), names=["default", "soft"])
+    with pytest.raises(SourceError, match="expected 2 rows of 256 RGBA"):
+        library(out).volumes()
+    names = ["default", "soft", "sharp"]
+    replace_transfer_functions(out / "bundle", np.zeros((3, 256)), names=names, chosen="arcs")
+    with pytest.raises(SourceError, match="arcs is none of default, soft, sharp"):
+        library(out).volumes()
 
 
 def test_a_second_start_builds_nothing(out):

@@ -53,6 +53,18 @@ def test_everything_in_sight_is_wanted_to_the_leaves():
     assert (TREE.level == 0).sum() == 5**3
 
 
+def test_nodes_of_apron_alone_never_come_even_with_everything_in_sight():
+    """49 texels along x: the fourth cell begins at 48, and what is drawn ends at 47.5."""
+    volume = noise((34, 34, 49))
+    tree = placed(volume)
+    nodes = build(volume, 20).nodes
+    _, wanted, _ = order(view(FAR, MIDDLE), [tree])
+    is_apron = (nodes["level"] == 0) & (nodes["x"] == 3)
+    assert is_apron.sum() == 3 * 3
+    assert not tree.is_empty[is_apron].any()
+    assert sorted(wanted.tolist()) == np.flatnonzero(~is_apron).tolist()
+
+
 def test_boxes_lie_where_the_texels_are_drawn():
     """Texture y runs down: row 0's drawn side is the top of the box."""
     volume = phantom((35, 40, 50))

@@ -10,6 +10,7 @@ from PIL import Image
 
 import phantoms
 from dicom_series import grid, scene, turn, write_series
+from stereocell import read
 from stereocell.assets import schema_path
 from stereocell.cli import main
 from stereocell.slices import to_bytes
@@ -56,6 +57,18 @@ def test_another_folder_is_left_alone_and_slices_are_replaced_as_a_whole(
     assert main(["slices", str(source), "-o", out, "--region", "2:6,:,:"]) == 0
     names = sorted(file.name for file in Path(out).iterdir())
     assert names == ["0.png", "1.png", "2.png", "3.png", "slices.json"]
+
+
+def test_lengths_of_surfaces_do_not_matter(tmp_path: Path) -> None:
+    """Preset mri takes every 1.4 mm for the surface; this head is as large as a grain."""
+    write_series(tmp_path / "s", grid(spacing=(0.02, 0.02, 0.02)))
+    source, out = str(tmp_path / "s"), tmp_path / "out"
+    assert main(["plan", source, "-o", str(tmp_path / "plan"), "--preset", "mri"]) == 2
+    assert main(["slices", source, "-o", str(out), "--preset", "mri"]) == 0
+    about = json.loads((out / "slices.json").read_text())
+    dataset = read.open(source)
+    voxels = dataset.read(0, dataset.levels[0].box).voxels
+    assert about["window"] == pytest.approx(np.percentile(voxels, (1.0, 99.8)))
 
 
 def test_more_than_one_channel_is_wrong_usage(

@@ -67,6 +67,28 @@ def test_window_is_that_of_the_region_alone(
     )
     assert channel["display"]["window"] == pytest.approx(expected)
     assert sum(channel["display"]["histogram"]) == pyramid[level][part].size
+    # the threshold is read from every voxel, however few tell the window
+    low, high = channel["display"]["window"]
+    whole = fine[2:14, 4:32, 8:32]
+    inside = (whole >= low) & (whole <= high)
+    assert sum(channel["display"]["values"]["counts"]) == np.count_nonzero(inside)
+
+
+def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tasks, "SURVEY_VOXELS", 4000)
+    monkeypatch.setattr(tasks, "COUNTED_VOXELS", 7999)
+    voxels = np.random.default_rng(0).integers(100, 200, (20, 20, 20)).astype(np.uint16)
+    source = phantoms.write_ome_zarr(tmp_path / "one.ome.zarr", [voxels])
+    out = tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out)]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = Store(out).survey().values()
+    low, high = channel["display"]["window"]
+    seen = voxels[::2]
+    inside = (seen >= low) & (seen <= high)
+    assert sum(channel["display"]["values"]["counts"]) == np.count_nonzero(inside)
 
 
 @pytest.mark.parametrize("iso", [None, 0.0, 0.02, 0.3, 0.97, 1.0, 1.7])

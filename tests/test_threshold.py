@@ -16,7 +16,7 @@ import phantoms
 from stereocell.check import check
 from stereocell.cli import main
 from stereocell.config import WindowOptions
-from stereocell.report.thresholds import draw_cut, draw_threshold, find_peers
+from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
 from stereocell.specimen import evaluate
 from stereocell.survey import display_from_json, display_to_json, find_display, make_look
 from stereocell.threshold import (
@@ -139,6 +139,58 @@ def test_a_flat_histogram_has_no_threshold(counts: NDArray[np.float64]) -> None:
     assert find_adaptive_threshold(histogram(counts)) is None
 
 
+def test_a_peak_is_one_however_low_beside_the_others() -> None:
+    """As in a head at 7 T: grey matter rises 4 % above the saddle before it, many times what
+    counting makes; white matter stands apart and is lower.
+    """
+    bells = [(0.0, 20.0, 5e6), (115.0, 25.0, 40_000.0), (200.0, 12.0, 50_000.0)]
+    fat = 150_000 * np.exp(-AT / 80)
+    threshold = found(sum(bell(*b) for b in bells) + fat)
+    _, grey, white = threshold.peaks
+    heights, levels = threshold.smoothed, AT
+    between = (levels > 60) & (levels < grey)
+    saddle = heights[between].min()
+    assert 0.02 < (heights[int(grey)] - saddle) / heights[int(grey)] < 0.05
+    assert heights[int(white)] < heights[int(grey)]
+    assert threshold.between == (threshold.peaks[0], grey)
+    assert threshold.value == levels[between][heights[between].argmin()]
+
+
+@pytest.mark.parametrize(("rise", "count"), [(4.0, 1), (6.0, 2)])
+def test_a_rise_counts_from_five_deviations_of_counting_on(rise: float, count: int) -> None:
+    """Steps as broad as the window: its means are theirs. 25 bins, 1000 voxels in each."""
+    deviation = np.sqrt(2 * 1000 / 25)
+    top = 1000 + rise * deviation
+    counts = np.concatenate(
+        [np.full(60, 9000.0), np.full(60, 1000), np.full(60, top), np.zeros(76)]
+    )
+    threshold = found(counts)
+    assert len(threshold.peaks) == count
+    assert len(threshold.chance) == 2 - count
+    (low,) = (*threshold.peaks[1:], *threshold.chance)
+    assert low == pytest.approx(150, abs=2)
+
+
+def test_single_voxels_of_a_long_tail_make_no_peaks() -> None:
+    """1000 bins of an exponential, counted: few voxels beyond bin 300, then single ones."""
+    rng = np.random.default_rng(3)
+    at = np.arange(1000)
+    for _ in range(20):
+        threshold = found(rng.poisson(1e6 * np.exp(-at / 25)).astype(float))
+        assert len(threshold.peaks) == 1
+        assert threshold.reading == "single peak"
+
+
+def test_a_peak_has_at_least_the_height_of_a_voxel_that_chance_may_add() -> None:
+    """Over a window of 101 bins: 5 deviations of a height of 1 are 5 sqrt(2 / 101) = 0.70 a bin."""
+    at = np.arange(1000)
+    counts = np.where(at < 300, 1e6 * np.exp(-((at - 100) ** 2) / 800), 0)
+    counts[800] = 60
+    assert len(found(counts).peaks) == 1
+    counts[800] = 90
+    assert len(found(counts).peaks) == 2
+
+
 def test_chance_makes_no_peaks() -> None:
     """A flat bright tail of noise: 100 voxels a bin, each give or take its root."""
     rng = np.random.default_rng(0)
@@ -219,7 +271,23 @@ def test_the_report_draws_it_beside_otsu_s_and_li_s() -> None:
     for kind in ("mark", "otsu", "li", "curve", "area"):
         assert figure.chart.count(f'class="{kind}"') == 1
     assert figure.chart.count('class="peak"') == 2
+    assert display.threshold is not None
+    dark, bright = display.threshold.between
+    assert dark == pytest.approx(100, abs=25)
+    assert bright == pytest.approx(1000, abs=25)
+    assert f"peak, at {bright:.5g}, and the peak before it, at {dark:.5g}" in figure.reading
     assert draw_threshold(find_display(np.full(100, 7, np.uint8), WindowOptions())) is None
+
+
+def test_the_report_names_what_was_left_out_as_chance() -> None:
+    rng = np.random.default_rng(4)
+    threshold = found(rng.poisson(bell(30, 9, 50_000) + bell(150, 20, 9_000) + 100).astype(float))
+    assert threshold.chance
+    assert "are no peaks" in describe(threshold)
+    assert f"{threshold.chance[0]:.5g}" in describe(threshold)
+    smooth_one = found(bell(60, 12, 100_000) + bell(180, 20, 60_000))
+    assert smooth_one.chance == ()
+    assert "are no peaks" not in describe(smooth_one)
 
 
 def test_slices_are_black_below_the_threshold() -> None:

@@ -1,6 +1,7 @@
 """`stereocell tissue OUT`: classes become channels, and nothing else is built anew."""
 
 import json
+import shutil
 from pathlib import Path
 
 import jsonschema
@@ -91,6 +92,17 @@ def test_the_plan_with_classes_survives_its_file_and_passes_its_schema(planned: 
     content = json.loads(json.dumps(to_json(plan)))
     jsonschema.validate(content, json.loads(find_asset("schemas/plan.schema.json").read_text()))
     assert from_json(content) == plan
+
+
+def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: Path) -> None:
+    here = add(planned, "--classes", "3").plan()
+    copy = Store(shutil.copytree(planned, tmp_path / "moved"))
+    there = copy.plan()
+    for before, after in zip(here.channels[1:], there.channels[1:], strict=True):
+        voxels = tmp_path.resolve() / "moved" / "tissue" / "classes.ome.zarr"
+        assert (Path(after.source), after.fingerprint) == (voxels, before.fingerprint)
+    assert str(planned.resolve()) not in copy.plan_file.read_text()
+    assert copy.save_plan(there) is False
 
 
 def test_classes_take_the_place_of_earlier_ones(planned: Path, tmp_path: Path) -> None:

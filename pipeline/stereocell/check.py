@@ -15,10 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from stereocell.as_planned import require_added
 from stereocell.assets import find_asset
 from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.store import Store
+from stereocell.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.transfer2d import find_fault, shapes_from
 from stereocell.validate_usd import validate_stage, validate_usdz
 from stereocell.write.bundle import FILES, MANIFEST
@@ -57,6 +59,7 @@ def check(out: Path) -> Iterator[CheckLine]:
     bundle = out / "bundle"
     checks: list[tuple[str, Callable[[], str]]] = [
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
+        *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
@@ -81,12 +84,19 @@ def _check_json(path: Path, schema: str, remedy: str) -> str:
     return f"{path.name} fits {schema}"
 
 
+def _check_tissue(out: Path) -> str:
+    """Check what `stereocell tissue` left; the bundle needs none of it."""
+    files = read_whole(out / FOLDER)["files"]
+    require_added(Store(out).plan())
+    return f"{RECORD} and {len(files)} files that it lists"
+
+
 def _check_stage(out: Path) -> str:
     store = Store(out)
     store.require_finished("stage")
     path = store.stage_file
     findings = validate_stage(path)
-    _raise_on([str(finding) for finding in findings])
+    raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"
 
 
@@ -95,7 +105,7 @@ def _check_usdz(path: Path) -> str:
         raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
     if not path.is_file():
         return f"no {path.name}: a specimen without surfaces has none"
-    _raise_on([str(finding) for finding in validate_usdz(path)])
+    raise_on([str(finding) for finding in validate_usdz(path)])
     return f"{path.name}: nothing found by the validators of usdz and by our own rules"
 
 
@@ -112,7 +122,7 @@ def _check_stage_files(out: Path) -> str:
             _WHOLE[path.suffix](path)
         except StereoCellError as error:
             problems.append(str(error))
-    _raise_on(problems)
+    raise_on(problems)
     copies = sum(path.suffix == ".stl" for path in paths)
     closed = f" and {copies} closed .stl" if copies else ""
     return f"{len(paths) - copies} volumes and lookup tables{closed} are whole"
@@ -150,7 +160,7 @@ def _check_volume_lists(bundle: Path) -> str:
                 problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
                 continue
             problems += _spoilt_levels(texture, volume)
-    _raise_on(problems)
+    raise_on(problems)
     return f"{volumes} volumes"
 
 
@@ -215,7 +225,7 @@ def _check_transfer2d(bundle: Path) -> str:
                 for i, shape in enumerate(shapes_from(content))
                 if (fault := find_fault(shape))
             ]
-    _raise_on(problems)
+    raise_on(problems)
     return f"{count} shapes"
 
 
@@ -239,7 +249,7 @@ def _check_tilesets(bundle: Path) -> str:
                     problems.append(f"{path}: {uri} has a larger geometricError than its parent")
         except (KeyError, TypeError) as error:
             problems.append(f"{path}: no 3D Tiles tileset: {error!r}")
-    _raise_on(problems)
+    raise_on(problems)
     return f"{contents} contents"
 
 
@@ -291,7 +301,7 @@ def _check_hashes(bundle: Path) -> str:
             expected = _measure(bundle / FILES)
         if entry != expected:
             problems.append(f"{reference['path']}: a reference to it has another hash")
-    _raise_on(sorted(problems))
+    raise_on(sorted(problems))
     return f"{len(listed)} files, {len(references)} references"
 
 
@@ -350,11 +360,12 @@ def _run_node(script_name: str, paths: list[Path]) -> str:
     if answer.returncode != 0:
         raise CheckError(f"{script_name} failed: {' '.join(answer.stderr.split())[-300:]}")
     results = json.loads(answer.stdout)
-    _raise_on([f"{result['path']}: {p}" for result in results for p in result["problems"]])
+    raise_on([f"{result['path']}: {p}" for result in results for p in result["problems"]])
     return f"{len(results)} files"
 
 
-def _raise_on(problems: list[str]) -> None:
+def raise_on(problems: list[str]) -> None:
+    """Raise CheckError with the first few of the problems, if there are any."""
     if problems:
         more = f" (and {len(problems) - _MOST_SHOWN} more)" if len(problems) > _MOST_SHOWN else ""
         raise CheckError("; ".join(problems[:_MOST_SHOWN]) + more)

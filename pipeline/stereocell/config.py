@@ -15,6 +15,7 @@ from typing import Any
 from stereocell.errors import UsageError
 from stereocell.isovalue import IsoValueOptions
 from stereocell.lod import LodOptions
+from stereocell.modality import MODALITIES
 from stereocell.options import AUTO, length_um, setting
 from stereocell.unwrap import UnwrapOptions
 
@@ -42,6 +43,9 @@ class PlanOptions:
     time: int = setting(0, "index into a time series")
     series: int = setting(0, "which series of DICOM, from 1 as --series list counts; 0: largest")
     spacing_um: tuple[float, ...] = setting((), "voxel spacing z, y, x, instead of the file's")
+    modality: str = setting(
+        "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
+    )
 
     def __post_init__(self) -> None:
         if self.max_voxels < 1:
@@ -54,6 +58,11 @@ class PlanOptions:
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(
                 f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0 (--spacing-um)"
+            )
+        if self.modality and self.modality not in MODALITIES:
+            raise UsageError(
+                f"plan.modality is {self.modality!r}, expected one of "
+                f"{', '.join(sorted(MODALITIES))}, or nothing"
             )
 
 

@@ -10,6 +10,7 @@ from jsonschema.exceptions import best_match
 
 from stereocell.assets import schema_path
 from stereocell.errors import OutputError
+from stereocell.mirror import bring
 from stereocell.write.atomic import write_bytes
 
 
@@ -21,6 +22,7 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
 
     Raises OutputError, which names file, field and remedy.
     """
+    bring(path)
     try:
         content = json.loads(path.read_bytes())
     except FileNotFoundError:

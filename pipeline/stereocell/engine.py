@@ -1,8 +1,14 @@
-"""Run a function over many tasks: inline, or on worker processes by the `distributed` client."""
+"""Run a function over many tasks: inline, on worker processes of this machine, or on a cluster.
+
+The last two are one path, the `distributed` client. A cluster is whatever answers at a scheduler's
+address: `dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or dask-kubernetes.
+Its workers have to see OUT and the input under the same paths, and to run the same StereoCell.
+"""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 from rich.console import Console
@@ -15,8 +21,10 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from stereocell.cluster import ClusterError, join
 from stereocell.errors import StereoCellError
 from stereocell.interrupts import children_ignore_interrupts
+from stereocell.mirror import carried, forget_scratch
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -29,10 +37,17 @@ class TasksFailedError(StereoCellError):
 
 
 class Engine:
-    """Worker processes for the length of a build; none with `workers` = 0 (for debugging)."""
+    """Workers for the length of a build.
 
-    def __init__(self, workers: int) -> None:
+    workers    processes of this machine; 0: none, tasks run inline (for debugging)
+    scheduler  address (`tcp://...`) or scheduler file of a running cluster, which is used instead
+    shared     a file that the cluster's workers have to see: it lies in OUT
+    """
+
+    def __init__(self, workers: int, scheduler: str = "", shared: Path | None = None) -> None:
         self.workers = workers
+        self._scheduler = scheduler
+        self._shared = shared
         self._client: Any = None
 
     def run(
@@ -51,7 +66,7 @@ class Engine:
                         results[place] = result
                     else:
                         failures[place] = _in_words(error)
-                    advance(error is not None)
+                    advance(tasks[place][0], error is not None)
         except KeyboardInterrupt:
             self.close()  # now: workers would go on writing into folders that are being removed
             raise
@@ -68,7 +83,7 @@ class Engine:
     def _outcomes(
         self, function: Callable[[T], R], tasks: Sequence[T]
     ) -> Iterator[tuple[int, Any, BaseException | None]]:
-        if self.workers == 0 or len(tasks) < 2:
+        if not self._scheduler and (self.workers == 0 or len(tasks) < 2):
             for place, task in enumerate(tasks):
                 try:
                     result = function(task)
@@ -80,27 +95,28 @@ class Engine:
         from distributed import as_completed
 
         client = self._start()
-        futures = {
-            client.submit(function, task, pure=False): place for place, task in enumerate(tasks)
-        }
+        work, settle = carried(function)
+        futures = {client.submit(work, task, pure=False): place for place, task in enumerate(tasks)}
         suspects = []
         for future in as_completed(futures):
-            failure = future.exception()
+            failure = _failure_of(future)
             if _is_killed(failure):
                 suspects.append(futures[future])
             else:
-                yield futures[future], None if failure else future.result(), failure
+                yield futures[future], None if failure else settle(future.result()), failure
             future.release()
         # whoever waited on a worker when another task killed it is blamed too: each once more, by
         # itself, and only the one to blame fails again
         for place in sorted(suspects):
-            future = client.submit(function, tasks[place], pure=False)
-            failure = future.exception()
-            yield place, None if failure else future.result(), failure
+            future = client.submit(work, tasks[place], pure=False)
+            failure = _failure_of(future)
+            yield place, None if failure else settle(future.result()), failure
             future.release()
 
     def _start(self) -> Any:
-        if self._client is None:
+        if self._client is None and self._scheduler:
+            self._client = join(self._scheduler, self._shared)
+        elif self._client is None:
             from distributed import Client
             from distributed.gc import disable_gc_diagnosis
 
@@ -120,9 +136,24 @@ class Engine:
 
     def close(self) -> None:
         if self._client is not None:
+            cluster = self._client.cluster  # None of one that others started: it stays
+            if cluster is None:
+                forget_scratch(self._client)
             self._client.close()
-            self._client.cluster.close()
+            if cluster is not None:
+                cluster.close()
             self._client = None
+
+
+def _failure_of(future: Any) -> BaseException | None:
+    """Return why a task failed, or None; of a scheduler that is gone, that it is."""
+    from distributed import CancelledError
+
+    try:
+        failure: BaseException | None = future.exception()
+    except CancelledError:
+        return ClusterError("the cluster's scheduler is gone: the same command goes on from here")
+    return failure
 
 
 def _is_killed(error: BaseException | None) -> bool:
@@ -145,8 +176,22 @@ def _in_words(error: BaseException) -> str:
 
 
 @contextmanager
-def _progress(label: str, total: int) -> Iterator[Callable[[bool], None]]:
-    """Yield a function to call once a task is over, with whether it failed."""
+def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
+    """Yield a function to call once a task is over, with its name and whether it failed.
+
+    A bar on a terminal; elsewhere, as in a log, a line for each task.
+    """
+    if not console.is_terminal:
+        done = 0
+
+        def tell(name: str, failure: bool) -> None:
+            nonlocal done
+            done += 1
+            end = ": failed" if failure else ""
+            console.print(f"{label}: {done}/{total} {name}{end}", markup=False)
+
+        yield tell
+        return
     failed = 0
     with Progress(
         TextColumn("{task.description:<9}"),
@@ -159,7 +204,7 @@ def _progress(label: str, total: int) -> Iterator[Callable[[bool], None]]:
     ) as progress:
         bar = progress.add_task(label, total=total, failures="")
 
-        def advance(failure: bool) -> None:
+        def advance(_: str, failure: bool) -> None:
             nonlocal failed
             failed += failure
             progress.update(bar, advance=1, failures=f"[red]{failed} failed" if failed else "")

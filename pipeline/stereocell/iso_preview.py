@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from stereocell.build import settle
 from stereocell.config import Settings
 from stereocell.errors import NoSurfaceError, UsageError
 from stereocell.isovalue import ADAPTIVE, CRITERIA, IsoValue
+from stereocell.phases import settle
 from stereocell.plan import Channel, Plan
 from stereocell.report.slices import VIEWS, Color, Slice, find_font, paint_slices
 from stereocell.rounds import display_task, iso_task

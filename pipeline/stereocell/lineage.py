@@ -9,7 +9,7 @@ import ast
 import hashlib
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
@@ -51,18 +51,27 @@ def _lineage(module: str) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]
     waiting = [module]
     while waiting:
         name = waiting.pop()
+        if name == _NAME:
+            continue  # the package's own names are for its users: nothing is made by them
         if name.split(".")[0] != _NAME:
             foreign.add(name.split(".")[0])
             continue
         file = _source(name)
         if file is not None and file not in found:
             found[file] = None
-            found.update(dict.fromkeys(_assets(file)))
-            waiting += _imports(file)
-    known = packages_distributions()  # a lone extension module isn't in it: it has its own name
+            assets, imports = _needs(file)
+            found.update(dict.fromkeys(assets))
+            waiting += imports
+    known = _distributions()  # a lone extension module isn't in it: it has its own name
     tops = foreign - sys.stdlib_module_names
     names = {name for top in tops for name in known.get(top, (top,))}
     return tuple(sorted(found)), tuple((name, version(name)) for name in sorted(names))
+
+
+@cache
+def _distributions() -> Mapping[str, list[str]]:
+    """Return the names of the installed packages by what they are imported as: a second's work."""
+    return packages_distributions()
 
 
 def _source(name: str) -> Path | None:
@@ -72,17 +81,24 @@ def _source(name: str) -> Path | None:
     return next((file for file in candidates if file.is_file()), None)
 
 
-def _assets(file: Path) -> Iterator[Path]:
+@cache
+def _needs(file: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """Return what ships beside the code and the modules that a file of ours names."""
+    tree = ast.parse(file.read_bytes())
+    return tuple(_assets(tree)), tuple(_imports(tree))
+
+
+def _assets(tree: ast.Module) -> Iterator[Path]:
     """Yield the files that ship beside the code and that a module finds by a literal name."""
-    calls = (n for n in ast.walk(ast.parse(file.read_bytes())) if isinstance(n, ast.Call))
+    calls = (n for n in ast.walk(tree) if isinstance(n, ast.Call))
     for call in calls:
         if ast.unparse(call.func) == "find_asset" and isinstance(call.args[0], ast.Constant):
             asset = find_asset(str(call.args[0].value))
             yield from asset.rglob("*.*") if asset.is_dir() else [asset]
 
 
-def _imports(file: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(file.read_bytes())):
+def _imports(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:

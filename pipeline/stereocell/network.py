@@ -11,6 +11,7 @@ Output  float32 (1, K, D, H, W): probabilities, or anything else is taken for lo
 import hashlib
 import itertools
 import json
+import re
 from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.metadata import version
@@ -70,8 +71,7 @@ class Network:
                 content, options, providers=["CPUExecutionProvider"]
             )
         except _errors() as error:
-            reason = " ".join(str(error).split())[:200]
-            raise SourceError(f"{path}: {reason}, expected an ONNX model") from None
+            raise SourceError(f"{path}: {_why(error)}, expected an ONNX model") from None
         patch = _patch(path, session)
         tried = _run(str(path), session, np.zeros(patch, np.float32))
         names = _names(path, session, tried.shape[0])
@@ -125,6 +125,14 @@ def _errors() -> tuple[type[Exception], ...]:
     return (*found, RuntimeError, ValueError)
 
 
+def _why(error: Exception) -> str:
+    """Return what the runtime says without its own name and codes; files of no model say little."""
+    text = " ".join(str(error).split())
+    if "protobuf" in text:  # it couldn't be parsed, or holds no graph
+        return "found another kind of file"
+    return re.sub(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ", "", text)[:200]
+
+
 def _starts(length: int, patch: int) -> list[int]:
     """Return where patches begin that half overlap; the last one ends where the axis does."""
     step = max(1, patch // 2)
@@ -163,8 +171,7 @@ def _run(where: str, session: Any, patch: Field) -> Field:
     try:
         (found,) = session.run(None, {session.get_inputs()[0].name: patch[None, None]})
     except _errors() as error:
-        reason = " ".join(str(error).split())[:200]
-        raise SourceError(f"{where}: failed on a patch of {patch.shape}: {reason}") from None
+        raise SourceError(f"{where}: failed on a patch of {patch.shape}: {_why(error)}") from None
     result = np.asarray(found)
     shape = result.shape
     is_fit = len(shape) == 5 and shape[0] == 1 and shape[2:] == patch.shape

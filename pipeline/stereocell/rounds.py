@@ -4,23 +4,24 @@ Round one finds each channel's window, dataset-wide, and an iso-value for each (
 Round two builds meshes and volumes. Every result lies under a name that says what it depends on.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
 from stereocell import tasks as maker
 from stereocell.agreement import Agreed, agree, find_neighbours
 from stereocell.alphawrap import find_wrapper
+from stereocell.as_planned import require_added, require_input
 from stereocell.calm import plan_for
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.engine import Engine
-from stereocell.errors import SourceError, UsageError
+from stereocell.errors import UsageError
 from stereocell.isovalue import ADAPTIVE
 from stereocell.latticefield import LatticeField, make_iso_field
 from stereocell.lineage import key_of
 from stereocell.plan import Channel, Plan
 from stereocell.repair import RepairOptions
-from stereocell.sources import open_source, source_of
+from stereocell.sources import source_of
 from stereocell.store import Store
 from stereocell.survey import Display, display_from_json, display_to_json, make_look
 from stereocell.tasks import DisplayTask, IsoTask, UnitTask, run_display, run_unit, write_iso
@@ -46,13 +47,33 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> tu
     """
     wanted = {(tile_id, channel.id) for tile_id, channel in _select(plan, only)}
     content = _survey(store, plan, engine)
+    tasks, keys, others = [], {}, 0
+    for name, task, key in unit_tasks(store, plan, content):
+        keys[name] = key
+        if is_whole(task.directory):
+            continue
+        tile_id, channel_id = name.split("/")
+        if (tile_id, channel_id) in wanted:
+            channel = next(channel for channel in plan.channels if channel.id == channel_id)
+            tasks.append((f"{tile_id}/{channel.name}", task))
+        else:
+            others += 1
+    _run(plan, engine, "units", run_unit, tasks)
+    if not others:  # all there: the stage may be made of them
+        store.save_units(plan, keys)
+    return len(tasks), others
+
+
+def unit_tasks(
+    store: Store, plan: Plan, content: Mapping[str, Any]
+) -> Iterator[tuple[str, UnitTask, str]]:
+    """Yield `<tile>/<channel>`, task and key of every unit; `content` is what survey.json holds."""
     displays = {id_: display_from_json(entry["display"]) for id_, entry in content.items()}
     fields = {
         channel_id: make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
         for channel_id, entry in content.items()
     }
     plans = {id_: plan_for(plan, entry["look"]["surface"]) for id_, entry in content.items()}
-    tasks, keys, others = [], {}, 0
     for tile_id, channel in _select(plan, None):
         display = displays[channel.id]
         painter = plan.painter(channel)
@@ -61,17 +82,7 @@ def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> tu
         field = fields[channel.id]
         repair = RepairOptions(**content[channel.id]["repair"])
         task, key = _unit_task(store, as_built, tile_id, channel, field, repair, display, painted)
-        keys[f"{tile_id}/{channel.id}"] = key
-        if is_whole(task.directory):
-            continue
-        if (tile_id, channel.id) in wanted:
-            tasks.append((f"{tile_id}/{channel.name}", task))
-        else:
-            others += 1
-    _run(plan, engine, "units", run_unit, tasks)
-    if not others:  # all there: the stage may be made of them
-        store.save_units(plan, keys)
-    return len(tasks), others
+        yield f"{tile_id}/{channel.id}", task, key
 
 
 def _run(
@@ -84,20 +95,8 @@ def _run(
     """Run tasks that read the source; it must be the one that was planned."""
     if not tasks:
         return []
-    found = open_source(source_of(plan)).fingerprint
-    if found != plan.fingerprint:
-        raise SourceError(
-            f"{plan.name}: changed since it was planned (fingerprint {found[:12]}, expected "
-            f"{plan.fingerprint[:12]}): plan into another OUT"
-        )
-    for channel in plan.channels:
-        if channel.source and open_source(source_of(plan, channel)).fingerprint != (
-            channel.fingerprint
-        ):
-            raise SourceError(
-                f"{channel.source}: channel {channel.name!r} changed since it was planned: run the "
-                "command again that made it (`stereocell tissue OUT`)"
-            )
+    require_input(plan)
+    require_added(plan)
     return engine.run(label, function, tasks)
 
 

@@ -25,6 +25,7 @@ from starlette.types import ASGIApp
 from stereocell.errors import StereoCellError
 from stereocell.serve_access import Access, Gate
 from stereocell.serve_bricks import BrickEndpoint
+from stereocell.serve_deadline import HeadDeadline
 from stereocell.serve_files import BundleFiles
 from stereocell.serve_lan import draw_qr, explain, find_addresses, find_names, make_certificate
 from stereocell.serve_library import BrickLibrary
@@ -110,7 +111,7 @@ class BundleServer:
             log_level="error",
             access_log=False,
             server_header=False,
-            http="h11",
+            http=HeadDeadline,
             ws="websockets-sansio",
             ws_max_size=MESSAGE_BYTES,
             ws_per_message_deflate=False,  # bricks are compressed

@@ -70,7 +70,8 @@ class Access:
         elif scope["type"] == "http":
             await answer(scope, receive, send)
         else:
-            await WebSocket(scope, receive, send).send_denial_response(answer)
+            # 403 without a word: after a response of its own uvicorn logs a fault that is none
+            await WebSocket(scope, receive, send).close()
 
     def _judge(self, scope: Scope) -> Response | None:
         """Return the answer to a request that goes no further, or None."""

@@ -4,8 +4,10 @@ A file is named by the hash of what it is made of: the volume's KTX2 file, the t
 version. So a second start builds nothing, and a bundle that was written anew is noticed. Files
 that no volume of the bundle calls for are removed when one is built.
 
-The threshold is the largest intensity that every transfer function of the channel leaves
-invisible: what is left out can't be seen with any of them.
+The threshold is the largest intensity that the channel's transfer function leaves invisible, the
+one that is chosen in the stage and that a viewer opens with. Of all of them it would be the lowest,
+which mostly is that of a function that nobody looks at; a viewer that is switched to one that shows
+more takes the volume's KTX2 file instead.
 """
 
 import hashlib
@@ -219,13 +221,13 @@ def _key(volume: Volume) -> tuple[str, str]:
     return volume.tile, volume.channel
 
 
-def invisible_below(lut: NDArray[np.uint8]) -> int:
-    """Return the largest intensity that no row of a table, uint8 (rows, 256, 4), shows; -1: none.
+def invisible_below(row: NDArray[np.uint8]) -> int:
+    """Return the largest intensity that a row of a table, uint8 (256, 4), leaves at 0; -1: none.
 
     Texel k stands for intensity k; between texels opacity runs linearly, so what lies at or below
     the last texel before the first opaque one is invisible.
     """
-    shown = (lut[..., 3] > 0).any(axis=0)
+    shown = row[:, 3] > 0
     first = int(shown.argmax()) if shown.any() else 255
     return min(first, 255) - 1
 
@@ -240,9 +242,14 @@ def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
             lut = decode_finest(_read(bundle, channel["lut"]))[0]
         except SourceError as error:
             raise SourceError(f"{name}: {error}: {_REMEDY}") from None
-        if lut.shape[1:] != (256, 4):
-            raise SourceError(f"{name}: {lut.shape} texels, expected 256 RGBA: {_REMEDY}")
-        threshold = invisible_below(lut)
+        names = channel["transfer_functions"]
+        if lut.shape != (len(names), 256, 4):
+            wanted = f"{len(names)} rows of 256 RGBA"
+            raise SourceError(f"{name}: {lut.shape} texels, expected {wanted}: {_REMEDY}")
+        if channel["transfer_function"] not in names:
+            chosen = channel["transfer_function"]
+            raise SourceError(f"{MANIFEST}: {chosen} is none of {', '.join(names)}: {_REMEDY}")
+        threshold = invisible_below(lut[names.index(channel["transfer_function"])])
         for entry in listed["volumes"]:
             found[entry["tile"], channel["id"]] = Volume(
                 entry["tile"], channel["id"], entry, threshold

@@ -9,6 +9,7 @@ MAX_TREES = 1024
 MAX_CONNECTIONS = 128
 MESSAGES_PER_S = 100  # but for acks
 ACKS_PER_S = 5000
+HEAD_S = 10.0  # for the head of an HTTP request
 HELLO_S = 10.0
 ACK_S = 60.0
 _REASON_BYTES = 120  # RFC 6455: a close frame has room for 123

@@ -7,6 +7,7 @@ The window is found as a build finds it, so that 0 and 255 mean the same here as
 """
 
 import json
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from stereocell.config import Settings, SurfaceOptions
 from stereocell.errors import OutputError, UsageError
 from stereocell.placement import IDENTITY
 from stereocell.plan import Plan
@@ -29,6 +31,12 @@ FORMAT, VERSION = "stereocell-slices", 1
 # where a slice's axes run, for a source whose place in a body is known
 ANATOMICAL = {"slices": "anterior", "rows": "inferior", "columns": "left"}
 UNKNOWN = {"slices": "towards the viewer", "rows": "down", "columns": "right"}
+
+
+def without_surface(settings: Settings) -> Settings:
+    """Return settings whose lengths of surfaces, which slices don't have, suit all voxels."""
+    lengths = {f.name: 0.0 for f in fields(SurfaceOptions) if f.name.endswith("_um")}
+    return replace(settings, surface=SurfaceOptions(**lengths))  # type: ignore[arg-type]
 
 
 def write_slices(plan: Plan, folder: Path) -> int:

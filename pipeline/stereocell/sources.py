@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 from stereocell import read
+from stereocell.mirror import bring
 from stereocell.plan import Channel, Plan
 
 
@@ -24,6 +26,7 @@ class SourceRef:
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
+    bring(Path(ref.source))  # an added channel's lies in OUT
     if not ref.spacing_um:
         return read.open(ref.source, time=ref.time, series=ref.series)
     z, y, x = ref.spacing_um

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from stereocell.mirror import at_hand
 from stereocell.plan import Plan
 from stereocell.specimen import ChannelContent, PaintColors, TileContent
 from stereocell.store import Store
@@ -49,10 +50,11 @@ def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) ->
 
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units. Raises OutputError."""
-    channels = tuple(
-        ChannelContent(
-            channel_id, load_lods(folder), load_volume(folder), paint, find_closed(folder)
+    with at_hand(*(folder for _, folder, _ in task.units)):
+        channels = tuple(
+            ChannelContent(
+                channel_id, load_lods(folder), load_volume(folder), paint, find_closed(folder)
+            )
+            for channel_id, folder, paint in task.units
         )
-        for channel_id, folder, paint in task.units
-    )
-    usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
+        usd.write_tile(task.stage_dir, replace(task.content, channels=channels))

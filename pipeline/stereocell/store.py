@@ -5,8 +5,9 @@ written under a temporary name and renamed: a killed run resumes, a finished one
 """
 
 import os
-import shutil
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,14 @@ from stereocell import plan as plan_module
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
 from stereocell.lineage import key_of
+from stereocell.mirror import remove, sizes_below
 from stereocell.plan import Plan, from_json, to_json
+from stereocell.processes import is_alive
 from stereocell.write.atomic import write_bytes
 
 _PLAN = "plan.schema.json"
 _PHASES = "units.schema.json#Phases"
+_TEMPORARY = re.compile(r"\..+\.(\d{1,9})(\.[A-Za-z]\w*)?")  # as write/atomic.py names them
 _RUN_UNITS = "run `stereocell units OUT` first"
 
 
@@ -50,6 +54,13 @@ class Store:
                 f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
             ) from None
 
+    def remove_temporaries(self) -> None:
+        """Remove the files that killed processes were writing; folders are replaced anyway."""
+        for file in self.out.rglob(".*"):
+            name = _TEMPORARY.fullmatch(file.name)
+            if name is not None and file.is_file() and not is_alive(int(name[1])):
+                file.unlink(missing_ok=True)
+
     # --- the plan
 
     def save_plan(self, plan: Plan) -> bool:
@@ -65,7 +76,7 @@ class Store:
                 f"{self.out} holds a build of {_what_differs(there, plan)}: "
                 "choose another OUT or remove that folder"
             )
-        write_json(self.plan_file, to_json(plan))
+        write_json(self.plan_file, to_json(self._without_place(plan)))
         return True
 
     def plan(self) -> Plan:
@@ -73,7 +84,21 @@ class Store:
         remedy = "run `stereocell plan INPUT -o OUT` first"
         if self.plan_file.exists():
             remedy = f"remove it and {remedy}"
-        return from_json(read_json(self.plan_file, _PLAN, remedy))
+        return self._in_place(from_json(read_json(self.plan_file, _PLAN, remedy)))
+
+    def _without_place(self, plan: Plan) -> Plan:
+        """Return a plan whose channels' own sources, where they lie in OUT, are told from there."""
+        root = self.out.resolve()
+
+        def told(source: str) -> str:
+            inside = source and Path(source).is_relative_to(root)
+            return Path(source).relative_to(root).as_posix() if inside else source
+
+        return _with_sources(plan, told)
+
+    def _in_place(self, plan: Plan) -> Plan:
+        root = self.out.resolve()
+        return _with_sources(plan, lambda source: str(root / source) if source else source)
 
     # --- results of the units' two rounds
 
@@ -97,12 +122,15 @@ class Store:
     def save_units(self, plan: Plan, keys: Mapping[str, str]) -> None:
         """Keep the units' keys, and which plan they were built for."""
         write_json(self.index_file, dict(keys))
-        write_bytes(self.units_plan_file, _key(plan).encode())
+        write_bytes(self.units_plan_file, self._key(plan).encode())
+
+    def _key(self, plan: Plan) -> str:
+        return key_of(to_json(self._without_place(plan)), plan_module)
 
     def require_units_of(self, plan: Plan) -> None:
         """Raise OutputError unless all units of the plan are known to be there."""
         signed = self.units_plan_file
-        if not signed.is_file() or signed.read_bytes() != _key(plan).encode():
+        if not signed.is_file() or signed.read_bytes() != self._key(plan).encode():
             raise OutputError(
                 f"{self.out / 'units'}: not built for the plan in {self.plan_file.name}: "
                 f"{_RUN_UNITS}"
@@ -118,9 +146,9 @@ class Store:
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
         """Remove the folders in `parent` that an earlier plan left."""
-        for folder in parent.iterdir():
-            if folder.is_dir() and folder.name not in keep:
-                shutil.rmtree(folder)
+        names = {file.relative_to(parent).parts for file in sizes_below(parent)}
+        for name in {parts[0] for parts in names if len(parts) > 1} - keep:
+            remove(parent / name)
 
     # --- the phases
 
@@ -141,8 +169,9 @@ class Store:
         write_json(self.phases_file, {**self.phases(), name: entry})
 
 
-def _key(plan: Plan) -> str:
-    return key_of(to_json(plan), plan_module)
+def _with_sources(plan: Plan, change: Callable[[str], str]) -> Plan:
+    channels = (replace(one, source=change(one.source)) for one in plan.channels)
+    return replace(plan, channels=tuple(channels))
 
 
 def _what_differs(there: Plan, plan: Plan) -> str:

@@ -30,6 +30,7 @@ from stereocell.latticefield import LatticeField
 from stereocell.read import Dataset
 from stereocell.sources import SourceRef, open_source
 from stereocell.survey import Display, find_display
+from stereocell.threshold import Histogram, make_histogram
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput, build_unit
 from stereocell.unit_files import save_unit
@@ -37,6 +38,10 @@ from stereocell.volume import Volume
 from stereocell.wrap import sum_solids
 
 SURVEY_VOXELS = 16_000_000  # a channel's window is found on at most about so many
+# Peaks of the histogram are told from chance by their counts: of a head of 384 x 384 x 274 voxels
+# the second-highest stands 6.5 deviations high with all of them, 3.7 with every third plane
+COUNTED_VOXELS = 64_000_000
+COUNTED_PLANES = 16  # at once
 JOINT_VOXELS = 8_000_000  # and its boundaries on so many at full resolution
 
 
@@ -104,7 +109,20 @@ def run_display(task: DisplayTask) -> Display:
             float(surface.background_um),
         )
     display = find_display(voxels, task.settings.window, background, task.window)
+    if len(voxels) < task.region.shape[0] and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
+        display = replace(display, values=_count_values(task, dataset, display.window))
     return replace(display, proposal=_propose(task, dataset, display.window))
+
+
+def _count_values(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -> Histogram:
+    """Return the histogram of all voxels of the region within the window."""
+    (z0, *start), (z1, *stop) = task.region.start, task.region.stop
+    counts: list[NDArray[np.int64]] = []
+    for z in range(z0, z1, COUNTED_PLANES):
+        box = Box((z, start[0], start[1]), (min(z + COUNTED_PLANES, z1), stop[0], stop[1]))
+        part = make_histogram(dataset.read(task.channel, box, task.level).voxels, window)
+        counts.append(np.array(part.counts))
+    return replace(part, counts=tuple(int(n) for n in np.sum(counts, axis=0)))
 
 
 def _propose(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -> Proposal:
@@ -115,7 +133,7 @@ def _propose(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -
         around = box.grown((1, 1, 1), task.region)
         voxels = dataset.read(task.channel, around, task.level).voxels
         fine += count_joint(to_eight_bits(voxels, window), spacing, STEEPEST, FINE_ROWS)
-    return propose(fine)
+    return propose(fine, spacing)
 
 
 def _voxels(task: DisplayTask, dataset: Dataset, level: int) -> int:

@@ -8,9 +8,11 @@ Where that is open it is read so:
   exist: no bins of zero are made up, which would push a peak at the end (the air round a head)
   away from it.
 - peak: a bin that both sides fall away from; a plateau is one peak, at its middle; at an end of the
-  histogram one side is enough. Over a spike narrower than the window the mean is flat but for
-  chance, and chance has peaks of its own: one counts if the way up from the saddle to any higher
-  one is at least MIN_PROMINENCE of its height.
+  histogram one side is enough. Counting has peaks of its own, where the mean is flat but for
+  chance: in thin tails, and over a spike narrower than the window. A peak counts if chance does not
+  make it: if the way up from the saddle to any higher one is more than CHANCE standard deviations
+  of the difference of two means of Poisson counts over the window, sqrt(2 height / its bins), of a
+  height of at least one voxel. However low it is beside the others, what is left is a peak.
 - second-highest: by the smoothed height. Of equal ones the darker comes first, as air does.
 - the peak before it: the next one of lower intensity, whichever its height. In a head that is the
   air, the highest of all. Where nothing lies before it (bright air, dark bodies) the threshold
@@ -32,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 WINDOW_SHARE = 0.10  # of the histogram's length
-MIN_PROMINENCE = 0.05
+CHANCE = 5.0  # standard deviations
 BINS = 256
 Reading = Literal["two peaks", "no peak before", "single peak"]
 
@@ -65,6 +67,7 @@ class Threshold:
     between   the two of them that the value lies between; one, if there is only one
     smoothed  (bins,) the mean over the moving window
     reading   how the rule applied
+    chance    levels of the peaks that were left out, which counting alone may have made
     """
 
     value: float
@@ -72,6 +75,7 @@ class Threshold:
     between: tuple[float, ...]
     smoothed: NDArray[np.float64]
     reading: Reading
+    chance: tuple[float, ...]
 
 
 def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogram:
@@ -101,7 +105,7 @@ def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
     if np.count_nonzero(counts) < 2 or counts.min() == counts.max():
         return None
     smoothed = smooth(counts)
-    peaks = _find_peaks(smoothed)
+    peaks, chance = _find_peaks(smoothed)
     if not peaks:
         return None
 
@@ -125,29 +129,37 @@ def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
         tuple(level(peak) for peak in between),
         smoothed,
         reading,
+        tuple(level(peak) for peak in chance),
     )
 
 
 def smooth(counts: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean over a window of WINDOW_SHARE of the bins, an odd number, at least one."""
-    half = int(WINDOW_SHARE * len(counts)) // 2
     sums = np.concatenate([[0.0], np.cumsum(counts)])
-    bins = np.arange(len(counts))
-    first, stop = np.maximum(bins - half, 0), np.minimum(bins + half + 1, len(counts))
+    first, stop = _windows(len(counts))
     mean: NDArray[np.float64] = (sums[stop] - sums[first]) / (stop - first)
     return mean
 
 
-def _find_peaks(heights: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the middles (bins, halves too) of the peaks that stand out, rising."""
+def _windows(bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the window of each bin begins and ends, cut at the histogram's ends."""
+    half = int(WINDOW_SHARE * bins) // 2
+    at = np.arange(bins, dtype=np.int64)
+    return np.maximum(at - half, 0), np.minimum(at + half + 1, bins)
+
+
+def _find_peaks(heights: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the middles (bins, halves too) of the peaks that count, and of chance's; rising."""
     starts = np.flatnonzero(np.diff(heights, prepend=np.nan) != 0)  # of runs of equal heights
     stops = np.append(starts[1:], len(heights))
     runs = heights[starts]
     if len(runs) == 1:
-        return ()
+        return (), ()
+    first, stop = _windows(len(heights))
     padded = np.concatenate([[-np.inf], runs, [-np.inf]])
     tops = np.flatnonzero((runs > padded[:-2]) & (runs > padded[2:]))
-    found = []
+    found: list[float] = []
+    chance: list[float] = []
     for top in tops:
         saddles = []
         for side in (runs[top::-1], runs[top:]):
@@ -155,9 +167,11 @@ def _find_peaks(heights: NDArray[np.float64]) -> tuple[float, ...]:
             if len(higher):
                 saddles.append(side[: higher[0]].min())
         saddle = max(saddles, default=0.0)
-        if runs[top] - saddle >= MIN_PROMINENCE * runs[top]:
-            found.append((starts[top] + stops[top] - 1) / 2)
-    return tuple(float(place) for place in found)
+        place = float(starts[top] + stops[top] - 1) / 2
+        deviation = np.sqrt(2 * max(runs[top], 1.0) / (stop - first)[int(place)])
+        is_real = runs[top] - saddle > CHANCE * deviation
+        (found if is_real else chance).append(place)
+    return tuple(found), tuple(chance)
 
 
 def _valley(heights: NDArray[np.float64], first: int, last: int) -> float:

@@ -15,22 +15,29 @@ from numpy.typing import NDArray
 
 from stereocell import network as network_module
 from stereocell import tissue
-from stereocell.build import provenance
-from stereocell.documents import find_json, write_json
+from stereocell.as_planned import require_input
+from stereocell.documents import write_json
 from stereocell.engine import console
-from stereocell.errors import SourceError, UsageError
+from stereocell.errors import OutputError, SourceError, UsageError
 from stereocell.lineage import key_of, libraries_of
 from stereocell.network import Network, apply_network
+from stereocell.phases import provenance
 from stereocell.plan import PALETTE, Channel, Plan
 from stereocell.sources import SourceRef, open_source, source_of
 from stereocell.store import Store
 from stereocell.tissue import AUTO_CLASSES, TissueOptions, learn_tissue
+from stereocell.tissue_files import (
+    FOLDER,
+    RECORD,
+    VOXELS,
+    digests_of,
+    read_whole,
+    remove_remains,
+)
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.generator import GENERATOR
 from stereocell.write.ome_zarr import write_probabilities
 
-FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
-RECORD_SCHEMA = "tissue.schema.json"
 LEVEL = 127.5  # of 255: probability 1/2
 MOST_VOXELS = 250_000_000  # about 40 bytes each while learning
 # of three classes in a head, by rising T1 intensity; linear RGB
@@ -78,8 +85,8 @@ def parse_classes(text: str) -> int | Literal["auto"]:
 def add_tissue(out: Path, request: TissueRequest) -> Plan:
     """Learn the classes, write OUT/tissue, and put them into the plan in place of earlier ones.
 
-    Nothing is learned anew where OUT/tissue comes from the same voxels, options and code. Raises
-    StereoCellError; the plan is then as it was.
+    Nothing is learned anew where OUT/tissue comes from the same voxels, options and code and is
+    whole. Raises StereoCellError; plan and OUT/tissue are then as they were.
     """
     store = Store(out)
     plan = without_tissue(store.plan())
@@ -103,10 +110,10 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     region = [plan.region.start, plan.region.stop]
     depends = [source, region, channel.index, channel.name, settings]
     key = key_of(key_of(depends, tissue), network_module)
-    record = find_json(out / FOLDER / RECORD, RECORD_SCHEMA)
-    if record is not None and record["key"] == key and (out / FOLDER / VOXELS).is_dir():
-        console.print("tissue: up to date")
-    else:
+    remove_remains(out)
+    store.remove_temporaries()
+    record = _find_learned(out / FOLDER, key)
+    if record is None:
         record = _learn(store, plan, channel, options, network, settings, key)
     plan = with_tissue(plan, out, record)
     store.save_plan(plan)
@@ -126,18 +133,29 @@ def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
     """Return the plan with a channel for each class of OUT/tissue."""
     source = str((out / FOLDER / VOXELS).resolve())
     fingerprint = open_source(SourceRef(source, 0, ())).fingerprint
-    taken = {channel.name for channel in plan.channels}
+    _require_free([one["name"] for one in record["classes"]], plan)
     added = []
     for index, one in enumerate(record["classes"]):
-        if one["name"] in taken:
-            raise SourceError(
-                f"{plan.name}: has a channel {one['name']!r} of its own, expected none of that name"
-            )
         red, green, blue = one["color"]
         added.append(Channel(index, one["name"], (red, green, blue), source, fingerprint))
     values = {**plan.settings.iso_values, **{channel.name: LEVEL for channel in added}}
     settings = replace(plan.settings, iso_values=values)
     return replace(plan, channels=(*plan.channels, *added), settings=settings)
+
+
+def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
+    """Return the record of OUT/tissue if it is what `key` names, and whole; say what it is."""
+    if not folder.exists():
+        return None
+    try:
+        record = read_whole(folder)
+    except OutputError as fault:
+        console.print(f"tissue: {fault}", markup=False)
+        return None
+    if record["key"] != key:
+        return None
+    console.print("tissue: up to date")
+    return record
 
 
 def _learn(
@@ -149,6 +167,7 @@ def _learn(
     settings: dict[str, Any],
     key: str,
 ) -> dict[str, Any]:
+    require_input(plan)
     dataset = open_source(source_of(plan))
     volume = dataset.read(channel.index, plan.region, plan.level)
     if network is None:
@@ -168,6 +187,7 @@ def _learn(
             _colored(names, plan), intensities, found, strict=True
         )
     ]
+    _require_free([one.name for one in classes], plan)
     voxel_mm3 = math.prod(length / 1000 for length in plan.spacing_um)
     record: dict[str, Any] = {
         "format": "stereocell-tissue",
@@ -200,7 +220,7 @@ def _learn(
             plan.spacing_um,
             plan.origin_um,
         )
-        write_json(folder / RECORD, record)
+        write_json(folder / RECORD, {**record, "files": digests_of(folder)})
     open_source.cache_clear()  # another volume lies at the same address now
     return record
 
@@ -218,6 +238,16 @@ def _find_channel(plan: Plan, wanted: str) -> Channel:
         f"--channel is {wanted!r}, expected one of {', '.join(c.name for c in plan.channels)}, or "
         f"an index of {', '.join(str(c.index) for c in plan.channels)}"
     )
+
+
+def _require_free(names: Sequence[str], plan: Plan) -> None:
+    """Raise SourceError if a class has the name of one of the input's channels."""
+    taken = {channel.name for channel in plan.channels}
+    for name in names:
+        if name in taken:
+            raise SourceError(
+                f"{plan.name}: has a channel {name!r} of its own, expected none of that name"
+            )
 
 
 def _names(plan: Plan, count: int, is_brain: bool) -> list[str]:

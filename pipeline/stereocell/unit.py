@@ -17,7 +17,7 @@ from stereocell.levels import make_levels
 from stereocell.mesh import Lod, Mesh
 from stereocell.occlusion import find_openness
 from stereocell.paint import find_paint
-from stereocell.repair import RepairOptions, repair
+from stereocell.repair import Repaired, RepairOptions, repair
 from stereocell.specimen import APRON
 from stereocell.surface import cut_planes, extract_surface, signed_distance
 from stereocell.tiling import Box
@@ -133,16 +133,21 @@ def _thin(field: NDArray[np.float32], given: UnitInput, frame: _Frame) -> NDArra
     return np.ascontiguousarray(field[part])
 
 
-def _fine_surface(
-    volume: Volume,
-    given: UnitInput,
-    frame: _Frame,
-    iso: LatticeField,
-    painted: Volume | None,
-    clock: Clock,
-) -> tuple[Mesh, Closed | None, FineSurface, int, int]:
-    """Return the repaired surface, its closed copy, what maps are baked from, and the numbers of
-    fragments dropped and cavities filled.
+def find_surface(volume: Volume, given: UnitInput) -> Mesh:
+    """Return a unit's iso-surface, repaired, before any level of detail is made of it; it may be
+    empty. The same numbers as in `build_unit`.
+    """
+    if given.iso is None:
+        nothing = np.zeros((0, 3), np.float32)
+        return Mesh(nothing, np.zeros((0, 3), np.uint32), nothing)
+    frame = _frame(volume.spacing_um, given)
+    return _extract(*_repaired(volume, given, frame, given.iso, Clock()), given, frame, Clock())
+
+
+def _repaired(
+    volume: Volume, given: UnitInput, frame: _Frame, iso: LatticeField, clock: Clock
+) -> tuple[Repaired, bool]:
+    """Return the repaired distance, and whether gaps are still to be closed by triangles.
 
     A function of its own: its float32 copies of the window are gone when levels are made.
     """
@@ -162,15 +167,43 @@ def _fine_surface(
         options = (
             replace(given.repair, alpha_um=0.0, offset_um=0.0) if by_triangles else given.repair
         )
-        repaired = repair(distance, spacing, options)
+        return repair(distance, spacing, options), by_triangles
+
+
+def _extract(
+    repaired: Repaired, by_triangles: bool, given: UnitInput, frame: _Frame, clock: Clock
+) -> Mesh:
     with clock("extract"):
-        boxes = frame.window, frame.lattice
-        fine = extract_surface(repaired.distance, *boxes, frame.region, spacing, frame.origin_um)
+        fine = extract_surface(
+            repaired.distance,
+            frame.window,
+            frame.lattice,
+            frame.region,
+            frame.spacing_um,
+            frame.origin_um,
+        )
     if by_triangles and len(fine.triangles):
         with clock("wrap"):
             fine = alpha_wrap(fine, given.repair.alpha_um, given.repair.offset_um)
+    return fine
+
+
+def _fine_surface(
+    volume: Volume,
+    given: UnitInput,
+    frame: _Frame,
+    iso: LatticeField,
+    painted: Volume | None,
+    clock: Clock,
+) -> tuple[Mesh, Closed | None, FineSurface, int, int]:
+    """Return the repaired surface, its closed copy, what maps are baked from, and the numbers of
+    fragments dropped and cavities filled.
+    """
+    repaired, by_triangles = _repaired(volume, given, frame, iso, clock)
+    fine = _extract(repaired, by_triangles, given, frame, clock)
+    boxes, spacing = (frame.window, frame.lattice), frame.spacing_um
     closed = None
-    if surface.closed_tiles:
+    if given.settings.surface.closed_tiles:
         with clock("close"):
             error = given.settings.lod.errors[0] * min(volume.spacing_um)
             closed = close_tile(repaired.distance, *boxes, spacing, frame.origin_um, error)

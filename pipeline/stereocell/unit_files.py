@@ -17,6 +17,7 @@ from stereocell.closed import Closed
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
 from stereocell.mesh import Baked, Lod, Mesh, Quality, Spread
+from stereocell.mirror import bring, is_file, sizes_below
 from stereocell.unit import Unit
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.stl import write_stl
@@ -66,11 +67,8 @@ def is_whole(directory: Path) -> bool:
     record = find_json(directory / _RECORD, SCHEMA)
     if record is None:
         return False
-    try:
-        sizes = {name: (directory / name).stat().st_size for name in record["files"]}
-    except OSError:
-        return False
-    return bool(sizes == record["files"])
+    sizes = {file.name: size for file, size in sizes_below(directory).items()}
+    return bool(record["files"].items() <= sizes.items())
 
 
 def load_record(directory: Path) -> dict[str, Any]:
@@ -91,7 +89,7 @@ def lod_file(directory: Path, level: int) -> Path:
 def find_closed(directory: Path) -> Path | None:
     """Return the file of the unit's closed copy; None if it has none."""
     file = directory / _CLOSED
-    return file if file.exists() else None
+    return file if is_file(file) else None
 
 
 def load_lods(directory: Path) -> tuple[Lod, ...]:
@@ -111,6 +109,7 @@ def load_quality(stored: Mapping[str, Any]) -> Quality:
 
 def load_volume(directory: Path) -> NDArray[np.uint8]:
     """Return the 8-bit voxels (z, y, x), mapped from the file. Raises OutputError."""
+    bring(directory / _VOLUME)
     try:
         volume: NDArray[np.uint8] = np.load(directory / _VOLUME, mmap_mode="r")
     except (OSError, ValueError) as error:
@@ -119,6 +118,7 @@ def load_volume(directory: Path) -> NDArray[np.uint8]:
 
 
 def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
+    bring(lod_file(directory, level))
     # opened here: numpy leaves a damaged file open
     with lod_file(directory, level).open("rb") as file, np.load(file) as arrays:
         mesh = Mesh(

@@ -17,7 +17,7 @@ from skimage import measure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from phantoms import blurred_ball, write_ome_tiff
-from stereocell import build, config, denoise, lod, repair, surface
+from stereocell import config, denoise, lod, phases, repair, surface
 from stereocell.engine import Engine
 from stereocell.tiling import Box
 from stereocell.volume import Volume
@@ -99,11 +99,11 @@ def main() -> None:
         seconds = {}
         for workers in (1, 2):
             out = Path(folder) / str(workers)
-            build.make(str(source), out, config.load("cycif", None, {"plan": {"grid": "4x2"}}))
+            phases.make(str(source), out, config.load("cycif", None, {"plan": {"grid": "4x2"}}))
             engine = Engine(workers)
             engine.run("warm-up", abs, [("a", -1), ("b", -2)])
             start = time.perf_counter()
-            build.run_units(out, engine)
+            phases.run_units(out, engine)
             seconds[workers] = time.perf_counter() - start
             engine.close()
         print(f"units with 2 workers: {seconds[1] / seconds[2]:.2f} x as fast as with 1")

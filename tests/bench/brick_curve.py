@@ -1,9 +1,13 @@
 """How good a picture is after so many bytes: bricks by view against mip levels of the KTX2 file.
 
-    .venv/bin/python tests/bench/brick_curve.py [FOLDER OF DICOM FILES]
+    .venv/bin/python tests/bench/brick_curve.py [OUT | FOLDER OF DICOM FILES]
 
-Also: what building the tree takes, its size, and that it gives the volume back. PSNR is that of the
-volume as a client would sample it (tests/brick_client.py), against the volume, all in sight.
+Of a bundle as a build makes it: that of OUT, or one that is built of the images, by the preset mri,
+with its own surface and transfer functions (minutes). The first channel's largest volume is taken.
+
+Also: what building the tree takes, its size, and that it gives the volume back; its size for each
+of the channel's functions. PSNR is that of the volume as a client would sample it
+(tests/brick_client.py), against the volume, all in sight.
 """
 
 import json
@@ -20,36 +24,54 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from websockets.sync.client import connect
 
-from brick_bundles import write_mri
 from brick_client import BrickClient, look_at, psnr, reconstruct
 from stereocell.brick_stream import encode_tree
 from stereocell.bricks import mip_levels
+from stereocell.cli import main as stereocell
 from stereocell.read.ktx2 import decode_finest
 from stereocell.serve import BundleServer
-from stereocell.serve_library import BrickLibrary
+from stereocell.serve_library import BrickLibrary, Volume, invisible_below
 from stereocell.voxel_bvh import build, reassemble
 
 DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")) / "mri_t1_7t" / "dicoms"
 SHARES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
-def main(source: Path) -> None:
+def main(source: Path) -> int:
     with tempfile.TemporaryDirectory() as folder:
-        out = write_mri(Path(folder) / "out", source)
-        volume = BrickLibrary(out / "bundle", out / "bricks").volumes()["r0_c0", "CD31"]
+        out = source
+        if not (source / "bundle" / "manifest.json").is_file():
+            out = Path(folder) / "out"
+            status = stereocell(["build", str(source), "-o", str(out), "--preset", "mri"])
+            if status:
+                return status
+        # trees go elsewhere than OUT/bricks, so that they are built anew
+        library = BrickLibrary(out / "bundle", Path(folder) / "bricks")
+        manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+        channel = manifest["channels"][0]
+        volume = max(
+            (v for v in library.volumes().values() if v.channel == channel["id"]),
+            key=lambda v: int(np.prod(v.entry["size"])),
+        )
         texture = (out / "bundle" / volume.entry["file"]["path"]).read_bytes()
         voxels = decode_finest(texture)[..., 0]
+        print(f"tile {volume.tile}, channel {volume.channel}, drawn by its function", end=" ")
+        print(f"`{channel['transfer_function']}`")
         tell_build(voxels, volume.threshold, len(texture))
+        tell_functions(out / "bundle", channel, voxels, len(texture))
         shown = np.where(voxels > volume.threshold, voxels, 0)
         print(f"\nmip levels of the KTX2 file, coarse to fine ({len(texture):,} bytes)")
-        print(f"{'bytes':>12} {'PSNR dB':>8}")
+        print(f"{'bytes':>12} {'PSNR dB':>8} {'above threshold':>16}")
         spent = 0
         levels = mip_levels(voxels)
         for level, place in reversed(list(zip(levels, volume.entry["levels"], strict=True))):
             spent += place["length"]
             if min(level.shape) >= 8:
-                print(f"{spent:12,} {psnr(stretch(level, voxels.shape), voxels):8.2f}")
-        tell_stream(out, voxels, volume.threshold, shown)
+                drawn = stretch(level, voxels.shape)
+                seen = psnr(np.where(drawn > volume.threshold, drawn, 0), shown)
+                print(f"{spent:12,} {psnr(drawn, voxels):8.2f} {seen:16.2f}")
+        tell_stream(out, volume, voxels, shown)
+    return 0
 
 
 def tell_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
@@ -71,13 +93,22 @@ def tell_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
     print(f"texels that came back otherwise: {differs.mean():.4f} of all, above threshold: {above}")
 
 
-def tell_stream(out: Path, voxels: np.ndarray, threshold: int, shown: np.ndarray) -> None:
+def tell_functions(bundle: Path, channel: dict, voxels: np.ndarray, ktx2_bytes: int) -> None:
+    """Print what the tree would be, did the stage open with another function."""
+    rows = decode_finest((bundle / channel["lut"]["path"]).read_bytes())[0]
+    print(f"\n{'function':>12} {'threshold':>9} {'bytes':>12} {'of KTX2':>8}")
+    for name, row in zip(channel["transfer_functions"], rows, strict=True):
+        threshold = invisible_below(row)
+        size = len(encode_tree(build(voxels, threshold), bytes(16)))
+        print(f"{name:>12} {threshold:9} {size:12,} {size / ktx2_bytes:8.2f}")
+
+
+def tell_stream(out: Path, volume: Volume, voxels: np.ndarray, shown: np.ndarray) -> None:
     server = BundleServer(out, 0, lan=False)
     thread = Thread(target=server.run)
     thread.start()
     client = BrickClient()
-    middle = np.array([voxels.shape[2] / 2, -voxels.shape[1] / 2, voxels.shape[0] / 2])
-    camera = look_at(middle + np.array([0, 0, 2.0 * max(voxels.shape)]), middle)
+    camera = look_from_front(volume.entry)
     while not server.has_started:
         time.sleep(0.01)
     try:
@@ -90,11 +121,12 @@ def tell_stream(out: Path, voxels: np.ndarray, threshold: int, shown: np.ndarray
 
             stream.send('{"type": "hello", "version": 1}')
             start = time.perf_counter()
-            stream.send('{"type": "open", "volumes": [{"tile": "r0_c0", "channel": "CD31"}]}')
+            wanted = {"tile": volume.tile, "channel": volume.channel}
+            stream.send(json.dumps({"type": "open", "volumes": [wanted]}))
             until(lambda: client.is_ready(0))
             tree = client.trees[0]
             print(f"\nbricks by view, gaze in the middle (table {client.table_bytes:,} bytes,")
-            print(f"first `tree` after {time.perf_counter() - start:.2f} s, built then)")
+            print(f"first `tree` after {time.perf_counter() - start:.2f} s)")
             print(f"{'bytes':>12} {'bricks':>7} {'PSNR dB':>8} {'above threshold':>16} {'s':>6}")
             seconds = 0.0
             for id, share in enumerate(SHARES, 1):
@@ -105,14 +137,26 @@ def tell_stream(out: Path, voxels: np.ndarray, threshold: int, shown: np.ndarray
                 until(lambda id=id: id in client.done)
                 seconds += time.perf_counter() - start
                 drawn = reconstruct(tree.table, tree.frames)
-                seen = psnr(np.where(drawn > threshold, drawn, 0), shown)
+                seen = psnr(np.where(drawn > volume.threshold, drawn, 0), shown)
                 print(
                     f"{client.brick_bytes:12,} {len(tree.frames):7,} {psnr(drawn, voxels):8.2f}"
                     f" {seen:16.2f} {seconds:6.2f}"
                 )
+            left = tree.table.nodes["length"].astype(bool).sum() - len(tree.frames)
+            print(f"`{client.done[len(SHARES)]['reason']}`; never in sight, apron alone: {left}")
     finally:
         server.stop()
         thread.join()
+
+
+def look_from_front(entry: dict) -> dict:
+    """Return a camera with all of a volume in sight, from +z; boxes lie before the matrix."""
+    to_world = np.array(entry["matrix"]).reshape(4, 4).T
+    low, high = (np.array(entry["bounds_um"][key]) for key in ("min", "max"))
+    middle = (to_world @ np.append((low + high) / 2, 1))[:3]
+    diagonal = float(np.linalg.norm(to_world[:3, :3] @ (high - low)))
+    eye = middle + np.array([0, 0, 1.5 * diagonal])
+    return look_at(eye, middle, near=0.1 * diagonal, far=10 * diagonal)
 
 
 def stretch(level: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -129,4 +173,4 @@ def stretch(level: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else DATA)
+    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else DATA))

@@ -110,7 +110,7 @@ def _find(location: Location) -> Found:
             frames[f"{frame.file} {frame.index}".encode()] = frame
     if not frames:
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
-        many = f"{len(files)} files: " if root.is_dir() else ""
+        many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
             f"{many}{held or 'nothing'}; expected slices of MR, CT or the like"

@@ -11,6 +11,8 @@ class Encoding:
 
     bits, high_bit  of the value inside its container of `allocated` bits; 0 bits: floats
     is_inverted     MONOCHROME1: the lowest value is the brightest
+    padding         lowest and highest stored value that are no part of the image, before the
+                    inversion; None: there are none
     """
 
     allocated: int
@@ -20,6 +22,7 @@ class Encoding:
     is_inverted: bool
     slope: float = 1.0
     intercept: float = 0.0
+    padding: tuple[int, int] | None = None
 
     @property
     def stored_range(self) -> tuple[int, int]:
@@ -35,6 +38,7 @@ class Frame:
     file, index        which file in the order of names, which frame in it, both from 0
     series, instance   digests that tell series, and copies of one image, apart
     reference          digest of the frame of reference
+    stack              digest of the stack that an enhanced image puts the frame in
     position           centre of the first pixel
     along_row          unit vector of growing column index; `along_column` of growing row index
     spacing            mm between (rows, columns)
@@ -45,6 +49,7 @@ class Frame:
     series: bytes
     instance: bytes
     reference: bytes
+    stack: bytes
     number: int
     modality: str
     rows: int

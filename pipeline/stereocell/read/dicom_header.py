@@ -15,13 +15,15 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pydicom
-from pydicom.uid import DeflatedExplicitVRLittleEndian
+from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
 
+from stereocell.modality import MODALITIES
 from stereocell.read.dicom_codecs import PLUGINS, is_compressed
 from stereocell.read.dicom_frame import Encoding, Frame, Vector
 from stereocell.read.dicom_quiet import DICOM_FAULTS, quiet
 
 _TAGS: list[Any] = [
+    "SOPClassUID",
     "Modality",
     "SeriesInstanceUID",
     "SOPInstanceUID",
@@ -36,6 +38,8 @@ _TAGS: list[Any] = [
     "BitsStored",
     "HighBit",
     "PixelRepresentation",
+    "PixelPaddingValue",
+    "PixelPaddingRangeLimit",
     "PixelSpacing",
     "ImagePositionPatient",
     "ImageOrientationPatient",
@@ -45,13 +49,8 @@ _TAGS: list[Any] = [
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
 ]
-# Defined terms of Modality (0008,0060) for images, PS3.3 C.7.3.1.1.1; any other text is dropped.
-_TERMS = (
-    "AR AU BDUS BI BMD CFM CR CT DG DMS DX ECG EEG EMG EOG EPS ES FID GM HC HD IO IOL IVOCT IVUS "
-    "KER LEN LP LS M3D MG MR NM OAM OCT OP OPM OPT OPTBSV OPTENF OPV OSS OT PA PT PX RF RG "
-    "RTDOSE RTIMAGE SM SRF SEG TG US VA XA XC"
-)
-MODALITIES = frozenset(_TERMS.split())
+# mm between pixels; beyond it, distances that are told in pixels mean nothing
+_SPACINGS = (1e-6, 100.0)
 
 
 class NoPlaneError(Exception):
@@ -107,11 +106,9 @@ def _refuse_deflated(path: Path) -> None:
 
 
 def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
-    if opened.tell() >= size:
-        raise NoPlaneError("without pixels")
     rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
-    if rows < 1 or columns < 1:
-        raise NoPlaneError("without pixels")
+    if opened.tell() >= size or rows < 1 or columns < 1:
+        raise NoPlaneError(f"without pixels{_kind(header)}")
     grey = ("MONOCHROME1", "MONOCHROME2")
     kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
@@ -132,8 +129,10 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
     if (own or count > 1) and len(own) != count:
         raise NoPlaneError("of several frames without a place for each")
     frames = []
+    padding = _padding(header)
     for index in range(count):
         groups = [own[index] if own else None, shared]
+        stack = _found({}, groups, "FrameContentSequence", "StackID")
         position, directions, spacing = _place(header, groups)
         frames.append(
             Frame(
@@ -142,6 +141,7 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
                 series,
                 instance,
                 reference,
+                hashlib.sha256(str(stack).encode()).digest(),
                 int(header.get("InstanceNumber") or 0),
                 modality if modality in MODALITIES else "",
                 rows,
@@ -149,10 +149,35 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
                 position,
                 *directions,
                 spacing,
-                _encoding(header, groups, kind == "MONOCHROME1", is_float),
+                _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
             )
         )
     return frames
+
+
+def _kind(header: Any) -> str:
+    """Return what a file without pixels is, in the words of the standard: " (...)"; or nothing."""
+    kind = UID(str(header.get("SOPClassUID", "")))
+    return f" ({kind.name})" if kind.name != kind else ""  # of one that is private it is the UID
+
+
+def _padding(header: Any) -> tuple[int, int] | None:
+    """Return the lowest and highest value that pads: PS3.3 C.7.5.1.1.2, stored as pixels are."""
+    ends = []
+    for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
+        value = header.get(key)
+        if isinstance(value, bytes) and len(value) == 2:  # where the VR is not told
+            little = header.original_encoding[1]
+            value = int.from_bytes(value, "little" if little else "big")
+        if isinstance(value, int):
+            ends.append(value)
+        elif not ends:
+            return None
+    if header.get("PixelRepresentation"):  # whatever sign its VR gave it
+        ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
+    else:
+        ends = [end & 0xFFFF for end in ends]
+    return min(ends), max(ends)
 
 
 def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
@@ -219,11 +244,20 @@ def _place(
     is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
     if min(between) <= 0 or not is_frame:
         raise NoPlaneError("without a place in the patient")
+    if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
+        shown = " and ".join(f"{value:g}" for value in between)
+        raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
     along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
     return (x, y, z), (along_row, along_column), (between[0], between[1])
 
 
-def _encoding(header: Any, groups: Sequence[Any], is_inverted: bool, is_float: bool) -> Encoding:
+def _encoding(
+    header: Any,
+    groups: Sequence[Any],
+    is_inverted: bool,
+    is_float: bool,
+    padding: tuple[int, int] | None,
+) -> Encoding:
     sequence = "PixelValueTransformationSequence"
     slope = _found(header, groups, sequence, "RescaleSlope")
     intercept = _found(header, groups, sequence, "RescaleIntercept")
@@ -238,4 +272,4 @@ def _encoding(header: Any, groups: Sequence[Any], is_inverted: bool, is_float: b
     if not 1 <= bits <= high_bit + 1 <= allocated:
         raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
     signed = bool(header.get("PixelRepresentation") or 0)
-    return Encoding(allocated, bits, high_bit, signed, is_inverted, slope, intercept)
+    return Encoding(allocated, bits, high_bit, signed, is_inverted, slope, intercept, padding)

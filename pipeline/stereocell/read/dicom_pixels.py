@@ -1,4 +1,4 @@
-"""Decode the pixels of DICOM frames: codec, bits, sign, MONOCHROME1, rescale."""
+"""Decode the pixels of DICOM frames: codec, bits, sign, MONOCHROME1, rescale, padding."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from stereocell.errors import SourceError
 from stereocell.read.dicom_frame import Encoding, Frame
+from stereocell.read.dicom_padding import Padding, is_padding
 from stereocell.read.dicom_quiet import DICOM_FAULTS, quiet
 from stereocell.read.dicom_stored import open_pixels, stored_values
 from stereocell.read.gdcm_process import GdcmProcess
@@ -29,10 +30,12 @@ def decode(
 ) -> NDArray[Any]:
     """Return the values of frames of one size, (n, rows, columns), in their order.
 
-    Each file is read once. Raises SourceError for a frame that can't be decoded: it names the
-    file by its number among `paths`, never by name.
+    Each file is read once; the frames' padding is replaced (dicom_padding.py). Raises SourceError
+    for a frame that can't be decoded: it names the file by its number among `paths`, never by name.
     """
+    padding = Padding()
     planes = np.empty((len(frames), frames[0].rows, frames[0].columns), dtype)
+    has_padding = any(frame.encoding.padding is not None for frame in frames)
     order = sorted(range(len(frames)), key=lambda place: (frames[place].file, frames[place].index))
     with GdcmProcess() as apart:
         for file, places in groupby(order, key=lambda place: frames[place].file):
@@ -51,11 +54,15 @@ def decode(
                         encoding = frames[place].encoding
                         raw = unpack_bits(values, encoding)
                         planes[place] = rescale(raw, encoding.slope, encoding.intercept, dtype)
+                        if has_padding:
+                            mask = is_padding(values, raw, encoding)
+                            padding.add(place, planes[place], mask)
             except DICOM_FAULTS:  # its text may quote what the file says
                 raise SourceError(
                     f"{where}: its pixels can't be decoded, expected {frames[wanted[0]].rows} x "
                     f"{frames[wanted[0]].columns} whole ones, as its header says"
                 ) from None
+    padding.fill(planes)
     return planes
 
 

@@ -1,18 +1,19 @@
 """Sort DICOM frames into stacks, each a volume, and say what each holds without its description.
 
-A stack is one series, one frame of reference, one size of pixels and planes, one orientation: a
-localizer of three orientations is three stacks. Of frames at one place the first by instance
-number is taken; if every place holds the same number of them, and they differ, they are points in
-time (or echoes, or b-values) in the order of instance numbers.
+A stack is one series, one frame of reference, one StackID, one size of pixels and planes, one
+orientation (dicom_groups.py): a localizer of three orientations is three stacks. Of frames at
+one place the first by instance number is taken; if every place holds the same number of them, and
+they differ, they are points in time (or echoes, or b-values) in the order of instance numbers.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stereocell.read.anatomy import plane_name
 from stereocell.read.dicom_frame import Frame
+from stereocell.read.dicom_groups import Group, describe_neighbours, find_groups
 from stereocell.read.stack_layout import (
     SAME_PLACE,
     NoStackError,
@@ -20,8 +21,6 @@ from stereocell.read.stack_layout import (
     lay_out,
     normal_of,
 )
-
-PARALLEL = 1e-3  # of the direction cosines: planes further apart in orientation are another stack
 
 AreEqual = Callable[[Frame, Frame], bool]
 
@@ -71,7 +70,9 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
 
     `are_equal` compares the pixels of two frames; it is asked only about frames at one place.
     """
-    stacks = [_stack(group, are_equal) for group in _groups(frames)]
+    groups = find_groups(frames)
+    stacks = [_stack(group, are_equal, describe_neighbours(group, groups)) for group in groups]
+    stacks = _explain_single(stacks, groups)
     return tuple(
         sorted(
             stacks,
@@ -80,34 +81,20 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
     )
 
 
-def _groups(frames: Iterable[Frame]) -> Iterator[list[Frame]]:
-    groups: dict[tuple[object, ...], list[list[Frame]]] = {}
-    for frame in frames:
-        rows, columns = frame.spacing
-        key = (
-            frame.series, frame.reference, frame.modality, frame.rows, frame.columns,
-            f"{rows:.4g} {columns:.4g}",
-        )  # fmt: skip
-        alike = groups.setdefault(key, [])
-        group = next((g for g in alike if _is_parallel(g[0], frame)), None)
-        if group is None:
-            alike.append([frame])
-        else:
-            group.append(frame)
-    for alike in groups.values():
-        yield from alike
+def _explain_single(stacks: list[Stack], groups: list[Group]) -> list[Stack]:
+    """Where each of several stacks is one slice, say of each what keeps them apart."""
+    if len(stacks) < 2 or any(len(stack.times[0]) > 1 for stack in stacks):
+        return stacks
+    apart = sorted({word for group in groups[1:] for word in group.differences(groups[0])})
+    problem = f"found {len(stacks)} stacks of one slice each, told apart by {', '.join(apart)}"
+    return [replace(stack, problem=problem) for stack in stacks]
 
 
-def _is_parallel(a: Frame, b: Frame) -> bool:
-    ours, theirs = (np.array([f.along_row, f.along_column]) for f in (a, b))
-    return bool(np.abs(ours - theirs).max() < PARALLEL)
-
-
-def _stack(frames: list[Frame], are_equal: AreEqual) -> Stack:
-    places = _places(frames)
+def _stack(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> Stack:
+    places = _places(group)
     counts = {len(place) for place in places}
-    notes: list[str] = []
-    extra = len(frames) - len(places)
+    notes = list(neighbours)
+    extra = len(group.frames) - len(places)
     times = 1
     if extra:
         pairs = ((place[0], other) for place in places for other in place[1:])
@@ -125,9 +112,9 @@ def _stack(frames: list[Frame], are_equal: AreEqual) -> Stack:
     try:
         layout = lay_out(
             [frame.position for frame in by_time[0]],
-            first.along_row,
-            first.along_column,
-            first.spacing,
+            group.along_row,
+            group.along_column,
+            group.spacing,
             (first.rows, first.columns),
         )
     except NoStackError as error:
@@ -135,12 +122,13 @@ def _stack(frames: list[Frame], are_equal: AreEqual) -> Stack:
     return Stack(by_time, layout, "", (*notes, *layout.notes))
 
 
-def _places(frames: Sequence[Frame]) -> list[list[Frame]]:
+def _places(group: Group) -> list[list[Frame]]:
     """Return frames by place, along the normal; at each place by instance number."""
-    first = frames[0]
-    normal = normal_of(first.along_row, first.along_column)
-    near = SAME_PLACE * min(first.spacing)
-    rising = sorted(frames, key=lambda f: (float(normal @ f.position), f.number, f.file, f.index))
+    normal = normal_of(group.along_row, group.along_column)
+    near = SAME_PLACE * min(group.spacing)
+    rising = sorted(
+        group.frames, key=lambda f: (float(normal @ f.position), f.number, f.file, f.index)
+    )
     places: list[list[Frame]] = []
     for frame in rising:
         there = np.array(places[-1][0].position) if places else None

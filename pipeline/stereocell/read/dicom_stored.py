@@ -53,10 +53,13 @@ def open_pixels(path: Path) -> tuple[Any, str]:
 
 
 def stored_values(dataset: Any, plugin: str, indices: Sequence[int]) -> Iterator[NDArray[Any]]:
-    """Yield the stored values (rows, columns) of frames. Raises DICOM_FAULTS."""
+    """Yield the values (rows, columns) of frames, in their containers. Raises DICOM_FAULTS."""
     if plugin:
         _check_streams(dataset)
-    return iter_pixels(dataset, indices=indices, raw=True, decoding_plugin=plugin)
+    # all bits of the container: padding may lie in those above the stored ones
+    return iter_pixels(
+        dataset, indices=indices, raw=True, decoding_plugin=plugin, correct_unused_bits=False
+    )
 
 
 def _check_streams(dataset: Any) -> None:

@@ -15,7 +15,7 @@ from botocore.exceptions import BotoCoreError  # type: ignore[import-untyped]
 from pydantic import ValidationError
 from zarr.errors import NodeNotFoundError
 
-from stereocell.errors import SourceError
+from stereocell.errors import SourceError, StereoCellError
 
 # Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
 # KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
@@ -36,17 +36,19 @@ _FAULTS = (
 
 
 @contextmanager
-def one_line(where: str, expected: str) -> Iterator[None]:
-    """Turn what a library raises inside the block into a SourceError of one line.
+def one_line(
+    where: str, expected: str, raised: type[StereoCellError] = SourceError
+) -> Iterator[None]:
+    """Turn what a library raises inside the block into an error of one line.
 
     Only calls into format libraries belong inside: the caught classes are broad.
     """
     try:
         yield
-    except SourceError:
+    except StereoCellError:
         raise
     except _FAULTS as error:
-        raise SourceError(f"{where}: {_reason(error)}; expected {expected}") from error
+        raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
 
 
 def _reason(error: BaseException) -> str:

@@ -20,6 +20,7 @@ class Image:
     close          frees open files, or None
     title          what the image is called in place of its file's name; None: by the file
     modality, placement, notes  as in Dataset, whose `remarks` the notes are
+    notes_at       more notes, of one point in time; may read its voxels
     """
 
     arrays: tuple[VoxelArray, ...]
@@ -32,6 +33,7 @@ class Image:
     modality: str = ""
     placement: Matrix = IDENTITY
     notes: tuple[str, ...] = ()
+    notes_at: Callable[[int], tuple[str, ...]] | None = None
 
 
 def linear_color(rgb: tuple[int, int, int]) -> Color:

@@ -1,8 +1,9 @@
 """NIfTI-1 and -2, .nii and .nii.gz: https://nifti.nimh.nih.gov/nifti-1/ by nibabel.
 
 The affine is the one that nibabel settles on: sform, else qform, else a guess by the shape, which
-is said. Texts in the header (`descrip`, `db_name`, ...) and the file's name may hold an identity
-and are not looked at.
+is said. NaN, which marks what lies outside a brain that was cut out, is read as the smallest
+finite value of its point in time. Texts in the header (`descrip`, `db_name`, ...) and the file's
+name may hold an identity and are not looked at.
 """
 
 import logging
@@ -82,9 +83,11 @@ def read_image(location: Location) -> Image:
     canonical = canonical_of(affine, grid)
     z, y, x = (grid[axis] for axis in canonical.order)
     times = shape[3] if len(shape) > 3 else 1
-    load = partial(_load, location, canonical, skewed, dtype)
+    counts: dict[int, int] = {}
+    load = partial(_load, location, canonical, skewed, dtype, counts)
+    voxels = WholeArray((times, z, y, x), dtype, load)
     return Image(
-        arrays=(VoxelArray(WholeArray((times, z, y, x), dtype, load), ("t", "z", "y", "x")),),
+        arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),
         names=(NAME,),
         colors=(None,),
@@ -92,7 +95,15 @@ def read_image(location: Location) -> Image:
         title=NAME,
         placement=canonical.placement,
         notes=tuple(notes),
+        notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:
+    """Say how many voxels are NaN at a point in time; it is read, and held for whoever asks."""
+    _ = voxels[time, slice(0, 0), 0, 0]
+    found = counts.get(time, 0)
+    return (f"{found:,} voxels are NaN: read as the smallest finite value",) if found else ()
 
 
 def _open(location: Location) -> Any:
@@ -128,6 +139,7 @@ def _load(
     canonical: Canonical,
     skewed: NDArray[np.float64] | None,
     dtype: np.dtype[Any],
+    counts: dict[int, int],
     time: int,
 ) -> NDArray[Any]:
     try:
@@ -140,6 +152,20 @@ def _load(
         raise SourceError(
             f"{location.shown}: its voxels can't be read, expected {NAME} that is whole"
         ) from None
+    if values.dtype.kind == "f":
+        values, counts[time] = _without_nan(values, location.shown)
     if skewed is not None:
         values, _ = resample_sheared(values, skewed)
     return canonical.apply(values)
+
+
+def _without_nan(values: NDArray[Any], where: str) -> tuple[NDArray[Any], int]:
+    """Return the values with the smallest finite one for NaN, and how many are NaN."""
+    is_nan = np.isnan(values)
+    count = int(np.count_nonzero(is_nan))
+    if count == 0:
+        return values, 0
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        raise SourceError(f"{where}: found no finite voxel, expected finite voxels")
+    return np.where(is_nan, finite.min(), values), count

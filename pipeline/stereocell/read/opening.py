@@ -1,5 +1,6 @@
 """Open a source: find its format, read its metadata, check that it is a volume we can build."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -46,7 +47,8 @@ def open(
 ) -> Dataset:
     """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
 
-    No voxels are read yet; of DICOM at most slices that lie at one place, to tell copies.
+    No voxels are read yet; of DICOM at most slices that lie at one place, to tell copies, and
+    NIfTI's floats, to tell how many are none.
 
     `source` is a local path (DICOM and NIfTI only that) or an address (`http://`, `https://`,
     `s3://`, or another one that fsspec knows). `time` is the time point, from 0. `spacing_um`
@@ -109,7 +111,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         on_close=image.close,
         modality=image.modality,
         placement=image.placement,
-        remarks=image.notes,
+        remarks=(*image.notes, *(image.notes_at(time) if image.notes_at is not None else ())),
     )
 
 
@@ -149,9 +151,10 @@ def _check_arrays(where: str, image: Image) -> None:
             )
         bytes_of_one = int(np.prod(level.array.chunks, dtype=np.int64)) * dtype.itemsize
         if bytes_of_one > MAX_CHUNK_BYTES:
+            found = math.ceil(bytes_of_one / 2**30 * 100) / 100  # up, so that it is more
             raise SourceError(
-                f"{where}: chunk {level.array.chunks} of level {index}: found "
-                f"{bytes_of_one / 2**30:.0f} GiB, expected at most {MAX_CHUNK_BYTES >> 30} GiB"
+                f"{where}: chunk {level.array.chunks} of level {index}: found {found:g} GiB, "
+                f"expected at most {MAX_CHUNK_BYTES >> 30} GiB"
             )
     if finest.shape[0] < 2:
         raise SourceError(

@@ -30,9 +30,13 @@ def dtype_for(ranges: Iterable[tuple[float, float, float, float]]) -> np.dtype[A
 def rescale(
     stored: NDArray[Any], slope: float, intercept: float, dtype: np.dtype[Any]
 ) -> NDArray[Any]:
-    """Return slope * stored + intercept in `dtype`, worked out without overflow."""
-    if slope == 1 and intercept == 0:
-        return stored.astype(dtype, copy=False)
-    if dtype.kind == "f":
-        return (stored.astype(np.float64) * slope + intercept).astype(dtype)
+    """Return slope * stored + intercept in `dtype`, worked out without overflow.
+
+    What float32 can't hold becomes infinite, which whoever reads the voxels refuses.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        if slope == 1 and intercept == 0:
+            return stored.astype(dtype, copy=False)
+        if dtype.kind == "f":
+            return (stored.astype(np.float64) * slope + intercept).astype(dtype)
     return (stored.astype(np.int64) * int(slope) + int(intercept)).astype(dtype)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stereocell.documents import read_json
+from stereocell.mirror import sizes_below
 from stereocell.plan import Channel, Plan
 from stereocell.store import Store
 from stereocell.tiling import Tile
@@ -160,8 +161,8 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
     lods = []
     for level, lod in enumerate(record["lods"]):
         glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
-        file = glb if glb.is_file() else lod_file(directory, level)
-        lods.append(_lod(lod, file.stat().st_size))
+        size = sizes_below(glb).get(glb) or record["files"][lod_file(directory, level).name]
+        lods.append(_lod(lod, size))
     ktx2 = [bundle / "volumes" / tile.id / f"{channel.id}{end}.ktx2" for end in ("", "_bricks")]
     z, y, x = record["volume"]
     return UnitFacts(
@@ -177,7 +178,7 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
         lods=tuple(lods),
         voxels=(x, y, z),
         volume_bytes=x * y * z,
-        ktx2_bytes=sum(file.stat().st_size for file in ktx2 if file.is_file()),
+        ktx2_bytes=sum(size for file in ktx2 for size in sizes_below(file).values()),
         fragments_dropped=record["fragments_dropped"],
         cavities_filled=record["cavities_filled"],
         seconds=find_seconds(directory),
@@ -274,9 +275,9 @@ def _files(store: Store) -> tuple[FileFacts, ...]:
     rows = []
     for part in (store.out / "units", store.stage_dir, store.bundle_dir):
         sizes: dict[str, list[int]] = defaultdict(list)
-        for file in part.rglob("*"):
-            if file.is_file() and not file.name.startswith("."):
-                sizes[file.suffix.removeprefix(".") or file.name].append(file.stat().st_size)
+        for file, size in sizes_below(part).items():
+            if not file.name.startswith("."):
+                sizes[file.suffix.removeprefix(".") or file.name].append(size)
         kinds = [FileFacts(part.name, suffix, len(n), sum(n)) for suffix, n in sizes.items()]
         rows += sorted(kinds, key=lambda kind: (-kind.bytes, kind.suffix))
     return tuple(rows)

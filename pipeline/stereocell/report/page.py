@@ -59,6 +59,7 @@ def write_report(out: Path) -> None:
 def render(store: Store, facts: Facts) -> str:
     """Return the page as HTML."""
     plan = facts.plan
+    tissue = find_tissue(store.out, plan)  # first: what is damaged ends it before all is drawn
     chosen = choose_units(len(plan.tiles), len(plan.channels), MOST_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
@@ -77,7 +78,6 @@ def render(store: Store, facts: Facts) -> str:
         pictures, refusal = drawing.result()
 
     pictured = [_inline(picture) for picture in pictures]
-    tissue = find_tissue(store.out, plan)
     environment = Environment(
         loader=FileSystemLoader(TEMPLATE.parent),
         autoescape=True,
@@ -151,6 +151,8 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "surface": look.surface,
                 "repair": entry["repair"],
                 "spread": (min(values), max(values)) if values else None,
+                "arcs": len(entry["display"]["proposal"]["shapes"]),
+                "no_arcs": entry["display"]["proposal"]["reason"],
                 "given": channel.name in facts.plan.settings.iso_values,
                 "histogram": charts.histogram(
                     entry["display"]["histogram"], look.transfer_functions, look.iso_normalized

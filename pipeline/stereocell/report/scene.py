@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from stereocell.report.slices import encode
@@ -74,6 +75,17 @@ def draw_scenes(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
         if refusal.exists():
             return [], f"{refusal.read_text()}; {_REMEDY}"
         return [_read(folder / f"{i}.png") for i in range(len(scenes))], ""
+
+
+def can_draw() -> str:
+    """Return why this machine can't draw meshes; empty: it can. Draws one triangle."""
+    with tempfile.TemporaryDirectory(prefix="stereocell-") as name:
+        file = Path(name) / "triangle.npz"
+        corners = np.eye(3, dtype=np.float32)
+        np.savez(file, positions=corners, triangles=np.array([[0, 1, 2]]), normals=corners)
+        unit = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+        triangle = Surface(str(file), (1.0, 1.0, 1.0))
+        return draw_scenes([Scene((triangle,), (), unit, (32, 32))])[1]
 
 
 def _read(path: Path) -> Picture:

@@ -16,13 +16,15 @@ from stereocell.report import charts
 from stereocell.report.scene import Picture
 from stereocell.report.slices import VIEWS, Slice, draw_slices
 from stereocell.survey import Display
-from stereocell.threshold import Histogram
+from stereocell.threshold import Histogram, Threshold
 
-READINGS = {
-    "two peaks": "between the second-highest peak and the peak before it",
-    "no peak before": "between the second-highest peak, the darkest, and the next one",
-    "single peak": "at the foot of the only peak's longer side",
+READINGS = {  # of the levels of Threshold.between
+    "two peaks": "between the second-highest peak, at {1:.5g}, and the peak before it, at {0:.5g}",
+    "no peak before": "between the second-highest peak, at {0:.5g}, before which there is none, "
+    "and the next one, at {1:.5g}",
+    "single peak": "at the foot of the longer side of the only peak, at {0:.5g}",
 }
+MOST_NAMED = 6
 _ROOM = 1.6  # of the second-highest peak: the highest, air, would leave no room for the others
 _LI_VOXELS = 200_000  # Li's method wants voxels: about so many stand for the counts
 
@@ -72,7 +74,18 @@ def draw_threshold(display: Display) -> ThresholdFigure | None:
         [place(level) for level in found.peaks],
         {row.kind: place(row.value) for row in reversed(rows)},
     )
-    return ThresholdFigure(READINGS[found.reading], rows, chart, (values.low, values.high))
+    return ThresholdFigure(describe(found), rows, chart, (values.low, values.high))
+
+
+def describe(found: Threshold) -> str:
+    """Return how a threshold was read, with the levels of its peaks, and what was left out."""
+    reading = READINGS[found.reading].format(*found.between)
+    left_out = ", ".join(f"{level:.5g}" for level in found.chance[:MOST_NAMED])
+    if len(found.chance) > MOST_NAMED:
+        left_out += f" and {len(found.chance) - MOST_NAMED} more"
+    if not left_out:
+        return reading
+    return f"{reading}. Rises that counting alone may make, at {left_out}, are no peaks"
 
 
 def find_peers(histogram: Histogram) -> tuple[float, float]:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.documents import find_json
+from stereocell.as_planned import require_added
 from stereocell.plan import Plan
 from stereocell.report.slices import VIEWS, encode
 from stereocell.sources import open_source, source_of
 from stereocell.specimen import to_srgb8
 from stereocell.tiling import Box
+from stereocell.tissue_files import FOLDER, read_record
 
 SHOWN_PX = 330  # the longest side of a plane
 _GAP_PX = 6
@@ -29,11 +30,15 @@ class TissueFacts:
 
 
 def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
-    """Return what to show of the plan's tissue channels; None where there are none."""
+    """Return what to show of the plan's tissue channels; None where there are none.
+
+    Raises OutputError, SourceError where OUT/tissue is damaged or another than was planned.
+    """
     added = [channel for channel in plan.channels if channel.source]
-    record = find_json(out / "tissue" / "tissue.json", "tissue.schema.json")
-    if not added or record is None:
+    if not added:
         return None
+    require_added(plan)
+    record = read_record(out / FOLDER)
     dataset = open_source(source_of(plan, added[0]))
     colors = np.array([channel.color for channel in added], np.float32)
 

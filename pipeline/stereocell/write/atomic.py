@@ -1,4 +1,7 @@
-"""Write a file under a temporary name beside it, flush it, rename it: the whole file or none."""
+"""Write a file under a temporary name beside it, flush it, rename it: the whole file or none.
+
+Where OUT is on object storage, it is put there then: see mirror.py.
+"""
 
 import os
 import shutil
@@ -7,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from stereocell.errors import OutputError
+from stereocell.mirror import keep, making
 
 
 @contextmanager
@@ -25,6 +29,7 @@ def replacing(path: Path) -> Iterator[Path]:
             with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
             os.replace(temporary, path)
+            keep(path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
@@ -47,16 +52,17 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     new, old = (path.with_name(f".{path.name}.{word}") for word in ("partial", "old"))
     try:
         shutil.rmtree(new, ignore_errors=True)
-        new.mkdir(parents=True)
-        try:
-            yield new
-            for file in new.rglob("*"):
-                if file.is_file():
-                    with file.open("rb+") as opened:
-                        os.fsync(opened.fileno())
-            _swap(new, path, old)
-        finally:
-            shutil.rmtree(new, ignore_errors=True)
+        with making(new, path):
+            new.mkdir(parents=True)
+            try:
+                yield new
+                for file in new.rglob("*"):
+                    if file.is_file():
+                        with file.open("rb+") as opened:
+                            os.fsync(opened.fileno())
+                _swap(new, path, old)
+            finally:
+                shutil.rmtree(new, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from stereocell.engine import Engine
 from stereocell.errors import OutputError, StageError
+from stereocell.mirror import is_file, sizes_below
 from stereocell.specimen import evaluate
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
@@ -53,7 +54,7 @@ def write_bundle(
     Raises StageError where the stage lacks something, naming prim and file (TasksFailedError where
     a tile does); OutputError where `bundle_dir` can't be written, or is something else.
     """
-    if bundle_dir.exists() and not (bundle_dir / MANIFEST).is_file() and _holds(bundle_dir):
+    if _holds(bundle_dir) and not is_file(bundle_dir / MANIFEST):
         raise OutputError(f"{bundle_dir}: exists and is no bundle: no {MANIFEST} in it")
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
@@ -190,4 +191,6 @@ def _compact(content: object) -> bytes:
 
 
 def _holds(folder: Path) -> bool:
-    return not folder.is_dir() or any(folder.iterdir())
+    if not folder.is_dir():
+        return folder.exists() or bool(sizes_below(folder))
+    return any(folder.iterdir())

@@ -189,9 +189,9 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
     prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
     maps = lod.maps
     textures = Textures(
-        None if maps.normal is None else encode_normal_map(_read_image(maps.normal)),
-        None if maps.occlusion is None else encode_occlusion_map(_read_image(maps.occlusion)),
-        None if maps.color is None else encode_color_map(_read_image(maps.color)),
+        None if maps.normal is None else encode_normal_map(read_image(maps.normal)),
+        None if maps.occlusion is None else encode_occlusion_map(read_image(maps.occlusion)),
+        None if maps.color is None else encode_color_map(read_image(maps.color)),
     )
     try:
         return encode_glb(
@@ -206,8 +206,11 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error
 
 
-def _read_image(path: Path) -> NDArray[np.uint8]:
-    """Return an image (y, x, 3), both edges multiples of 4, as Basis Universal asks."""
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """Return an image uint8 (y, x, 3), both edges multiples of 4, as Basis Universal asks.
+
+    Raises StageError.
+    """
     try:
         with Image.open(path) as file:
             image = file.convert("RGB")

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Tf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from stereocell.errors import StageError
 from stereocell.mesh import Mesh
+from stereocell.mirror import at_hand
 from stereocell.write.composed_choice import TileChoice, lod_levels, read_choice
 from stereocell.write.composed_look import material_of, surface_of
 from stereocell.write.composed_maps import ComposedMaps, maps_of, vertex_values_of
@@ -133,6 +134,11 @@ def loaded(stage: Usd.Stage, tile_id: str) -> Iterator[tuple[Usd.Prim, TileChoic
     Its meshes and volumes are both active, whichever was chosen. Raises StageError.
     """
     path = TILES.AppendChild(tile_id)
+    with at_hand(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
+        yield from _loaded(stage, path)
+
+
+def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileChoice]]:
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
     stage.Load(path)
     del quiet

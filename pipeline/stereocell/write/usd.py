@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
 from stereocell.assets import find_asset
+from stereocell.mirror import at_hand
 from stereocell.placement import IDENTITY, Matrix
 from stereocell.specimen import Look, Provenance, TileContent
 from stereocell.write.atomic import replacing_folder
@@ -113,7 +114,9 @@ def write_stage(
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
         prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
-        selections, extents = _read_layer(stage_dir / "tiles" / tile.id / LAYER_NAME)
+        file = stage_dir / "tiles" / tile.id / LAYER_NAME
+        with at_hand(file):
+            selections, extents = _read_layer(file)
         for variant_set, variant in selections:
             prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
         # what an unloaded tile is known by; an offset takes surfaces further than its own box

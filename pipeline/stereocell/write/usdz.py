@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 from pxr import Kind as Kinds
 
+from stereocell.mirror import bring, remove
 from stereocell.write.atomic import replacing
 from stereocell.write.composed import (
     ComposedLod,
@@ -65,7 +66,7 @@ def write_usdz(stage_path: Path, path: Path) -> int | None:
     stage = open_stage(stage_path)
     level = _choose_level(stage)
     if level is None:
-        path.unlink(missing_ok=True)
+        remove(path)
         return None
     parts = list(_read_parts(stage, level))
     boxes = [hinted_box(prim) for prim in tile_prims(stage)]
@@ -220,6 +221,7 @@ def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path) -> None:
         export(layer, Path(folder) / _LAYER)
         files = [(_LAYER, Path(folder) / _LAYER)]
         for part in parts:
+            bring(*_images(part).values())
             files += [(_texture_name(part, kind), file) for kind, file in _images(part).items()]
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
             for name, file in files:

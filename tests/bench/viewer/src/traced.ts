@@ -101,7 +101,12 @@ class Traced implements Renderer {
     this.overlay.hide();
     this.depth.render(this.renderer, this.room, this.eyes, []);
     const scene = { specimen: new Matrix4(), clip: NO_CLIP, solids: 0, bounds: this.bounds };
-    this.tracer.render(this.renderer, this.eyes, scene, this.settings, 1, 1);
+    this.tracer.render(this.renderer, this.eyes, scene, this.settings, {
+      scale: 1,
+      passes: 1,
+      mayTremble: false,
+      isDraft: false,
+    });
     this.overlay.show(this.eyes, 1);
     this.renderer.render(this.room, this.camera);
   }

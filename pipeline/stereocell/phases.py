@@ -19,6 +19,7 @@ from stereocell.documents import write_json
 from stereocell.engine import Engine, console
 from stereocell.errors import OutputError
 from stereocell.lineage import key_of, libraries_of
+from stereocell.mirror import is_file, objects_below, sizes_below
 from stereocell.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
@@ -65,13 +66,14 @@ def settle(source: str, settings: Settings) -> Plan:
     dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
     for note in dataset.notes:
         console.print(f"plan: {note}", markup=False)
+    modality = dataset.modality or options.modality
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(len(dataset.channels)) if indices is None else indices
     channels = [
         Channel(
             index,
             dataset.channels[index].name,
-            dataset.channels[index].color or choose_color(place, dataset.modality),
+            dataset.channels[index].color or choose_color(place, modality),
         )
         for place, index in enumerate(chosen)
     ]
@@ -79,7 +81,7 @@ def settle(source: str, settings: Settings) -> Plan:
     origin = dataset.levels[level[0]].origin_um
     return make_plan(
         location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
-        settings, modality=dataset.modality, placement=dataset.placement,
+        settings, modality=modality, placement=dataset.placement,
     )  # fmt: skip
 
 
@@ -159,12 +161,14 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
     with _phase(store, "bundle") as phase:
         store.require_finished("stage")
         path = stage if stage is not None else store.stage_file
-        if not path.is_file():
+        if not is_file(path):
             remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
             raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
-        files = dependencies(path) + ([] if viewer is None else sorted(viewer.rglob("*")))
-        key = key_of([str(path.absolute()), [_state(file) for file in files]], bundle)
+        kept = objects_below(path.parent)
+        made_of = [str(path.absolute()), _states(dependencies(path))] if kept is None else kept
+        page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
+        key = key_of([made_of, page], bundle)
         if phase.is_done(key, store.bundle_dir):
             return
         bundle.write_bundle(path, store.bundle_dir, viewer, engine)
@@ -174,10 +178,10 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         )
 
 
-def _state(file: Path) -> tuple[str, int, int]:
-    """Return name, size and time of change: what an edit alters."""
-    status = file.stat()
-    return str(file), status.st_size, status.st_mtime_ns
+def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
+    """Return each file's name, size and time of change: what an edit alters."""
+    found = [(file, file.stat()) for file in files]
+    return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
 
 
 def run_report(out: Path) -> None:
@@ -220,12 +224,10 @@ def _digest(results: Iterable[Path]) -> str:
     """
     digest = hashlib.sha256()
     for result in results:
-        for file in sorted(result.rglob("*")) if result.is_dir() else [result]:
-            if file.suffix in usd.LAYER_SUFFIXES:
-                state = int(usd.is_layer(file))
-            else:
-                state = file.stat().st_size if file.is_file() else -1
-            digest.update(f"{file.relative_to(result.parent)} {state}\n".encode())
+        for file, size in (sizes_below(result) or {result: -1}).items():
+            if size >= 0 and file.suffix in usd.LAYER_SUFFIXES:
+                size = int(usd.is_layer(file) if file.is_file() else True)  # kept: put as a whole
+            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
     return digest.hexdigest()[:20]
 
 

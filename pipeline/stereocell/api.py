@@ -1,0 +1,84 @@
+"""What `import stereocell` gives: the whole build from Python. Heavy imports wait until a call."""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stereocell.errors import UsageError
+
+if TYPE_CHECKING:
+    from stereocell.read import Dataset
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What a build left: paths, or addresses where OUT is one."""
+
+    out: str
+    stage: str
+    bundle: str
+    report: str
+
+
+def build(
+    source: str | Path,
+    out: str | Path,
+    *,
+    preset: str | None = None,
+    config: str | Path | None = None,
+    settings: Mapping[str, Any] | None = None,
+    workers: int = 0,
+    scheduler: str = "",
+) -> Built:
+    """Build stage, bundle and report of a source in OUT, as the command `stereocell build` does.
+
+    source     a path, or an address (http(s)://, s3://)
+    out        a folder, or an s3:// address; whatever is finished there is not done again
+    preset     cycif, lightsheet, mri, or a TOML file; config: a TOML file over it
+    settings   sections and keys over both, as in the TOML: `{"plan": {"grid": "5x2"}}`
+    workers    processes; 0: in this one. More than 0 wants `if __name__ == "__main__":` in scripts
+    scheduler  address or scheduler file of a Dask cluster, instead
+
+    Progress goes to stderr. Raises StereoCellError, one line that says what and where.
+    """
+    from stereocell import phases
+    from stereocell.config import load
+    from stereocell.engine import Engine
+    from stereocell.lock import LOCK, alone_in
+    from stereocell.mirror import opened
+    from stereocell.read.location import Location, require_apart
+
+    if workers < 0:
+        raise UsageError(f"workers is {workers}, expected 0 or more")
+    wanted = load(preset, None if config is None else Path(config), dict(settings or {}))
+    place = Location.of(out)
+    with ExitStack() as stack:
+        if place.is_local:
+            folder = Path(place.source)
+            require_apart(source, folder)
+            stack.enter_context(alone_in(folder, "build"))
+        else:
+            folder = stack.enter_context(opened(place.source, "build"))
+        engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
+        stack.callback(engine.close)
+        phases.make(str(source), folder, wanted)
+        phases.run_units(folder, engine)
+        phases.run_stage(folder, engine)
+        phases.run_bundle(folder, engine)
+        phases.run_report(folder)
+    shown = place.source if place.is_local else place.shown.rstrip("/")
+    parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
+    return Built(shown, *(f"{shown}/{part}" for part in parts))
+
+
+def open_volume(source: str | Path, **options: Any) -> "Dataset":
+    """Open a source without reading voxels; see `stereocell.read.open` for the options.
+
+    The dataset has `channels`, `levels` (shape and spacing in um, (z, y, x)) and `read(channel,
+    box, level)`, which returns a Volume: `voxels` (z, y, x), `spacing_um`, `origin_um`.
+    """
+    from stereocell import read
+
+    return read.open(source, **options)

@@ -1,0 +1,247 @@
+"""What each command does, and what it answers.
+
+Lines for people are printed as they come; with --json they are not, and the answer's data is
+printed as one JSON object at the end. Progress and errors go to stderr either way. Heavy imports
+wait until they are needed, so that --help is quick.
+"""
+
+import argparse
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from stereocell.cli_options import flags_of, numbers
+
+if TYPE_CHECKING:
+    from stereocell.check import CheckLine
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """data: for machines; code: the exit code."""
+
+    data: Mapping[str, Any] = field(default_factory=dict)
+    code: int = 0
+
+
+Handler = Callable[[argparse.Namespace], Answer]
+
+
+def say(options: argparse.Namespace, text: str) -> None:
+    """Tell a person something."""
+    if not options.json:
+        print(_as_given(options, text), flush=True)
+
+
+def answer(options: argparse.Namespace, found: Answer) -> int:
+    """Tell a machine what was found, if one asked; return the exit code."""
+    if options.json and found.data:
+        print(_as_given(options, json.dumps(found.data, allow_nan=False, ensure_ascii=False)))
+    return found.code
+
+
+def _as_given(options: argparse.Namespace, text: str) -> str:
+    """Name an OUT on object storage, not the folder in which it is worked on."""
+    is_kept = isinstance(getattr(options, "shown", None), str)
+    return text.replace(str(options.out), options.shown.rstrip("/")) if is_kept else text
+
+
+def settings(options: argparse.Namespace) -> Answer:
+    from stereocell import config
+
+    found = config.load(options.preset, options.config, {})
+    say(options, config.to_toml(found, config.TEMPLATE).removesuffix("\n"))
+    return Answer(config.to_dict(found))
+
+
+def _series(options: argparse.Namespace) -> Answer | None:
+    """List the series of a source if that is all that was asked for."""
+    if options.series != "list":
+        return None
+    from stereocell import read
+
+    lines = read.list_series(options.input)
+    say(options, "\n".join(lines))
+    return Answer({"series": list(lines)})
+
+
+def plan(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    from stereocell import config, phases
+
+    wanted = config.load(options.preset, options.config, flags_of(options))
+    made = phases.make(options.input, options.out, wanted)
+    return Answer(
+        {
+            "out": str(options.shown),
+            "name": made.name,
+            "level": made.level,
+            "shape": list(made.region.shape),
+            "spacing_um": list(made.spacing_um),
+            "tiles": [tile.id for tile in made.tiles],
+            "channels": [channel.name for channel in made.channels],
+        }
+    )
+
+
+def iso(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    from stereocell import config, iso_preview
+
+    wanted = config.load(options.preset, options.config, flags_of(options))
+    candidates, path = iso_preview.preview(
+        options.input, options.channel, options.tile, options.out, wanted
+    )
+    say(options, "\n".join(iso_preview.table(candidates)))
+    say(options, f"wrote {path}")
+    return Answer({"picture": str(path), "candidates": [asdict(one) for one in candidates]})
+
+
+def run_phases(options: argparse.Namespace, *names: str) -> Answer:
+    from stereocell import phases
+    from stereocell.engine import Engine
+    from stereocell.lock import LOCK
+    from stereocell.store import Store
+
+    scheduler = getattr(options, "scheduler", "")
+    is_kept = isinstance(options.shown, str)  # on object storage: workers find it by themselves
+    out = options.out.absolute() if scheduler else options.out  # workers may stand elsewhere
+    engine = Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
+    try:
+        for name in names:
+            if name == "units":
+                phases.run_units(out, engine, getattr(options, "only", None))
+            elif name == "stage":
+                phases.run_stage(out, engine)
+            elif name == "bundle":
+                phases.run_bundle(out, engine, getattr(options, "stage", None))
+            else:
+                phases.run_report(out)
+    finally:
+        engine.close()
+    seconds = {name: phase["seconds"] for name, phase in Store(out).phases().items()}
+    results = {
+        "stage": "stage/stage.usda",
+        "bundle": "bundle/index.html",
+        "report": "report/index.html",
+    }
+    made = {name: f"{options.shown}/{file}" for name, file in results.items() if name in names}
+    return Answer({"out": str(options.shown), "seconds": seconds, **made})
+
+
+def one_phase(name: str) -> Handler:
+    """Return the handler of the command that runs one phase."""
+    return lambda options: run_phases(options, name)
+
+
+def build(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    planned = plan(options)
+    made = run_phases(options, "units", "stage", "bundle", "report")
+    for name in ("stage", "bundle", "report"):
+        say(options, f"{name:<8} {made.data[name]}")
+    say(options, f"look at it: stereocell view {options.shown}")
+    return Answer({**planned.data, **made.data})
+
+
+def slices(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    from stereocell import config, phases
+    from stereocell.read.location import require_apart
+    from stereocell.slices import without_surface, write_slices
+
+    wanted = config.load(options.preset, options.config, flags_of(options))
+    require_apart(options.input, options.out)
+    count = write_slices(phases.settle(options.input, without_surface(wanted)), options.out)
+    say(options, f"wrote {count} slices to {options.out}")
+    return Answer({"out": str(options.out), "slices": count})
+
+
+def sample(options: argparse.Namespace) -> Answer:
+    from stereocell import samples
+
+    if options.name == "cycif":
+        columns, _, rows = options.grid.partition("x")
+        if not (columns.isdecimal() and rows.isdecimal() and int(columns) and int(rows)):
+            from stereocell.errors import UsageError
+
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+        z, y, x = numbers(options.tile_size, int, "--tile-size")
+        samples.write_cycif(
+            options.out,
+            grid=(int(columns), int(rows)),
+            tile_size=(z, y, x),
+            seed=options.seed,
+            brightness_spread=options.brightness_spread,
+        )
+    elif options.name == "mri":
+        samples.write_head(options.out, options.seed)
+    else:
+        samples.write_brain_cells(options.out)
+    say(options, f"wrote {options.out}")
+    return Answer({"out": str(options.out)})
+
+
+def tissue(options: argparse.Namespace) -> Answer:
+    from stereocell.tissue_channels import TissueRequest, add_tissue, parse_classes
+
+    classes = None if options.classes is None else parse_classes(options.classes)
+    request = TissueRequest(classes, options.channel, options.model, options.everywhere)
+    add_tissue(options.out, request)
+    return run_phases(options, "units", "stage", "bundle", "report")
+
+
+def check(options: argparse.Namespace) -> Answer:
+    from stereocell.check import check as run
+
+    lines = []
+    for line in chain(run(options.out), _deep(options) if options.deep else ()):
+        lines.append(asdict(line))
+        say(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
+    is_sound = all(line["ok"] for line in lines)
+    return Answer({"ok": is_sound, "checks": lines}, 0 if is_sound else 1)
+
+
+def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
+    from stereocell.deep import check_deep
+    from stereocell.engine import Engine
+
+    engine = Engine(options.workers, options.scheduler)
+    try:
+        stage = options.stage and options.stage.absolute()  # workers may stand elsewhere
+        yield from check_deep(options.out.absolute(), engine, stage)
+    finally:
+        engine.close()
+
+
+def doctor(options: argparse.Namespace) -> Answer:
+    from stereocell.doctor import examine
+
+    found = []
+    for one in examine():
+        found.append(one)
+        mark = "ok     " if one.ok else "missing" if one.is_needed else "without"
+        say(options, f"{mark} {one.name}: {one.found}" + (f": {one.cost}" if one.cost else ""))
+    can_work = all(one.ok for one in found if one.is_needed)
+    return Answer({"ok": can_work, "found": [asdict(one) for one in found]}, 0 if can_work else 1)
+
+
+def view(options: argparse.Namespace) -> Answer:
+    from stereocell.serve import serve
+
+    # on the LAN everybody needs the code that is shown here
+    serve(options.out, options.port, options.lan, not (options.no_browser or options.lan))
+    return Answer()
+
+
+def serve(options: argparse.Namespace) -> Answer:
+    from stereocell.serve import serve
+
+    serve(options.out, options.port, options.lan, open_browser=False)
+    return Answer()

@@ -1,0 +1,132 @@
+"""`stereocell check OUT --deep`: stage against source, and bundle against stage, as a table."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from stereocell.as_planned import require_added, require_input
+from stereocell.check import CheckLine, raise_on
+from stereocell.deep_bundle import BundleTask, hold_manifest, hold_tile
+from stereocell.deep_source import SourceTask, UnitFinding, hold_unit
+from stereocell.engine import Engine, TasksFailedError
+from stereocell.errors import StereoCellError
+from stereocell.plan import Channel, Plan
+from stereocell.rounds import unit_tasks
+from stereocell.store import Store
+from stereocell.write.composed import open_stage, tile_prims
+
+
+def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
+    """Yield a line for each comparison.
+
+    stage  what the bundle was exported from, if not OUT's own
+
+    Raises StereoCellError where plan, units or source are missing, or are no longer what was built.
+    """
+    store = Store(out)
+    plan = store.plan()
+    store.require_units_of(plan)
+    require_input(plan)
+    require_added(plan)
+    yield _line("tiles of the stage", lambda: _hold_tiles(store, plan))
+    tasks = list(_source_tasks(store, plan))
+    try:
+        findings: Sequence[UnitFinding] = engine.run("source", hold_unit, tasks)
+    except TasksFailedError as error:
+        yield CheckLine("stage against source", False, _one_line(error))
+        findings = ()
+    for channel in plan.channels if findings else ():
+        yield from _channel_lines(channel, findings)
+    exported, bundle = stage or store.stage_file, store.bundle_dir
+    yield _line("manifest against stage", lambda: _hold_manifest(exported, bundle))
+    yield _line("bundle against stage", lambda: _hold_bundle(exported, bundle, engine))
+
+
+def _line(name: str, run: Callable[[], str]) -> CheckLine:
+    try:
+        return CheckLine(name, True, run())
+    except StereoCellError as error:
+        return CheckLine(name, False, _one_line(error))
+
+
+def _one_line(error: StereoCellError) -> str:
+    return "; ".join(str(error).splitlines())
+
+
+def _tiles_in(path: Path) -> list[str]:
+    stage = open_stage(path)  # prims end with it
+    return [str(prim.GetName()) for prim in tile_prims(stage)]
+
+
+def _hold_tiles(store: Store, plan: Plan) -> str:
+    there = set(_tiles_in(store.stage_file))
+    planned = {tile.id for tile in plan.tiles}
+    raise_on(
+        [f"{name} is missing" for name in sorted(planned - there)]
+        + [f"{name} is not of the plan" for name in sorted(there - planned)]
+    )
+    return f"{len(there)}, as planned"
+
+
+def _source_tasks(store: Store, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
+    there = set(_tiles_in(store.stage_file))
+    index = store.index()
+    for name, task, _ in unit_tasks(store, plan, store.survey()):
+        tile_id, channel_id = name.split("/")
+        if tile_id not in there:
+            continue  # told already
+        # as it was built, maybe by an earlier version
+        unit = replace(task, directory=store.unit_dir(tile_id, channel_id, index[name]))
+        tile = plan.tile(tile_id)
+        yield (
+            name,
+            SourceTask(
+                unit,
+                store.stage_file,
+                tile_id,
+                channel_id,
+                plan.position_um(tile.lattice(plan.region).start),
+                tile.box.shape,
+                plan.spacing_um,
+                plan.placement,
+                plan.settings.lod.samples,
+            ),
+        )
+
+
+def _channel_lines(channel: Channel, findings: Sequence[UnitFinding]) -> Iterator[CheckLine]:
+    """Yield a row for each level of a channel's surface, and one for its volumes and problems."""
+    units = [unit for unit in findings if unit.name.split("/")[1] == channel.id]
+    for level in range(max(len(unit.levels) for unit in units)):
+        rows = [unit.levels[level] for unit in units if level < len(unit.levels)]
+        stated, found, largest = (max(row[k] for row in rows) for k in range(3))
+        yield CheckLine(
+            f"{channel.name} lod{level} against source",
+            True,
+            f"{len(rows)} surfaces within {found:.4g} um, {stated:.4g} stated; at most "
+            f"{largest:.4g}",
+        )
+    problems = [f"{unit.name}: {problem}" for unit in units for problem in unit.problems]
+
+    def sum_up() -> str:
+        raise_on(problems)
+        return f"{len(units)} units: surfaces as stated, volumes equal to 8 bits"
+
+    yield _line(f"{channel.name} against source", sum_up)
+
+
+def _hold_manifest(stage: Path, bundle: Path) -> str:
+    raise_on(hold_manifest(stage, bundle))
+    return "names, colours, windows, transfer functions, tiles"
+
+
+def _hold_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
+    tasks = [(name, BundleTask(stage, bundle, name)) for name in _tiles_in(stage)]
+    tiles = engine.run("bundle", hold_tile, tasks)
+    raise_on([problem for tile in tiles for problem in tile.problems])
+    surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
+    worst = max((tile.worst for tile in tiles), default=0.0)
+    return (
+        f"{surfaces} surfaces within {worst:.2f} lattice steps, their colours and maps; "
+        f"{volumes} volumes, every voxel of every level"
+    )

@@ -1,0 +1,154 @@
+"""Hold a stage against its source: the surfaces and volumes of each unit, made anew from voxels.
+
+Surfaces: the iso-surface of the unit's own voxels, before any level of detail is made of it, and
+from it, and to it, the distance of each level: by the same measure as a level's stated distance
+(the 99th percentile over both areas), and the largest of all, vertices too, as the unit's record
+has it. Volumes: every voxel in 8 bits, and the .vdb byte by byte.
+"""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stereocell.distance import Nearest, measure_distance, measure_spread
+from stereocell.errors import StereoCellError
+from stereocell.mesh import Mesh
+from stereocell.mirror import at_hand
+from stereocell.placement import Matrix
+from stereocell.sources import open_source
+from stereocell.specimen import APRON
+from stereocell.tasks import UnitTask
+from stereocell.unit import find_surface, to_eight_bit
+from stereocell.unit_files import load_quality, load_record
+from stereocell.write.composed import ComposedLod, loaded, open_stage, read_lods, read_volume
+from stereocell.write.exr import read_atlas
+from stereocell.write.vdb import write_vdb
+
+# what float32 and another order of the same triangles may do to a distance
+_SHARE, _HAIR_UM = 0.02, 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class SourceTask:
+    """One unit, and the tile of the stage that holds it.
+
+    first_um   (z, y, x), centre of its first own voxel; own_shape: its voxels without apron
+    placement  from the voxels' world to where the stage's tiles stand
+    samples    points spread over each surface
+    """
+
+    unit: UnitTask
+    stage_file: Path
+    tile_id: str
+    channel_id: str
+    first_um: tuple[float, float, float]
+    own_shape: tuple[int, int, int]
+    spacing_um: tuple[float, float, float]
+    placement: Matrix
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class UnitFinding:
+    """What was seen of one unit: problems, and for each level (stated, found, largest) in um."""
+
+    name: str
+    levels: tuple[tuple[float, float, float], ...]
+    problems: tuple[str, ...]
+
+
+def hold_unit(task: SourceTask) -> UnitFinding:
+    """Return how a unit's part of the stage agrees with its voxels. Raises StereoCellError."""
+    given = task.unit.given
+    dataset = open_source(task.unit.ref)
+    volume = dataset.read(task.unit.channel, given.window, task.unit.level)
+    fine = find_surface(volume, given)
+    problems = []
+    stage = open_stage(task.stage_file)
+    with at_hand(task.unit.directory), loaded(stage, task.tile_id) as (tile, _):
+        lods = list(read_lods(tile, task.channel_id))
+        composed = read_volume(tile, task.channel_id)
+        record = load_record(task.unit.directory)
+        levels, faults = _hold_lods(_placed(fine, task.placement), lods, record, task.samples)
+        problems += faults
+        if composed is None:
+            problems.append("no volume in the stage")
+        else:
+            eight_bit = to_eight_bit(volume.voxels, given)
+            problems += _hold_volume(eight_bit, composed.atlas, task)
+    return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
+
+
+def _placed(mesh: Mesh, placement: Matrix) -> Mesh:
+    move = np.array(placement)
+    positions = mesh.positions.astype(np.float64) @ move[:3, :3].T + move[:3, 3]
+    return Mesh(positions.astype(np.float32), mesh.triangles, mesh.normals)
+
+
+def _hold_lods(
+    fine: Mesh, lods: list[ComposedLod], record: dict[str, Any], samples: int
+) -> tuple[tuple[tuple[float, float, float], ...], list[str]]:
+    if not len(fine.triangles) or not lods:
+        if len(fine.triangles):
+            return (), [
+                f"the source has a surface of {len(fine.triangles)} triangles, the stage none"
+            ]
+        return (), ["the source has no surface, the stage has one"] if lods else []
+    problems = []
+    if len(lods) < len(record["lods"]):
+        problems.append(f"{len(lods)} levels of detail, {len(record['lods'])} were built")
+    levels = []
+    to_fine = Nearest(fine, samples)
+    for lod in lods:
+        stored = record["lods"][min(lod.level, len(record["lods"]) - 1)]
+        to_mesh = Nearest(lod.mesh, samples)
+        found = measure_distance(to_fine, to_mesh)
+        there, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
+        largest = max(there.max, back.max)
+        levels.append((lod.distance_um, found, largest))
+        quality = load_quality(stored["quality"])
+        bound = max(quality.away.max, quality.back.max)
+        name = f"lod{lod.level}"
+        if found > _slack(lod.distance_um):
+            problems.append(
+                f"{name}: {found:.4g} um from the iso-surface, the stage states "
+                f"{lod.distance_um:.4g}"
+            )
+        if largest > _slack(bound):
+            problems.append(f"{name}: up to {largest:.4g} um away, {bound:.4g} when it was built")
+        built_um = stored["distance_um"]
+        if abs(lod.distance_um - built_um) > _HAIR_UM + 1e-5 * built_um:
+            problems.append(
+                f"{name}: the stage states {lod.distance_um:.4g} um, the unit {built_um:.4g}"
+            )
+    return tuple(levels), problems
+
+
+def _slack(um: float) -> float:
+    return um * (1 + _SHARE) + _HAIR_UM
+
+
+def _hold_volume(eight_bit: Any, atlas: Path, task: SourceTask) -> list[str]:
+    problems = []
+    stored = read_atlas(atlas)
+    if stored.shape != eight_bit.shape:
+        return [
+            f"{atlas.name}: {stored.shape} voxels (z, y, x), the source gives {eight_bit.shape}"
+        ]
+    wrong = int((stored != eight_bit).sum())
+    if wrong:
+        problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels are not the source's")
+    own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
+    vdb = atlas.with_suffix(".vdb")
+    with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
+        anew = Path(folder) / vdb.name
+        write_vdb(anew, own, task.first_um, task.spacing_um)
+        try:
+            if vdb.read_bytes() != anew.read_bytes():
+                problems.append(f"{vdb.name}: not the file that the source gives")
+        except OSError as error:
+            raise StereoCellError(f"{vdb}: {error.strerror}") from error
+    return problems

@@ -1,0 +1,182 @@
+"""One command at a time writes into an OUT: who comes second is told who is at work there.
+
+OUT/.lock is held by the system's own lock (flock), which ends with its process however that ends: a
+stale file is taken over by itself, and no process id that has been given away again can mislead.
+What the file says is for people alone. On NFS the lock holds between machines (Linux 2.6.12 on).
+
+On object storage nothing ends by itself: the object is written anew every BEAT_S seconds, and one
+that has not been for STALE_S, or whose process on this machine is gone, is taken over. The clocks
+of machine and storage may differ by minutes. Only one can create it where the storage knows
+conditional writes (AWS since 2024); elsewhere two that begin within a second may both get in.
+"""
+
+import json
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from stereocell.errors import OutputError
+from stereocell.processes import is_alive
+
+if sys.platform != "win32":
+    import fcntl
+
+LOCK = ".lock"
+BEAT_S, STALE_S = 60.0, 600.0
+_SETTLE_S = 1.0  # after taking over: another may have done so at once
+
+
+@contextmanager
+def alone_in(out: Path, command: str) -> Iterator[None]:
+    """Hold OUT for a command that writes into it; a folder that stays empty is not left behind.
+
+    Raises OutputError if another process holds it, naming that one, or if OUT can't be written.
+    """
+    made = _missing_folders(out)
+    try:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            file = _hold(out / LOCK, command)
+        except OSError as error:
+            raise OutputError(
+                f"{out}: can't be written ({error.strerror}), expected a folder of your own"
+            ) from None
+        try:
+            yield
+        finally:
+            (out / LOCK).unlink(missing_ok=True)  # while it is held: nobody waits at this file
+            os.close(file)
+    finally:
+        for folder in made:
+            with suppress(OSError):  # something lies in it
+                folder.rmdir()
+
+
+def _missing_folders(out: Path) -> list[Path]:
+    """Return OUT and the folders above it that are not there, the innermost first."""
+    return [folder for folder in (out, *out.parents) if not folder.exists()]
+
+
+def _hold(path: Path, command: str) -> int:
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            if sys.platform != "win32":
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            told = _owner(file)
+            os.close(file)
+            raise OutputError(
+                f"{path.parent}: {told} is writing here: wait until it has ended"
+            ) from None
+        # whoever held it before may have removed the file in between
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file), path.stat()):
+                break
+        os.close(file)
+    with suppress(OSError):  # a full disk: what it says is for people
+        os.ftruncate(file, 0)
+        os.write(file, json.dumps(_claim(command)).encode())
+    return file
+
+
+def _claim(command: str) -> dict[str, Any]:
+    return {
+        "process": os.getpid(),
+        "host": socket.gethostname(),
+        "command": command,
+        "since": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _owner(file: int) -> str:
+    return _in_words(os.pread(file, 4096, 0))
+
+
+def _in_words(content: bytes) -> str:
+    try:
+        owner = json.loads(content)
+        return (
+            f"`stereocell {owner['command']}` (process {owner['process']} on {owner['host']}, "
+            f"since {owner['since']})"
+        )
+    except (ValueError, KeyError, TypeError):  # it has just begun
+        return "another command"
+
+
+@contextmanager
+def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[None]:
+    """Hold an OUT on object storage: `path` is the lock's in a file system of fsspec.
+
+    Raises OutputError if another process holds it, naming that one. What the storage itself raises
+    is the caller's.
+    """
+    content = json.dumps(_claim(command) | {"id": str(uuid4())}).encode()
+    _create(fs, path, shown, content)
+    over = threading.Event()
+
+    def beat() -> None:
+        while not over.wait(BEAT_S):
+            with suppress(Exception):  # a storage that fails now is met where it matters
+                fs.pipe_file(path, content)
+
+    thread = threading.Thread(target=beat, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+        with suppress(Exception):
+            if fs.cat_file(path) == content:
+                fs.rm_file(path)
+
+
+def _create(fs: Any, path: str, shown: str, content: bytes) -> None:
+    taken_over = False
+    while True:
+        there = _read(fs, path)
+        if there is None:
+            with suppress(FileExistsError):
+                fs.pipe_file(path, content, mode="create")
+                break
+            there = _read(fs, path)
+        if there is not None:
+            if not _is_stale(*there):
+                raise OutputError(
+                    f"{shown}: {_in_words(there[0])} is writing here: wait until it has ended"
+                )
+            with suppress(FileNotFoundError):
+                fs.rm_file(path)
+            taken_over = True
+    if taken_over:
+        time.sleep(_SETTLE_S)
+    there = _read(fs, path)
+    if there is None or there[0] != content:
+        told = "another command" if there is None else _in_words(there[0])
+        raise OutputError(f"{shown}: {told} is writing here: wait until it has ended")
+
+
+def _read(fs: Any, path: str) -> tuple[bytes, float] | None:
+    """Return a lock's content and how many seconds ago it was written; None: there is none."""
+    try:
+        content, written = fs.cat_file(path), fs.modified(path)
+    except FileNotFoundError:
+        return None
+    return content, (datetime.now(UTC) - written).total_seconds()
+
+
+def _is_stale(content: bytes, age_s: float) -> bool:
+    with suppress(ValueError, KeyError, TypeError):
+        owner = json.loads(content)
+        if owner["host"] == socket.gethostname() and not is_alive(int(owner["process"])):
+            return True
+    return age_s > STALE_S

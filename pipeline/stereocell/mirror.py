@@ -1,0 +1,424 @@
+"""An OUT on object storage: written and read here as files, kept there as objects.
+
+pxr, numpy and PIL want files. So where OUT is an address (`s3://...`), a command works in a folder
+of this machine that lasts as long as it does, and each of a cluster's workers in one of the same
+name on its own machine:
+
+- `keep` puts what was written under its final name, whole, what tells of the others last. A large
+  file is then taken away here: the disk holds what is at work, never the build.
+- `bring` fetches what is about to be read; the small files that steer a build come at the start.
+
+In any other folder these do nothing, so that readers and writers just call them.
+"""
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from stereocell.errors import OutputError, StereoCellError, UsageError
+from stereocell.lock import LOCK, alone_at
+from stereocell.processes import is_alive
+
+T = TypeVar("T")
+R = TypeVar("R")
+Size = int | None  # of an object in bytes; None: it is gone
+
+_SMALL_BYTES = 1 << 16
+# what tells of others is put after them, in this order
+_LAST = ("tile.usdc", "stage.usda", "files.json", "manifest.json", "unit.json")
+# what steers a build: a few objects for each unit, all small
+_STEERING = re.compile(
+    r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
+    r"|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
+)
+_SCRATCH = re.compile(r"stereocell\.(\d+)\.\w+")
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where OUT lies, and the folder in which it is worked on. Picklable."""
+
+    address: str
+    root: Path
+
+    @property
+    def shown(self) -> str:
+        """The address without what it may hold in secret."""
+        from stereocell.read.location import Location
+
+        return Location.of(self.address).shown.rstrip("/")
+
+
+class Mirror:
+    """One OUT on object storage, as this process knows it.
+
+    sizes  of all objects by key, where they are known (in the process that runs the command, which
+           alone is in OUT); None: the storage is asked each time
+    news   what this process has put and removed since somebody asked
+    """
+
+    def __init__(self, place: Place) -> None:
+        self.place = place
+        self.sizes: dict[str, int] | None = None
+        self.news: dict[str, Size] = {}
+        self.making: set[Path] = set()  # folders that this process will keep as a whole
+        self._folders: dict[str, set[str]] = {}
+
+    @cached_property
+    def _storage(self) -> tuple[Any, str]:
+        """The file system of fsspec, and OUT's path in it."""
+        import fsspec
+
+        from stereocell.read.location import Location
+
+        address = self.place.address
+        options = Location.of(address).storage_options
+        with self._telling("", "read"):
+            fs, path = fsspec.core.url_to_fs(address, use_listings_cache=False, **options)
+        return fs, str(path).rstrip("/")
+
+    @contextmanager
+    def alone(self, command: str) -> Iterator[None]:
+        """Hold OUT for a command that writes into it. Raises OutputError."""
+        fs, base = self._storage
+        with ExitStack() as stack:
+            with self._telling(LOCK, "written"):
+                stack.enter_context(alone_at(fs, f"{base}/{LOCK}", self.place.shown, command))
+            yield
+
+    # --- what lies there
+
+    def list_all(self) -> None:
+        """Learn of every object; what killed commands left half-made is removed."""
+        self.sizes = {}
+        found = self._find("")
+        for key, size in found.items():
+            self._learn(key, size)
+        if LOCK in found:  # held by us: what others left half-made is nobody's
+            self._remove([key for key in found if "/." in f"/{key}" and key != LOCK])
+
+    def keys_of(self, path: Path) -> dict[str, int]:
+        """Return the objects of a file or of all below a folder, with their sizes."""
+        key = self._key(path)
+        if self.sizes is None:
+            return self._find(key)
+        if key in self.sizes:
+            return {key: self.sizes[key]}
+        return {each: self.sizes[each] for each in self._below(key)}
+
+    def _find(self, key: str) -> dict[str, int]:
+        return {name: int(entry["size"]) for name, entry in self._list(key).items()}
+
+    def _list(self, key: str) -> dict[str, dict[str, Any]]:
+        fs, base = self._storage
+        with self._telling(key, "read"):
+            found = fs.find(f"{base}/{key}" if key else base, detail=True)
+        return {name[len(base) + 1 :]: entry for name, entry in found.items()}
+
+    def marks(self, folder: Path) -> list[tuple[str, int, str]]:
+        """Return key, bytes and the storage's own mark of each object below a folder, in order."""
+        entries = self._list(self._key(folder)).items()
+        return [
+            (key, int(e["size"]), str(e.get("ETag") or e.get("LastModified") or ""))
+            for key, e in sorted(entries)
+        ]
+
+    def _below(self, key: str) -> Iterator[str]:
+        for name in sorted(self._folders.get(key, ())):
+            child = f"{key}/{name}" if key else name
+            if self.sizes is not None and child in self.sizes:
+                yield child
+            else:
+                yield from self._below(child)
+
+    def learn(self, news: Mapping[str, Size]) -> None:
+        """Take in what a worker has put and removed."""
+        for key, size in news.items():
+            self._learn(key, size)
+
+    def _learn(self, key: str, size: Size) -> None:
+        self.news[key] = size
+        if self.sizes is None:
+            return
+        parts = key.split("/")
+        folders = ["/".join(parts[:k]) for k in range(len(parts))]
+        if size is None:
+            self.sizes.pop(key, None)
+            self._folders.get(folders[-1], set()).discard(parts[-1])
+            return
+        self.sizes[key] = size
+        for folder, name in zip(folders, parts, strict=True):
+            self._folders.setdefault(folder, set()).add(name)
+
+    def _key(self, path: Path) -> str:
+        key = path.relative_to(self.place.root).as_posix()
+        return "" if key == "." else key
+
+    # --- to here
+
+    def bring(self, keys: Iterable[str]) -> list[Path]:
+        """Fetch the objects that aren't here; return their files."""
+        fs, base = self._storage
+        files = {key: self.place.root / key for key in keys}
+        missing = {key: file for key, file in files.items() if not file.exists()}
+        if not missing:
+            return []
+        # under another name at first: another worker of this machine may want the same
+        parts = {key: f.with_name(f".{f.name}.{os.getpid()}") for key, f in missing.items()}
+        for file in missing.values():
+            file.parent.mkdir(parents=True, exist_ok=True)
+        with self._telling(next(iter(missing)), "read"):
+            fs.get([f"{base}/{key}" for key in missing], [str(part) for part in parts.values()])
+        for key, part in parts.items():
+            os.replace(part, missing[key])
+        return list(missing.values())
+
+    # --- to there
+
+    def keep(self, path: Path, half_made: Path | None = None) -> None:
+        """Put a file, or all of a folder in place of what was there.
+
+        half_made  a folder of which others have kept parts already: they are moved
+        """
+        files = [path] if path.is_file() else [f for f in path.rglob("*") if f.is_file()]
+        here = {self._key(file): file for file in files}
+        there: dict[str, str] = {}
+        if half_made is not None:
+            old, new = self._key(half_made), self._key(path)
+            there = {new + key[len(old) :]: key for key in self.keys_of(half_made)}
+        stale = [key for key in self.keys_of(path) if key not in here and key not in there]
+        self._put({key: file for key, file in here.items() if key not in there}, there)
+        self._remove([*stale, *there.values()])
+        for key, file in here.items():
+            if file.stat().st_size > _SMALL_BYTES and not _STEERING.fullmatch(key):
+                file.unlink()
+
+    def _put(self, here: Mapping[str, Path], there: Mapping[str, str]) -> None:
+        fs, base = self._storage
+        sizes = {key: file.stat().st_size for key, file in here.items()}
+        sizes |= {key: self.keys_of(self.place.root / old)[old] for key, old in there.items()}
+        ranks = [(rank, key) for key in sizes for rank in [_rank(key)]]
+        for rank in sorted({rank for rank, _ in ranks}):
+            keys = sorted(key for r, key in ranks if r == rank)
+            own, moved = [k for k in keys if k in here], [k for k in keys if k in there]
+            with self._telling(keys[0], "written"):
+                if own:
+                    fs.put([str(here[k]) for k in own], [f"{base}/{k}" for k in own])
+                if moved:
+                    fs.copy([f"{base}/{there[k]}" for k in moved], [f"{base}/{k}" for k in moved])
+            for key in keys:
+                self._learn(key, sizes[key])
+
+    def remove(self, path: Path) -> None:
+        self._remove(list(self.keys_of(path)))
+
+    def _remove(self, keys: list[str]) -> None:
+        if not keys:
+            return
+        fs, base = self._storage
+        with self._telling(keys[0], "removed"):
+            fs.rm([f"{base}/{key}" for key in keys])
+        for key in keys:
+            self._learn(key, None)
+
+    @contextmanager
+    def _telling(self, key: str, what: str) -> Iterator[None]:
+        from stereocell.read.faults import one_line
+
+        where = f"{self.place.shown}/{key}".rstrip("/")
+        with one_line(where, f"an object that can be {what}", OutputError):
+            yield
+
+
+def _rank(key: str) -> int:
+    name = key.rpartition("/")[2]
+    return _LAST.index(name) + 1 if name in _LAST else 0
+
+
+# --- what readers and writers call
+
+_open: list[Mirror] = []  # of this process: none or one
+
+
+def _of(path: Path) -> Mirror | None:
+    """Return the mirror that a path lies in."""
+    return next((mirror for mirror in _open if path.is_relative_to(mirror.place.root)), None)
+
+
+def bring(*paths: Path) -> None:
+    """Have files, or all of folders, at hand. Raises OutputError."""
+    for path in paths:
+        mirror = _of(path)
+        if mirror is not None and not path.is_file():
+            mirror.bring(mirror.keys_of(path))
+
+
+@contextmanager
+def at_hand(*paths: Path) -> Iterator[None]:
+    """Have files, or all of folders, at hand within the block; what it fetched is gone afterwards.
+
+    Raises OutputError.
+    """
+    brought: list[Path] = []
+    try:
+        for path in paths:
+            mirror = _of(path)
+            if mirror is not None:
+                brought += mirror.bring(mirror.keys_of(path))
+        yield
+    finally:
+        for file in brought:
+            file.unlink(missing_ok=True)
+
+
+def keep(path: Path) -> None:
+    """Put a file that was written under its final name. Raises OutputError.
+
+    One of a folder that this process is making is put with the folder.
+    """
+    mirror = _of(path)
+    if mirror is not None and not any(path.is_relative_to(folder) for folder in mirror.making):
+        mirror.keep(path)
+
+
+@contextmanager
+def making(folder: Path, final: Path) -> Iterator[None]:
+    """Put a folder as a whole that the block makes at `folder` and renames to `final`."""
+    mirror = _of(folder)
+    if mirror is None or any(folder.is_relative_to(outer) for outer in mirror.making):
+        yield
+        return
+    mirror.remove(folder)
+    mirror.making.add(folder)
+    try:
+        yield
+        mirror.keep(final, folder)
+    finally:
+        mirror.making.discard(folder)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder with all that lies in it, if it is there. Raises OutputError."""
+    mirror = _of(path)
+    if mirror is not None:
+        mirror.remove(path)
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def sizes_below(path: Path) -> dict[Path, int]:
+    """Return every file at or below a path, here or kept, in order, with its bytes."""
+    mirror = _of(path)
+    if mirror is not None:
+        return {mirror.place.root / key: n for key, n in sorted(mirror.keys_of(path).items())}
+    files = sorted(path.rglob("*")) if path.is_dir() else [path]
+    return {file: file.stat().st_size for file in files if file.is_file()}
+
+
+def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:
+    """Return key, bytes and mark of all that is kept below a folder: what an edit alters.
+
+    None for a folder that is on no object storage.
+    """
+    mirror = _of(folder)
+    return None if mirror is None else mirror.marks(folder)
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a file is there, here or kept."""
+    return path.is_file() or (_of(path) is not None and path in sizes_below(path))
+
+
+# --- processes
+
+
+@contextmanager
+def opened(address: str, command: str = "") -> Iterator[Path]:
+    """Yield the folder of this machine in which an OUT at an address is worked on.
+
+    Holds OUT for a `command` that writes there; without one, all of OUT is fetched. In errors from
+    inside the block, the address stands for the folder.
+
+    Raises OutputError if nothing can be read there or another command writes there, UsageError for
+    an address that can't be written.
+    """
+    if address.partition("://")[0] in ("http", "https"):
+        raise UsageError(
+            f"OUT is {address}: can't be written, expected a folder or an s3:// address"
+        )
+    _clear_scratch()
+    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{os.getpid()}."))
+    mirror = Mirror(Place(address.rstrip("/"), root))
+    _open.append(mirror)
+    try:
+        with mirror.alone(command) if command else nullcontext():
+            mirror.list_all()
+            keys = mirror.keys_of(root)
+            mirror.bring(key for key in keys if not command or _STEERING.fullmatch(key))
+            yield root
+    except StereoCellError as error:
+        error.args = tuple(str(part).replace(str(root), mirror.place.shown) for part in error.args)
+        raise
+    finally:
+        _open.remove(mirror)
+        shutil.rmtree(root, ignore_errors=True)
+
+
+def _clear_scratch() -> None:
+    """Remove what killed commands of this machine left."""
+    for folder in Path(tempfile.gettempdir()).glob("stereocell.*"):
+        name = _SCRATCH.fullmatch(folder.name)
+        if name is not None and not is_alive(int(name[1])):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+@dataclass(frozen=True, slots=True)
+class _Carried(Generic[T, R]):
+    """A function that finds its OUT on any machine, and tells what it has put there."""
+
+    function: Callable[[T], R]
+    place: Place
+
+    def __call__(self, task: T) -> tuple[R, dict[str, Size]]:
+        mirror = next((mirror for mirror in _open if mirror.place == self.place), None)
+        if mirror is None:
+            mirror = Mirror(self.place)
+            _open[:] = [mirror]
+        self.place.root.mkdir(parents=True, exist_ok=True)
+        mirror.news.clear()
+        return self.function(task), dict(mirror.news)
+
+
+def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[Any], R]]:
+    """Return what workers are to run instead of a function, and what makes its result of theirs."""
+    if not _open:
+        return function, lambda result: result
+    mirror = _open[0]
+
+    def settle(answer: tuple[R, dict[str, Size]]) -> R:
+        result, news = answer
+        mirror.learn(news)
+        return result
+
+    return _Carried(function, mirror.place), settle
+
+
+def forget_scratch(client: Any) -> None:
+    """Remove, on a cluster's workers, the folders in which they worked."""
+    if _open:
+        with suppress(Exception):  # whatever befell the cluster
+            client.run(_forget, _open[0].place.root)
+
+
+def _forget(root: Path) -> None:
+    _open.clear()
+    shutil.rmtree(root, ignore_errors=True)

@@ -1,0 +1,178 @@
+"""`check --deep` passes what was built, and names each fault that is put in by hand."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Sdf, Usd, Vt
+
+import phantoms
+from stereocell.check import CheckLine
+from stereocell.cli import main
+from stereocell.deep import check_deep
+from stereocell.engine import Engine
+from stereocell.write.exr import read_atlas, write_atlas
+
+TILE = "stage/tiles/r0_c0/tile.usdc"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("deep")
+    body = phantoms.f_phantom(2)
+    source = phantoms.write_ome_tiff(folder / "f.ome.tif", body[None], "CZYX", names=["F"])
+    flags = ["--grid", "2x1", "--workers", "0"]
+    assert main(["build", str(source), "-o", str(folder / "out"), *flags]) == 0
+    return folder / "out"
+
+
+@pytest.fixture
+def out(built: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(built, tmp_path / "out")
+
+
+def lines_of(out: Path) -> dict[str, CheckLine]:
+    return {line.name: line for line in check_deep(out, Engine(0))}
+
+
+def failures(out: Path) -> dict[str, str]:
+    return {name: line.detail for name, line in lines_of(out).items() if not line.ok}
+
+
+def edit_mesh(out: Path, change: Callable[[Sdf.AttributeSpec], None], name: str) -> None:
+    """Change an attribute of the finest mesh of r0_c0 in its own layer."""
+    layer = Sdf.Layer.FindOrOpen(str(out / TILE))
+    found: list[Sdf.Path] = []
+    layer.Traverse(
+        Sdf.Path.absoluteRootPath,
+        lambda path: found.append(path) if path.name == name and "lod=lod0" in str(path) else None,
+    )
+    assert len(found) == 1, found
+    change(layer.GetAttributeAtPath(found[0]))
+    assert layer.Save()
+    layer.Reload(True)
+
+
+def move_a_vertex(out: Path) -> None:
+    def change(points: Sdf.AttributeSpec) -> None:
+        moved = np.array(points.default)
+        moved[len(moved) // 2] += (0, 0, 9)
+        points.default = Vt.Vec3fArray.FromNumpy(moved)
+
+    edit_mesh(out, change, "points")
+
+
+def swap_axes(out: Path) -> None:
+    def change(points: Sdf.AttributeSpec) -> None:
+        swapped = np.ascontiguousarray(np.array(points.default)[:, [1, 0, 2]])
+        points.default = Vt.Vec3fArray.FromNumpy(swapped)
+
+    edit_mesh(out, change, "points")
+
+
+def state_half_the_distance(out: Path) -> None:
+    def change(distance: Sdf.AttributeSpec) -> None:
+        distance.default = distance.default / 2
+
+    edit_mesh(out, change, "stereocell:distance")
+
+
+def drop_a_tile(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"), Usd.Stage.LoadNone)
+    stage.RemovePrim("/Specimen/Tiles/r0_c1")
+    stage.GetRootLayer().Save()
+
+
+def change_a_colour(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
+    stage.GetPrimAtPath("/Specimen/Channels/F").GetAttribute("inputs:color").Set((0.2, 0.9, 0.1))
+    stage.GetRootLayer().Save()
+
+
+def leave_a_texture_stale(out: Path) -> None:
+    file = out / "stage" / "tiles" / "r0_c0" / "F_lod1_normal.png"
+    with Image.open(file) as image:
+        mirrored = image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)
+    mirrored.save(file)
+
+
+def spoil_a_voxel(out: Path) -> None:
+    file = out / "stage" / "tiles" / "r0_c0" / "F.exr"
+    volume = read_atlas(file).copy()
+    volume[5, 6, 7] ^= 1
+    write_atlas(file, volume)
+
+
+def rename_a_channel(out: Path) -> None:
+    file = out / "bundle" / "manifest.json"
+    manifest = json.loads(file.read_bytes())
+    manifest["channels"][0]["name"] = "G"
+    file.write_text(json.dumps(manifest))
+
+
+@pytest.mark.slow
+def test_what_was_built_is_as_it_says(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(built), "--deep", "--workers", "0"]) == 0
+    told = capsys.readouterr().out
+    assert "ok   F lod0 against source: 2 surfaces within " in told
+    assert "ok   F against source: 2 units: surfaces as stated, volumes equal to 8 bits" in told
+    assert "2 volumes, every voxel of every level" in told
+    found = lines_of(built)["F lod3 against source"].detail.split()
+    within, stated = float(found[3]), float(found[5])
+    assert 0 < within <= stated * 1.02
+
+
+SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest against stage"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (
+            move_a_vertex,
+            {SOURCE: "r0_c0/F: lod0: ", BUNDLE: "r0_c0/F: lod0: a vertex is "},
+        ),
+        (
+            swap_axes,
+            {SOURCE: "um from the iso-surface, the stage states", BUNDLE: "lod0: a vertex is"},
+        ),
+        (state_half_the_distance, {SOURCE: "lod0: "}),
+        (
+            drop_a_tile,
+            {
+                "tiles of the stage": "r0_c1 is missing",
+                MANIFEST: "tiles are r0_c0, r0_c1, the stage's r0_c0",
+            },
+        ),
+        (change_a_colour, {MANIFEST: "F: color is ", BUNDLE: "drawn in "}),
+        (leave_a_texture_stale, {BUNDLE: "F_lod1_normal.png is another image in the stage"}),
+        (
+            spoil_a_voxel,
+            {SOURCE: "F.exr: 1 of ", BUNDLE: "F.ktx2: level 0: 1 of "},
+        ),
+        (rename_a_channel, {MANIFEST: "F: name is 'G', the stage's 'F'"}),
+    ],
+)
+def test_a_fault_put_in_by_hand_is_named(
+    out: Path, spoil: Callable[[Path], None], expected: dict[str, str]
+) -> None:
+    spoil(out)
+    found = failures(out)
+    assert found.keys() == expected.keys(), found
+    for name, part in expected.items():
+        assert part in found[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["channels/F/r0_c0/lod0.glb", "volumes/r0_c1/F.ktx2"])
+def test_a_cut_file_is_named_in_a_line(out: Path, name: str) -> None:
+    file = out / "bundle" / name
+    file.write_bytes(file.read_bytes()[:300])
+    line = failures(out)[BUNDLE]
+    assert f"{file}: can't be decoded: " in line
+    assert "\n" not in line

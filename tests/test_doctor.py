@@ -1,0 +1,62 @@
+"""What `stereocell doctor` finds on this machine, and on one that has nothing."""
+
+import json
+import shutil
+import subprocess
+import sys
+from collections import namedtuple
+from pathlib import Path
+
+import pytest
+
+from stereocell import doctor
+from stereocell.cli import main
+
+Usage = namedtuple("Usage", "total used free")
+
+
+def test_every_missing_thing_says_what_it_costs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["ok"]
+    assert {one["name"] for one in answer["found"]} >= {"Python", "memory", "disk", "OpenGL", "GPU"}
+    for one in answer["found"]:
+        assert one["found"]
+        assert bool(one["cost"]) != one["ok"]
+    assert main(["doctor"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(answer["found"])
+
+
+def test_on_a_bare_machine(tmp_path: Path) -> None:
+    """Nothing on the PATH, no display, nothing in the environment."""
+    answer = subprocess.run(
+        [sys.executable, "-m", "stereocell.cli", "doctor", "--json"],
+        env={"HOME": str(tmp_path), "PATH": str(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = {one["name"]: one for one in json.loads(answer.stdout)["found"]}
+    assert not found["browser"]["ok"]
+    assert "--lan" in found["browser"]["cost"]
+    assert not found["Node.js"]["ok"]
+    assert answer.stderr == ""
+
+
+def test_what_is_needed_fails(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lacking = lambda name: ["numpy>=2", "no-such-package>=1; extra-less", "x>1; extra == 'y'"]  # noqa: E731
+    monkeypatch.setattr(doctor, "requires", lacking)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage(0, 0, 3 << 30))
+    monkeypatch.setattr(doctor, "_available_bytes", lambda: 1 << 30)
+    monkeypatch.setattr(
+        doctor, "LOOKS", tuple(one for one in doctor.LOOKS if one is not doctor._opengl)
+    )
+    assert main(["doctor"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert "missing packages: missing: no-such-package: what needs them fails" in lines[1]
+    told = "\n".join(lines)
+    assert "without memory: 1.0 GiB available: 0 workers" in told
+    assert "without disk: 3.0 GiB free in this folder: a large build may not fit" in told

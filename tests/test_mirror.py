@@ -1,0 +1,181 @@
+"""An OUT on object storage: the same bytes as in a folder, object by object, and refusals."""
+
+import hashlib
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import phantoms
+from object_store import ObjectStore, serving
+from stereocell.cli import main
+from stereocell.errors import OutputError
+from stereocell.lock import alone_at
+
+ARGUMENTS = ["--grid", "2x1", "--workers", "0"]
+PARTS = ("units", "stage", "bundle")
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
+    with serving(tmp_path_factory.mktemp("objects")) as store, pytest.MonkeyPatch.context() as m:
+        for name, value in store.environment.items():
+            m.setenv(name, value)
+        store.files().mkdir("bucket")
+        yield store
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("volume") / "f.ome.tif"
+    phantoms.write_ome_tiff(path, phantoms.f_phantom()[None], "CZYX")
+    return path
+
+
+@pytest.fixture(scope="module")
+def local(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The SHA-256 of what a build in a folder leaves."""
+    out = tmp_path_factory.mktemp("local") / "out"
+    assert main(["build", str(volume), "-o", str(out), *ARGUMENTS]) == 0
+    return {
+        file.relative_to(out).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(out.rglob("*"))
+        if file.is_file() and file.relative_to(out).parts[0] in PARTS
+    }
+
+
+@pytest.fixture(scope="module")
+def there(store: ObjectStore, volume: Path) -> str:
+    """A build on the store."""
+    assert main(["build", str(volume), "-o", "s3://bucket/there", *ARGUMENTS]) == 0
+    return "s3://bucket/there"
+
+
+def kept(store: ObjectStore, prefix: str) -> dict[str, str]:
+    """The SHA-256 of every object of a build; seconds differ, and nothing is made of them."""
+    fs = store.files()
+    return {
+        name.removeprefix(f"{prefix}/"): hashlib.sha256(fs.cat_file(name)).hexdigest()
+        for name in fs.find(prefix)
+    }
+
+
+def of_parts(found: dict[str, str]) -> dict[str, str]:
+    return {
+        key: digest
+        for key, digest in found.items()
+        if key.split("/")[0] in PARTS and not key.endswith("seconds.json")
+    }
+
+
+@pytest.mark.slow
+def test_objects_are_the_files_of_a_folder(
+    store: ObjectStore,
+    volume: Path,
+    local: dict[str, str],
+    there: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    print(f"object store: {store.kind}")
+    found = kept(store, "bucket/there")
+    assert of_parts(found) == of_parts(local)
+    assert {"plan.json", "phases.json", "report/index.html"} <= found.keys()
+    assert not [key for key in found if "/." in f"/{key}"]
+    # nothing to do, and nothing done
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    told = capsys.readouterr()
+    assert "stage    s3://bucket/there/stage/stage.usda\n" in told.out
+    for phase in ("plan", "units", "stage", "bundle", "report"):
+        assert f"{phase}: up to date" in told.err
+    assert kept(store, "bucket/there") == found
+
+
+@pytest.mark.slow
+def test_what_is_lost_or_half_made_there_is_made_again(
+    store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs = store.files()
+    before = of_parts(kept(store, "bucket/there"))
+    (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
+    fs.rm(f"bucket/there/{unit}")
+    fs.pipe_file("bucket/there/bundle/index.html", b"cut")
+    fs.pipe_file("bucket/there/stage/.tiles.partial/x", b"left by a killed command")
+    capsys.readouterr()
+    assert main(["check", there]) == 1
+    assert "FAIL hashes: index.html: not the bytes that files.json" in capsys.readouterr().out
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert of_parts(kept(store, "bucket/there")) == before
+    capsys.readouterr()
+    assert main(["check", there, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"]
+    manifest = fs.cat_file("bucket/there/bundle/manifest.json")
+    fs.rm("bucket/there/bundle/manifest.json")
+    assert main(["check", there]) == 1
+    assert f"FAIL manifest: {there}/bundle/manifest.json is missing" in capsys.readouterr().out
+    fs.pipe_file("bucket/there/bundle/manifest.json", manifest)
+
+
+def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
+    store: ObjectStore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs, lock = store.files(), "bucket/held/.lock"
+    owner = {"process": 7, "host": "elsewhere", "command": "build", "since": "2026-01-01T00:00:00"}
+    fs.pipe_file(lock, json.dumps(owner).encode())
+    assert main(["units", "s3://bucket/held"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == (
+        "stereocell: s3://bucket/held: `stereocell build` (process 7 on elsewhere, since "
+        "2026-01-01T00:00:00) is writing here: wait until it has ended"
+    )
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    gone = {**owner, "process": dead.pid, "host": socket.gethostname()}
+    fs.pipe_file(lock, json.dumps(gone).encode())
+    assert main(["units", "s3://bucket/held"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == (
+        "stereocell: s3://bucket/held/plan.json is missing: run `stereocell plan INPUT -o OUT` "
+        "first"
+    )
+    assert not fs.exists(lock)
+
+
+def test_a_lock_that_was_not_renewed_is_taken_over(
+    store: ObjectStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stereocell.lock._SETTLE_S", 0.0)
+    fs, path = store.files(), "bucket/renewed/.lock"
+    with alone_at(fs, path, "there", "build"):
+        refused = pytest.raises(OutputError, match="there: `stereocell build`")
+        with refused, alone_at(fs, path, "there", "units"):
+            pass
+        monkeypatch.setattr("stereocell.lock.STALE_S", -1e6)
+        with alone_at(fs, path, "there", "units"):
+            assert json.loads(fs.cat_file(path))["command"] == "units"
+        assert not fs.exists(path)
+    assert not fs.exists(path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["units", "https://x.org/out"], 2, "can't be written, expected a folder or an s3://"),
+        (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
+        (["slices", "x.nii", "-o", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (["units", "nothing://x"], 1, "nothing://x: Protocol not known: nothing"),
+    ],
+)
+def test_what_is_no_place_is_said_in_a_line(
+    store: ObjectStore,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    code: int,
+    message: str,
+) -> None:
+    assert main(arguments) == code
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
