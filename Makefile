@@ -142,7 +142,7 @@ test-viewer: setup browser
 	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
 	$(MAKE) --no-print-directory demo SAMPLE=brain-cells OUT=out/brain-cells
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
-	for f in f.ome.tif f.ome.zarr f.nii.gz dicom; do $(RUN) build out/f/$$f -o out/f/of-$$f --workers 0 || exit 1; done
+	$(BIN)/python tests/assets.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
 	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit
 	$(MAKE) --no-print-directory bundle INPUT=out/edit/balls.ome.tif OUT=out/edit/built ARGS="--grid 3x2" WORKERS=0
 	cp -r out/edit/built/bundle out/edit/before

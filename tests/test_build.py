@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 import phantoms
+from assets import make_assets
 from stereocell.cli import main
 from stereocell.store import Store
 from stereocell.unit_files import load_record
@@ -95,15 +96,14 @@ def test_tiff_and_zarr_of_the_same_voxels_give_the_same_surface(
         channels=[{"label": "F body"}, {"label": "empty"}],
     )
     out = tmp_path / "out"
-    assert main(["build", str(source), "-o", str(out), *BUILD]) == 0
+    assert make_assets(source, out, "2x1", "--workers", "0") == 0
     for lod in ("lod0.glb", "lod3.glb"):
         file = f"bundle/channels/F_x20_body/r0_c0/{lod}"
         assert (out / file).read_bytes() == (built / file).read_bytes()
 
 
 def test_same_input_gives_the_same_bytes(built: Path, tmp_path: Path) -> None:
-    source = _source(tmp_path)
-    assert main(["build", str(source), "-o", str(tmp_path / "out"), *BUILD]) == 0
+    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "0") == 0
     for part in ("stage", "bundle"):
         assert _files(tmp_path / "out" / part) == _files(built / part)
     units, again = (
@@ -121,8 +121,7 @@ def test_same_input_gives_the_same_bytes(built: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_number_of_workers_does_not_change_the_bytes(built: Path, tmp_path: Path) -> None:
-    arguments = ["build", str(_source(tmp_path)), "-o", str(tmp_path / "out")]
-    assert main([*arguments, "--workers", "2", "--grid", "2x1"]) == 0
+    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "2") == 0
     for part in ("stage", "bundle"):
         assert _files(tmp_path / "out" / part) == _files(built / part)
 

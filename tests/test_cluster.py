@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 
 import phantoms
+from assets import make_assets
 from object_store import ObjectStore, serving
 from stereocell.cli import main
 from stereocell.cluster import ClusterError, join
 
-ARGUMENTS = ["--grid", "2x1"]
+GRID = "2x1"
 Cluster = tuple[str, ObjectStore]
 
 
@@ -58,7 +59,7 @@ def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def alone(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """What one process leaves in a folder."""
     out = tmp_path_factory.mktemp("alone") / "out"
-    assert main(["build", str(volume), "-o", str(out), "--workers", "0", *ARGUMENTS]) == 0
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
     found = results(out)
     assert len(found) > 20
     return found
@@ -90,8 +91,7 @@ def test_a_cluster_builds_the_same_bytes_as_one_process(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)  # OUT is told from here; the workers stand elsewhere
-    told = ["-o", "out", "--scheduler", cluster[0]]
-    assert main(["build", str(volume), *told, *ARGUMENTS]) == 0
+    assert make_assets(volume, "out", GRID, "--scheduler", cluster[0]) == 0
     assert results(tmp_path / "out") == alone
 
 
@@ -103,8 +103,8 @@ def test_a_cluster_reads_from_and_writes_to_an_object_store(
     print(f"object store: {store.kind}")
     fs = store.files()
     fs.put(str(volume), "bucket/f.ome.zarr", recursive=True)
-    told = ["-o", "s3://bucket/out", "--scheduler", scheduler]
-    assert main(["build", "s3://bucket/f.ome.zarr", *told, *ARGUMENTS]) == 0
+    told = ["-o", "s3://bucket/out", "--scheduler", scheduler, "--grid", GRID]
+    assert main(["build", "s3://bucket/f.ome.zarr", *told]) == 0
     keys = [name.removeprefix("bucket/out/") for name in fs.find("bucket/out")]
     assert {
         key: hashlib.sha256(fs.cat_file(f"bucket/out/{key}")).hexdigest()

@@ -11,6 +11,7 @@ from PIL import Image
 from pxr import Sdf, Usd, Vt
 
 import phantoms
+from assets import make_assets
 from stereocell.check import CheckLine
 from stereocell.cli import main
 from stereocell.deep import check_deep
@@ -25,8 +26,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("deep")
     body = phantoms.f_phantom(2)
     source = phantoms.write_ome_tiff(folder / "f.ome.tif", body[None], "CZYX", names=["F"])
-    flags = ["--grid", "2x1", "--workers", "0"]
-    assert main(["build", str(source), "-o", str(folder / "out"), *flags]) == 0
+    assert make_assets(source, folder / "out", "2x1", "--workers", "0") == 0
     return folder / "out"
 
 

@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 import phantoms
+from assets import make_assets
 from object_store import ObjectStore, serving
 from stereocell.cli import main
 from stereocell.errors import OutputError
 from stereocell.lock import alone_at
 
-ARGUMENTS = ["--grid", "2x1", "--workers", "0"]
+GRID = "2x1"
+ARGUMENTS = ["--grid", GRID, "--workers", "0"]
 PARTS = ("units", "stage", "bundle")
 
 
@@ -38,9 +40,9 @@ def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def local(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The SHA-256 of what a build in a folder leaves."""
+    """The SHA-256 of the assets that a build leaves in a folder."""
     out = tmp_path_factory.mktemp("local") / "out"
-    assert main(["build", str(volume), "-o", str(out), *ARGUMENTS]) == 0
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
     return {
         file.relative_to(out).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(out.rglob("*"))

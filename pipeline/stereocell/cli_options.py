@@ -262,7 +262,7 @@ def declare_sample(parser: argparse.ArgumentParser) -> None:
     cycif.add_argument(
         "--grid", default="5x2", help="columns x rows of tiles (default %(default)s)"
     )
-    cycif.add_argument("--tile-size", default="64,128,128", help="z,y,x (default %(default)s)")
+    cycif.add_argument("--tile-size", default="48,96,96", help="z,y,x (default %(default)s)")
     cycif.add_argument(
         "--brightness-spread", type=float, default=1.0, help="cells are up to 1 + this as bright"
     )

@@ -50,7 +50,7 @@ def find_pixels(
     triangle_of = np.zeros(height * width, np.int64)
     weights_of = np.zeros((height * width, 3))
     for triangle, weights, pixel, _ in _cover(corners, size, 0.0):
-        here = (depth[triangle] * weights).sum(axis=1)
+        here = np.einsum("nk,nk->n", depth[triangle], weights)
         better = np.flatnonzero(here > nearest[pixel])
         order = better[np.argsort(here[better], kind="stable")]
         at = pixel[order]
@@ -74,7 +74,8 @@ def _cover(
     low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - beyond - 1e-6), 0, last + 1).astype(np.int64)
     high = np.clip(np.floor(corners.max(axis=1) - 0.5 + beyond + 1e-6), -1, last).astype(np.int64)
     extent = np.maximum(high - low + 1, 0)
-    count = extent.prod(axis=1)
+    frames, is_flat = _frames(corners)
+    count = np.where(is_flat, 0, extent.prod(axis=1))  # flat triangles have nothing near
     ends = np.cumsum(count)
     first = 0
     while first < len(corners):
@@ -83,34 +84,49 @@ def _cover(
         part = slice(first, stop)
         triangle = np.repeat(np.arange(first, stop), count[part])
         within = np.arange(len(triangle)) - np.repeat(ends[part] - count[part] - done, count[part])
-        across = np.maximum(extent[triangle, 0], 1)
-        column, row = low[triangle, 0] + within % across, low[triangle, 1] + within // across
-        place = np.stack([column + 0.5, row + 0.5], axis=1)
-        weights, outside = _weigh(corners[triangle], place)
+        across = np.repeat(extent[part, 0], count[part])
+        column = np.repeat(low[part, 0], count[part]) + within % across
+        row = np.repeat(low[part, 1], count[part]) + within // across
+        own = np.repeat(frames[:, part], count[part], axis=1)
+        weights, outside = _weigh(own, column + 0.5, row + 0.5)
         near = outside <= beyond + 1e-9
         yield triangle[near], weights[near], (row * width + column)[near], outside[near]
         first = stop
 
 
+def _frames(
+    corners: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return what `_weigh` needs of each triangle (10, m), and which are flat (m,).
+
+    Its corner a, its edges a to b and a to c, twice its area, and its height over each edge.
+    """
+    a, b, c = corners.transpose(1, 2, 0)
+    ab, ac = b - a, c - a
+    twice = ab[0] * ac[1] - ab[1] * ac[0]
+    sides = np.stack([np.hypot(*edge) for edge in (c - b, ac, ab)])
+    # slivers too: their weights are noise
+    is_flat = np.abs(twice) <= 1e-6 * sides.max(axis=0) ** 2 + 1e-12
+    heights = np.abs(twice) / np.maximum(sides, 1e-12)
+    return np.concatenate([a, ab, ac, twice[None], heights]), is_flat
+
+
 def _weigh(
-    corners: NDArray[np.float64], place: NDArray[np.float64]
+    frames: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return barycentric weights (n, 3), and how far each place lies beyond its triangle's edges.
 
-    Beyond a corner that is less than the distance to it. Flat triangles have nothing near.
+    Beyond a corner that is less than the distance to it. `frames` (10, n): of each place's
+    triangle.
     """
-    a, b, c = corners.transpose(1, 0, 2)
-    whole = _cross(b - a, c - a)
-    sides = np.stack([np.linalg.norm(e, axis=1) for e in (c - b, a - c, b - a)], axis=1)
-    # slivers too: their weights are noise
-    is_flat = np.abs(whole) <= 1e-6 * sides.max(axis=1) ** 2 + 1e-12
-    whole = np.where(is_flat, 1.0, whole)
-    wb, wc = _cross(place - a, c - a) / whole, _cross(b - a, place - a) / whole
-    weights = np.stack([1 - wb - wc, wb, wc], axis=1)
-    heights = np.abs(whole)[:, None] / np.maximum(sides, 1e-12)
-    outside = np.maximum((-weights * heights).max(axis=1), 0.0)
-    return weights, np.where(is_flat, np.inf, outside)
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    ax, ay, abx, aby, acx, acy, twice, *heights = frames
+    x, y = x - ax, y - ay
+    weights = np.empty((len(x), 3))
+    wa, wb, wc = weights.T
+    wb[:] = (x * acy - y * acx) / twice
+    wc[:] = (abx * y - aby * x) / twice
+    wa[:] = 1 - wb - wc
+    outside = np.zeros(len(x))
+    for weight, height in zip((wa, wb, wc), heights, strict=True):
+        np.maximum(outside, -weight * height, out=outside)
+    return weights, outside

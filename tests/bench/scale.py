@@ -1,0 +1,254 @@
+"""What units cost in time, memory and bytes read, and what the whole dataset would.
+
+    python scale.py FOLDER [TILE]      TILE: z,y,x voxels of the slope's tiles
+
+Small tiles, 4 to 32 of them, tell how time and memory grow with their number; two tiles of
+194 x 512 x 512 tell what a real one takes. Samples and builds stay in FOLDER: they are made once.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from stereocell.store import Store
+
+STEREOCELL = (sys.executable, "-m", "stereocell.cli")
+GRID = (8, 4)  # columns x rows of the slope's sample
+COUNTS = {4: (2, 2), 8: (4, 2), 16: (4, 4), 32: (8, 4)}  # units: columns x rows
+REAL = (194, 512, 512)
+WHOLE = 242 * 70  # units of the CyCIF dataset
+PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
+GIB = 1024**3
+
+# Run in a process of its own, which builds one unit and looks at itself meanwhile
+WATCHED = """
+import collections, json, sys, threading, time
+from stereocell.cli import main
+
+def rss():
+    return int(open("/proc/self/statm").read().split()[1]) * 4096
+
+most, before, is_over = collections.defaultdict(int), rss(), False
+me = threading.main_thread().ident
+def watch():
+    while not is_over:
+        frame, place = sys._current_frames().get(me), "?"
+        while frame is not None:
+            name = frame.f_globals.get("__name__", "")
+            if name.startswith("stereocell."):
+                place = f"{name.removeprefix('stereocell.')}.{frame.f_code.co_name}"
+                break
+            frame = frame.f_back
+        most[place] = max(most[place], rss())
+        time.sleep(0.02)
+thread = threading.Thread(target=watch)
+thread.start()
+code = main(sys.argv[1:])
+is_over = True
+thread.join()
+print(json.dumps({"code": code, "before": before, "most": most}))
+"""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of `stereocell units`: its seconds, and the most memory that one process had."""
+
+    units: int
+    workers: int
+    seconds: float
+    peak: int
+
+
+def make_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int]) -> Path:
+    path = folder / f"{grid[0]}x{grid[1]}_{'_'.join(map(str, tile))}.ome.zarr"
+    size, tiles = ",".join(map(str, tile)), f"{grid[0]}x{grid[1]}"
+    _call("sample", "cycif", str(path), "--grid", tiles, "--tile-size", size)
+    return path
+
+
+def plan(
+    source: str, out: Path, grid: tuple[int, int], tile: tuple[int, int, int], channels: str
+) -> None:
+    """Plan the first columns x rows of tiles."""
+    shutil.rmtree(out, ignore_errors=True)
+    depth, height, width = tile
+    region = f"0:{depth},0:{grid[1] * height},0:{grid[0] * width}"
+    size = ",".join(map(str, tile))
+    _call("plan", source, "-o", str(out), "--preset", "cycif", "--level", "0",
+          "--region", region, "--tile-size", size, "--channels", channels)  # fmt: skip
+
+
+def run_units(out: Path, workers: int) -> Run:
+    """Build all units; the peak is that of the worker (or lone) process that had most."""
+    start = time.perf_counter()
+    command = subprocess.Popen(
+        [*STEREOCELL, "units", str(out), "--workers", str(workers)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    peaks: dict[int, int] = {}
+    parent = psutil.Process(command.pid)
+    while command.poll() is None:
+        try:
+            for process in (parent, *parent.children(recursive=True)):
+                peaks[process.pid] = max(peaks.get(process.pid, 0), _peak_of(process.pid))
+        except (psutil.Error, OSError):
+            pass  # it ended while it was looked at
+        time.sleep(0.2)
+    if command.returncode:
+        raise SystemExit(f"units {out}: ended with {command.returncode}")
+    units = len(Store(out).index())
+    return Run(units, workers, time.perf_counter() - start, max(peaks.values()))
+
+
+def measure_slope(folder: Path, tile: tuple[int, int, int]) -> list[Run]:
+    source = make_sample(folder, GRID, tile)
+    runs = []
+    for workers in (1, 2):
+        for columns, rows in COUNTS.values():
+            out = folder / "slope"
+            plan(str(source), out, (columns, rows), tile, "0")
+            runs.append(run_units(out, workers))
+            last = runs[-1]
+            print(f"  {last.units:3} units  {workers} workers  {last.seconds:7.1f} s  "
+                  f"{last.units / last.seconds:6.3f} units/s  peak {last.peak / GIB:.2f} GiB",
+                  flush=True)  # fmt: skip
+    return runs
+
+
+def print_slope(runs: list[Run]) -> None:
+    for workers in (1, 2):
+        own = [run for run in runs if run.workers == workers]
+        units = np.array([run.units for run in own])
+        slope, start = np.polyfit(units, [run.seconds for run in own], 1)
+        growth = own[-1].peak / own[0].peak - 1
+        print(f"  {workers} workers: {start:.1f} s + {slope:.2f} s a unit; peak of a process from "
+              f"{own[0].units} to {own[-1].units} units: {growth:+.1%} (bound +10 %)")  # fmt: skip
+
+
+def watch_memory(out: Path) -> dict[str, int]:
+    """Build one unit anew in a process that watches itself; return most bytes by function."""
+    tile, channel = next(iter(Store(out).index())).split("/")
+    shutil.rmtree(out / "units" / tile / channel)
+    answer = subprocess.run(
+        [sys.executable, "-c", WATCHED, "units", str(out), "--workers", "0", "--only",
+         f"{tile}/{channel}"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    seen = json.loads(answer.stdout.splitlines()[-1])
+    return {"(interpreter and libraries)": seen["before"], **seen["most"]}
+
+
+@contextmanager
+def counting(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
+    """Serve a folder; count the bytes of each file that were sent."""
+    sent: dict[str, int] = defaultdict(int)
+    lock = threading.Lock()
+
+    class Handler(SimpleHTTPRequestHandler):
+        def copyfile(self, source: object, outputfile: object) -> None:
+            file = Path(self.translate_path(self.path))
+            with lock:
+                sent[str(file)] += file.stat().st_size
+            super().copyfile(source, outputfile)  # type: ignore[arg-type]
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder)))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}", sent
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def measure_reading(folder: Path, tile: tuple[int, int, int]) -> tuple[float, float, float]:
+    """Return bytes that one unit's build reads over those of the chunks that it touches, bytes it
+    reads over its window's as voxels, and the bytes that finding windows and iso-values reads, for
+    each unit, in the same measure."""
+    source = make_sample(folder, GRID, tile)
+    out = folder / "reading"
+    window = 2 * int(np.prod(tile))
+    with counting(source.parent) as (address, sent):
+        plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
+
+        def run(*only: str) -> dict[str, int]:
+            sent.clear()
+            _call("units", str(out), "--workers", "0", *only)
+            return {file: size for file, size in sent.items() if not file.endswith(".json")}
+
+        run("--only", "r0_c0/0")  # windows and iso-values of all nine, and one unit
+        survey_and_one = sum(sent.values())
+        middle = run("--only", "r1_c1/0")  # it has neighbours all round
+        chunks = sum(Path(file).stat().st_size for file in middle)
+        one = sum(middle.values())
+    return one / chunks, one / window, (survey_and_one - one) / 9 / window
+
+
+def _peak_of(pid: int) -> int:
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1024
+    return 0
+
+
+def _call(*arguments: str) -> None:
+    done = subprocess.run([*STEREOCELL, *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+
+
+def main(folder: Path, tile: tuple[int, int, int]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    print(f"Slope, tiles of {' x '.join(map(str, tile))}, one channel, {os.cpu_count()} cores")
+    print_slope(measure_slope(folder, tile))
+
+    reading, of_window, survey = measure_reading(folder, tile)
+    print(f"Read by a unit: {reading:.2f} x the chunks that it touches (bound 1.3); stored bytes "
+          f"{of_window:.2f} x its voxels', for windows and iso-values {survey:.2f} x")  # fmt: skip
+
+    print(f"A unit of {' x '.join(map(str, REAL))}")
+    source, out = make_sample(folder, (2, 1), REAL), folder / "real"
+    runs = []
+    for workers in (1, 2):
+        plan(str(source), out, (2, 1), REAL, "0,2")
+        runs.append(run_units(out, workers))
+        last = runs[-1]
+        print(f"  {last.units} units  {workers} workers  {last.seconds:.1f} s  peak "
+              f"{last.peak / GIB:.2f} GiB (bound 3.5 GB: {3.5e9 / GIB:.2f})")  # fmt: skip
+    size = sum(file.stat().st_size for file in (out / "units").rglob("*") if file.is_file())
+    seen = watch_memory(out)
+    print("  most memory while this ran, GiB:")
+    for place, most in sorted(seen.items(), key=lambda item: -item[1])[:8]:
+        print(f"    {most / GIB:5.2f}  {place}")
+
+    each = runs[0].seconds / runs[0].units
+    hours = each * WHOLE / 3600
+    print(f"{WHOLE} units of that size: {hours:.0f} core-hours ({each:.0f} s each), "
+          f"{WHOLE * (of_window + survey) * 2 * np.prod(REAL) / 1e12:.2f} TB read, "
+          f"{WHOLE * size / runs[0].units / 1e12:.2f} TB of units written, "
+          f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
+
+
+if __name__ == "__main__":
+    given = tuple(int(n) for n in (sys.argv[2] if len(sys.argv) > 2 else "97,256,256").split(","))
+    main(Path(sys.argv[1]), given)  # type: ignore[arg-type]
