@@ -16,7 +16,7 @@ from skimage import filters
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from iso_family import SPACING, Member, boundary_distance_um, dice, family, make
+from iso_family import SPACING, Mask, Member, boundary_distance_um, dice, family, make
 from stereocell.background import find_background
 from stereocell.denoise import denoise, smooth
 from stereocell.isovalue import CRITERIA, IsoValueOptions, find_iso_value
@@ -41,8 +41,8 @@ def fields(counts: NDArray[np.uint16]) -> tuple[NDArray[np.float32], NDArray[np.
     return smooth(volume, SIGMA_UM), denoise(volume, SIGMA_UM) - under.at(region)
 
 
-def measure(member: Member) -> Figures:
-    """Return the figures of every criterion and peer on one member."""
+def find_solids(member: Member) -> tuple[Mask, dict[str, Mask]]:
+    """Return the solids of one member, and what every criterion and peer finds of them."""
     truth, counts = make(member, seed=0)
     plain, ours = fields(counts)
     found = {name: plain > peer(plain) for name, peer in PEERS.items()}
@@ -50,6 +50,12 @@ def measure(member: Member) -> Figures:
     for criterion in CRITERIA:
         options = IsoValueOptions(criterion=criterion)
         found[f"stereocell {criterion}"] = ours > find_iso_value(ours, SPACING, options).value
+    return truth, found
+
+
+def measure(member: Member) -> Figures:
+    """Return the figures of every criterion and peer on one member."""
+    truth, found = find_solids(member)
     return {name: (dice(s, truth), boundary_distance_um(s, truth)) for name, s in found.items()}
 
 
