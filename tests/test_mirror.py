@@ -105,7 +105,6 @@ def test_what_is_lost_or_half_made_there_is_made_again(
     (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
     fs.rm(f"bucket/there/{unit}")
     fs.pipe_file("bucket/there/bundle/index.html", b"cut")
-    fs.pipe_file("bucket/there/stage/.tiles.partial/x", b"left by a killed command")
     capsys.readouterr()
     assert main(["check", there]) == 1
     assert "FAIL hashes: index.html: not the bytes that files.json" in capsys.readouterr().out

@@ -38,18 +38,24 @@ _SETTLE_S = 1.0  # after taking over: another may have done so at once
 def alone_in(out: Path, command: str) -> Iterator[None]:
     """Hold OUT for a command that writes into it; a folder that stays empty is not left behind.
 
+    If who held it before was killed, what that one had half written is removed.
+
     Raises OutputError if another process holds it, naming that one, or if OUT can't be written.
     """
     made = _missing_folders(out)
     try:
         try:
             out.mkdir(parents=True, exist_ok=True)
-            file = _hold(out / LOCK, command)
+            file, was_killed = _hold(out / LOCK, command)
         except OSError as error:
             raise OutputError(
                 f"{out}: can't be written ({error.strerror}), expected a folder of your own"
             ) from None
         try:
+            if was_killed:
+                from stereocell.write.atomic import clear_remains  # needs mirror, which needs this
+
+                clear_remains(out)
             yield
         finally:
             (out / LOCK).unlink(missing_ok=True)  # while it is held: nobody waits at this file
@@ -65,7 +71,8 @@ def _missing_folders(out: Path) -> list[Path]:
     return [folder for folder in (out, *out.parents) if not folder.exists()]
 
 
-def _hold(path: Path, command: str) -> int:
+def _hold(path: Path, command: str) -> tuple[int, bool]:
+    """Return the open lock, and whether who held it before was killed."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
@@ -82,10 +89,11 @@ def _hold(path: Path, command: str) -> int:
             if os.path.samestat(os.fstat(file), path.stat()):
                 break
         os.close(file)
+    was_killed = os.fstat(file).st_size > 0
     with suppress(OSError):  # a full disk: what it says is for people
         os.ftruncate(file, 0)
         os.write(file, json.dumps(_claim(command)).encode())
-    return file
+    return file, was_killed
 
 
 def _claim(command: str) -> dict[str, Any]:

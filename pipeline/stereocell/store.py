@@ -4,8 +4,7 @@ Results are named by a hash of all that they depend on (input, settings of the s
 written under a temporary name and renamed: a killed run resumes, a finished one is a no-op.
 """
 
-import os
-import re
+import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,12 +16,10 @@ from stereocell.errors import OutputError
 from stereocell.lineage import key_of
 from stereocell.mirror import remove, sizes_below
 from stereocell.plan import Plan, from_json, to_json
-from stereocell.processes import is_alive
 from stereocell.write.atomic import write_bytes
 
 _PLAN = "plan.schema.json"
 _PHASES = "units.schema.json#Phases"
-_TEMPORARY = re.compile(r"\..+\.(\d{1,9})(\.[A-Za-z]\w*)?")  # as write/atomic.py names them
 _RUN_UNITS = "run `stereocell units OUT` first"
 
 
@@ -46,20 +43,13 @@ class Store:
         """Make OUT. Raises OutputError if it can't be made or written."""
         try:
             self.out.mkdir(parents=True, exist_ok=True)
-            probe = self.out / f".writable.{os.getpid()}"
+            probe = self.out / f".writable.{secrets.token_hex(4)}"
             probe.write_bytes(b"")
             probe.unlink()
         except OSError as error:
             raise OutputError(
                 f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
             ) from None
-
-    def remove_temporaries(self) -> None:
-        """Remove the files that killed processes were writing; folders are replaced anyway."""
-        for file in self.out.rglob(".*"):
-            name = _TEMPORARY.fullmatch(file.name)
-            if name is not None and file.is_file() and not is_alive(int(name[1])):
-                file.unlink(missing_ok=True)
 
     # --- the plan
 

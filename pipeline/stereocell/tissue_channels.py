@@ -32,7 +32,6 @@ from stereocell.tissue_files import (
     VOXELS,
     digests_of,
     read_whole,
-    remove_remains,
 )
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.generator import GENERATOR
@@ -110,8 +109,6 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     region = [plan.region.start, plan.region.stop]
     depends = [source, region, channel.index, channel.name, settings]
     key = key_of(key_of(depends, tissue), network_module)
-    remove_remains(out)
-    store.remove_temporaries()
     record = _find_learned(out / FOLDER, key)
     if record is None:
         record = _learn(store, plan, channel, options, network, settings, key)

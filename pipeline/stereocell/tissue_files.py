@@ -5,7 +5,6 @@ that was lost for zeros, and zstd decodes some damage to other voxels without a 
 """
 
 import hashlib
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -47,9 +46,3 @@ def read_whole(folder: Path) -> dict[str, Any]:
                 fault = "not of this build"
             raise OutputError(f"{folder / name}: {fault}: {_AGAIN}")
     return record
-
-
-def remove_remains(out: Path) -> None:
-    """Remove what a killed run left beside OUT/tissue."""
-    for word in ("partial", "old"):
-        shutil.rmtree(out / f".{FOLDER}.{word}", ignore_errors=True)

@@ -1,0 +1,157 @@
+"""What a build depends on goes away in the middle and comes back: one line, then the same bytes."""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import phantoms
+from assets import make_assets
+from faulty_store import FAULTS, Faults, before
+from object_store import ObjectStore, serving
+from stereocell import rounds
+from stereocell.cli import main
+from torture import digests_of
+
+GRID = "2x1"
+Fixture = tuple[ObjectStore, Faults]
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("volume") / "f.ome.zarr"
+    return phantoms.write_ome_zarr(path, [phantoms.f_phantom()])
+
+
+@pytest.fixture(scope="module")
+def undisturbed(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    return assets(digests_of(out))
+
+
+def assets(digests: dict[str, str]) -> dict[str, str]:
+    """Stage and bundle: what does not name the source."""
+    return {name: digest for name, digest in digests.items() if not name.startswith("units/")}
+
+
+def only_line(capsys: pytest.CaptureFixture[str]) -> str:
+    printed = capsys.readouterr().err
+    assert "Traceback" not in printed
+    (line,) = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
+    return line
+
+
+@pytest.mark.slow
+def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
+    volume: Path,
+    undisturbed: dict[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    away, out = volume.with_name("away"), tmp_path / "out"
+    survey = rounds._survey
+
+    def vanish(*arguments: Any) -> Any:
+        found = survey(*arguments)
+        volume.rename(away)
+        return found
+
+    monkeypatch.setattr(rounds, "_survey", vanish)
+    assert make_assets(volume, out, GRID, "--workers", "0") == 1
+    assert "f.ome.zarr: " in only_line(capsys)
+    assert not list(out.rglob("unit.json"))
+    monkeypatch.undo()
+    away.rename(volume)
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    assert assets(digests_of(out)) == undisturbed
+
+
+@pytest.mark.slow
+def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
+    volume: Path,
+    undisturbed: dict[str, str],
+    small_disk: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def remount(options: str) -> None:
+        subprocess.run(["mount", "-o", f"remount,{options}", str(small_disk)], check=True)
+
+    out = small_disk / "out"
+    remount("size=64m")
+    for phase in (["plan", str(volume), "-o", str(out), "--grid", GRID], ["units", str(out)]):
+        remount("ro")
+        assert main(phase) == 1
+        line = only_line(capsys)
+        assert str(out) in line
+        assert "Read-only file system" in line
+        remount("rw")
+        assert main([*phase, *(["--workers", "0"] if phase[0] == "units" else [])]) == 0
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    assert assets(digests_of(out)) == undisturbed
+
+
+@pytest.fixture(scope="module")
+def store(
+    volume: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[ObjectStore, Faults]]:
+    with (
+        serving(tmp_path_factory.mktemp("objects")) as store,
+        before(store.endpoint) as faults,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        through = ObjectStore(store.kind, faults.endpoint)
+        for name, value in through.environment.items():
+            patch.setenv(name, value)
+        fs = through.files()
+        fs.mkdir("bucket")
+        fs.put(str(volume), "bucket/f.ome.zarr", recursive=True)
+        yield through, faults
+
+
+def kept(store: ObjectStore, out: str, folder: Path) -> dict[str, str]:
+    store.files().get(out, str(folder), recursive=True)
+    return assets(digests_of(folder))
+
+
+@pytest.mark.slow
+def test_a_store_that_fails_now_and_then_is_asked_again(
+    store: Fixture, undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    files, faults = store
+    faults.seen.clear()
+    faults.rate = 0.15
+    try:
+        code = make_assets("s3://bucket/f.ome.zarr", "s3://bucket/often", GRID, "--workers", "0")
+    finally:
+        faults.rate = 0
+    assert code == 0
+    assert set(FAULTS) <= faults.seen.keys()
+    assert kept(files, "bucket/often", tmp_path / "often") == undisturbed
+
+
+@pytest.mark.slow
+def test_a_store_that_is_down_is_named_and_the_build_goes_on_when_it_is_up(
+    store: Fixture,
+    undisturbed: dict[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    files, faults = store
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    source, out = "s3://bucket/f.ome.zarr", "s3://bucket/down"
+    assert main(["plan", source, "-o", out, "--grid", GRID]) == 0
+    for kind in ("503", "cut"):
+        capsys.readouterr()
+        faults.rate, faults.only = 1.0, (kind,)
+        try:
+            assert main(["units", out, "--workers", "0"]) == 1
+        finally:
+            faults.rate, faults.only = 0, FAULTS
+        assert "s3://bucket/" in only_line(capsys)
+    assert make_assets(source, out, GRID, "--workers", "0") == 0
+    assert kept(files, "bucket/down", tmp_path / "down") == undisturbed
