@@ -39,7 +39,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender bench bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer wheel docs lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -166,8 +166,15 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/test_blender.py; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
 
+torture: setup ## 50 builds killed at random moments; all malformed inputs
+	$(BIN)/python tests/torture.py 50
+	$(BIN)/python -m malformed
+
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py
+
+bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; the whole dataset
+	$(BIN)/python tests/bench/scale.py out/bench-scale
 
 bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids are known
 	$(BIN)/python tests/bench/iso.py
@@ -194,6 +201,12 @@ bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, 
 	    || { npm ci --ignore-scripts --no-audit --no-fund --loglevel=error && touch node_modules/.ready; }; } \
 	  && $(abspath $(BIN))/python bench.py $(abspath out/bench-viewer); \
 	fi
+
+wheel: setup ## A wheel with the built viewer in it: out/wheel
+	$(BIN)/hatchling build -t wheel -d out/wheel
+
+docs: $(READY) ## The documentation as a site: out/docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -160,3 +161,22 @@ def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     told = capsys.readouterr().out
     assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130"))
+
+
+def test_no_color_leaves_the_colours_out() -> None:
+    progress = (
+        "from stereocell import engine\n"
+        "with engine._progress('units', 2) as advance:\n"
+        "    advance('r0_c0/CD31', True)"
+    )
+
+    def colours(**given: str) -> list[str]:
+        kept = {key: value for key, value in os.environ.items() if key != "NO_COLOR"}
+        terminal = {"FORCE_COLOR": "1", "TERM": "xterm-256color", **given}
+        command = [sys.executable, "-c", progress]
+        told = subprocess.run(command, env={**kept, **terminal}, capture_output=True, check=True)
+        assert b"1 failed" in told.stderr
+        return re.findall(r"\x1b\[[\d;]+m", told.stderr.decode())
+
+    assert "\x1b[31m" in colours()
+    assert colours(NO_COLOR="1") == []

@@ -1,7 +1,9 @@
-"""Find the files that ship beside the code: JSON Schemas, the USD schema, hand-written layers.
+"""Find the files that ship beside the code: JSON Schemas, the USD schema, hand-written layers,
+the viewer.
 
-A checkout keeps `schemas/` and `usd_assets/` at its top, two levels above the package; a wheel
-carries them inside the package.
+A checkout keeps `schemas/`, `usd_assets/` and `viewer_gltf/` at its top, two levels above the
+package; a wheel carries them inside the package. Inside goes first: a checkout has nothing there,
+while two levels above an installed package lies a folder that is not ours.
 """
 
 from pathlib import Path
@@ -28,5 +30,5 @@ def schema_path(name: str) -> Path:
 
 def viewer_dist() -> Path | None:
     """Return the folder of the built viewer, or None where it has not been built."""
-    folder = _PACKAGE.parents[1] / "viewer_gltf" / "dist"
-    return folder if (folder / "index.html").is_file() else None
+    folders = (home / "viewer_gltf" / "dist" for home in _HOMES)
+    return next((folder for folder in folders if (folder / "index.html").is_file()), None)
