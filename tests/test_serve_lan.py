@@ -190,6 +190,20 @@ def test_nothing_that_is_written_tells_a_token_but_the_code(server, context, cap
     assert draw_qr(f"{server.address}?token={server.gate.token}") in out
 
 
+def test_the_person_is_told_what_to_accept_and_why(server, capfd):
+    server.invite()
+    said = " ".join(capfd.readouterr().out.split())
+    for words in (
+        "a token that lets in one device, once",
+        "this program made it just now",  # hence the phone's warning
+        "browsers give stereo (WebXR) and head tracking to encrypted pages only",
+        "Go on (Advanced, Proceed;",
+        f"has this SHA-256 fingerprint: {server.fingerprint}",
+        "If it has another, somebody is in between: go back.",
+    ):
+        assert words in said
+
+
 def test_the_code_says_the_address():
     """Half blocks, two rows a line, light modules drawn: against the matrix of the standard."""
     address = "https://192.168.7.9:8000/?token=" + "x" * 43

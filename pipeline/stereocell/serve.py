@@ -3,7 +3,8 @@
 The static bundle stands by itself and works on any web host; here it is served with byte ranges,
 and beside it the websocket `/bricks` sends volumes by view (serve_bricks.py). On localhost, or with
 `--lan` to the network: then by TLS, and to holders of a token only (serve_access.py). Nothing is
-logged but faults of the program itself and of the bundle.
+logged but faults of the program itself and of the bundle: no request, so no token, and no name that
+a client sent. What the other modules refuse, and from whom, is listed in docs/brick-stream.md.
 """
 
 import logging
@@ -18,28 +19,30 @@ from pathlib import Path
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 
 from stereocell.errors import StereoCellError
 from stereocell.serve_access import Access, Gate
 from stereocell.serve_bricks import BrickEndpoint
-from stereocell.serve_deadline import HeadDeadline
 from stereocell.serve_files import BundleFiles
 from stereocell.serve_lan import draw_qr, explain, find_addresses, find_names, make_certificate
 from stereocell.serve_library import BrickLibrary
-from stereocell.serve_limits import MESSAGE_BYTES
+from stereocell.serve_lifetime import Lifetime
+from stereocell.serve_limits import MESSAGE_BYTES, STOP_S
+from stereocell.serve_protocol import GuardedHttp
+from stereocell.serve_socket import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
 _OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
-_STOP_S = 3  # for what is under way when the server is stopped
 
 
 def serve(out: Path, port: int, lan: bool, open_browser: bool) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one.
 
-    Raises StereoCellError if there is no bundle, the port is taken, or there is no network.
+    Returns when the transfers that run have ended, or STOP_S later. Raises KeyboardInterrupt at
+    once at a second Ctrl+C; StereoCellError if there is no bundle, the port is taken, or there is
+    no network.
     """
     server = BundleServer(out, port, lan)
     print(f"{server.address} shows {out / 'bundle'}; Ctrl+C ends it", flush=True)
@@ -52,6 +55,8 @@ def serve(out: Path, port: int, lan: bool, open_browser: bool) -> None:
             server.run()
     finally:
         signal.signal(signal.SIGTERM, before)
+    if server.was_forced:
+        raise KeyboardInterrupt
 
 
 def make_app(
@@ -69,14 +74,14 @@ def make_app(
         yield
         endpoint.close()
 
-    return Starlette(
+    app = Starlette(
         routes=[
             WebSocketRoute("/bricks", endpoint.talk),
             Route("/{path:path}", BundleFiles(out / "bundle").answer, methods=["GET"]),
         ],
-        middleware=[Middleware(Access, names=names, gate=gate)],
         lifespan=lifespan,
     )
+    return Access(app, names, gate)
 
 
 class BundleServer:
@@ -111,21 +116,23 @@ class BundleServer:
             log_level="error",
             access_log=False,
             server_header=False,
-            http=HeadDeadline,
-            ws="websockets-sansio",
+            http=GuardedHttp,
+            ws=GuardedSocket,
             ws_max_size=MESSAGE_BYTES,
             ws_per_message_deflate=False,  # bricks are compressed
-            timeout_graceful_shutdown=_STOP_S,
         )
-        config.load()
-        config.ssl = context
         logging.getLogger("uvicorn.error").addFilter(_is_ours)
-        self._server = uvicorn.Server(config)
+        self._server = Lifetime(config, context, _tell_wait)
 
     @property
     def has_started(self) -> bool:
         """Whether it answers."""
         return self._server.started
+
+    @property
+    def was_forced(self) -> bool:
+        """Whether a second Ctrl+C cut its end short."""
+        return self._server.force_exit
 
     def invite(self) -> None:
         """Print the QR code for the next device on the LAN, and what to make of its warning."""
@@ -143,6 +150,14 @@ class BundleServer:
     def stop(self) -> None:
         """Have run() end soon; may be called from any thread."""
         self._server.should_exit = True
+
+
+def _tell_wait(transfers: int) -> None:
+    print(
+        f"finishing {transfers} transfer{'s' * (transfers > 1)}, at most {STOP_S:g} s; "
+        "Ctrl+C again stops at once",
+        flush=True,
+    )
 
 
 def _bind(host: str, port: int) -> socket.socket:

@@ -1,10 +1,12 @@
 """Who may ask a server: requests by its own names, pages of its own origin, holders of a session.
 
 A page of another site can have a browser send requests here. Against that: the Host header must be
-one of the server's names (DNS rebinding), and a websocket's Origin, which browsers always send and
-pages can't change, must be the same host and port (cross-site websocket hijacking). Programs that
-are no browsers send no Origin and need none. On the LAN all requests need a session besides: a
-one-time token, in the address that a QR code carries, is exchanged for a cookie and then void.
+one of the server's names (DNS rebinding), and the Origin, which browsers always send with a
+websocket and pages can't change, must be the same host and port (cross-site websocket hijacking).
+Where a page of another site asks without one (an image, a script, a frame), browsers say so by
+Sec-Fetch-Site; it may only lead a person here. Programs that are no browsers send neither and need
+none. On the LAN all requests need a session besides: a one-time token, in the address that a QR
+code carries, is exchanged for a cookie and then void.
 """
 
 import secrets
@@ -14,10 +16,11 @@ from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from stereocell.serve_files import redirect
+from stereocell.serve_headers import protect
 
 # __Host-: browsers take it with Secure and Path=/ only, and from no neighbouring host.
 # Lax: the page may be opened from a scanner's link; websockets of other sites go without it.
@@ -52,7 +55,10 @@ class Gate:
 
 
 class Access:
-    """ASGI middleware: refuses with 403 whoever may not ask, before anything is looked at."""
+    """ASGI middleware: refuses with 403 whoever may not ask, before anything is looked at.
+
+    All answers get the headers that protect them (serve_headers.py): it is the outermost layer.
+    """
 
     def __init__(self, app: ASGIApp, names: Collection[str], gate: Gate | None) -> None:
         """names: hosts that this server answers to, in lower case; gate: None on localhost."""
@@ -64,11 +70,17 @@ class Access:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+
+        async def send_protected(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = protect(message.get("headers", []))
+            await send(message)
+
         answer = self._judge(scope)
         if answer is None:
-            await self._app(scope, receive, send)
+            await self._app(scope, receive, send_protected)
         elif scope["type"] == "http":
-            await answer(scope, receive, send)
+            await answer(scope, receive, send_protected)
         else:
             # 403 without a word: after a response of its own uvicorn logs a fault that is none
             await WebSocket(scope, receive, send).close()
@@ -79,13 +91,8 @@ class Access:
         host = headers.get("host", "").lower()
         if _name(host) not in self._names:
             return PlainTextResponse("this server answers to its own names only", 403)
-        if scope["type"] == "websocket" and "origin" in headers:
-            try:
-                origin = urlsplit(headers["origin"].lower()).netloc
-            except ValueError:
-                origin = ""
-            if origin != host:
-                return PlainTextResponse("pages of other origins may not ask this server", 403)
+        if not (_is_own_origin(headers, host) and _is_own_fetch(headers)):
+            return PlainTextResponse("pages of other origins may not ask this server", 403)
         return None if self._gate is None else self._judge_session(scope, headers, self._gate)
 
     def _judge_session(self, scope: Scope, headers: Headers, gate: Gate) -> Response | None:
@@ -103,6 +110,24 @@ class Access:
         answer = redirect(scope["path"])
         answer.headers["set-cookie"] = f"{COOKIE}={session}; {_ATTRIBUTES}"
         return answer
+
+
+def _is_own_origin(headers: Headers, host: str) -> bool:
+    try:
+        return all(urlsplit(one.lower()).netloc == host for one in headers.getlist("origin"))
+    except ValueError:
+        return False
+
+
+def _is_own_fetch(headers: Headers) -> bool:
+    """Return whether it is this server's page, a person, or no browser that asks."""
+    if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
+        return True
+    goes = (
+        headers.get("sec-fetch-mode"),
+        headers.get("sec-fetch-dest"),
+    )  # a link, on a page or in a chat
+    return goes == ("navigate", "document")
 
 
 def _name(host: str) -> str:

@@ -8,6 +8,8 @@ docs/brick-stream.md is closed with a code and a reason:
     1003  a binary frame                    1007  no UTF-8, no JSON, not as the schema asks
     1008  against the order or the limits   1009  a message that is too long
     1012  the bundle was written anew       1013  too many connections
+
+(1001, the server ends, and limits of frames that are no messages: serve_socket.py.)
 """
 
 import asyncio
@@ -15,7 +17,7 @@ import base64
 import binascii
 import json
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -43,6 +45,7 @@ from stereocell.serve_library import BrickFile, BrickLibrary, UnknownVolumeError
 from stereocell.serve_limits import (
     ACK_S,
     ACKS_PER_S,
+    CLIENT_SOCKETS,
     FRAME_BYTES,
     HELLO_S,
     MAX_CONNECTIONS,
@@ -67,19 +70,23 @@ class BrickEndpoint:
         self._library = library
         self._builder = ThreadPoolExecutor(1, "bricks-build")
         self._quick = ThreadPoolExecutor(2, "bricks-read")
-        self._connections = 0
+        self._connections: Counter[str] = Counter()  # by the client's address
 
     async def talk(self, socket: WebSocket) -> None:
         """Talk to one client until it leaves or is closed."""
         await socket.accept()
-        if self._connections >= MAX_CONNECTIONS:
-            await socket.close(1013, f"{MAX_CONNECTIONS} connections are open, try again later")
-            return
-        self._connections += 1
+        address = socket.client.host if socket.client else ""
+        counts = self._connections
+        for count, most in ((counts.total(), MAX_CONNECTIONS), (counts[address], CLIENT_SOCKETS)):
+            if count >= most:
+                await socket.close(1013, f"{most} connections are open, try again later")
+                return
+        counts[address] += 1
         try:
             await BrickSession(socket, self._library, self._builder, self._quick).run()
         finally:
-            self._connections -= 1
+            counts[address] -= 1
+            counts += Counter()  # leaves out those at 0
 
     def close(self) -> None:
         """Let the threads end; what they are at is finished."""

@@ -14,8 +14,10 @@ import anyio.to_thread
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
+from stereocell.serve_headers import policy
+
 BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # tells a page that /bricks is there
-_HEADERS = {"Cache-Control": "no-cache", "X-Content-Type-Options": "nosniff"}
+_HEADERS = {"Cache-Control": "no-cache"}
 _TYPES = {
     ".css": "text/css; charset=utf-8",
     ".glb": "model/gltf-binary",
@@ -44,16 +46,13 @@ class BundleFiles:
         if found is None:
             return PlainTextResponse("not found", 404)
         path, status = found
-        response = FileResponse(
-            path,
-            headers={**_HEADERS, **BRICKS_HEADER},
-            media_type=_TYPES.get(path.suffix, "application/octet-stream"),
-            stat_result=status,
-        )
-        response.headers["content-type"] = _TYPES.get(path.suffix, "application/octet-stream")
+        kind = _TYPES.get(path.suffix, "application/octet-stream")
+        headers = {**_HEADERS, **BRICKS_HEADER, **policy(kind)}
+        response = FileResponse(path, headers=headers, media_type=kind, stat_result=status)
+        response.headers["content-type"] = kind
         tag = response.headers["etag"]
         if tag in [known.strip() for known in request.headers.get("if-none-match", "").split(",")]:
-            return Response(status_code=304, headers={**_HEADERS, **BRICKS_HEADER, "ETag": tag})
+            return Response(status_code=304, headers={**headers, "ETag": tag})
         _plain_range(request, status.st_size)
         return response
 
@@ -68,7 +67,7 @@ class BundleFiles:
             if not path.is_relative_to(self._root) or not path.is_file():
                 return None
             return path, path.stat()
-        except OSError:  # a name that is too long, a folder without rights
+        except (OSError, RuntimeError):  # too long a name, a folder without rights, links in a ring
             return None
 
 
@@ -103,9 +102,4 @@ def _plain_range(request: Request, size: int) -> None:
 
 def redirect(path: str) -> Response:
     """Return a redirect to a path of this server, which no cache keeps."""
-    headers = {
-        "Location": quote(path),
-        "Cache-Control": "no-store",
-        "Referrer-Policy": "no-referrer",
-    }
-    return Response(status_code=303, headers=headers)
+    return Response(status_code=303, headers={"Location": quote(path), "Cache-Control": "no-store"})

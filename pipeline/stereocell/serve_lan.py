@@ -73,10 +73,12 @@ def explain(address: str, fingerprint: str, code: str) -> str:
     """Return what the person at the terminal has to know. The token is in the code alone."""
     return (
         f"{code}\n"
-        f"Scan this code with a phone in the same network: it opens {address} and works once.\n"
+        f"Scan this code with a phone in the same network: it opens {address} with a token\n"
+        "that lets in one device, once.\n"
         "The phone warns that it does not know the certificate: this program made it just now,\n"
-        "for this run, so nobody else has vouched for it. It encrypts all the same, and stereo\n"
-        "and head tracking need that. Go on (Advanced, Proceed) if the certificate that the phone\n"
-        f"shows has this SHA-256 fingerprint:\n{fingerprint}\n"
+        "for this run, so nobody else has vouched for it. It encrypts all the same, and browsers\n"
+        "give stereo (WebXR) and head tracking to encrypted pages only. Go on (Advanced, Proceed;\n"
+        "on an iPhone: Show Details, visit this website) if the certificate that the phone shows\n"
+        f"has this SHA-256 fingerprint:\n{fingerprint}\n"
         "If it has another, somebody is in between: go back."
     )
