@@ -20,6 +20,7 @@ from stereocell.assets import find_asset
 from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.store import Store
+from stereocell.tilesets import Content, walk
 from stereocell.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.transfer2d import find_fault, shapes_from
 from stereocell.validate_usd import validate_stage, validate_usdz
@@ -37,7 +38,6 @@ _NODE_TIMEOUT_S = 1200.0
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
 _RUN_BUNDLE = "run `stereocell bundle OUT`"
-_GET_NODE = "install Node 20.19 or newer, then run `make setup`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,44 +235,35 @@ def _check_tilesets(bundle: Path) -> str:
     for channel in _channels(bundle):
         if channel["tileset"] is None:
             continue
-        path = bundle / channel["tileset"]["path"]
-        tileset = read_json(path, None, _RUN_BUNDLE)
         try:
-            for content, error, limit in _walk(tileset["root"], tileset["geometricError"]):
-                contents += 1
-                uri = content["uri"]
-                if not (path.parent / uri).is_file():
-                    problems.append(f"{path}: no file at {uri}")
-                else:
-                    problems += _spoilt_content(path, content)
-                if error > limit:
-                    problems.append(f"{path}: {uri} has a larger geometricError than its parent")
-        except (KeyError, TypeError) as error:
-            problems.append(f"{path}: no 3D Tiles tileset: {error!r}")
+            for content in walk(bundle, bundle / channel["tileset"]["path"]):
+                contents += not content.is_tileset
+                problems += _spoilt_content(content)
+        except StereoCellError as error:
+            problems.append(str(error))
     raise_on(problems)
     return f"{contents} contents"
 
 
-def _spoilt_content(tileset: Path, content: dict[str, Any]) -> list[str]:
-    """Return what is wrong where a surface is not what the tileset's hash says."""
-    uri = content["uri"]
+def _spoilt_content(content: Content) -> list[str]:
+    """Return what is wrong with a file that a tileset names, and with what it says of it."""
+    uri = content.named["uri"]
+    name = f"{content.tileset}: {uri}"
+    problems = []
+    if content.error_m > content.limit_m:
+        problems.append(f"{name} has a larger geometricError than its parent")
     try:
-        expected = content["extras"][CONTENT_HASH]
+        expected = content.named["extras"][CONTENT_HASH]
     except (KeyError, TypeError):
-        return [f"{tileset}: {uri} has no hash, expected extras.{CONTENT_HASH}"]
-    found = content_hash(_measure(tileset.parent / uri)["sha256"])
-    if found == expected:
-        return []
-    return [f"{tileset}: {uri}: expected {CONTENT_HASH} {expected}, found {found}"]
-
-
-def _walk(tile: dict[str, Any], limit: float) -> Iterator[tuple[dict[str, Any], float, float]]:
-    """Yield each content, its tile's geometricError and that of the parent."""
-    error = tile["geometricError"]
-    if "content" in tile:
-        yield tile["content"], error, limit
-    for child in tile.get("children", ()):
-        yield from _walk(child, error)
+        return [*problems, f"{name} has no hash, expected extras.{CONTENT_HASH}"]
+    if not content.path.is_file():
+        if not content.is_tileset:  # of those, the walk tells
+            problems.append(f"{content.tileset}: no file at {uri}")
+        return problems
+    found = content_hash(_measure(content.path)["sha256"])
+    if found != expected:
+        problems.append(f"{name}: expected {CONTENT_HASH} {expected}, found {found}")
+    return problems
 
 
 def _check_hashes(bundle: Path) -> str:
@@ -343,7 +334,7 @@ def _run_node(script_name: str, paths: list[Path]) -> str:
         raise CheckError(f"{script_name} comes with a checkout of StereoCell only") from error
     node = shutil.which("node")
     if node is None:
-        raise CheckError(f"no `node` to run {script_name}: {_GET_NODE}")
+        raise CheckError(f"no `node` to run {script_name}: install Node 20.19 or newer")
     try:
         answer = subprocess.run(
             [node, str(script)],
@@ -356,7 +347,7 @@ def _run_node(script_name: str, paths: list[Path]) -> str:
     except subprocess.TimeoutExpired as error:
         raise CheckError(f"{script_name} was not done after {_NODE_TIMEOUT_S:g} s") from error
     if "ERR_MODULE_NOT_FOUND" in answer.stderr:
-        raise CheckError(f"{script.parent.parent}: its node packages are missing: {_GET_NODE}")
+        raise CheckError(f"{script.parent.parent}: its node packages are missing: run `make setup`")
     if answer.returncode != 0:
         raise CheckError(f"{script_name} failed: {' '.join(answer.stderr.split())[-300:]}")
     results = json.loads(answer.stdout)

@@ -25,6 +25,7 @@ from stereocell.documents import read_json
 from stereocell.errors import CheckError
 from stereocell.mesh import Mesh
 from stereocell.specimen import evaluate
+from stereocell.tilesets import walk
 from stereocell.write.bundle import MANIFEST
 from stereocell.write.bundle_tile import read_image
 from stereocell.write.composed import (
@@ -159,15 +160,10 @@ def _contents(
     """Yield level, file and stated distance (um) of a tile's surfaces in a channel's tileset."""
     if channel["tileset"] is None:
         return
-    path = bundle / channel["tileset"]["path"]
-    waiting = [read_json(path, None, _REMEDY)["root"]]
-    while waiting:
-        tile = waiting.pop()
-        waiting += tile.get("children", ())
-        uri = tile.get("content", {}).get("uri", "")
-        if uri.startswith(f"{tile_id}/lod"):
-            level = int(uri.removeprefix(f"{tile_id}/lod").removesuffix(".glb"))
-            yield level, (path.parent / uri, tile["geometricError"] * _UM_PER_METRE)
+    for content in walk(bundle, bundle / channel["tileset"]["path"], tile_id):
+        if not content.is_tileset:
+            level = int(content.path.stem.removeprefix("lod"))
+            yield level, (content.path, content.error_m * _UM_PER_METRE)
 
 
 def _hold_surface(

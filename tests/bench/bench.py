@@ -21,7 +21,7 @@ from stereocell import config, denoise, lod, phases, repair, surface
 from stereocell.engine import Engine
 from stereocell.tiling import Box
 from stereocell.volume import Volume
-from test_usd_scale import COLUMNS, ROWS, open_unloaded, write_many
+from test_usd_scale import CHANNELS, COLUMNS, ROWS, open_unloaded, write_many
 
 SPACING = (0.28, 0.14, 0.14)
 ROUNDS = 5
@@ -113,7 +113,8 @@ def main() -> None:
         median = statistics.median(one["seconds"] for one in opened)
         growth = opened[0]["growth_kib"]
         held = "" if growth is None else f", {growth / 1024:.0f} MiB"
-        print(f"a stage of {COLUMNS * ROWS} tiles opens unloaded in {median:.2f} s{held}")
+        units = COLUMNS * ROWS * CHANNELS
+        print(f"a stage of {units} units opens unloaded in {median:.2f} s{held}")
 
 
 if __name__ == "__main__":

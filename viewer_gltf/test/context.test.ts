@@ -5,7 +5,7 @@ import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
 
 describeInChromium("the graphics driver", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 360 } });
+  const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
   it("drops the picture, which is drawn anew: surfaces and volumes", async () => {

@@ -24,7 +24,7 @@ describe("the policy", () => {
 });
 
 describeInChromium("the page's policy", () => {
-  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 640, height: 360 } });
+  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 480, height: 270 } });
   let other: Host;
 
   beforeAll(async () => {

@@ -73,13 +73,13 @@ describeInChromium("the path-traced page", () => {
   }
 
   it("shows a scan, gathers, and changes only what a key or a slider is for", async () => {
-    await open("&quality=low");
+    await open();
     expect((await snapshot()).state.mode).toBe("traced");
     expect(stand.host.requests.filter(({ path }) => path.endsWith(".glb"))).toEqual([]);
     const early = await shoot();
     expect(drawn(early)).toBeGreaterThan(1000);
     for (const { color } of [F, BALL]) expect(early.count(hasColor(color))).toBeGreaterThan(100);
-    const late = await shoot((await samples()) + 12);
+    const late = await shoot((await samples()) + 6);
     expect(apart(early, late)).toBeLessThan(10);
 
     // before and after: at once, of the same samples
@@ -318,7 +318,7 @@ describeInChromium("the path-traced page", () => {
       Object.assign(window, { trembling });
     });
     const resting = await samples();
-    await gathered(resting + 6); // nothing is lost
+    await gathered(resting + 3); // nothing is lost
     const before = await samples();
     await page().evaluate(() => {
       const { headset, trembling } = window as unknown as {

@@ -1,7 +1,7 @@
 """Write the web bundle of a composed stage, as schemas/bundle.schema.json describes it.
 
     manifest.json  files.json                      written last: they hash all others
-    channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb
+    channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb  <tile>/finer.json
                        transfer2d.json  histogram2d.ktx2
     volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
     luts/<channel>.ktx2
@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.documents import compact_json
 from stereocell.engine import Engine
 from stereocell.errors import OutputError, StageError
 from stereocell.mirror import is_file, sizes_below
@@ -37,7 +38,7 @@ from stereocell.write.composed_look import ComposedLook, read_looks
 from stereocell.write.generator import GENERATOR
 from stereocell.write.gltf import choose_step
 from stereocell.write.ktx2 import encode_2d
-from stereocell.write.tiles3d import make_tileset
+from stereocell.write.tiles3d import make_tilesets
 
 MANIFEST = "manifest.json"
 FILES = "files.json"
@@ -90,15 +91,27 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine
         files += _copy_viewer(viewer_dist, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, _json(dict(sorted(listed.items()))))
+    specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels, index))
+
+
+def describe_bundle(
+    specimen: dict[str, str],
+    tiles: Sequence[BundleTile],
+    channels: Sequence[dict[str, Any]],
+    index: FileRef,
+) -> bytes:
+    """Return manifest.json.
+
+    specimen  its name and modality
+    channels  as `describe_channel` returns them
+    index     files.json
+    """
     manifest = {
         "format": "stereocell-bundle",
         "version": 1,
         "generator": GENERATOR,
-        "specimen": {
-            "name": specimen_name(stage),
-            "modality": modality_of(stage),
-            "bounds_um": _bounds(tiles),
-        },
+        "specimen": {**specimen, "bounds_um": _bounds(tiles)},
         "tiles": [
             {"id": tile.id, "representation": tile.representation, "bounds_um": _bounds([tile])}
             for tile in tiles
@@ -106,7 +119,7 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine
         "channels": channels,
         "files": asdict(index),
     }
-    write_file(root, MANIFEST, _json(manifest))
+    return _json(manifest)
 
 
 def _write_channel(
@@ -115,17 +128,39 @@ def _write_channel(
     """Write what a channel has once; return its entry in the manifest, and the files."""
     folder = f"channels/{look.id}"
     drawn = [channel.lods for _, channel in tiles if channel.lods]
-    tileset = None
-    if drawn:
-        tileset = write_file(root, f"{folder}/tileset.json", _compact(make_tileset(drawn)))
+    tilesets = [
+        write_file(root, f"{folder}/{address}", content)
+        for address, content in (make_tilesets(drawn) if drawn else {}).items()
+    ]
     entries = [channel.volume for _, channel in tiles if channel.volume is not None]
-    volumes = write_file(root, f"{folder}/volumes.json", _compact({"volumes": entries}))
+    volumes = write_file(root, f"{folder}/volumes.json", compact_json({"volumes": entries}))
     lut = write_file(root, f"luts/{look.id}.ktx2", encode_2d(_bake(look)).data)
     counts = sum_tiles(channel.joint for _, channel in tiles if channel.joint is not None)
     histogram = write_file(root, f"{folder}/histogram2d.ktx2", encode_histogram(counts))
-    joint = _compact(describe(look, counts, asdict(histogram)))
+    joint = compact_json(describe(look, counts, asdict(histogram)))
     transfer2d = write_file(root, f"{folder}/transfer2d.json", joint)
-    entry = {
+    entry = describe_channel(
+        look,
+        [channel.triangles for _, channel in tiles],
+        transfer2d=transfer2d,
+        lut=lut,
+        tileset=tilesets[0] if tilesets else None,
+        volumes=volumes,
+    )
+    return entry, [*tilesets, volumes, lut, histogram, transfer2d]
+
+
+def describe_channel(
+    look: ComposedLook,
+    triangles: Iterable[Sequence[int]],
+    *,
+    transfer2d: FileRef,
+    lut: FileRef,
+    tileset: FileRef | None,
+    volumes: FileRef,
+) -> dict[str, Any]:
+    """Return a channel's entry in the manifest; `triangles` of each tile by level."""
+    return {
         "id": look.id,
         "name": look.name,
         "color": list(look.color),
@@ -139,11 +174,9 @@ def _write_channel(
         "transfer_functions_2d": {"names": list(look.shapes), "file": asdict(transfer2d)},
         "lut": asdict(lut),
         "tileset": None if tileset is None else asdict(tileset),
-        "triangles": _totals([channel.triangles for _, channel in tiles]),
+        "triangles": _totals(triangles),
         "volumes": asdict(volumes),
     }
-    written = (tileset, volumes, lut, histogram, transfer2d)
-    return entry, [ref for ref in written if ref is not None]
 
 
 def _bake(look: ComposedLook) -> np.ndarray[Any, np.dtype[np.uint8]]:
@@ -183,11 +216,6 @@ def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
 
 def _json(content: object) -> bytes:
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
-
-
-def _compact(content: object) -> bytes:
-    """Return JSON for what a phone waits for: half the bytes."""
-    return (json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n").encode()
 
 
 def _holds(folder: Path) -> bool:

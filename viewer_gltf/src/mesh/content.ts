@@ -1,4 +1,4 @@
-/** Fetch and check what a tileset is made of: its JSON and its glb files. */
+/** Fetch and check what a tileset is made of: its JSON, external ones too, and its glb files. */
 import { BundleError } from "../bundle/errors";
 import { fetchFile, fileAddress, parseJson, readBody, request } from "../bundle/fetch";
 import type { FileRef } from "../bundle/generated/bundle";
@@ -23,7 +23,7 @@ export function checkGlb(bytes: Uint8Array, path: string): void {
 }
 
 /** The bytes of a surface, whose hash its tileset gave. Throws BundleError, or AbortError. */
-export async function fetchGlb(
+async function fetchGlb(
   base: string,
   path: string,
   hash: string,
@@ -47,15 +47,17 @@ export type Tileset = Readonly<{ asset: Readonly<{ version: string }>; root: Til
 /** A tileset.json with a version and a root, which the renderer takes for granted. */
 export function checkTileset(value: unknown, path: string): Tileset {
   const tileset = value as { asset?: { version?: unknown }; root?: { children?: unknown } } | null;
-  if (typeof tileset?.asset?.version !== "string" || !Array.isArray(tileset.root?.children)) {
+  const { root } = tileset ?? {};
+  const isTile = typeof root === "object" && root !== null && Array.isArray(root.children ?? []);
+  if (typeof tileset?.asset?.version !== "string" || !isTile) {
     throw new BundleError(`${path}: expected a 3D Tiles tileset with asset.version and root`);
   }
   return tileset as Tileset;
 }
 
 /**
- * The hash of every surface that a tileset names, by the surface's address; `address` is the
- * tileset's own. Throws BundleError.
+ * The hash of every file that a tileset names, surface or external tileset, by the file's address;
+ * `address` is the tileset's own. Throws BundleError.
  */
 export function contentHashes(
   { root }: Tileset,
@@ -79,7 +81,65 @@ export function contentHashes(
   return hashes;
 }
 
-export async function fetchTileset(base: string, file: FileRef): Promise<Tileset> {
+async function fetchTileset(base: string, file: FileRef): Promise<Tileset> {
   const text = new TextDecoder().decode(await fetchFile(base, file));
   return checkTileset(parseJson(text, file.path), file.path);
+}
+
+/** An external tileset, whose hash the one above it gave. Throws BundleError, or AbortError. */
+async function fetchExternal(
+  base: string,
+  path: string,
+  hash: string,
+  signal?: AbortSignal | null,
+): Promise<Tileset> {
+  const response = await request(fileAddress(base, path), path, { signal });
+  const bytes = await readBody(response, path);
+  // says more of a host's error page than its hash
+  const tileset = checkTileset(parseJson(new TextDecoder().decode(bytes), path), path);
+  await checkHash(path, bytes, hash, SHA_256_128);
+  return tileset;
+}
+
+/**
+ * The files of one channel's tileset, by the addresses that the renderer asks for: those of the
+ * bundle without its query, which goes with every request (see fileAddress). A file is known by its
+ * hash once a tileset that names it has come.
+ */
+export class TilesetFiles {
+  /** Address of the channel's tileset.json. */
+  readonly root: string;
+  private readonly folder: string;
+  private readonly hashes = new Map<string, string>();
+
+  constructor(
+    private readonly base: string,
+    private readonly file: FileRef,
+  ) {
+    this.folder = new URL(".", base).href.split("?")[0];
+    this.root = new URL(file.path, this.folder).href;
+  }
+
+  /** A file's path in the bundle. */
+  nameOf(address: string): string {
+    return decodeURIComponent(address.replace(this.folder, ""));
+  }
+
+  /** A tileset, or the bytes of a surface. Throws BundleError, or AbortError. */
+  async fetch(address: string, signal?: AbortSignal | null): Promise<Tileset | ArrayBuffer> {
+    const { base, file } = this;
+    if (address === this.root) return this.learn(await fetchTileset(base, file), address);
+    const hash = this.hashes.get(address);
+    if (hash === undefined) throw new Error(`${address} is not in its tileset`);
+    const path = this.nameOf(address);
+    if (!path.endsWith(".json")) return fetchGlb(base, path, hash, signal);
+    return this.learn(await fetchExternal(base, path, hash, signal), address);
+  }
+
+  private learn(tileset: Tileset, address: string): Tileset {
+    const found = contentHashes(tileset, this.nameOf(address), address);
+    for (const [each, hash] of found) this.hashes.set(each, hash);
+    // of 1.1 the renderer warns; it knows all that is new there in a bundle: glTF as content
+    return { ...tileset, asset: { ...tileset.asset, version: "1.0" } };
+  }
 }

@@ -21,7 +21,8 @@ import { BundleError } from "../bundle/errors";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Rgb } from "../color";
 import { BlendedSurface, type SurfaceFrame } from "./blend";
-import { contentHashes, fetchGlb, fetchTileset } from "./content";
+import { branchOf, leaveOut, putBack } from "./branch";
+import { TilesetFiles } from "./content";
 import type { SurfaceLoader } from "./loader";
 import type { TileProgress } from "./progress";
 
@@ -61,32 +62,15 @@ export class SurfaceTileset {
     onError: (error: unknown) => void,
   ) {
     if (channel.tileset === null) throw new Error(`channel ${channel.id} has no surface`);
-    const file = channel.tileset;
-    // Addresses without the bundle's query, which goes with every request: see fileAddress.
-    const folder = new URL(".", base).href.split("?")[0];
-    const root = new URL(file.path, folder).href;
-    this.tiles = new TilesRenderer(root);
+    const files = new TilesetFiles(base, channel.tileset);
+    this.tiles = new TilesRenderer(files.root);
     this.tiles.lruCache.maxBytesSize = bytes;
     this.tiles.lruCache.minBytesSize = KEPT_SHARE * bytes;
     this.tiles.maxDepth = DEPTH_OF_COARSEST + 1;
     this.tiles.manager.addHandler(/\.(gltf|glb)$/, loader.gltf);
-    const nameOf = (url: string) => decodeURIComponent(url.replace(folder, ""));
-    let hashes: ReadonlyMap<string, string> = new Map();
-    const fetchRoot = async () => {
-      const tileset = await fetchTileset(base, file);
-      hashes = contentHashes(tileset, file.path, root);
-      // of 1.1 the renderer warns; it knows all that is new there in a bundle: glTF as content
-      return { ...tileset, asset: { ...tileset.asset, version: "1.0" } };
-    };
-    const fetchSurface = async (url: string, signal: RequestInit["signal"]) => {
-      const hash = hashes.get(url);
-      if (hash === undefined) throw new Error(`${url} is not in its tileset`);
-      return fetchGlb(base, nameOf(url), hash, signal);
-    };
     this.tiles.registerPlugin({
       name: "STEREOCELL_BUNDLE",
-      fetchData: (url: string, { signal }: RequestInit) =>
-        url === root ? fetchRoot() : fetchSurface(url, signal),
+      fetchData: (url: string, { signal }: RequestInit) => files.fetch(url, signal),
       // Before the renderer puts its own `tile` into every userData.
       processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
     });
@@ -102,9 +86,10 @@ export class SurfaceTileset {
       onError(
         error instanceof BundleError
           ? error
-          : new BundleError(`${nameOf(String(url))}: the surface can't be read: ${error.message}`, {
-              cause: error,
-            }),
+          : new BundleError(
+              `${files.nameOf(String(url))}: the surface can't be read: ${error.message}`,
+              { cause: error },
+            ),
       );
     });
     this.tiles.addEventListener("dispose-model", ({ scene }) => {
@@ -185,10 +170,8 @@ export class SurfaceTileset {
    */
   private giveUp(tile: Tile): void {
     this.failed.add(tile);
-    const { parent } = tile;
-    if (parent?.children !== undefined && tile.internal.depth > DEPTH_OF_COARSEST) {
-      parent.children = parent.children.filter((child) => child !== tile);
-    }
+    const branch = branchOf(tile);
+    if (branch.internal.depth > DEPTH_OF_COARSEST) leaveOut(branch);
     this.count(tile);
   }
 
@@ -196,8 +179,7 @@ export class SurfaceTileset {
   retryFailed(): void {
     if (this.tiles.root === null) this.total = null;
     for (const tile of this.failed) {
-      const siblings = tile.parent?.children;
-      if (siblings !== undefined && !siblings.includes(tile)) siblings.push(tile);
+      putBack(branchOf(tile));
       this.tiles.lruCache.remove(tile); // makes it a tile that was never loaded
     }
     this.failed.clear();

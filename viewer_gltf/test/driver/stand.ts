@@ -4,7 +4,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, afterEach, beforeAll, beforeEach } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
-import { writeFixture } from "../fixture/bundle";
+import { type FixtureOptions, writeFixture } from "../fixture/bundle";
 import { type Browser, launch } from "./chromium";
 import { Host } from "./host";
 import { ViewerPage } from "./page";
@@ -27,6 +27,7 @@ export type Stand = Readonly<{
 export type StandOptions = Readonly<{
   /** A bundle's folder; without one, the synthetic fixture is written. */
   bundle?: string;
+  fixture?: FixtureOptions;
   /** CSS pixels; small ones, since software draws them. */
   viewport: { width: number; height: number };
   hasTouch?: boolean;
@@ -35,7 +36,8 @@ export type StandOptions = Readonly<{
 }>;
 
 /** Set up and cleared away around the tests of one `describe`; to be used inside them. */
-export function prepareStand({ bundle: given, viewport, hasTouch, mounts }: StandOptions): Stand {
+export function prepareStand(options: StandOptions): Stand {
+  const { bundle: given, fixture, viewport, hasTouch, mounts } = options;
   let folder: string;
   let bundle: string;
   let manifest: Manifest;
@@ -45,7 +47,7 @@ export function prepareStand({ bundle: given, viewport, hasTouch, mounts }: Stan
 
   beforeAll(async () => {
     folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
-    if (given === undefined) await writeFixture(folder);
+    if (given === undefined) await writeFixture(folder, fixture);
     bundle = given ?? folder;
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });

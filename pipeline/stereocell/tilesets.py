@@ -1,0 +1,77 @@
+"""Walk the tilesets of a bundle: what they name, also by way of external tilesets."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stereocell.documents import read_json
+from stereocell.errors import CheckError
+
+_JSON = ".json"
+_REMEDY = "run `stereocell bundle OUT`"
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """A file that a tileset names: a surface, or an external tileset.
+
+    tileset   the JSON file that names it
+    path      where it lies, in the bundle
+    named     the content as it stands there: `uri`, `extras`
+    error_m   geometricError of its tile
+    limit_m   that of the tile's parent
+    """
+
+    tileset: Path
+    path: Path
+    named: dict[str, Any]
+    error_m: float
+    limit_m: float
+
+    @property
+    def is_tileset(self) -> bool:
+        return self.path.suffix == _JSON
+
+
+def walk(bundle: Path, tileset: Path, tile_id: str | None = None) -> Iterator[Content]:
+    """Yield each content of a tileset, and of those that it names, coarse ones first.
+
+    tile_id  only what lies in this tile's folder is looked at; None: all
+
+    An external tileset is yielded before it is opened. Raises StereoCellError, which names the
+    file, where a tileset is missing or is none, or names a file outside `bundle` or a tileset that
+    was met before.
+    """
+    yield from _walk_file(bundle.resolve(), tileset, tile_id, None, {tileset.resolve()})
+
+
+def _walk_file(
+    bundle: Path, tileset: Path, tile_id: str | None, parent_m: float | None, met: set[Path]
+) -> Iterator[Content]:
+    content = read_json(tileset, None, _REMEDY)
+    try:
+        whole_m = content["geometricError"]
+        waiting = [(content["root"], whole_m if parent_m is None else min(whole_m, parent_m))]
+        while waiting:
+            tile, limit_m = waiting.pop()
+            error_m = tile["geometricError"]
+            waiting += [(child, error_m) for child in reversed(tile.get("children", ()))]
+            if "content" not in tile:
+                continue
+            uri = tile["content"]["uri"]
+            path = tileset.parent / uri
+            place = path.resolve()
+            if not place.is_relative_to(bundle):
+                raise CheckError(f"{tileset}: {uri} is outside the bundle")
+            if tile_id is not None and place.parent.name != tile_id:
+                continue
+            found = Content(tileset, path, tile["content"], error_m, limit_m)
+            yield found
+            if found.is_tileset:
+                if place in met:
+                    raise CheckError(f"{tileset}: {uri} is a tileset that was named before")
+                met.add(place)
+                yield from _walk_file(bundle, path, tile_id, error_m, met)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise CheckError(f"{tileset}: no 3D Tiles tileset: {error!r}") from error

@@ -1,0 +1,27 @@
+/** What is left out of a tileset where a tile has failed, and put back when it is tried again. */
+export type Branch<T> = {
+  readonly parent: T | null;
+  children?: T[];
+  readonly internal: Readonly<{ hasUnrenderableContent: boolean }>;
+};
+
+/**
+ * What hangs from the next tile above that can draw something: the tile, or what holds the external
+ * tileset whose root it is. A holder draws nothing, and would be a hole without that root. It comes
+ * anew once it was dropped from memory: nothing may be put back into it.
+ */
+export function branchOf<T extends Branch<T>>(tile: T): T {
+  let branch = tile;
+  while (branch.parent?.internal.hasUnrenderableContent) branch = branch.parent;
+  return branch;
+}
+
+export function leaveOut<T extends Branch<T>>(branch: T): void {
+  const { parent } = branch;
+  if (parent?.children) parent.children = parent.children.filter((child) => child !== branch);
+}
+
+export function putBack<T extends Branch<T>>(branch: T): void {
+  const siblings = branch.parent?.children;
+  if (siblings !== undefined && !siblings.includes(branch)) siblings.push(branch);
+}
