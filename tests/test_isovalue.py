@@ -150,3 +150,9 @@ def test_options_out_of_range_are_wrong_usage(values: dict[str, Any], message: s
 def test_unknown_criterion_is_wrong_usage() -> None:
     with pytest.raises(UsageError, match=r"'best', expected one of edges"):
         IsoValueOptions(criterion="best")
+
+
+def test_slopes_that_are_the_background_s_own_leave_no_surface() -> None:
+    ramp = np.indices((8, 8, 8), dtype=np.float32)[2]
+    with pytest.raises(NoSurfaceError, match="no level separates anything"):
+        find_iso_value(ramp, (1.0, 1.0, 1.0), IsoValueOptions())

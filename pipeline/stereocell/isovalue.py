@@ -170,7 +170,7 @@ def _score(
     area: NDArray[np.float64], total: NDArray[np.float64], options: IsoValueOptions
 ) -> NDArray[np.float64]:
     """Return the criterion over the levels; 0 for those that are out of the choice."""
-    large = area >= options.min_area_share * area.max()
+    large = (area > 0) & (area >= options.min_area_share * area.max())
     if options.curve == "pekar-area":
         return np.where(large, area, 0.0)
     exponent = {"pekar-total": 0.0, "pekar-mean": 1.0}.get(options.curve, 0.5)
