@@ -168,7 +168,7 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 
 torture: setup ## 50 builds killed at random moments; all malformed inputs
 	$(BIN)/python tests/torture.py 50
-	$(BIN)/python -m malformed
+	$(BIN)/python tests/malformed
 
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py

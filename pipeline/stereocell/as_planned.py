@@ -18,6 +18,16 @@ def require_input(plan: Plan) -> None:
             f"{plan.name}: changed since it was planned (fingerprint {dataset.fingerprint[:12]}, "
             f"expected {plan.fingerprint[:12]}{remarks}): plan into another OUT"
         )
+    levels, channels = len(dataset.levels), len(dataset.channels)
+    if plan.level >= levels or any(c.index >= channels for c in plan.channels if not c.source):
+        raise SourceError(
+            f"{plan.name}: holds {levels} levels and {channels} channels, the plan names others: "
+            "plan into another OUT"
+        )
+    if any(a > b for a, b in zip(plan.region.stop, dataset.levels[plan.level].shape, strict=True)):
+        raise SourceError(
+            f"{plan.name}: level {plan.level} holds no such region: plan into another OUT"
+        )
 
 
 def require_added(plan: Plan) -> None:

@@ -1,7 +1,6 @@
 """The command `stereocell`: one subcommand per phase, and one that runs them all."""
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -33,10 +32,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
-    print(f"stereocell: {line}", file=sys.stderr)
+    print(f"stereocell: {_shortened(line)}", file=sys.stderr)
     if options.json:
-        print(json.dumps({"error": line, "exit_code": code}, ensure_ascii=False))
+        print(commands.to_json({"error": line, "exit_code": code}))
     return code
+
+
+def _shortened(line: str) -> str:
+    """Leave out the middle of lines that nobody reads to their end."""
+    lines = commands.plain(line).split("\n")
+    return "\n".join(one if len(one) < 1200 else f"{one[:700]} ... {one[-400:]}" for one in lines)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -32,14 +32,27 @@ Handler = Callable[[argparse.Namespace], Answer]
 def say(options: argparse.Namespace, text: str) -> None:
     """Tell a person something."""
     if not options.json:
-        print(_as_given(options, text), flush=True)
+        print(plain(_as_given(options, text)), flush=True)
+
+
+def plain(text: str) -> str:
+    """Escape what a file's name or content may hold to trouble a terminal; line ends are ours."""
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 def answer(options: argparse.Namespace, found: Answer) -> int:
     """Tell a machine what was found, if one asked; return the exit code."""
     if options.json and found.data:
-        print(_as_given(options, json.dumps(found.data, allow_nan=False, ensure_ascii=False)))
+        print(_as_given(options, to_json(found.data)))
     return found.code
+
+
+def to_json(data: Mapping[str, Any]) -> str:
+    """Return one line of JSON in the words of its names, which a lone surrogate is none of."""
+    text = json.dumps(data, allow_nan=False, ensure_ascii=False)
+    return text if text.isprintable() else json.dumps(data, allow_nan=False)
 
 
 def _as_given(options: argparse.Namespace, text: str) -> str:

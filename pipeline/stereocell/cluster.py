@@ -1,5 +1,6 @@
 """Join a Dask cluster that others have started, and see that it can do the work."""
 
+import json
 import re
 import socket
 from importlib.metadata import version
@@ -9,6 +10,7 @@ from typing import Any
 from stereocell.errors import StereoCellError
 
 _WAIT_S = 20  # for a scheduler that does not answer, and for its first worker
+_MAX_BYTES = 1 << 20  # of a scheduler file
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+")
 _EXPECTED = "expected the address of a Dask scheduler, as tcp://host:8786, or its scheduler file"
 
@@ -27,14 +29,14 @@ def join(scheduler: str, shared: Path | None) -> Any:
     it, or don't see the file.
     """
     is_file = Path(scheduler).is_file()
-    if not is_file and not _ADDRESS.fullmatch(scheduler):
+    address = _address_in(Path(scheduler)) if is_file else scheduler
+    if not is_file and not _ADDRESS.fullmatch(address):
         raise ClusterError(f"--scheduler {scheduler}: no such file and no address; {_EXPECTED}")
     from distributed import Client
 
-    given = {"scheduler_file": scheduler} if is_file else {"address": scheduler}
     try:
-        client = Client(**given, timeout=_WAIT_S)
-    except (OSError, ValueError, TypeError, KeyError) as error:
+        client = Client(address, timeout=_WAIT_S)
+    except (OSError, OverflowError, ValueError, TypeError, KeyError) as error:
         reason = str(error).splitlines()[0] if str(error) else "it does not answer"
         raise ClusterError(f"--scheduler {scheduler}: {reason}; {_EXPECTED}") from None
     try:
@@ -43,6 +45,19 @@ def join(scheduler: str, shared: Path | None) -> Any:
         client.close()
         raise
     return client
+
+
+def _address_in(file: Path) -> str:
+    """Return the address in a scheduler file. Raises ClusterError where there is none."""
+    try:
+        with file.open("rb") as opened:
+            content = json.loads(opened.read(_MAX_BYTES))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ClusterError(f"--scheduler {file}: {error!s:.100}; {_EXPECTED}") from None
+    address = content.get("address") if isinstance(content, dict) else None
+    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
+        raise ClusterError(f"--scheduler {file}: address: found {address!r:.100}; {_EXPECTED}")
+    return address
 
 
 def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:

@@ -20,6 +20,8 @@ from stereocell.options import AUTO, length_um, setting
 from stereocell.unwrap import UnwrapOptions
 
 PRESETS = Path(__file__).parent / "presets"
+# of a file of settings; tomllib's time grows with the square of a dotted key's length
+_MAX_BYTES, _MAX_LINE = 1 << 17, 2000
 # What the first lines of a file of settings say about it.
 TEMPLATE = "StereoCell settings. Every key may be left out; unknown keys are errors."
 RECORD = (
@@ -269,11 +271,18 @@ def _toml(value: Any) -> str:
 def _read(path: Path) -> dict[str, Any]:
     try:
         with path.open("rb") as file:
-            return tomllib.load(file)
+            content = file.read(_MAX_BYTES + 1)
+        longest = max(map(len, content.splitlines()), default=0)
+        if len(content) > _MAX_BYTES or longest > _MAX_LINE:
+            raise UsageError(
+                f"{path}: found {len(content)} bytes or more, {longest} in a line, expected "
+                f"settings of at most {_MAX_BYTES}, {_MAX_LINE} in a line"
+            )
+        return tomllib.loads(content.decode())
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}, expected a TOML file of settings") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: not TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # tomllib's own, no UTF-8, endless numbers
+        raise UsageError(f"{path}: not TOML: {error!s:.200}") from None
 
 
 def _known(key: str, known: list[str], where: str, what: str) -> None:
@@ -281,7 +290,7 @@ def _known(key: str, known: list[str], where: str, what: str) -> None:
         return
     near = get_close_matches(key, known, 1)
     hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
-    raise UsageError(f"{where}: unknown {what} {key!r}; {hint}")
+    raise UsageError(f"{where}: unknown {what} {key!r:.80}; {hint}")
 
 
 def _annotation(type_: Any) -> str:
@@ -309,7 +318,7 @@ def _typed(where: str, value: Any, expected: str) -> Any:
     wanted = "a list" if expected.startswith("tuple[") else plain.get(expected, expected)
     if wanted == expected:
         wanted = f"{'a number' if 'float' in expected else 'a whole number'} or {AUTO!r}"
-    raise UsageError(f"{where} is {value!r}, expected {wanted}")
+    raise UsageError(f"{where} is {value!r:.80}, expected {wanted}")
 
 
 def _is_finite(value: float) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,12 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
     """
     bring(path)
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(path.read_bytes(), parse_constant=_refuse, parse_float=_finite)
     except FileNotFoundError:
         raise OutputError(f"{path} is missing: {remedy}") from None
     except OSError as error:
         raise OutputError(f"{path}: can't be read ({error.strerror})") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:  # of lists in lists in lists
         raise OutputError(f"{path}: damaged, no JSON ({error}): {remedy}") from None
     if schema is None:
         return content
@@ -38,6 +39,17 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
         reason = fault.message if len(fault.message) < 200 else f"{fault.message[:200]}..."
         raise OutputError(f"{path}: {fault.json_path}: {reason}: {remedy}")
     return content
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not isfinite(number):
+        raise ValueError(f"{text:.20} is beyond all numbers")
+    return number
 
 
 def find_json(path: Path, schema: str) -> Any:
@@ -51,6 +63,11 @@ def find_json(path: Path, schema: str) -> Any:
 def write_json(path: Path, content: Any) -> None:
     """Put `content` at `path` as JSON, whole or not at all. Raises OutputError."""
     write_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
+
+
+def compact_json(content: Any) -> bytes:
+    """Return JSON for what a phone waits for: half the bytes."""
+    return (json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n").encode()
 
 
 @cache

@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeVar
 
 from stereocell.config import Settings, from_dict, to_dict
 from stereocell.denoise import SMOOTHING_REACH
-from stereocell.errors import SourceError, UsageError
+from stereocell.errors import OutputError, SourceError, UsageError
 from stereocell.names import to_identifier
 from stereocell.options import AUTO
 from stereocell.placement import IDENTITY, Matrix, to_matrix
@@ -406,7 +406,38 @@ def to_json(plan: Plan) -> dict[str, Any]:
 
 
 def from_json(content: Mapping[str, Any]) -> Plan:
-    """Return the plan that `to_json` was given; the content has passed its schema."""
+    """Return the plan that `to_json` was given; the content has passed its schema.
+
+    Raises OutputError for what no plan of ours says.
+    """
+    plan = _from_json(content)
+    fault = _find_fault(plan)
+    if fault is not None:
+        raise OutputError(f"plan.json: {fault}: remove it and run `stereocell plan INPUT -o OUT`")
+    return plan
+
+
+def _find_fault(plan: Plan) -> str | None:
+    """Return what a schema can't say of a plan that was edited or damaged."""
+    for name in (plan.name, *(channel.name for channel in plan.channels)):
+        if not name.isprintable():
+            return f"name: found {name!r:.80}, expected one that can be shown"
+    if not _is_inside(plan.region, Box((0, 0, 0), plan.region.stop)):
+        return f"region: found {plan.region!s:.100}, expected voxels in it"
+    for tile in plan.tiles:
+        if not _is_inside(tile.box, plan.region):
+            return f"tile {tile.id}: found {tile.box!s:.100}, expected a box inside the region"
+    if plan.settings.surface.resolved(plan.spacing_um) != plan.settings.surface:
+        return f"settings: surface: found {AUTO!r}, expected lengths"
+    return None
+
+
+def _is_inside(box: Box, region: Box) -> bool:
+    ends = zip(region.start, box.start, box.stop, region.stop, strict=True)
+    return all(low <= start < stop <= high for low, start, stop, high in ends)
+
+
+def _from_json(content: Mapping[str, Any]) -> Plan:
     return Plan(
         source=content["source"],
         name=content["name"],

@@ -57,9 +57,11 @@ def find_display(
     if not high > low:  # sparse channels: fewer bright voxels than the percentile leaves out
         low, high = float(voxels.min()), float(voxels.max())
     if not high > low:
-        high = low + 1.0
+        high = low + max(1.0, 1e-6 * abs(low))  # more than float32 tells apart
     if window is not None:
         low, high = window
+    if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
+        voxels = voxels.astype(np.float64)  # bins so narrow that float32 has no edges for them
     counts, _ = np.histogram(np.clip(voxels, low, high), BINS, (low, high))
     values = make_histogram(voxels, (low, high))
     return Display((low, high), tuple(int(n) for n in counts), background, values=values)

@@ -97,7 +97,7 @@ def load_lods(directory: Path) -> tuple[Lod, ...]:
     lods = load_record(directory)["lods"]
     try:
         return tuple(_load_lod(directory, level, lod) for level, lod in enumerate(lods))
-    except (OSError, ValueError, LookupError, BadZipFile) as error:
+    except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
 
 
@@ -112,7 +112,7 @@ def load_volume(directory: Path) -> NDArray[np.uint8]:
     bring(directory / _VOLUME)
     try:
         volume: NDArray[np.uint8] = np.load(directory / _VOLUME, mmap_mode="r")
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
     return volume
 

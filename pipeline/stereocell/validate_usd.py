@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdValidation, UsdVol
 
 from stereocell.errors import StageError
+from stereocell.write.composed_values import one_line
 from stereocell.write.usd_layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
 from stereocell.write.vdb_head import read_vdb_head
 
@@ -43,16 +44,16 @@ class Finding:
 def validate_stage(path: Path) -> list[Finding]:
     """Return the faults of a stage with all its payloads; an empty list says that it is clean."""
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would also print what is returned here
+    findings: list[Finding] = []
     try:
         stage = Usd.Stage.Open(str(path))
-    except Tf.ErrorException as error:
-        reasons = " ".join(fault.commentary for fault in error.args)
-        return [Finding("open", str(path), " ".join(reasons.split()))]
-    findings = [*_check_selections(stage), *_check_all(stage)]
-    passes = _select_variants(stage, 0)
-    for turn in range(passes):
-        _select_variants(stage, turn)
-        findings += _check_all(stage)
+        findings += [*_check_selections(stage), *_check_all(stage)]
+        passes = _select_variants(stage, 0)
+        for turn in range(passes):
+            _select_variants(stage, turn)
+            findings += _check_all(stage)
+    except Tf.ErrorException as error:  # a layer that can't be read ends it all
+        findings.append(Finding("open", str(path), one_line(error)))
     del quiet
     return list(dict.fromkeys(findings))
 
@@ -66,8 +67,7 @@ def validate_usdz(path: Path) -> list[Finding]:
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
-        reasons = " ".join(fault.commentary for fault in error.args)
-        return [Finding("open", str(path), " ".join(reasons.split()))]
+        return [Finding("open", str(path), one_line(error))]
     unit, axis = UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)
     findings = [*_run_validators(stage), *_check_names(stage)]
     if (unit, axis) != (1.0, UP_AXIS):

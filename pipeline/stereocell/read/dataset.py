@@ -21,6 +21,9 @@ from stereocell.volume import Volume
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 
 
+MAX_VALUE = 1e30  # of a voxel: squares and differences of larger ones leave float32
+
+
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
     """One channel. `color` is linear RGB, 0..1, or None where the source states none.
@@ -159,9 +162,10 @@ class Dataset:
         )
         with one_line(where, "chunks that are whole"):
             voxels = self.arrays[level].window(self.time, channel, box)
-        if voxels.dtype.kind == "f" and not np.isfinite(voxels).all():
+        if voxels.dtype.kind == "f" and not np.abs(voxels).max(initial=0) <= MAX_VALUE:
             bad = int(np.count_nonzero(~np.isfinite(voxels)))
-            raise SourceError(f"{where}: found {bad} NaN or infinite, expected finite voxels")
+            found = f"{bad} NaN or infinite" if bad else f"voxels beyond {MAX_VALUE:g}"
+            raise SourceError(f"{where}: found {found}, expected finite voxels")
         z, y, x = (
             origin + start * spacing
             for origin, start, spacing in zip(

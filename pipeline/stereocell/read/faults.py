@@ -14,21 +14,28 @@ from bioio_base.exceptions import UnsupportedFileFormatError
 from botocore.exceptions import BotoCoreError  # type: ignore[import-untyped]
 from pydantic import ValidationError
 from zarr.errors import NodeNotFoundError
+from zstandard import ZstdError
 
 from stereocell.errors import SourceError, StereoCellError
 
 # Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
 # KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
-# ValueError, and struct.error for a header cut short.
+# ValueError, and struct.error for a header cut short. Metadata of another form than the format's
+# end in AttributeError, sizes beyond this machine in MemoryError, OverflowError and SystemError.
 _FAULTS = (
     OSError,
     EOFError,
     ValueError,
     TypeError,
-    KeyError,
+    LookupError,
     RuntimeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+    SystemError,
     struct.error,
     zlib.error,
+    ZstdError,
     ClientError,
     BotoCoreError,
     UnsupportedFileFormatError,
@@ -67,6 +74,12 @@ def _reason(error: BaseException) -> str:
         return "not found, or not reachable"
     if isinstance(error, KeyError):
         return f"field {error} is missing"
+    if isinstance(error, AttributeError):
+        return f"metadata of another form ({_shortened(str(error))})"
+    if isinstance(error, MemoryError | OverflowError | SystemError):
+        return "it asks for more memory than there can be"
+    if isinstance(error, RecursionError):
+        return "metadata: nested too deeply"
     if isinstance(error, ParseError):
         return f"OME-XML: {error}"
     if isinstance(error, JSONDecodeError):

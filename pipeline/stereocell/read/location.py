@@ -43,7 +43,12 @@ class Location:
         text = str(source)
         if not _ADDRESS.match(text):
             return cls(os.path.abspath(os.path.expanduser(text)), True)
-        parts = urlsplit(text)
+        try:
+            parts = urlsplit(text)
+        except ValueError as error:
+            raise UsageError(
+                f"{text}: found no address ({error}), expected https:// or s3://"
+            ) from None
         if parts.scheme == "file":
             return cls(os.path.abspath(unquote(parts.path)), True)
         return cls(text, False)
@@ -121,7 +126,8 @@ def require_apart(source: str | Path, out: Path) -> None:
         return
     path = Path(location.source)
     outermost = next((p for p in [*reversed(path.parents), path] if p.suffix == ".zarr"), path)
-    if out.resolve().is_relative_to(outermost.resolve()):
+    # not Path.resolve, which has no word of ours for links in a ring
+    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(outermost)):
         raise UsageError(
             f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
             "it would write into the data"

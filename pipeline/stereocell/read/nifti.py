@@ -31,6 +31,7 @@ from stereocell.read.whole import WholeArray
 NAME = "NIfTI"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
+_MAX_OFFSET = 1 << 28  # bytes of header and extensions, which gzip has to be unpacked through
 _SKEW = 1e-3  # cosine between two axes: less is rounding
 _FAULTS = (
     nibabel.filebasedimages.ImageFileError,
@@ -61,10 +62,10 @@ def read_image(location: Location) -> Image:
         raise SourceError(f"{where}: datatype: found {stored}, expected whole or real numbers")
     dtype = _dtype(stored, image.dataobj.slope, image.dataobj.inter)
     unit = header.get_xyzt_units()[0]
-    affine = _RAS_TO_LPS @ image.affine
+    affine = _RAS_TO_LPS @ np.where(np.isfinite(image.affine), image.affine, 0.0)
     affine[:3] *= _MM[unit]
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
-    is_sound = np.isfinite(affine).all() and lengths.min() > 0
+    is_sound = np.isfinite(image.affine).all() and lengths.min() > 0
     if not is_sound or abs(np.linalg.det(affine[:3, :3] / lengths)) < 0.1:
         raise SourceError(f"{where}: sform and qform: found no three axes, expected an affine")
     notes = []
@@ -120,6 +121,9 @@ def _open(location: Location) -> Any:
             header.get_xyzt_units()
             header.get_data_dtype()
             header.get_data_shape()
+            stored: Any = image.dataobj
+            if not 0 <= stored.offset <= _MAX_OFFSET:
+                raise ValueError
             return image
     except _FAULTS:
         raise SourceError(

@@ -6,6 +6,10 @@ for each page. tifffile, on which it stands, serves every level as a Zarr array 
 strips or tiles.
 """
 
+import logging
+import math
+import re
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any
@@ -17,11 +21,18 @@ from tifffile import TiffFile, TiffFrame, TiffPage, TiffPageSeries
 
 from stereocell.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.faults import collected_log, one_line, without_warning
-from stereocell.read.image import Color, Image, linear_color
+from stereocell.read.faults import collected_log, one_line
+from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.location import Location
 from stereocell.read.spacing import Grid, Triple, um_per
 
+# What the OME-XML and the tags may claim: the libraries make lists of that length at once.
+_MAX_PLANES = 1_000_000
+_MAX_SIDE = 10_000_000
+_MAX_LEVELS = 64
+_SUB_IFDS = 330
+_CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # what matters becomes an error
 _REMOTE_BLOCK = 1 << 18  # bytes; fsspec's 5 MB of read-ahead would be fetched for every tile
 
 
@@ -34,10 +45,12 @@ def read_image(location: Location) -> Image:
             collected_log("tifffile") as log,
             one_line(where, "an OME-TIFF file, whole, with its OME-XML"),
         ):
-            # bioio passes ome-types an argument that it no longer takes
-            with without_warning("As of version 0.4.0, the parser argument", DeprecationWarning):
-                reader = Reader(location.source, fs_kwargs=location.storage_options)
             tiff = _open(location, stack)
+            _check_claims(where, tiff)
+            with warnings.catch_warnings():  # of values that are none: they become errors below
+                warnings.simplefilter("ignore")
+                reader = Reader(location.source, fs_kwargs=location.storage_options)
+                images = reader.ome_metadata.images
             series = tiff.series[0]
             pages = [list(level.pages) for level in series.levels]
             arrays = [_array(series, index) for index in range(len(pages))]
@@ -48,10 +61,34 @@ def read_image(location: Location) -> Image:
             )
         for index, level in enumerate(pages):
             _check_whole(f"{where}: level {index}", tiff, level)
-        return _image(where, reader.ome_metadata.images, arrays, stack.close)
+        return _image(where, images, arrays, stack.close)
     except BaseException:
         stack.close()
         raise
+
+
+def _check_claims(where: str, tiff: TiffFile) -> None:
+    """Raise SourceError where the OME-XML or the tags ask for more than any file holds."""
+    text = tiff.ome_metadata or ""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise SourceError(f"{where}: OME-XML: found a DOCTYPE, expected none")
+    sizes: dict[str, int] = {}
+    for name, digits in _CLAIM.findall(text):
+        most = _MAX_SIDE if name in ("SizeX", "SizeY") else _MAX_PLANES
+        if name == "SizeC":
+            most = MAX_CHANNELS
+        value = int(digits) if len(digits) < 20 else math.inf
+        if value > most:
+            raise SourceError(
+                f"{where}: OME-XML: {name}: found {digits:.20}, expected at most {most}"
+            )
+        sizes[name] = max(sizes.get(name, 1), int(value))
+    planes = math.prod(sizes.get(f"Size{axis}", 1) for axis in "ZCT")
+    if planes > _MAX_PLANES:
+        raise SourceError(f"{where}: OME-XML: {planes} planes, expected at most {_MAX_PLANES}")
+    tag = tiff.pages.first.tags.get(_SUB_IFDS)
+    if tag is not None and tag.count > _MAX_LEVELS:
+        raise SourceError(f"{where}: SubIFDs: found {tag.count}, expected at most {_MAX_LEVELS}")
 
 
 def _image(
@@ -106,8 +143,8 @@ def _check_whole(where: str, tiff: TiffFile, pages: Sequence[TiffPage | TiffFram
         )
     size = tiff.filehandle.size
     for page in present:
-        if page.parent is tiff and page.dataoffsets:
-            end = page.dataoffsets[-1] + page.databytecounts[-1]
+        if page.parent is tiff and page.dataoffsets and page.databytecounts:
+            end = max(a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=False))
             if end > size:
                 raise SourceError(
                     f"{where}: found {size} bytes, expected at least {end} (the file is cut short)"

@@ -8,36 +8,41 @@ bioio's reader opens the store and hands over the metadata. Three of its answers
 - `channel_names` is "" where a label is missing.
 """
 
+import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import zarr
 from bioio_ome_zarr import Reader
-from zarr.abc.buffer import Buffer
-from zarr.abc.store import ByteRequest, Store
-from zarr.core.buffer import BufferPrototype
-from zarr.storage import FsspecStore, LocalStore, WrapperStore
+from zarr.abc.store import Store
+from zarr.storage import FsspecStore, LocalStore
 
 from stereocell.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.faults import one_line
-from stereocell.read.image import Color, Image, linear_color
+from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.location import Location
 from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.read.zarr_store import GuardedStore, codec_name, require_metadata
 
-_BLOSC_HEADER = 16  # bytes; the last four are the length of the compressed chunk, header included
+_MAX_LEVELS = 64
 
 
 def read_image(location: Location) -> Image:
     """Return the first multiscale image of the group. Raises SourceError."""
     where = location.shown
     with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
+        if location.is_local:
+            require_metadata(Path(location.source))
         reader = Reader(location.source, fs_kwargs=location.storage_options)
         metadata = reader.metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
-    multiscales = ome.get("multiscales") if isinstance(ome, Mapping) else None
+    if not isinstance(ome, Mapping):
+        raise SourceError(f"{where}: attribute `ome`: found {ome!r:.60}, expected a table")
+    multiscales = ome.get("multiscales")
     if not isinstance(multiscales, list) or not multiscales:
         kind = next((key for key in ("plate", "well", "labels") if key in ome), None)
         found = f"found a {kind}" if kind else "not found"
@@ -49,8 +54,11 @@ def read_image(location: Location) -> Image:
         datasets = list(multiscales[0]["datasets"])
         paths = [str(dataset["path"]) for dataset in datasets]
         placements = [_placement(multiscales[0], dataset, len(axes)) for dataset in datasets]
-    if not paths:
-        raise SourceError(f"{where}: multiscales[0].datasets: found none, expected a level")
+    if not 0 < len(paths) <= _MAX_LEVELS:
+        raise SourceError(
+            f"{where}: multiscales[0].datasets: found {len(paths) or 'none'}, expected a level, "
+            f"and at most {_MAX_LEVELS}"
+        )
     missing = [axis for axis in "zyx" if axis not in axes]
     if missing:
         raise SourceError(
@@ -58,12 +66,13 @@ def read_image(location: Location) -> Image:
             f"among {', '.join(axes)}"
         )
     store = _store(location)
-    arrays = tuple(_open_array(where, store, path, axes, metadata.zarr_format) for path in paths)
+    arrays = tuple(_open_array(location, store, path, axes, metadata.zarr_format) for path in paths)
     grids = tuple(
         _grid(level, units, scale, shift)
         for level, (scale, shift) in zip(arrays, placements, strict=True)
     )
-    channels = ome.get("omero", {}).get("channels", []) if isinstance(ome, Mapping) else []
+    omero = ome.get("omero", {})
+    channels = omero.get("channels", []) if isinstance(omero, Mapping) else omero
     names, colors = _channels(where, channels, arrays[0].size("c"))
     return Image(arrays, grids, names, colors, len(multiscales))
 
@@ -135,6 +144,10 @@ def _spatial(
 def _channels(
     where: str, channels: Any, count: int
 ) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
+    if not isinstance(channels, list):
+        raise SourceError(f"{where}: omero.channels: found {channels!r:.60}, expected a list")
+    if count > MAX_CHANNELS:
+        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     entries = [entry for entry in channels if isinstance(entry, Mapping)]
     if len(entries) > count:
         raise SourceError(
@@ -164,43 +177,18 @@ def _store(location: Location) -> Store:
 
 
 def _open_array(
-    where: str, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
+    location: Location, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
 ) -> VoxelArray:
-    field = f"{where}: level {path!r}"
+    field = f"{location.shown}: level {path!r:.80}"
+    root = Path(location.source) if location.is_local else None
     with one_line(field, "a Zarr array"):
-        array = zarr.open_array(store, path=path, mode="r", zarr_format=zarr_format)
-        compressors = array.compressors
-    if any("blosc" in type(codec).__name__.lower() for codec in compressors):
-        array = zarr.open_array(
-            WholeBloscStore(store), path=path, mode="r", zarr_format=zarr_format
-        )
+        guard = GuardedStore(store, root)
+        array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
+        codecs = tuple(codec_name(codec) for codec in array.compressors)
+        size = math.prod(array.shards or array.chunks) * array.dtype.itemsize
+        named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
+        guard = GuardedStore(store, root, codecs, size, f"{path}/{named}")
+        array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
     if array.ndim != len(axes):
         raise SourceError(f"{field}: found {array.ndim} dimensions, expected {len(axes)} as `axes`")
     return VoxelArray(array, axes)
-
-
-class WholeBloscStore(WrapperStore[Store]):
-    """Refuses Blosc chunks that were cut short.
-
-    The decoder trusts the length in the chunk's header and reads past the end of the buffer, so a
-    truncated file would come out as noise, without an error.
-    """
-
-    async def get(
-        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
-    ) -> Buffer | None:
-        value = await self._store.get(key, prototype, byte_range)
-        is_metadata = key.rsplit("/", 1)[-1] in ("zarr.json", ".zarray", ".zattrs", ".zgroup")
-        if value is not None and not is_metadata and byte_range is None:
-            header = value[:_BLOSC_HEADER].to_bytes()
-            length = int.from_bytes(header[12:], "little")
-            if len(header) < _BLOSC_HEADER or len(value) < length:
-                raise OSError(f"chunk {key} is cut short ({len(value)} of {length} bytes)")
-        return value
-
-    async def get_partial_values(
-        self,
-        prototype: BufferPrototype,
-        key_ranges: Iterable[tuple[str, ByteRequest | None]],
-    ) -> list[Buffer | None]:
-        return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]

@@ -99,7 +99,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
         source=location.source,
-        name=image.title or location.name,
+        name=image.title or _shown(location.name) or "dataset",
         dtype=np.dtype(finest.array.dtype).newbyteorder("="),
         levels=levels_of(image.grids, spacing_um, where),
         channels=tuple(channels),
@@ -149,9 +149,9 @@ def _check_arrays(where: str, image: Image) -> None:
             raise SourceError(
                 f"{where}: axis {axis!r} of length {size}, expected only t, c, z, y and x"
             )
-        bytes_of_one = int(np.prod(level.array.chunks, dtype=np.int64)) * dtype.itemsize
+        bytes_of_one = math.prod(int(n) for n in level.array.chunks) * dtype.itemsize
         if bytes_of_one > MAX_CHUNK_BYTES:
-            found = math.ceil(bytes_of_one / 2**30 * 100) / 100  # up, so that it is more
+            found = min(-(-100 * bytes_of_one >> 30), 10**20) / 100  # up, so that it is more
             raise SourceError(
                 f"{where}: chunk {level.array.chunks} of level {index}: found {found:g} GiB, "
                 f"expected at most {MAX_CHUNK_BYTES >> 30} GiB"

@@ -67,9 +67,9 @@ class Grid:
     offset_um: Triple | None = None
 
 
-def um_per(unit: str | None) -> float | None:
+def um_per(unit: object) -> float | None:
     """Return a length unit in um; None for no unit or one that is no length (`pixel`)."""
-    if unit is None:
+    if not isinstance(unit, str):
         return None
     return _UM.get(unit, _UM.get(unit.strip().lower().replace("metre", "meter")))
 
@@ -85,7 +85,9 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
     if given_um is not None:
         if len(given_um) != 3 or not all(_is_length(value) for value in given_um):
             text = ",".join(f"{value:g}" for value in given_um)
-            raise UsageError(f"--spacing-um: found {text}, expected z,y,x in um, each above 0")
+            raise UsageError(
+                f"--spacing-um: found {text}, expected z,y,x in um, each above 0, up to 1e9"
+            )
         finest = given_um
         grids = tuple(grid if _is_sound(grid) else Grid(grid.shape) for grid in grids)
     elif grids[0].spacing_um is None:
@@ -117,7 +119,13 @@ def _check(grids: tuple[Grid, ...], where: str) -> None:
             if not _is_length(value):
                 raise SourceError(
                     f"{where}: voxel size {axis} of level {index}: found {value:g} um, "
-                    "expected a length above 0 (or give --spacing-um z,y,x)"
+                    "expected a length above 0, up to 1e+09 (or give --spacing-um z,y,x)"
+                )
+        for axis, value in zip("zyx", grid.offset_um or (), strict=False):
+            if not math.isfinite(value):
+                raise SourceError(
+                    f"{where}: translation {axis} of level {index}: found {value:g} um, "
+                    "expected a finite length"
                 )
         if any(n < 1 for n in grid.shape):
             raise SourceError(
@@ -151,7 +159,8 @@ def _is_sound(grid: Grid) -> bool:
 
 
 def _is_length(value: float) -> bool:
-    return math.isfinite(value) and value > 0.0
+    """Whether it is one that voxels can have, in um: any other is a unit gone wrong."""
+    return 1e-6 <= value <= 1e9
 
 
 def _triple(values: Iterable[float]) -> Triple:

@@ -24,14 +24,17 @@ from stereocell.write.composed_mesh import read_mesh
 from stereocell.write.composed_values import (
     Point,
     file_of,
+    numbers_of,
     one_line,
     point_of,
     select_variant,
     shortest,
-    value_of,
+    sizes_of,
 )
 from stereocell.write.gltf import Material
 from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, move_box
+
+_FARTHEST_UM = 1e12  # from the origin: what float32 and browsers still draw
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +127,10 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
     hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
     if not hint:
         raise StageError(f"{tile.GetPath()}.extentsHint: no value")
-    return move_box(np.array(hint[0]), np.array(hint[1]), _to_world(tile))
+    corners = np.array(hint, np.float64)
+    if len(corners) < 2 or not np.abs(corners).max() <= _FARTHEST_UM:
+        raise StageError(f"{tile.GetPath()}.extentsHint: found {hint!s:.60}, expected two corners")
+    return move_box(corners[0], corners[1], _to_world(tile))
 
 
 @contextmanager
@@ -175,7 +181,7 @@ def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[Comp
         if mesh is None:
             continue
         stretch = float(np.linalg.norm(matrix[:3, :3], 2))
-        distance = shortest(value_of(prim, "stereocell:distance")) * stretch
+        distance = shortest(*numbers_of(prim, "stereocell:distance", 1)) * stretch
         yield ComposedLod(level, mesh, distance, material_of(surface), maps_of(surface))
 
 
@@ -193,13 +199,19 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
     prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{name}"))
     if prim is None:
         return None
-    width, height, depth = value_of(prim, "stereocell:atlasSize")
+    width, height, depth = sizes_of(prim, "stereocell:atlasSize", 3)
+    (apron,) = sizes_of(prim, "stereocell:apron", 1)
+    if min(width, height, depth) <= 2 * apron:
+        raise StageError(
+            f"{prim.GetPath()}: found {width} x {height} x {depth} voxels, apron {apron}, "
+            "expected voxels inside it"
+        )
     return ComposedVolume(
         file_of(prim.GetAttribute("stereocell:atlas")),
         (width, height, depth),
-        value_of(prim, "stereocell:apron"),
-        point_of(value_of(prim, "stereocell:boundsMin")),
-        point_of(value_of(prim, "stereocell:boundsMax")),
+        apron,
+        point_of(prim, "stereocell:boundsMin"),
+        point_of(prim, "stereocell:boundsMax"),
         _to_world(prim),
     )
 
@@ -221,5 +233,21 @@ def _is_visible(prim: Usd.Prim) -> bool:
 
 
 def _to_world(prim: Usd.Prim) -> NDArray[np.float64]:
-    """Return the matrix from a prim's space to the world for row vectors, (4, 4)."""
-    return np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
+    """Return the matrix from a prim's space to the world for row vectors, (4, 4).
+
+    Raises StageError for one that no surface survives.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    try:
+        matrix = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
+    except Tf.ErrorException as error:
+        raise StageError(f"{prim.GetPath()}: {one_line(error)}") from error
+    finally:
+        del quiet
+    is_near = np.abs(matrix).max() <= _FARTHEST_UM
+    if not is_near or not np.abs(np.linalg.det(matrix[:3, :3])) > 0:
+        raise StageError(
+            f"{prim.GetPath()}: its transform is flat, infinite or leads farther than "
+            f"{_FARTHEST_UM:g} um, expected one that a surface survives"
+        )
+    return matrix

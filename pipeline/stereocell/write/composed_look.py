@@ -14,6 +14,7 @@ from stereocell.write.composed_maps import feeder
 from stereocell.write.composed_shapes import read_gradient_max, read_shapes
 from stereocell.write.composed_values import (
     color_of,
+    numbers_of,
     select_variant,
     shortest,
     value_of,
@@ -137,7 +138,7 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
 
 
 def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:
-    low, high = (shortest(number) for number in value_of(prim, name))
+    low, high = (shortest(number) for number in numbers_of(prim, name, 2))
     if not low < high:
         raise StageError(f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected them to rise")
     return low, high
@@ -161,8 +162,11 @@ def _verdict(prim: Usd.Prim, name: str) -> Verdict:
 
 
 def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
-    points = tuple((x, y) for x, y in value_of(prim, "stereocell:opacityPoints"))
     field = f"{prim.GetPath()}.stereocell:opacityPoints"
+    try:
+        points = tuple((float(x), float(y)) for x, y in value_of(prim, "stereocell:opacityPoints"))
+    except (TypeError, ValueError):
+        raise StageError(f"{field}: no pairs, expected intensity and opacity") from None
     if not points:
         raise StageError(f"{field}: empty, expected pairs of intensity and opacity")
     if not all(0 <= number <= 1 for point in points for number in point):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import UsdGeom
+from pxr import Usd, UsdGeom
 
 from stereocell.errors import StageError
 from stereocell.mesh import Mesh
@@ -28,9 +28,9 @@ def read_mesh(
 
     Raises StageError where its arrays contradict each other.
     """
-    points = _array(mesh.GetPointsAttr().Get(), np.float32)
-    counts = _array(mesh.GetFaceVertexCountsAttr().Get(), np.int64)
-    indices = _array(mesh.GetFaceVertexIndicesAttr().Get(), np.int64)
+    points = _values(mesh.GetPointsAttr(), np.float32)
+    counts = _values(mesh.GetFaceVertexCountsAttr(), np.int64)
+    indices = _values(mesh.GetFaceVertexIndicesAttr(), np.int64)
     if len(counts) == 0:
         return None
     path = mesh.GetPath()
@@ -72,6 +72,15 @@ def read_mesh(
         ),
         to_world,
     )
+
+
+def _values(attribute: Usd.Attribute, dtype: type) -> NDArray[Any]:
+    try:
+        return _array(attribute.Get(), dtype)
+    except (TypeError, ValueError):
+        raise StageError(
+            f"{attribute.GetPath()}: found {attribute.GetTypeName()}, expected an array of numbers"
+        ) from None
 
 
 def _array(value: object, dtype: type) -> NDArray[Any]:

@@ -1,10 +1,11 @@
 """Read single values of a composed stage, and say which prim lacks one."""
 
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Tf, Usd
+from pxr import Tf, Usd
 
 from stereocell.errors import StageError
 
@@ -37,8 +38,31 @@ def color_of(attribute: Usd.Attribute) -> tuple[float, float, float]:
     return r, g, b
 
 
-def point_of(value: Gf.Vec3d) -> Point:
-    x, y, z = (float(part) for part in value)
+def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
+    """Return an attribute's numbers. Raises StageError unless there are `count`, all finite."""
+    value = value_of(prim, name)
+    try:
+        numbers = [] if isinstance(value, str) else [float(part) for part in np.ravel(value)]
+    except (TypeError, ValueError):
+        numbers = []
+    if len(numbers) != count or not all(map(isfinite, numbers)):
+        raise StageError(
+            f"{prim.GetPath()}.{name}: found {value!s:.60}, expected {count} finite numbers"
+        )
+    return numbers
+
+
+def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
+    """Return an attribute's whole numbers, each 0 or more. Raises StageError."""
+    numbers = numbers_of(prim, name, count)
+    if not all(number >= 0 and number.is_integer() for number in numbers):
+        raise StageError(f"{prim.GetPath()}.{name}: found {numbers}, expected sizes in voxels")
+    return [int(number) for number in numbers]
+
+
+def point_of(prim: Usd.Prim, name: str) -> Point:
+    """Return a place, or a distance along three axes. Raises StageError."""
+    x, y, z = numbers_of(prim, name, 3)
     return x, y, z
 
 
@@ -57,5 +81,8 @@ def select_variant(prim: Usd.Prim, variant_set: str, variant: str) -> None:
 def one_line(error: object) -> str:
     """Return what USD says about an error, without its line breaks and places in its source."""
     args = error.args if isinstance(error, Tf.ErrorException) else ()
-    text = "; ".join(entry.commentary for entry in args) or str(error)
+    try:
+        text = "; ".join(entry.commentary for entry in args) or str(error)
+    except UnicodeDecodeError:  # it quotes what is no text
+        text = "a layer or a file of it is damaged"
     return " ".join(text.split())

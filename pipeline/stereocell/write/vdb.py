@@ -112,6 +112,8 @@ def _find_damage(file: BinaryIO, size: int) -> str | None:
         _, _, end = struct.unpack("<3q", file.read(24))
         if end > size:
             return f"it ends at byte {size}, expected {end} or more"
+        if end < file.tell():
+            return f"a grid ends at byte {end}, before it begins"
         file.seek(end)
     return None
 

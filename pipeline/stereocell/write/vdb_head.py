@@ -12,6 +12,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.errors import StageError
 from stereocell.write.vdb import check_vdb
 
 _OLDEST_FORMAT = 222
@@ -37,6 +38,13 @@ def read_vdb_head(path: Path) -> list[VdbGrid]:
     Raises StageError if the file is missing or damaged.
     """
     check_vdb(path)
+    try:
+        return _read(path)
+    except (struct.error, ValueError, OSError) as error:
+        raise StageError(f"{path}: can't be read as OpenVDB: {error}") from None
+
+
+def _read(path: Path) -> list[VdbGrid]:
     with path.open("rb") as file:
         file.seek(8)
         version, _, _, has_offsets = struct.unpack("<III?", file.read(13))

@@ -1,0 +1,162 @@
+"""What Zarr reads through: whole, regular files, and chunks that unpack to what their array says.
+
+A chunk's size is known from the array's metadata, but the decoders don't ask: gzip and zstd unpack
+until the stream ends, whatever the memory, and Blosc trusts the length in the chunk's header and
+reads past the end of the buffer, so that a truncated file would come out as noise. Of a shard that
+is read as a whole only the file's size is known here, not what its inner chunks unpack to.
+"""
+
+import bz2
+import lzma
+import stat
+import struct
+import zlib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import zstandard
+from zarr.abc.buffer import Buffer
+from zarr.abc.store import ByteRequest, Store
+from zarr.core.buffer import BufferPrototype
+from zarr.storage import WrapperStore
+
+_METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
+_METADATA_BYTES = 64 << 20
+_ROOM = 1 << 20  # bytes over a chunk's own: what poor compression, checksums and an index add
+_BLOSC_HEADER = struct.Struct("<4B3I")  # the last three: bytes unpacked, of a block, of the chunk
+
+
+class GuardedStore(WrapperStore[Store]):
+    """Refuses what is no regular file, is cut short, or unpacks to more than a chunk holds.
+
+    root     the local folder, or None
+    codecs   the names of the bytes-to-bytes codecs, in the order of encoding
+    chunk    bytes of a chunk as it is in memory; None: metadata alone are read
+    array    the array's metadata file: where that is gone, a missing chunk is no empty one
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        root: Path | None = None,
+        codecs: tuple[str, ...] = (),
+        chunk: int | None = None,
+        array: str = "",
+    ) -> None:
+        super().__init__(store)
+        self._root, self._codecs, self._chunk, self._array = root, codecs, chunk, array
+
+    def _with_store(self, store: Store) -> "GuardedStore":
+        return type(self)(store, self._root, self._codecs, self._chunk, self._array)
+
+    async def get(
+        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
+    ) -> Buffer | None:
+        is_metadata = key.rsplit("/", 1)[-1] in _METADATA
+        most = _METADATA_BYTES if is_metadata or self._chunk is None else self._most(2)
+        if self._root is not None:
+            require_regular(self._root / key, most)
+        value = await self._store.get(key, prototype, byte_range)
+        if value is None and self._array and not await self._store.exists(self._array):
+            raise OSError(f"{self._array} is gone since it was opened")
+        if value is not None and not is_metadata and byte_range is None and self._chunk is not None:
+            self._require_fit(key, value)
+        return value
+
+    async def get_partial_values(
+        self,
+        prototype: BufferPrototype,
+        key_ranges: Iterable[tuple[str, ByteRequest | None]],
+    ) -> list[Buffer | None]:
+        return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]
+
+    def _most(self, times: int) -> int:
+        return times * (self._chunk or 0) + _ROOM
+
+    def _require_fit(self, key: str, value: Buffer) -> None:
+        codecs = list(self._codecs)
+        end = len(value)
+        while codecs and codecs[-1] == "crc32c":
+            codecs.pop()
+            end -= 4
+        measure = _UNPACKED.get(codecs[-1]) if codecs else None
+        if measure is None:
+            return
+        most = self._most(1)
+        size = measure(value.to_bytes()[: max(end, 0)], most)
+        if size > most:
+            raise OSError(f"chunk {key} unpacks to over {most} bytes, more than its array says")
+
+
+def require_regular(path: Path, most: int) -> None:
+    """Raise OSError for what is there and no regular file (a pipe, a device), or larger."""
+    try:
+        status = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(f"{path.name}: no regular file")
+    if status.st_size > most:
+        raise OSError(f"{path.name}: {status.st_size} bytes, over the {most} that it may have")
+
+
+def require_metadata(group: Path) -> None:
+    """Raise OSError where one of a local group's own metadata files is no regular file."""
+    for name in _METADATA:
+        require_regular(group / name, _METADATA_BYTES)
+
+
+def _of_zstd(data: bytes, most: int) -> int:
+    size: int = zstandard.get_frame_parameters(data).content_size
+    if 0 <= size < 1 << 62:  # else it isn't said
+        return size
+    total = 0
+    reader = zstandard.ZstdDecompressor().stream_reader(data)
+    while total <= most and (part := reader.read(1 << 20)):
+        total += len(part)
+    return total
+
+
+def _of_blosc(data: bytes, most: int) -> int:
+    if len(data) < _BLOSC_HEADER.size:
+        raise OSError(f"a chunk is cut short ({len(data)} bytes)")
+    *_, unpacked, _, packed = _BLOSC_HEADER.unpack_from(data)
+    if len(data) < packed:
+        raise OSError(f"a chunk is cut short ({len(data)} of {packed} bytes)")
+    return int(unpacked)
+
+
+def _of_lz4(data: bytes, most: int) -> int:
+    return int(struct.unpack_from("<I", data)[0])
+
+
+def _streamed(make: Callable[[], Any]) -> Callable[[bytes, int], int]:
+    """Return a measure that unpacks, no further than it has to, and keeps nothing."""
+
+    def measure(data: bytes, most: int) -> int:
+        total = 0
+        while data and total <= most:
+            stream = make()
+            total += len(stream.decompress(data, most + 1 - total))
+            data = stream.unused_data if stream.eof else b""
+        return total
+
+    return measure
+
+
+_UNPACKED: dict[str, Callable[[bytes, int], int]] = {
+    "zstd": _of_zstd,
+    "blosc": _of_blosc,
+    "lz4": _of_lz4,
+    "gzip": _streamed(lambda: zlib.decompressobj(47)),
+    "zlib": _streamed(lambda: zlib.decompressobj(47)),
+    "bz2": _streamed(bz2.BZ2Decompressor),
+    "lzma": _streamed(lzma.LZMADecompressor),
+}
+
+
+def codec_name(codec: Any) -> str:
+    """Return the name of a codec of Zarr v3 or of numcodecs, as `gzip`."""
+    name = type(codec).__name__.lower().removesuffix("codec").strip("_")
+    return str(name)

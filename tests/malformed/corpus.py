@@ -1,0 +1,28 @@
+"""All cases, in a fixed order."""
+
+from malformed import (
+    build_cases,
+    dicom_cases,
+    nifti_cases,
+    settings_cases,
+    tiff_cases,
+    usd_cases,
+    zarr_cases,
+)
+from malformed.cases import Case
+
+MODULES = (
+    zarr_cases, tiff_cases, nifti_cases, dicom_cases, settings_cases, build_cases, usd_cases,
+)  # fmt: skip
+
+
+def all_cases() -> list[Case]:
+    found = [case for module in MODULES for case in module.cases()]
+    keys = [(case.kind, case.name) for case in found]
+    assert len(set(keys)) == len(keys), {k for k in keys if keys.count(k) > 1}
+    return found
+
+
+def sample(cases: list[Case], count: int) -> list[Case]:
+    """Return so many of the cases, spread evenly."""
+    return [cases[i * len(cases) // count] for i in range(min(count, len(cases)))]
