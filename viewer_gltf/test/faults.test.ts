@@ -10,7 +10,7 @@ import { prepareStand } from "./driver/stand";
 const BALLS = "channels/Balls";
 
 describeInChromium("a faulty bundle", () => {
-  const stand = prepareStand({ viewport: { width: 480, height: 270 } });
+  const stand = prepareStand({ viewport: { width: 640, height: 360 } });
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
   async function onlyBalls(): Promise<number> {

@@ -91,7 +91,7 @@ describe("the viewer's code", () => {
 });
 
 describeInChromium("the first picture", () => {
-  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 480, height: 270 } });
+  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 640, height: 360 } });
 
   /** Whether a surface of the overview has Basis Universal textures. */
   async function overviewHasMaps(): Promise<boolean> {
