@@ -125,6 +125,29 @@ def test_what_lies_outside_the_bundle_is_not_opened(bundle, uri):
     assert "no JSON" not in detail
 
 
+def test_a_tileset_that_links_to_itself_is_none(bundle):
+    (bundle / FINER).unlink()
+    (bundle / FINER).symlink_to(bundle / FINER)
+    assert FINER in found(bundle).detail
+    assert "\n" not in found(bundle).detail
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ('"lod1.glb"', f'"{"a" * 5000}.glb"', "over 1024 characters"),
+        ('"geometricError":', '"geometricError":"x","was":', "no 3D Tiles tileset: ValueError"),
+    ],
+)
+def test_what_no_tileset_says_is_one_line(bundle, before, after, message):
+    path = bundle / FINER
+    path.write_text(path.read_text().replace(before, after))
+    detail = found(bundle).detail
+    assert message in detail
+    assert "\n" not in detail
+    assert len(detail) < 1000
+
+
 def test_errors_that_grow_behind_an_external_tileset_are_found(bundle):
     path = bundle / FINER
     content = json.loads(path.read_bytes())

@@ -1,5 +1,6 @@
 """Walk the tilesets of a bundle: what they name, also by way of external tilesets."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from stereocell.documents import read_json
 from stereocell.errors import CheckError
 
 _JSON = ".json"
+_MOST_CHARACTERS = 1024  # of an address: no file system knows longer names
 _REMEDY = "run `stereocell bundle OUT`"
 
 
@@ -43,7 +45,8 @@ def walk(bundle: Path, tileset: Path, tile_id: str | None = None) -> Iterator[Co
     file, where a tileset is missing or is none, or names a file outside `bundle` or a tileset that
     was met before.
     """
-    yield from _walk_file(bundle.resolve(), tileset, tile_id, None, {tileset.resolve()})
+    place = _place(tileset)
+    yield from _walk_file(_place(bundle), tileset, tile_id, None, {place})
 
 
 def _walk_file(
@@ -52,16 +55,20 @@ def _walk_file(
     content = read_json(tileset, None, _REMEDY)
     try:
         whole_m = content["geometricError"]
-        waiting = [(content["root"], whole_m if parent_m is None else min(whole_m, parent_m))]
+        waiting = [
+            (content["root"], float(whole_m) if parent_m is None else min(float(whole_m), parent_m))
+        ]
         while waiting:
             tile, limit_m = waiting.pop()
-            error_m = tile["geometricError"]
+            error_m = float(tile["geometricError"])
             waiting += [(child, error_m) for child in reversed(tile.get("children", ()))]
             if "content" not in tile:
                 continue
             uri = tile["content"]["uri"]
+            if len(uri) > _MOST_CHARACTERS:
+                raise CheckError(f"{tileset}: {uri:.80}...: over {_MOST_CHARACTERS} characters")
             path = tileset.parent / uri
-            place = path.resolve()
+            place = _place(path)
             if not place.is_relative_to(bundle):
                 raise CheckError(f"{tileset}: {uri} is outside the bundle")
             if tile_id is not None and place.parent.name != tile_id:
@@ -73,5 +80,10 @@ def _walk_file(
                     raise CheckError(f"{tileset}: {uri} is a tileset that was named before")
                 met.add(place)
                 yield from _walk_file(bundle, path, tile_id, error_m, met)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise CheckError(f"{tileset}: no 3D Tiles tileset: {error!r}") from error
+    except (AttributeError, KeyError, OSError, TypeError, ValueError) as error:
+        raise CheckError(f"{tileset}: no 3D Tiles tileset: {error!r:.200}") from error
+
+
+def _place(path: Path) -> Path:
+    """Return where a path leads; of links in a circle, some place."""
+    return Path(os.path.realpath(path))
