@@ -129,6 +129,7 @@ class Engine:
                     dashboard_address=":0",
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
+                    timeout=300,  # s to connect: a machine may be busy
                 )
             # its callback stays for good, and Python drops a Ctrl-C that falls into a callback
             disable_gc_diagnosis()
