@@ -4,6 +4,7 @@ import os
 
 import pytest
 
+from stereocell.cluster import ClusterError
 from stereocell.engine import Engine, TasksFailedError
 from stereocell.errors import SourceError
 
@@ -50,3 +51,12 @@ def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
     (line,) = str(raised.value).splitlines()
     assert line.startswith("t1: its worker process was killed each time")
     assert "fewer --workers" in line
+
+
+def test_workers_that_do_not_answer_are_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(**_: object) -> None:
+        raise TimeoutError  # as distributed does, without a word
+
+    monkeypatch.setattr("distributed.Client", never)
+    with pytest.raises(ClusterError, match="--workers: the processes did not answer within 300 s"):
+        Engine(2).run("slow", double, [("a", 1), ("b", 2)])

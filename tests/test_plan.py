@@ -11,7 +11,8 @@ import pytest
 from stereocell import config
 from stereocell.assets import find_asset
 from stereocell.errors import SourceError, StereoCellError, UsageError
-from stereocell.plan import Channel, Plan, choose_level, from_json, make_plan, to_json
+from stereocell.plan import Channel, Plan, choose_level, make_plan
+from stereocell.plan_file import from_json, to_json
 from stereocell.read import Level
 
 LEVELS = (

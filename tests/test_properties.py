@@ -22,7 +22,8 @@ from stereocell.brick_stream import content_hash, decode_brick, encode_tree, par
 from stereocell.bricks import mip_levels
 from stereocell.errors import SourceError, UsageError
 from stereocell.names import from_identifier, to_identifier
-from stereocell.plan import Channel, Plan, choose_level, from_json, make_plan, to_json
+from stereocell.plan import Channel, Plan, choose_level, make_plan
+from stereocell.plan_file import from_json, to_json
 from stereocell.read import Level
 from stereocell.read.ktx2 import decode_finest
 from stereocell.voxel_bvh import build

@@ -190,11 +190,22 @@ def test_a_window_out_of_range_is_a_bug(fixture: str, request: pytest.FixtureReq
             dataset.read(channel, box, level)
 
 
-def test_absent_chunks_are_the_fill_value(tiny_zarr_05: Path) -> None:
+@pytest.mark.parametrize("path", ["0", "0/"])
+def test_absent_chunks_are_the_fill_value(tiny_zarr_05: Path, path: str) -> None:
+    metadata = tiny_zarr_05 / "zarr.json"
+    metadata.write_text(metadata.read_text().replace('"path": "0"', f'"path": "{path}"'))
+    assert f'"path": "{path}"' in metadata.read_text()
     (tiny_zarr_05 / "0/c/0/0/0/0").unlink()
     volume = read.open(tiny_zarr_05).read(0, Box((0, 0, 0), (2, 16, 17)))
     assert not volume.voxels[:, :, :16].any()
     assert volume.voxels[:, :, 16].all()
+
+
+def test_absent_chunks_of_an_array_that_is_gone_are_no_fill_value(tiny_zarr_05: Path) -> None:
+    dataset = read.open(tiny_zarr_05)
+    (tiny_zarr_05 / "0").rename(tiny_zarr_05 / "elsewhere")
+    with pytest.raises(SourceError, match=r"0/zarr.json is gone since it was opened"):
+        dataset.read(0, Box((0, 0, 0), (2, 16, 17)))
 
 
 def test_pages_of_a_file_are_closed(tiny_tiff: Path) -> None:

@@ -17,7 +17,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from server_attacks import ATTACKS, MARK, attack, attacked, is_answer, is_well, write_bundle
+from attack_wire import is_answer
+from server_attacks import ATTACKS, MARK, attack, attacked, is_well, write_bundle
 from stereocell import serve_limits
 from stereocell.serve import BundleServer
 from stereocell.serve_lifetime import Lifetime

@@ -14,7 +14,7 @@ from stereocell.assets import find_asset
 from stereocell.check import check
 from stereocell.cli import main
 from stereocell.documents import read_json
-from stereocell.plan import from_json, to_json
+from stereocell.plan_file import from_json, to_json
 from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import PATIENT, write_dicom
 from stereocell.store import Store

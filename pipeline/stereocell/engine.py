@@ -29,6 +29,8 @@ from stereocell.mirror import carried, forget_scratch
 T = TypeVar("T")
 R = TypeVar("R")
 
+_START_S = 300  # for workers of this machine to answer: it may be busy
+
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -120,7 +122,7 @@ class Engine:
             from distributed import Client
             from distributed.gc import disable_gc_diagnosis
 
-            with children_ignore_interrupts():
+            with children_ignore_interrupts(), _started_in_time():
                 # units hold arrays of known size; distributed's spilling and pausing is in the way
                 self._client = Client(
                     n_workers=self.workers,
@@ -129,7 +131,7 @@ class Engine:
                     dashboard_address=":0",
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
-                    timeout=300,  # s to connect: a machine may be busy
+                    timeout=_START_S,
                 )
             # its callback stays for good, and Python drops a Ctrl-C that falls into a callback
             disable_gc_diagnosis()
@@ -144,6 +146,18 @@ class Engine:
             if cluster is not None:
                 cluster.close()
             self._client = None
+
+
+@contextmanager
+def _started_in_time() -> Iterator[None]:
+    """Raise ClusterError where distributed has only a TimeoutError without words."""
+    try:
+        yield
+    except TimeoutError:
+        raise ClusterError(
+            f"--workers: the processes did not answer within {_START_S} s: wait until this machine "
+            "is less busy, or try fewer --workers; 0 needs none"
+        ) from None
 
 
 def _failure_of(future: Any) -> BaseException | None:

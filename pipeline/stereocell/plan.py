@@ -7,21 +7,19 @@ Everything later phases need is in it, with every `auto` resolved; plan.json is 
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import Protocol, TypeVar
 
-from stereocell.config import Settings, from_dict, to_dict
+from stereocell.config import Settings
 from stereocell.denoise import SMOOTHING_REACH
-from stereocell.errors import OutputError, SourceError, UsageError
+from stereocell.errors import SourceError, UsageError
 from stereocell.names import to_identifier
 from stereocell.options import AUTO
-from stereocell.placement import IDENTITY, Matrix, to_matrix
+from stereocell.placement import IDENTITY, Matrix
 from stereocell.repair import RepairOptions
 from stereocell.tiling import Box, Tile, cut, cut_evenly
 
 T = TypeVar("T")
-FORMAT = "stereocell-plan"
-VERSION = 1
 
 # What a unit may work on, about 30 bytes a voxel: so many voxels, or so many times its tile.
 UNIT_VOXELS = 1 << 27
@@ -381,98 +379,3 @@ def _repair_options(settings: Settings) -> RepairOptions:
 
 def _by(numbers: Sequence[float]) -> str:
     return " x ".join(f"{n:.15g}" for n in numbers)
-
-
-def to_json(plan: Plan) -> dict[str, Any]:
-    """Return the plan as plain values, as plan.json holds it."""
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "source": plan.source,
-        "name": plan.name,
-        "fingerprint": plan.fingerprint,
-        "level": plan.level,
-        "level_reason": plan.level_reason,
-        "spacing_um": list(plan.spacing_um),
-        "origin_um": list(plan.origin_um),
-        "region": _box_json(plan.region),
-        "halo": list(plan.halo),
-        "tiles": [{"id": tile.id, **_box_json(tile.box)} for tile in plan.tiles],
-        "channels": [_channel_json(c) for c in plan.channels],
-        "settings": to_dict(plan.settings),
-        "modality": plan.modality,
-        "placement": [list(row) for row in plan.placement],
-    }
-
-
-def from_json(content: Mapping[str, Any]) -> Plan:
-    """Return the plan that `to_json` was given; the content has passed its schema.
-
-    Raises OutputError for what no plan of ours says.
-    """
-    plan = _from_json(content)
-    fault = _find_fault(plan)
-    if fault is not None:
-        raise OutputError(f"plan.json: {fault}: remove it and run `stereocell plan INPUT -o OUT`")
-    return plan
-
-
-def _find_fault(plan: Plan) -> str | None:
-    """Return what a schema can't say of a plan that was edited or damaged."""
-    for name in (plan.name, *(channel.name for channel in plan.channels)):
-        if not name.isprintable():
-            return f"name: found {name!r:.80}, expected one that can be shown"
-    if not _is_inside(plan.region, Box((0, 0, 0), plan.region.stop)):
-        return f"region: found {plan.region!s:.100}, expected voxels in it"
-    for tile in plan.tiles:
-        if not _is_inside(tile.box, plan.region):
-            return f"tile {tile.id}: found {tile.box!s:.100}, expected a box inside the region"
-    if plan.settings.surface.resolved(plan.spacing_um) != plan.settings.surface:
-        return f"settings: surface: found {AUTO!r}, expected lengths"
-    return None
-
-
-def _is_inside(box: Box, region: Box) -> bool:
-    ends = zip(region.start, box.start, box.stop, region.stop, strict=True)
-    return all(low <= start < stop <= high for low, start, stop, high in ends)
-
-
-def _from_json(content: Mapping[str, Any]) -> Plan:
-    return Plan(
-        source=content["source"],
-        name=content["name"],
-        fingerprint=content["fingerprint"],
-        level=content["level"],
-        level_reason=content["level_reason"],
-        spacing_um=tuple(content["spacing_um"]),
-        origin_um=tuple(content["origin_um"]),
-        region=_box(content["region"]),
-        halo=tuple(content["halo"]),
-        tiles=tuple(Tile(tile["id"], _box(tile)) for tile in content["tiles"]),
-        channels=tuple(
-            Channel(
-                c["index"],
-                c["name"],
-                tuple(c["color"]),
-                c.get("source", ""),
-                c.get("fingerprint", ""),
-            )
-            for c in content["channels"]
-        ),
-        settings=from_dict(content["settings"]),
-        modality=content["modality"],
-        placement=to_matrix(content["placement"]),
-    )
-
-
-def _channel_json(channel: Channel) -> dict[str, Any]:
-    own = {k: v for k, v in asdict(channel).items() if v or k not in ("source", "fingerprint")}
-    return {**own, "color": list(channel.color)}
-
-
-def _box_json(box: Box) -> dict[str, list[int]]:
-    return {"start": list(box.start), "stop": list(box.stop)}
-
-
-def _box(content: Mapping[str, Any]) -> Box:
-    return Box(tuple(content["start"]), tuple(content["stop"]))

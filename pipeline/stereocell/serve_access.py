@@ -123,11 +123,8 @@ def _is_own_fetch(headers: Headers) -> bool:
     """Return whether it is this server's page, a person, or no browser that asks."""
     if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
         return True
-    goes = (
-        headers.get("sec-fetch-mode"),
-        headers.get("sec-fetch-dest"),
-    )  # a link, on a page or in a chat
-    return goes == ("navigate", "document")
+    goes = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
+    return goes == ("navigate", "document")  # a link, on a page or in a chat
 
 
 def _name(host: str) -> str:
@@ -146,7 +143,7 @@ def _cookie(headers: Headers) -> str:
 
 def _no_session() -> Response:
     return PlainTextResponse(
-        "scan the QR code in the terminal of `stereocell serve`; each works once",
+        "scan the QR code in the terminal where this server was started; each works once",
         403,
         {"Cache-Control": "no-store"},
     )

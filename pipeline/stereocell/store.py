@@ -15,7 +15,8 @@ from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
 from stereocell.lineage import key_of
 from stereocell.mirror import remove, sizes_below
-from stereocell.plan import Plan, from_json, to_json
+from stereocell.plan import Plan
+from stereocell.plan_file import from_json, to_json
 from stereocell.write.atomic import write_bytes
 
 _PLAN = "plan.schema.json"

@@ -187,7 +187,8 @@ def _open_array(
         codecs = tuple(codec_name(codec) for codec in array.compressors)
         size = math.prod(array.shards or array.chunks) * array.dtype.itemsize
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
-        guard = GuardedStore(store, root, codecs, size, f"{path}/{named}")
+        # not `path`, which may end in a slash
+        guard = GuardedStore(store, root, codecs, size, f"{array.path}/{named}".lstrip("/"))
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
     if array.ndim != len(axes):
         raise SourceError(f"{field}: found {array.ndim} dimensions, expected {len(axes)} as `axes`")
