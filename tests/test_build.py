@@ -1,6 +1,5 @@
 """Whole builds of small phantoms, by the command line, held against what the phantoms are."""
 
-import hashlib
 import json
 import shutil
 import subprocess
@@ -13,6 +12,7 @@ from pxr import Usd, UsdGeom
 
 import phantoms
 from assets import make_assets
+from digests import digests_of
 from stereocell.cli import main
 from stereocell.store import Store
 from stereocell.unit_files import load_record
@@ -36,14 +36,6 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("build")
     assert main(["build", str(_source(folder)), "-o", str(folder / "out"), *BUILD]) == 0
     return folder / "out"
-
-
-def _files(folder: Path) -> dict[str, str]:
-    return {
-        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file()
-    }
 
 
 def test_build_leaves_everything(built: Path) -> None:
@@ -105,11 +97,11 @@ def test_tiff_and_zarr_of_the_same_voxels_give_the_same_surface(
 def test_same_input_gives_the_same_bytes(built: Path, tmp_path: Path) -> None:
     assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "0") == 0
     for part in ("stage", "bundle"):
-        assert _files(tmp_path / "out" / part) == _files(built / part)
+        assert digests_of(tmp_path / "out" / part) == digests_of(built / part)
     units, again = (
         {
             name: digest
-            for name, digest in _files(out / "units").items()
+            for name, digest in digests_of(out / "units").items()
             if Path(name).name not in ("seconds.json", "plan.key")  # the latter names the source
         }
         for out in (built, tmp_path / "out")
@@ -123,7 +115,7 @@ def test_same_input_gives_the_same_bytes(built: Path, tmp_path: Path) -> None:
 def test_number_of_workers_does_not_change_the_bytes(built: Path, tmp_path: Path) -> None:
     assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "2") == 0
     for part in ("stage", "bundle"):
-        assert _files(tmp_path / "out" / part) == _files(built / part)
+        assert digests_of(tmp_path / "out" / part) == digests_of(built / part)
 
 
 def test_same_build_again_does_nothing(
@@ -184,10 +176,10 @@ def test_build_of_another_input_into_a_used_out_is_refused(
     built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     other = phantoms.write_ome_tiff(tmp_path / "other.ome.tif", _two_channels()[:, :, ::-1], "CZYX")
-    before = _files(built)
+    before = digests_of(built)
     assert main(["build", str(other), "-o", str(built), *BUILD]) == 1
     assert "holds a build of 'f'" in _one_line(capsys)
-    assert _files(built) == before
+    assert digests_of(built) == before
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from faulty_store import FAULTS, Faults, before
 from object_store import ObjectStore, serving
 from stereocell import rounds
 from stereocell.cli import main
-from torture import digests_of
+from torture import asset_digests
 
 GRID = "2x1"
 Fixture = tuple[ObjectStore, Faults]
@@ -29,7 +29,7 @@ def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def undisturbed(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     out = tmp_path_factory.mktemp("undisturbed") / "out"
     assert make_assets(volume, out, GRID, "--workers", "0") == 0
-    return assets(digests_of(out))
+    return assets(asset_digests(out))
 
 
 def assets(digests: dict[str, str]) -> dict[str, str]:
@@ -67,7 +67,7 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
     monkeypatch.undo()
     away.rename(volume)
     assert make_assets(volume, out, GRID, "--workers", "0") == 0
-    assert assets(digests_of(out)) == undisturbed
+    assert assets(asset_digests(out)) == undisturbed
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
         remount("rw")
         assert main([*phase, *(["--workers", "0"] if phase[0] == "units" else [])]) == 0
     assert make_assets(volume, out, GRID, "--workers", "0") == 0
-    assert assets(digests_of(out)) == undisturbed
+    assert assets(asset_digests(out)) == undisturbed
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def store(
 
 def kept(store: ObjectStore, out: str, folder: Path) -> dict[str, str]:
     store.files().get(out, str(folder), recursive=True)
-    return assets(digests_of(folder))
+    return assets(asset_digests(folder))
 
 
 @pytest.mark.slow

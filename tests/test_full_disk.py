@@ -1,6 +1,5 @@
 """A disk that fills up in the middle of a build, in each phase; then room is made."""
 
-import hashlib
 import subprocess
 from pathlib import Path
 
@@ -8,19 +7,12 @@ import numpy as np
 import pytest
 
 import phantoms
+from digests import digests_of
 from stereocell.cli import main
 
 
 def _resize(disk: Path, size: str) -> None:
     subprocess.run(["mount", "-o", f"remount,size={size}", str(disk)], check=True)
-
-
-def _digests(folder: Path) -> dict[str, str]:
-    return {
-        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file()
-    }
 
 
 @pytest.mark.slow
@@ -53,4 +45,4 @@ def test_full_disk_is_one_line_leaves_no_half_file_and_the_build_goes_on_later(
     _resize(small_disk, "512m")
     assert build(out) == 0
     for part in ("stage", "bundle"):
-        assert _digests(out / part) == _digests(tmp_path / "undisturbed" / part)
+        assert digests_of(out / part) == digests_of(tmp_path / "undisturbed" / part)

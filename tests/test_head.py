@@ -1,6 +1,5 @@
 """The head phantom: what it promises, on its voxels and on the DICOM series made of it."""
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from bundles import load
+from digests import digests_of
 from leaks import find
 from stereocell import read
 from stereocell.check import check
@@ -199,15 +199,11 @@ def test_numbers_and_thickness_say_nothing_of_positions(series: Path) -> None:
     assert all(getattr(ds, name) == value for ds in images for name, value in IDENTITY.items())
 
 
-def digest(folder: Path) -> dict[str, str]:
-    return {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in folder.iterdir()}
-
-
 def test_the_bytes_repeat_and_another_seed_is_another_series(
     small: HeadPhantom, series: Path, tmp_path: Path
 ) -> None:
     write_dicom(tmp_path / "head", make_head(SMALL, seed=3))
-    assert digest(tmp_path / "head") == digest(series)
+    assert digests_of(tmp_path / "head") == digests_of(series)
     write_dicom(tmp_path / "other", small, seed=4)
     one, other = (
         {pydicom.dcmread(f, stop_before_pixels=True).SOPInstanceUID for f in folder.iterdir()}

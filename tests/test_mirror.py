@@ -12,6 +12,7 @@ import pytest
 
 import phantoms
 from assets import make_assets
+from digests import digests_of
 from object_store import ObjectStore, serving
 from stereocell.cli import main
 from stereocell.errors import OutputError
@@ -43,11 +44,7 @@ def local(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, s
     """The SHA-256 of the assets that a build leaves in a folder."""
     out = tmp_path_factory.mktemp("local") / "out"
     assert make_assets(volume, out, GRID, "--workers", "0") == 0
-    return {
-        file.relative_to(out).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(out.rglob("*"))
-        if file.is_file() and file.relative_to(out).parts[0] in PARTS
-    }
+    return {name: sha for name, sha in digests_of(out).items() if name.split("/")[0] in PARTS}
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """What is done stays done, and what was lost, cut, edited or killed is seen."""
 
-import hashlib
 import json
 import os
 import shutil
@@ -16,6 +15,7 @@ import pytest
 from pxr import Sdf
 
 import phantoms
+from digests import digests_of
 from stereocell.cli import main
 from stereocell.store import Store
 
@@ -54,14 +54,6 @@ def _unit(out: Path) -> Path:
     return store.unit_dir(*UNIT, store.index()["/".join(UNIT)])
 
 
-def _files(folder: Path) -> dict[str, str]:
-    return {
-        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file()
-    }
-
-
 def _cut(file: Path) -> None:
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
 
@@ -73,7 +65,7 @@ def _go_on(out: Path) -> None:
 
 
 def _same(out: Path, built: Path) -> bool:
-    return all(_files(out / part) == _files(built / part) for part in ("stage", "bundle"))
+    return all(digests_of(out / part) == digests_of(built / part) for part in ("stage", "bundle"))
 
 
 def test_lost_files_are_made_again(out: Path, built: Path) -> None:

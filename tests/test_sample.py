@@ -1,6 +1,5 @@
 """The samples: what they promise, measured on their voxels."""
 
-import hashlib
 import json
 import math
 from pathlib import Path
@@ -12,6 +11,7 @@ import zarr
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from digests import digests_of
 from stereocell import read
 from stereocell.cli import main
 from stereocell.errors import OutputError, UsageError
@@ -41,14 +41,6 @@ def truth_of(path: Path) -> Any:
     return json.loads((path.parent / name).read_text())
 
 
-def digests(folder: Path) -> dict[str, str]:
-    files = (file for file in folder.rglob("*") if file.is_file())
-    return {
-        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in files
-    }
-
-
 def test_cycif_is_an_ome_zarr_with_names_colours_and_a_pyramid(cycif: Path) -> None:
     assert zarr.open_group(cycif, mode="r").metadata.zarr_format == 3
     dataset = read.open(cycif)
@@ -72,19 +64,19 @@ def test_coarser_levels_are_means_of_blocks(cycif: Path) -> None:
 
 def test_cycif_repeats_to_the_byte(cycif: Path, tmp_path: Path) -> None:
     write_cycif(tmp_path / "block.ome.zarr", **SMALL)
-    assert digests(tmp_path) == digests(cycif.parent)
+    assert digests_of(tmp_path) == digests_of(cycif.parent)
     write_cycif(tmp_path / "other.ome.zarr", **{**SMALL, "seed": 4})
-    assert digests(tmp_path / "other.ome.zarr") != digests(cycif)
+    assert digests_of(tmp_path / "other.ome.zarr") != digests_of(cycif)
 
 
 def test_cycif_again_is_a_no_op_and_anything_else_stays(cycif: Path, tmp_path: Path) -> None:
-    before = digests(cycif.parent)
+    before = digests_of(cycif.parent)
     times = {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")}
     write_cycif(cycif, **SMALL)
     assert {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")} == times
     with pytest.raises(OutputError, match=r"holds something else.*remove it"):
         write_cycif(cycif, **{**SMALL, "seed": 4})
-    assert digests(cycif.parent) == before
+    assert digests_of(cycif.parent) == before
     (tmp_path / "mine.ome.zarr").mkdir()
     with pytest.raises(OutputError, match="holds something else"):
         write_cycif(tmp_path / "mine.ome.zarr", **SMALL)

@@ -7,7 +7,7 @@ import random
 import socket
 import struct
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from threading import Thread
 
 import pytest
@@ -184,29 +184,53 @@ def test_every_malformed_message_is_closed_with_a_reason_or_ignored(port, capfd,
     assert caplog.text == ""
 
 
-def test_every_broken_frame_ends_its_connection_alone(port, capfd, caplog):
+def handshake():
+    """Return what a client begins with."""
     key = base64.b64encode(os.urandom(16))
-    handshake = (
+    return (
         b"GET /bricks HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + key + b"\r\n\r\n"
     )
+
+
+@contextmanager
+def raw_stream(port):
+    """Yield a socket on which frames are next."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as stream:
+        stream.sendall(handshake())
+        answer = b""
+        while b"\r\n\r\n" not in answer:
+            answer += stream.recv(4096)
+        assert answer.startswith(b"HTTP/1.1 101")
+        yield stream
+
+
+def test_who_is_refused_reads_why_although_it_goes_on_sending(port):
+    with raw_stream(port) as stream:
+        whole = frame(1, bytes(MESSAGE_BYTES + 1))
+        for start in range(0, len(whole), 16384):
+            stream.sendall(whole[start : start + 16384])
+            time.sleep(0.02)  # it has judged the first part
+        said = b""
+        while part := stream.recv(4096):
+            said += part
+        assert struct.unpack(">H", said[2:4]) == (1009,)
+
+
+def test_every_broken_frame_ends_its_connection_alone(port, capfd, caplog):
     frames = raw_frames()
     for data in frames:
-        with socket.create_connection(("127.0.0.1", port), timeout=10) as stream:
-            stream.sendall(handshake)
-            answer = b""
-            while b"\r\n\r\n" not in answer:
-                answer += stream.recv(4096)
-            assert answer.startswith(b"HTTP/1.1 101")
-            with suppress(ConnectionError):  # it closed before all was read
-                stream.sendall(data)
-                stream.shutdown(socket.SHUT_WR)
-                while stream.recv(4096):  # until the server closes, too
-                    pass
-    heads = [b"GET /bricks HTTP/1.1\r\n\r\n", b"\x00" * 100, handshake.replace(b": 13", b": 99")]
+        # suppressed: it closed before all was read
+        with raw_stream(port) as stream, suppress(ConnectionError):
+            stream.sendall(data)
+            stream.shutdown(socket.SHUT_WR)
+            while stream.recv(4096):  # until the server closes, too
+                pass
+    hello = handshake()
+    heads = [b"GET /bricks HTTP/1.1\r\n\r\n", b"\x00" * 100, hello.replace(b": 13", b": 99")]
     heads += [
-        handshake.replace(b"Sec-WebSocket-Key", b"X"),
-        handshake[:60],
+        hello.replace(b"Sec-WebSocket-Key", b"X"),
+        hello[:60],
         b"GET /" + b"a" * 70000,
     ]
     for head in heads:

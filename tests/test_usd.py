@@ -1,4 +1,3 @@
-import hashlib
 import json
 import multiprocessing
 import runpy
@@ -10,6 +9,7 @@ import pytest
 from jsonschema import Draft202012Validator
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol
 
+from digests import digests_of
 from phantoms import f_phantom
 from stages import (
     BALL_ID,
@@ -287,17 +287,12 @@ def test_unloaded_tiles_still_have_their_bounds(stage_path: Path) -> None:
     assert tuple(box.GetMax()) == pytest.approx((35.5 * 0.25, 0.125, 15.5 * 0.5))
 
 
-def digests(folder: Path) -> dict[str, str]:
-    files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
-    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
-
-
 def test_another_process_writes_the_same_bytes(stage_path: Path, tmp_path: Path) -> None:
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         pool.apply(write_whole, (tmp_path / "again",))
         assert pool.apply(has_schema)  # that process opened no stage before the import
-    written = digests(stage_path.parent)
-    assert written == digests(tmp_path / "again")
+    written = digests_of(stage_path.parent)
+    assert written == digests_of(tmp_path / "again")
     assert not [name for name in written if "/." in name or name.startswith(".")]
 
 

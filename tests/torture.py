@@ -8,7 +8,6 @@ its end, every byte must be as in an undisturbed build, no unit that was finishe
 have been written again, and nothing half written may be left.
 """
 
-import hashlib
 import os
 import random
 import shutil
@@ -27,6 +26,7 @@ import numpy as np
 import psutil
 
 import phantoms
+from digests import digests_of
 from stereocell.lock import LOCK
 
 KINDS = ("command", "session", "worker", "scheduler")
@@ -98,7 +98,7 @@ class Torture:
         if build.wait(PATIENCE_S):
             raise TortureError("the undisturbed build failed")
         seconds = time.monotonic() - start
-        digests = digests_of(self._out)
+        digests = asset_digests(self._out)
         shutil.rmtree(self._out)
         return digests, seconds
 
@@ -120,7 +120,7 @@ class Torture:
         self._require_whole()
 
     def _require_whole(self) -> None:
-        found = digests_of(self._out)
+        found = asset_digests(self._out)
         if found != self._undisturbed:
             names = {name for name, _ in found.items() ^ self._undisturbed.items()}
             raise TortureError(f"other bytes than undisturbed: {sorted(names)}")
@@ -145,13 +145,12 @@ class Torture:
         return (self._out / name).stat().st_mtime_ns
 
 
-def digests_of(out: Path) -> dict[str, str]:
+def asset_digests(out: Path) -> dict[str, str]:
     """Return the SHA-256 of every asset; without seconds."""
     return {
-        file.relative_to(out).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for part in ("units", "stage", "bundle")
-        for file in sorted((out / part).rglob("*"))
-        if file.is_file() and file.name != "seconds.json"
+        name: digest
+        for name, digest in digests_of(out).items()
+        if name.split("/")[0] in ("units", "stage", "bundle") and not name.endswith("/seconds.json")
     }
 
 

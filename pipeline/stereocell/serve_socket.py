@@ -58,6 +58,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         self._controls = Bucket(CONTROLS_PER_S)
         self._fragments = 0
         self._unfinished: asyncio.TimerHandle | None = None
+        self._is_refused = False
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._end_message()
@@ -65,6 +66,8 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
+        if self._is_refused:
+            return
         super().data_received(data)
         if not self.handshake_initiated:  # what uvicorn hands over is a whole head
             self.transport.abort()
@@ -97,6 +100,26 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             super().handle_pong(event)
         else:
             self._refuse(1008, f"more than {CONTROLS_PER_S} pongs a second")
+
+    def handle_parser_exception(self) -> None:
+        """Say why, and end our side alone.
+
+        uvicorn closes at once, and a system that closes with something unread throws away what its
+        client has not read yet: the reason.
+        """
+        said = self.conn.close_sent
+        assert said is not None
+        self.queue.put_nowait(
+            {"type": "websocket.disconnect", "code": said.code, "reason": said.reason}
+        )
+        self.transport.write(b"".join(self.conn.data_to_send()))
+        self.close_sent = self._is_refused = True
+        if self.transport.can_write_eof():
+            self.transport.write_eof()
+            self.transport.resume_reading()
+            self.close_timer = self.loop.call_later(_GONE_S, self.transport.abort)
+        else:
+            self.transport.close()  # TLS: waits for the client's part of the end
 
     def keepalive_timeout(self) -> None:
         super().keepalive_timeout()
