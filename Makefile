@@ -118,8 +118,8 @@ serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
 	$(RUN) serve $(OUT) $(ARGS)
 
 lint: setup ## ruff, mypy, biome, tsc
-	$(BIN)/ruff check pipeline tests
-	$(BIN)/ruff format --check pipeline tests
+	$(BIN)/ruff check pipeline tests docs
+	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 

@@ -128,7 +128,9 @@ def _type(schema: Mapping[str, Any]) -> str:
 def _kind(kind: str, schema: Mapping[str, Any]) -> str:
     if kind == "array":
         least, most = schema.get("minItems"), schema.get("maxItems")
-        items = schema.get("items") or next(iter(schema.get("prefixItems", ())), {})
+        items: Mapping[str, Any] = schema.get("items") or next(
+            iter(schema.get("prefixItems", ())), {}
+        )
         inner = _type(items) if items else "any"
         if least is not None and least == most:
             return f"{least} x {inner}"

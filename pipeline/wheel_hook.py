@@ -15,7 +15,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 TOOL_PACKAGES = ("gltf-validator", "ktx-parse", "meshoptimizer", "zstddec")
 
 
-class WheelHook(BuildHookInterface):
+class WheelHook(BuildHookInterface[Any]):
     """Adds parts of viewer_gltf/ to the wheel, where `stereocell.assets` looks for them."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
