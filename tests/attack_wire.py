@@ -237,10 +237,12 @@ def framed(*frames: bytes) -> Callable[[Target], str]:
     """Return an attack that opens a websocket and sends frames."""
 
     def act(target: Target) -> str:
-        stream, rest = open_socket(target)
+        stream, first = open_socket(target)
         with stream:
-            rest += converse(stream, b"".join(frames), lambda said: closing(said) != "closed")
-        return closing(rest)
+            rest = converse(
+                stream, b"".join(frames), lambda said: closing(first + said) != "closed"
+            )
+        return closing(first + rest)
 
     return act
 

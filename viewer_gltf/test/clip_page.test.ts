@@ -220,7 +220,7 @@ const DRAWN: readonly (readonly [string, Mode])[] = [
 ];
 
 describeInChromium("a cut", () => {
-  const stand = prepareStand({ viewport: { width: 704, height: 352 } });
+  const stand = prepareStand({ viewport: { width: 600, height: 300 } });
   const page = () => stand.viewer.page;
   const AWAY_M = 1.8;
 
@@ -238,7 +238,7 @@ describeInChromium("a cut", () => {
       const eye = eyeOf("front", AWAY_M, 40, whole);
       for (const clip of [PLANE, OBLIQUE, BOX]) {
         const cut = await shoot(mode, from, clip.hash);
-        expectCut(compare(whole, cut, eye, clip), 1000, clip.hash);
+        expectCut(compare(whole, cut, eye, clip), 200, clip.hash);
       }
     });
   }
@@ -256,18 +256,18 @@ describeInChromium("a cut", () => {
       return takePicture(page());
     };
     const plane = planeClip([0, 0, 1], 12);
-    expectCut(compare(whole, await press("n"), eye, plane), 1000, "plane");
+    expectCut(compare(whole, await press("n"), eye, plane), 200, "plane");
     const back = compare(whole, await press("n"), eye, UNCUT);
     expect(back.changed).toBeLessThanOrEqual(SAME * back.stays);
     const box = boxClip([16, -36, 6], [48, -12, 18]);
     const found = compare(whole, await press("b"), eye, box); // no ray is kept from end to end
-    expect(found.gone).toBeGreaterThan(1000);
+    expect(found.gone).toBeGreaterThan(200);
     expect(found.left).toBe(0);
   });
 });
 
 describeInChromium("a cut in stereo", () => {
-  const VIEWPORT = { width: 480, height: 240 };
+  const VIEWPORT = { width: 360, height: 180 };
   const stand = prepareStand({ viewport: VIEWPORT });
   const page = () => stand.viewer.page;
 
@@ -304,7 +304,7 @@ describeInChromium("a cut in stereo", () => {
         const cut = await shoot(mode, clip.hash);
         whole.forEach((picture, i) => {
           const eye = eyeOf("front", XR_DISTANCE_M, 90, picture, (i - 0.5) * PUPILS_M);
-          expectCut(compare(picture, cut[i], eye, clip), 300, `${clip.hash}, eye ${i}`);
+          expectCut(compare(picture, cut[i], eye, clip), 80, `${clip.hash}, eye ${i}`);
         });
       }
     }, 400_000); // three times a session, in software

@@ -7,7 +7,7 @@ import { describeInChromium } from "./driver/skip";
 import { prepareStand } from "./driver/stand";
 import { BALLS } from "./fixture/bodies";
 
-const VIEWPORT = { width: 640, height: 320 };
+const VIEWPORT = { width: 480, height: 240 };
 /** Of the emulated headset: what iwer gives by default. */
 const PUPILS_M = 0.063;
 const FIELD_OF_VIEW_RAD = Math.PI / 2;

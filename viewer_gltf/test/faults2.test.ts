@@ -10,7 +10,7 @@ import { swapSurface } from "./fixture/swap";
 import { Gate } from "./offline/gate";
 
 describeInChromium("a fault on the way", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 360 } });
+  const stand = prepareStand({ viewport: { width: 640, height: 360 }, pixelRatio: 0.5 });
   let gate: Gate;
 
   beforeEach(async () => {

@@ -13,7 +13,7 @@ import { expectLetter } from "./letter";
 const F = "F_x20_body";
 
 describeInChromium("the picture of the fixture", () => {
-  const stand = prepareStand({ viewport: { width: 704, height: 400 } });
+  const stand = prepareStand({ viewport: { width: 480, height: 272 } });
 
   beforeEach(async () => {
     await stand.open();
@@ -73,7 +73,7 @@ describeInChromium("the picture of the fixture", () => {
     await showAsVolume("Block");
     const opaque = await takePicture(stand.viewer.page);
     await stand.viewer.openCard("Balls");
-    await stand.viewer.slide("Balls/opacity", 0.98);
+    await stand.viewer.slide("Balls/opacity", 0.96);
     const glass = await takePicture(stand.viewer.page);
     for (const { center } of [BALLS[2], BALLS[3]]) {
       const [before, after] = [at(opaque, center), at(glass, center)];

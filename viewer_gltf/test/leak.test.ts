@@ -3,7 +3,7 @@ import { expect, it } from "vitest";
 import { describeInChromium } from "./driver/skip";
 import { DEMO_BUNDLE, prepareStand } from "./driver/stand";
 
-const SWITCHES = 20;
+const SWITCHES = 10;
 /** Of the JavaScript heap: compiled code and the driver's own handles. A volume is more. */
 const HEAP_SLACK_BYTES = 2 * 1024 * 1024;
 /** Timer queries are not among them: a few are under way at any time. */
@@ -44,7 +44,11 @@ function countGpuObjects(kinds: readonly string[]): void {
 }
 
 describeInChromium("changing tiles", () => {
-  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 320, height: 240 } });
+  const stand = prepareStand({
+    bundle: DEMO_BUNDLE,
+    viewport: { width: 320, height: 240 },
+    pixelRatio: 0.5,
+  });
 
   it("leaks neither GPU objects nor memory", async () => {
     const { page } = stand.viewer;
@@ -97,7 +101,7 @@ describeInChromium("changing tiles", () => {
     };
     await blink(2);
     const first = await counts();
-    await blink(6);
+    await blink(4);
     await expect.poll(counts, { timeout: 10_000 }).toEqual(first);
   });
 });

@@ -137,6 +137,7 @@ describeInChromium("without a network", () => {
         },
         [hash, isSpoilt] as const,
       );
+    await viewer.settled();
     const asked = host.requests.filter(({ path }) => path.endsWith("volumes/r0_c0/Block.ktx2"));
     const ranges = new Set(asked.map(({ range }) => range));
     await expect.poll(() => sums(false)).toHaveLength(ranges.size);

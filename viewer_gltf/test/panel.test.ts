@@ -13,7 +13,7 @@ const SHOTS = process.env.STEREOCELL_SHOTS;
 const [FIRST, SECOND] = ["F_x20_body", "Balls"];
 
 describeInChromium("the panel", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 480 } });
+  const stand = prepareStand({ viewport: { width: 640, height: 480 }, pixelRatio: 0.5 });
   const page = () => stand.viewer.page;
   const control = (id: string) => page().locator(`[data-control="${id}"]`);
   const state = async (): Promise<ViewerState> => (await stand.viewer.snapshot()).state;

@@ -18,6 +18,9 @@ const FLAGS = [
   "--use-angle=swiftshader",
   "--enable-unsafe-swiftshader",
   "--ignore-gpu-blocklist",
+  // what is round the canvas is drawn without the software GPU, which takes most of it otherwise
+  "--disable-gpu-compositing",
+  "--disable-gpu-rasterization",
 ];
 
 export function hasChromium(): boolean {
@@ -30,6 +33,7 @@ export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<v
 export async function launch(
   viewport: { width: number; height: number },
   {
+    pixelRatio = 1,
     hasTouch = false,
     flags = [] as readonly string[],
     serviceWorkers = "allow" as "allow" | "block",
@@ -42,7 +46,7 @@ export async function launch(
     headless: false, // playwright's own switch is the old mode; the flag below is the new one
     args: ["--headless=new", ...FLAGS, ...flags],
     viewport,
-    deviceScaleFactor: 1,
+    deviceScaleFactor: pixelRatio,
     hasTouch,
     serviceWorkers,
   });

@@ -2,7 +2,7 @@
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach } from "vitest";
+import { afterAll, afterEach, beforeAll, beforeEach, inject } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
 import { type FixtureOptions, writeFixture } from "../fixture/bundle";
 import { type Browser, launch } from "./chromium";
@@ -25,11 +25,14 @@ export type Stand = Readonly<{
 }>;
 
 export type StandOptions = Readonly<{
-  /** A bundle's folder; without one, the synthetic fixture is written. */
+  /** A bundle's folder; without one, the synthetic fixture's. */
   bundle?: string;
+  /** Of a fixture of its own. */
   fixture?: FixtureOptions;
   /** CSS pixels; small ones, since software draws them. */
   viewport: { width: number; height: number };
+  /** Of the device to one of CSS; less where no picture is looked at. */
+  pixelRatio?: number;
   hasTouch?: boolean;
   /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
   mounts?: (bundle: string) => Readonly<Record<string, string>>;
@@ -37,8 +40,8 @@ export type StandOptions = Readonly<{
 
 /** Set up and cleared away around the tests of one `describe`; to be used inside them. */
 export function prepareStand(options: StandOptions): Stand {
-  const { bundle: given, fixture, viewport, hasTouch, mounts } = options;
-  let folder: string;
+  const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
+  let folder: string | undefined;
   let bundle: string;
   let manifest: Manifest;
   let host: Host;
@@ -46,19 +49,21 @@ export function prepareStand(options: StandOptions): Stand {
   let viewer: ViewerPage;
 
   beforeAll(async () => {
-    folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
-    if (given === undefined) await writeFixture(folder, fixture);
-    bundle = given ?? folder;
+    if (fixture !== undefined) {
+      folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
+      await writeFixture(folder, fixture);
+    }
+    bundle = given ?? folder ?? inject("fixture");
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
     // its own requests would be counted with the page's
-    browser = await launch(viewport, { hasTouch, serviceWorkers: "block" });
+    browser = await launch(viewport, { pixelRatio, hasTouch, serviceWorkers: "block" });
   });
 
   afterAll(async () => {
     await browser?.close();
     await host?.stop();
-    await rm(folder, { recursive: true, force: true });
+    if (folder !== undefined) await rm(folder, { recursive: true, force: true });
   });
 
   beforeEach(async () => {

@@ -1,0 +1,20 @@
+/** The synthetic bundle, written once for all files of tests, none of which changes it. */
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import type { TestProject } from "vitest/node";
+import { writeFixture } from "../fixture/bundle";
+
+declare module "vitest" {
+  interface ProvidedContext {
+    /** Its folder. */
+    fixture: string;
+  }
+}
+
+export default async function setup(project: TestProject): Promise<() => Promise<void>> {
+  const folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
+  await writeFixture(folder);
+  project.provide("fixture", folder);
+  return () => rm(folder, { recursive: true, force: true });
+}
