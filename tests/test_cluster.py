@@ -125,7 +125,7 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Cluster, tmp_path: 
 def test_what_is_no_scheduler_is_said_in_a_line(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stereocell.cluster._WAIT_S", 1)
+    monkeypatch.setattr("stereocell.cluster._ANSWER_S", 1)
     with pytest.raises(ClusterError) as raised:
         join(address, None)
     (line,) = str(raised.value).splitlines()

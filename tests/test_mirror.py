@@ -164,6 +164,7 @@ def test_a_lock_that_was_not_renewed_is_taken_over(
         (["units", "https://x.org/out"], 2, "can't be written, expected a folder or an s3://"),
         (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
         (["slices", "x.nii", "-o", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (["bundle", "s3://bucket/x", "--stage", "my.usda"], 2, "/x is on object storage, expected"),
         (["units", "nothing://x"], 1, "nothing://x: Protocol not known: nothing"),
     ],
 )

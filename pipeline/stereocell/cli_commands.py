@@ -117,11 +117,17 @@ def iso(options: argparse.Namespace) -> Answer:
 def run_phases(options: argparse.Namespace, *names: str) -> Answer:
     from stereocell import phases
     from stereocell.engine import Engine
+    from stereocell.errors import UsageError
     from stereocell.lock import LOCK
     from stereocell.store import Store
 
-    scheduler = getattr(options, "scheduler", "")
+    scheduler, edited = getattr(options, "scheduler", ""), getattr(options, "stage", None)
     is_kept = isinstance(options.shown, str)  # on object storage: workers find it by themselves
+    if is_kept and edited:
+        raise UsageError(
+            f"--stage {edited}: {options.shown} is on object storage, expected OUT in a folder: "
+            "copy its stage/ there"
+        )
     out = options.out.absolute() if scheduler else options.out  # workers may stand elsewhere
     engine = Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
     try:
@@ -131,7 +137,7 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
             elif name == "stage":
                 phases.run_stage(out, engine)
             elif name == "bundle":
-                phases.run_bundle(out, engine, getattr(options, "stage", None))
+                phases.run_bundle(out, engine, edited)
             else:
                 phases.run_report(out)
     finally:

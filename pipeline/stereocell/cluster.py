@@ -9,7 +9,8 @@ from typing import Any
 
 from stereocell.errors import StereoCellError
 
-_WAIT_S = 20  # for a scheduler that does not answer, and for its first worker
+_ANSWER_S = 8  # in which a scheduler has to answer
+_WORKER_S = 20  # and to have its first worker
 _MAX_BYTES = 1 << 20  # of a scheduler file
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+")
 _EXPECTED = "expected the address of a Dask scheduler, as tcp://host:8786, or its scheduler file"
@@ -35,7 +36,7 @@ def join(scheduler: str, shared: Path | None) -> Any:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=_WAIT_S)
+        client = Client(address, timeout=_ANSWER_S)
     except (OSError, OverflowError, ValueError, TypeError, KeyError) as error:
         reason = str(error).splitlines()[0] if str(error) else "it does not answer"
         raise ClusterError(f"--scheduler {scheduler}: {reason}; {_EXPECTED}") from None
@@ -62,7 +63,7 @@ def _address_in(file: Path) -> str:
 
 def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
     try:
-        client.wait_for_workers(1, timeout=_WAIT_S)
+        client.wait_for_workers(1, timeout=_WORKER_S)
     except TimeoutError:
         raise ClusterError(f"--scheduler {scheduler}: has no workers") from None
     ours = version("stereocell")
