@@ -139,14 +139,22 @@ describeInChromium("without a network", () => {
       );
     await viewer.settled();
     const asked = host.requests.filter(({ path }) => path.endsWith("volumes/r0_c0/Block.ktx2"));
-    const ranges = new Set(asked.map(({ range }) => range));
-    await expect.poll(() => sums(false)).toHaveLength(ranges.size);
+    const isKept = async () => {
+      const kept = (await sums(false)).map(([url]) => url);
+      const parts = asked.map(({ range }) => encodeURIComponent(range ?? ""));
+      return kept.length > 0 && parts.every((part) => kept.some((url) => url.endsWith(part)));
+    };
+    await expect.poll(isKept).toBe(true);
     const good = await sums(false);
     expect(await sums(true)).not.toEqual(good);
     await open();
     await viewer.drawVolume("Block", true);
     expect((await viewer.snapshot()).state.notices).toEqual([]);
-    await expect.poll(() => sums(false)).toEqual(good);
+    const isMended = async () => {
+      const found = new Map(await sums(false)); // and what may have come since
+      return good.every(([url, sum]) => found.get(url) === sum);
+    };
+    await expect.poll(isMended).toBe(true);
   });
 
   it("a file that changes on the host is fetched anew, the others are not", async () => {

@@ -19,7 +19,7 @@ const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/pyth
 const NOISE_TILE = 16;
 
 /** Of the reference: its standard errors are below 1 % then. */
-const PATHS = 450_000;
+const PATHS = 600_000;
 
 const luminanceOf = ([r, g, b]: readonly number[]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
 const mean = (values: readonly number[]) => values.reduce((a, b) => a + b, 0) / values.length;

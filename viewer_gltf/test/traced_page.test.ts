@@ -50,7 +50,7 @@ function meanColor(picture: Picture): readonly number[] {
 }
 
 describeInChromium("the path-traced page", () => {
-  const stand = prepareStand({ viewport: { width: 320, height: 160 } });
+  const stand = prepareStand({ viewport: { width: 320, height: 200 } });
   const page = () => stand.viewer.page;
   const snapshot = () => stand.viewer.snapshot();
   const trace = async () => (await snapshot()).state.trace;
@@ -84,10 +84,10 @@ describeInChromium("the path-traced page", () => {
     await open();
     expect((await snapshot()).state.mode).toBe("traced");
     expect(stand.host.requests.filter(({ path }) => path.endsWith(".glb"))).toEqual([]);
-    const early = await shoot();
+    const early = await shoot(10);
     expect(drawn(early)).toBeGreaterThan(600);
     for (const { color } of [F, BALL]) expect(early.count(hasColor(color))).toBeGreaterThan(60);
-    const late = await shoot((await samples()) + 6);
+    const late = await shoot((await samples()) + 10);
     expect(apart(early, late)).toBeLessThan(12);
 
     // before and after: at once, of the same samples
@@ -313,7 +313,7 @@ describeInChromium("the path-traced page", () => {
     await open(`#v=1&mode=traced&dwell=off&quality=low&${ONCE}`);
     await stand.viewer.enterStereo();
     await gathered(4);
-    const { width, height } = { width: 160, height: 160 };
+    const { width, height } = { width: 160, height: 200 };
     for (const x of [0, width]) {
       const eye = await takePicture(page(), { x, y: 0, width, height });
       expect(eye.count(hasColor(F.color)), `eye at ${x}`).toBeGreaterThan(20);
