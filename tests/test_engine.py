@@ -5,7 +5,7 @@ import os
 import pytest
 
 from stereocell.cluster import ClusterError
-from stereocell.engine import Engine, TasksFailedError
+from stereocell.engine import Engine, TasksFailedError, _failure_of
 from stereocell.errors import SourceError
 
 
@@ -51,6 +51,18 @@ def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
     (line,) = str(raised.value).splitlines()
     assert line.startswith("t1: its worker process was killed each time")
     assert "fewer --workers" in line
+
+
+def test_workers_that_are_gone_are_not_waited_for_for_ever() -> None:
+    class Gone:
+        def exception(self, timeout: float) -> None:
+            raise TimeoutError
+
+        def scheduler_info(self) -> dict[str, dict[str, str]]:
+            return {"workers": {}}
+
+    failure = _failure_of(Gone(), Gone())
+    assert "its workers are gone and did not come back" in str(failure)
 
 
 def test_workers_that_do_not_answer_are_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _START_S = 300  # for workers of this machine to answer: it may be busy
+_LOOK_S, _LOOKS = 15, 4  # for workers, while a task waits for one; a killed one is started anew
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -101,7 +102,7 @@ class Engine:
         futures = {client.submit(work, task, pure=False): place for place, task in enumerate(tasks)}
         suspects = []
         for future in as_completed(futures):
-            failure = _failure_of(future)
+            failure = _failure_of(client, future)
             if _is_killed(failure):
                 suspects.append(futures[future])
             else:
@@ -111,7 +112,7 @@ class Engine:
         # itself, and only the one to blame fails again
         for place in sorted(suspects):
             future = client.submit(work, tasks[place], pure=False)
-            failure = _failure_of(future)
+            failure = _failure_of(client, future)
             yield place, None if failure else settle(future.result()), failure
             future.release()
 
@@ -160,15 +161,25 @@ def _started_in_time() -> Iterator[None]:
         ) from None
 
 
-def _failure_of(future: Any) -> BaseException | None:
-    """Return why a task failed, or None; of a scheduler that is gone, that it is."""
+def _failure_of(client: Any, future: Any) -> BaseException | None:
+    """Return why a task failed, or None; of a scheduler or workers that are gone, that they are."""
     from distributed import CancelledError
 
-    try:
-        failure: BaseException | None = future.exception()
-    except CancelledError:
-        return ClusterError("the cluster's scheduler is gone: the same command goes on from here")
-    return failure
+    missed = 0
+    while missed < _LOOKS:
+        try:
+            failure: BaseException | None = future.exception(timeout=_LOOK_S)
+        except CancelledError:
+            return ClusterError(
+                "the cluster's scheduler is gone: the same command goes on from here"
+            )
+        except TimeoutError:
+            missed = 0 if client.scheduler_info()["workers"] else missed + 1
+        else:
+            return failure
+    return ClusterError(
+        "its workers are gone and did not come back: the same command goes on from here"
+    )
 
 
 def _is_killed(error: BaseException | None) -> bool:
