@@ -134,8 +134,9 @@ test: setup browser ## All tests, in headless Chromium too
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 19 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 19
+# a process for each core, and of each one thread: others would wait for one another, busily
 test-python: setup
-	$(BEHIND) $(BIN)/pytest -n $(WORKERS) --durations 25
+	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $(WORKERS) --durations 25
 
 test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
+from threadpoolctl import threadpool_limits
 
 import phantoms
 from assets import make_assets
@@ -34,7 +35,8 @@ def _source(path: Path) -> Path:
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("build")
-    assert main(["build", str(_source(folder)), "-o", str(folder / "out"), *BUILD]) == 0
+    with threadpool_limits(2):  # workers have one thread each
+        assert main(["build", str(_source(folder)), "-o", str(folder / "out"), *BUILD]) == 0
     return folder / "out"
 
 

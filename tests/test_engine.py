@@ -2,10 +2,11 @@
 
 import os
 
+import dask
 import pytest
 
 from stereocell.cluster import ClusterError
-from stereocell.engine import Engine, TasksFailedError, _failure_of
+from stereocell.engine import Engine, TasksFailedError, _outcome_of
 from stereocell.errors import SourceError
 
 
@@ -42,6 +43,8 @@ def die(value: int) -> int:
 
 @pytest.mark.slow
 def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
+    # as on a machine so busy that a new worker takes longer than distributed waits for one
+    dask.config.set({"distributed.deploy.lost-worker-timeout": "1ms"})
     engine = Engine(2)
     try:
         with pytest.raises(TasksFailedError) as raised:
@@ -53,15 +56,27 @@ def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
     assert "fewer --workers" in line
 
 
-def test_workers_that_are_gone_are_not_waited_for_for_ever() -> None:
-    class Gone:
-        def exception(self, timeout: float) -> None:
+class Gone:
+    """A client and a task of its whose workers are gone: before the task ended, or after."""
+
+    def __init__(self, ended: bool) -> None:
+        self.ended = ended
+
+    def exception(self, timeout: float) -> None:
+        if not self.ended:
             raise TimeoutError
 
-        def scheduler_info(self) -> dict[str, dict[str, str]]:
-            return {"workers": {}}
+    def result(self, timeout: float) -> None:
+        raise TimeoutError  # it lay on a worker
 
-    failure = _failure_of(Gone(), Gone())
+    def scheduler_info(self) -> dict[str, dict[str, str]]:
+        return {"workers": {}}
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_workers_that_are_gone_are_not_waited_for_for_ever(ended: bool) -> None:
+    result, failure = _outcome_of(Gone(ended), Gone(ended))
+    assert result is None
     assert "its workers are gone and did not come back" in str(failure)
 
 

@@ -116,7 +116,11 @@ def test_after_an_answer_the_next_head_has_as_long(out: Path) -> None:
         assert DEADLINE_S * 0.7 < taken < DEADLINE_S + 2
 
 
-def test_many_silent_clients_are_gone_and_others_are_served(out: Path) -> None:
+def test_many_silent_clients_are_gone_and_others_are_served(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    head_s = 8 * DEADLINE_S  # so that on a busy machine the one that asks is not late itself
+    monkeypatch.setattr(HeadDeadline, "head_s", head_s)
     with serving(out, lan=False) as server:
         silent = [plain(server) for _ in range(100)]
         await_connections(server, 100)
@@ -124,7 +128,7 @@ def test_many_silent_clients_are_gone_and_others_are_served(out: Path) -> None:
         for _ in range(8):  # one connection, longer than the deadline in all
             connection.request("GET", "/index.html")
             assert connection.getresponse().read() == b"<!doctype html>"
-            time.sleep(DEADLINE_S / 4)
+            time.sleep(head_s / 7)
         await_connections(server, 1)
         connection.close()
         for stream in silent:

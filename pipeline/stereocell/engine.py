@@ -30,7 +30,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _START_S = 300  # for workers of this machine to answer: it may be busy
-_LOOK_S, _LOOKS = 15, 4  # for workers, while a task waits for one; a killed one is started anew
+_LOOK_S, _LOOKS = 15, 12  # for workers, while a task waits for one; a killed one is started anew
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -102,27 +102,30 @@ class Engine:
         futures = {client.submit(work, task, pure=False): place for place, task in enumerate(tasks)}
         suspects = []
         for future in as_completed(futures):
-            failure = _failure_of(client, future)
+            result, failure = _outcome_of(client, future)
             if _is_killed(failure):
                 suspects.append(futures[future])
             else:
-                yield futures[future], None if failure else settle(future.result()), failure
+                yield futures[future], None if failure else settle(result), failure
             future.release()
         # whoever waited on a worker when another task killed it is blamed too: each once more, by
         # itself, and only the one to blame fails again
         for place in sorted(suspects):
             future = client.submit(work, tasks[place], pure=False)
-            failure = _failure_of(client, future)
-            yield place, None if failure else settle(future.result()), failure
+            result, failure = _outcome_of(client, future)
+            yield place, None if failure else settle(result), failure
             future.release()
 
     def _start(self) -> Any:
         if self._client is None and self._scheduler:
             self._client = join(self._scheduler, self._shared)
         elif self._client is None:
+            import dask
             from distributed import Client
             from distributed.gc import disable_gc_diagnosis
 
+            # a killed worker that a busy machine does not start anew in 15 s is given up for good
+            dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
             with children_ignore_interrupts(), _started_in_time():
                 # units hold arrays of known size; distributed's spilling and pausing is in the way
                 self._client = Client(
@@ -161,25 +164,26 @@ def _started_in_time() -> Iterator[None]:
         ) from None
 
 
-def _failure_of(client: Any, future: Any) -> BaseException | None:
-    """Return why a task failed, or None; of a scheduler or workers that are gone, that they are."""
+def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
+    """Wait for a task and return its result and None, or None and why it failed.
+
+    A scheduler that is gone is such a reason, and so are workers that stay away.
+    """
     from distributed import CancelledError
 
     missed = 0
     while missed < _LOOKS:
         try:
             failure: BaseException | None = future.exception(timeout=_LOOK_S)
+            # may wait again: a result that was lost with its worker is computed anew
+            return (None, failure) if failure else (future.result(timeout=_LOOK_S), None)
         except CancelledError:
-            return ClusterError(
-                "the cluster's scheduler is gone: the same command goes on from here"
-            )
+            gone = "the cluster's scheduler is gone: the same command goes on from here"
+            return None, ClusterError(gone)
         except TimeoutError:
             missed = 0 if client.scheduler_info()["workers"] else missed + 1
-        else:
-            return failure
-    return ClusterError(
-        "its workers are gone and did not come back: the same command goes on from here"
-    )
+    gone = "its workers are gone and did not come back: the same command goes on from here"
+    return None, ClusterError(gone)
 
 
 def _is_killed(error: BaseException | None) -> bool:
