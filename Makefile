@@ -78,7 +78,8 @@ demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells or mr
 	$(RUN) build $(DEMO_INPUT) -o $(OUT) --workers $(WORKERS) $(DEMO_ARGS) $(ARGS)
 	@echo
 	@du -sh $(OUT)/stage $(OUT)/bundle $(OUT)/report
-	@echo "look at it:  make view OUT=$(OUT)      check it:  make check OUT=$(OUT)"
+	$(RUN) check $(OUT) --deep --workers $(WORKERS)
+	@echo "look at it:  make view OUT=$(OUT)"
 
 need-input:
 	@test -n "$(INPUT)" || { echo "make: INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder" >&2; exit 2; }
@@ -140,7 +141,7 @@ test-python: setup
 
 test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test
-	$(MAKE) --no-print-directory demo check SAMPLE=cycif OUT=out/demo
+	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/demo
 	$(MAKE) --no-print-directory demo SAMPLE=brain-cells OUT=out/brain-cells
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
 	$(BIN)/python tests/assets.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))

@@ -2,8 +2,9 @@
 
     python scale.py FOLDER [TILE]      TILE: z,y,x voxels of the slope's tiles
 
-Small tiles, 4 to 32 of them, tell how time and memory grow with their number; two tiles of
-194 x 512 x 512 tell what a real one takes. Samples and builds stay in FOLDER: they are made once.
+Small tiles, 4 to 32 of them, tell how time and memory grow with their number; one of
+194 x 512 x 512, full of nuclei, tells what a real one takes: a quarter of an hour in all. Samples
+and builds stay in FOLDER: they are made once.
 """
 
 import json
@@ -142,12 +143,9 @@ def print_slope(runs: list[Run]) -> None:
 
 
 def watch_memory(out: Path) -> dict[str, int]:
-    """Build one unit anew in a process that watches itself; return most bytes by function."""
-    tile, channel = next(iter(Store(out).index())).split("/")
-    shutil.rmtree(out / "units" / tile / channel)
+    """Build OUT's one unit in a process that watches itself; return most bytes by function."""
     answer = subprocess.run(
-        [sys.executable, "-c", WATCHED, "units", str(out), "--workers", "0", "--only",
-         f"{tile}/{channel}"],
+        [sys.executable, "-c", WATCHED, "units", str(out), "--workers", "0"],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     seen = json.loads(answer.stdout.splitlines()[-1])
@@ -227,28 +225,23 @@ def main(folder: Path, tile: tuple[int, int, int]) -> None:
           f"{of_window:.2f} x its voxels', for windows and iso-values {survey:.2f} x")  # fmt: skip
 
     print(f"A unit of {' x '.join(map(str, REAL))}")
-    source, out = make_sample(folder, (2, 1), REAL), folder / "real"
-    runs = []
-    for workers in (1, 2):
-        plan(str(source), out, (2, 1), REAL, "0,2")
-        runs.append(run_units(out, workers))
-        last = runs[-1]
-        print(f"  {last.units} units  {workers} workers  {last.seconds:.1f} s  peak "
-              f"{last.peak / GIB:.2f} GiB (bound 3.5 GB: {3.5e9 / GIB:.2f})")  # fmt: skip
-    size = sum(file.stat().st_size for file in (out / "units").rglob("*") if file.is_file())
+    source, out = make_sample(folder, (1, 1), REAL), folder / "real"
+    plan(str(source), out, (1, 1), REAL, "0")
+    start = time.perf_counter()
     seen = watch_memory(out)
-    print("  most memory while this ran, GiB:")
+    seconds = time.perf_counter() - start
+    size = sum(file.stat().st_size for file in (out / "units").rglob("*") if file.is_file())
+    print(f"  {seconds:.0f} s; most memory while this ran, GiB (bound 3.5 GB: {3.5e9 / GIB:.2f}):")
     for place, most in sorted(seen.items(), key=lambda item: -item[1])[:8]:
         print(f"    {most / GIB:5.2f}  {place}")
 
-    each = runs[0].seconds / runs[0].units
-    hours = each * WHOLE / 3600
-    print(f"{WHOLE} units of that size: {hours:.0f} core-hours ({each:.0f} s each), "
+    hours = seconds * WHOLE / 3600
+    print(f"{WHOLE} units of that size: {hours:.0f} core-hours, "
           f"{WHOLE * (of_window + survey) * 2 * np.prod(REAL) / 1e12:.2f} TB read, "
-          f"{WHOLE * size / runs[0].units / 1e12:.2f} TB of units written, "
+          f"{WHOLE * size / 1e12:.2f} TB of units written, "
           f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
 
 
 if __name__ == "__main__":
-    given = tuple(int(n) for n in (sys.argv[2] if len(sys.argv) > 2 else "97,256,256").split(","))
+    given = tuple(int(n) for n in (sys.argv[2] if len(sys.argv) > 2 else "48,96,96").split(","))
     main(Path(sys.argv[1]), given)  # type: ignore[arg-type]

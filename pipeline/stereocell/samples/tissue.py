@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from stereocell.samples.bodies import Nucleus, Triple, Tube, rotation_of
 
@@ -176,9 +177,12 @@ def _distance_to_vessels(
 ) -> NDArray[np.float64]:
     """Return signed distances, capped at 10 um, to the nearest vessel."""
     nearest = np.full(len(points), 10.0)
+    tree = KDTree(points)
     for tube in vessels:
         low, high = np.asarray(tube.low_um) - 10.0, np.asarray(tube.high_um) + 10.0
-        near = np.all((points > low) & (points < high), axis=1)
+        reach = float(np.linalg.norm(high - low)) / 2
+        near = np.array(tree.query_ball_point((low + high) / 2, reach), np.intp)
+        near = near[np.all((points[near] > low) & (points[near] < high), axis=1)]
         z, y, x = points[near].T
         nearest[near] = np.minimum(nearest[near], tube.distance((z, y, x)))
     return nearest
