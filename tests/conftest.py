@@ -15,8 +15,13 @@ import pytest
 from numpy.typing import NDArray
 
 import phantoms
+from object_store import VERSITYGW
 
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
+
+
+def pytest_report_header() -> str:
+    return f"object store of the tests: {'moto' if VERSITYGW is None else 'versitygw'}"
 
 
 @pytest.fixture

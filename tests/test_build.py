@@ -15,6 +15,7 @@ import phantoms
 from assets import make_assets
 from digests import digests_of
 from stereocell.cli import main
+from stereocell.engine import Engine
 from stereocell.store import Store
 from stereocell.unit_files import load_record
 
@@ -113,11 +114,40 @@ def test_same_input_gives_the_same_bytes(built: Path, tmp_path: Path) -> None:
     assert list((built / "units").rglob("seconds.json"))
 
 
+def asset_digests(out: Path) -> dict[str, str]:
+    return {
+        name: digest
+        for name, digest in digests_of(out).items()
+        if name.startswith(("units/", "stage/", "bundle/"))
+        and not name.endswith(("seconds.json", "plan.key"))  # the second: where the source lies
+    }
+
+
 @pytest.mark.slow
-def test_number_of_workers_does_not_change_the_bytes(built: Path, tmp_path: Path) -> None:
-    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "2") == 0
-    for part in ("stage", "bundle"):
-        assert digests_of(tmp_path / "out" / part) == digests_of(built / part)
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_number_of_workers_does_not_change_the_bytes(
+    built: Path, tmp_path: Path, workers: str
+) -> None:
+    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", workers) == 0
+    assert asset_digests(tmp_path / "out") == asset_digests(built)
+
+
+def test_order_of_the_tasks_does_not_change_the_bytes(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_order = Engine._outcomes
+    asked = []
+
+    def backwards(self, function, tasks):
+        asked.append(len(tasks))
+        last = len(tasks) - 1
+        for place, result, error in in_order(self, function, tasks[::-1]):
+            yield last - place, result, error
+
+    monkeypatch.setattr(Engine, "_outcomes", backwards)
+    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "0") == 0
+    assert max(asked) == 4
+    assert asset_digests(tmp_path / "out") == asset_digests(built)
 
 
 def test_same_build_again_does_nothing(

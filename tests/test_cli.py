@@ -160,7 +160,7 @@ def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
     told = capsys.readouterr().out
-    assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130"))
+    assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130", "143"))
 
 
 def test_no_color_leaves_the_colours_out() -> None:

@@ -121,6 +121,23 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Cluster, tmp_path: 
     join(cluster[0], tmp_path).close()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "ours", "said"),
+    [
+        ("version", lambda _: "99", r"on .*: has StereoCell .*, expected 99"),
+        ("libraries_of", lambda _: {"numpy": "99"}, r"on .*: has numpy .*, expected 99"),
+        ("key_of", lambda *_: "other", "runs other code than this command: expected the same"),
+    ],
+)
+def test_workers_that_would_make_other_bytes_are_refused(
+    cluster: Cluster, monkeypatch: pytest.MonkeyPatch, name: str, ours: object, said: str
+) -> None:
+    monkeypatch.setattr(f"stereocell.cluster.{name}", ours)
+    with pytest.raises(ClusterError, match=rf"worker tcp://.* {said}"):
+        join(cluster[0], None)
+
+
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x"])
 def test_what_is_no_scheduler_is_said_in_a_line(
     address: str, monkeypatch: pytest.MonkeyPatch

@@ -114,6 +114,25 @@ def rename_a_channel(out: Path) -> None:
     file.write_text(json.dumps(manifest))
 
 
+def choose_the_volume(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
+    tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+    tile.GetVariantSet("representation").SetVariantSelection("volume")
+    stage.GetRootLayer().Save()
+
+
+def lose_a_level(out: Path) -> None:
+    for file in (out / "bundle" / "channels" / "F").rglob("tileset.json"):
+        tileset = json.loads(file.read_bytes())
+        waiting = [tileset["root"]]
+        while waiting:
+            tile = waiting.pop()
+            waiting += tile.get("children", [])
+            if "r0_c1/lod2.glb" in tile.get("content", {}).get("uri", ""):
+                del tile["content"]
+        file.write_text(json.dumps(tileset))
+
+
 @pytest.mark.slow
 def test_what_was_built_is_as_it_says(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(built), "--deep", "--workers", "0"]) == 0
@@ -126,6 +145,7 @@ def test_what_was_built_is_as_it_says(built: Path, capsys: pytest.CaptureFixture
     assert 0 < within <= stated * 1.02
 
 
+FINEST = "F lod0 against source"
 SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest against stage"
 
 
@@ -135,13 +155,21 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
     [
         (
             move_a_vertex,
-            {SOURCE: "r0_c0/F: lod0: ", BUNDLE: "r0_c0/F: lod0: a vertex is "},
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "r0_c0/F: lod0: ",
+                BUNDLE: "r0_c0/F: lod0: a vertex is ",
+            },
         ),
         (
             swap_axes,
-            {SOURCE: "um from the iso-surface, the stage states", BUNDLE: "lod0: a vertex is"},
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "um from the iso-surface, the stage states",
+                BUNDLE: "lod0: a vertex is",
+            },
         ),
-        (state_half_the_distance, {SOURCE: "lod0: "}),
+        (state_half_the_distance, {FINEST: " stated; at most ", SOURCE: "lod0: "}),
         (
             drop_a_tile,
             {
@@ -155,6 +183,8 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
             spoil_a_voxel,
             {SOURCE: "F.exr: 1 of ", BUNDLE: "F.ktx2: level 0: 1 of "},
         ),
+        (choose_the_volume, {BUNDLE: "r0_c0: representation is 'mesh', the stage's 'volume'"}),
+        (lose_a_level, {BUNDLE: "r0_c1/F: the bundle lacks lod2"}),
         (rename_a_channel, {MANIFEST: "F: name is 'G', the stage's 'F'"}),
     ],
 )

@@ -17,6 +17,8 @@ from object_store import ObjectStore, serving
 from stereocell.cli import main
 from stereocell.errors import OutputError
 from stereocell.lock import alone_at
+from stereocell.tissue_channels import TissueRequest, add_tissue
+from test_tissue import blobs
 
 GRID = "2x1"
 ARGUMENTS = ["--grid", GRID, "--workers", "0"]
@@ -158,12 +160,31 @@ def test_a_lock_that_was_not_renewed_is_taken_over(
     assert not fs.exists(path)
 
 
+@pytest.mark.slow
+def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[set[str]] = []
+
+    def serve(out: Path, *_: object, open_browser: bool) -> None:
+        seen.append({path.name for path in out.iterdir()})
+        assert (out / "bundle" / "manifest.json").is_file()
+
+    monkeypatch.setattr("stereocell.serve.serve", serve)
+    assert main(["serve", there]) == 0
+    assert seen == [{"bundle"}]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
         (["units", "https://x.org/out"], 2, "can't be written, expected a folder or an s3://"),
         (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
         (["slices", "x.nii", "-o", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (["sample", "mri", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (
+            ["iso", "x.nii", "--channel", "0", "--tile", "r0_c0", "-o", "s3://bucket/x.png"],
+            2,
+            "expected a folder or file of this",
+        ),
         (["bundle", "s3://bucket/x", "--stage", "my.usda"], 2, "/x is on object storage, expected"),
         (["units", "nothing://x"], 1, "nothing://x: Protocol not known: nothing"),
     ],
@@ -178,3 +199,18 @@ def test_what_is_no_place_is_said_in_a_line(
     assert main(arguments) == code
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
+
+
+@pytest.mark.slow
+def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: Path) -> None:
+    voxels, _ = blobs(2)
+    source = phantoms.write_ome_tiff(tmp_path / "blobs.ome.tif", voxels[None], "CZYX")
+    for out in (str(tmp_path / "out"), "s3://bucket/classes"):
+        assert main(["plan", str(source), "-o", out]) == 0
+    assert main(["tissue", "s3://bucket/classes", "--classes", "2", "--workers", "0"]) == 0
+    found = kept(store, "bucket/classes")
+    assert len([key for key in found if key.endswith("unit.json")]) == 3
+    add_tissue(tmp_path / "out", TissueRequest(2))
+    here = {key: sha for key, sha in digests_of(tmp_path / "out").items() if "tissue/" in key}
+    assert here == {key: sha for key, sha in found.items() if key.startswith("tissue/")}
+    assert main(["check", "s3://bucket/classes"]) == 0

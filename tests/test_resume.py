@@ -242,7 +242,10 @@ out = Path(sys.argv[1])
 def interrupt():
     while not list(out.glob(".bundle.*.partial/volumes/*/*")):
         time.sleep(0.001)
-    os.killpg(0, signal.SIGINT)
+    if sys.argv[2] == "SIGINT":
+        os.killpg(0, signal.SIGINT)
+    else:
+        os.kill(os.getpid(), signal.SIGTERM)
 
 threading.Thread(target=interrupt, daemon=True).start()
 sys.exit(main(["bundle", str(out), "--workers", "2"]))
@@ -250,16 +253,19 @@ sys.exit(main(["bundle", str(out), "--workers", "2"]))
 
 
 @pytest.mark.slow
-def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(out: Path) -> None:
+@pytest.mark.parametrize(("kind", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(
+    out: Path, kind: str, code: int
+) -> None:
     shutil.rmtree(out / "bundle")
     bundle = subprocess.Popen(
-        [sys.executable, "-c", _INTERRUPTED, str(out)],
+        [sys.executable, "-c", _INTERRUPTED, str(out), kind],
         stderr=subprocess.PIPE,
         start_new_session=True,
         text=True,
     )
     _, printed = bundle.communicate()
-    assert bundle.returncode == 130
+    assert bundle.returncode == code
     assert printed.endswith("stereocell: stopped; the same command goes on from here\n")
     assert "Traceback" not in printed
     assert not list(out.glob(".bundle*"))

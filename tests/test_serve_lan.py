@@ -167,6 +167,13 @@ def test_a_certificate_is_good_for_the_servers_names_alone(server):
     assert not found.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
 
 
+def test_a_host_name_that_no_certificate_takes_is_left_out(monkeypatch):
+    monkeypatch.setattr("socket.gethostname", lambda: "my_host")
+    names = find_names(["192.168.7.9"])
+    assert "my_host" in names
+    assert len(make_certificate(names)[1].split(":")) == 32
+
+
 def test_every_run_has_a_key_of_its_own():
     names = find_names(["192.168.7.9"])
     assert names[0] == "192.168.7.9"

@@ -9,26 +9,30 @@ from stereocell import cli_commands as commands
 from stereocell import cli_options as flags
 from stereocell.cli_commands import Handler
 from stereocell.errors import StereoCellError, UsageError
+from stereocell.interrupts import Terminated, answering_sigterm
 
 EXIT_CODES = """exit codes:
   0    done
   1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
   2    wrong usage
-  130  stopped by Ctrl+C: the same command goes on from there"""
+  130  stopped by Ctrl+C: the same command goes on from there
+  143  stopped by SIGTERM, likewise"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
     options = _parser().parse_args(arguments)
     try:
-        return _run(options)
+        with answering_sigterm():
+            return _run(options)
     except StereoCellError as error:
         return _fail(options, str(error), error.exit_code)
     except OSError as error:  # the disk is full, a folder was taken away
         place = f"{error.filename}: " if error.filename else ""
         return _fail(options, f"{place}{error.strerror or error}", 1)
-    except KeyboardInterrupt:
-        return _fail(options, "stopped; the same command goes on from here", 130)
+    except KeyboardInterrupt as stop:
+        code = 143 if isinstance(stop, Terminated) else 130
+        return _fail(options, "stopped; the same command goes on from here", code)
 
 
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
@@ -50,11 +54,14 @@ def _run(options: argparse.Namespace) -> int:
     options.shown = out
     with ExitStack() as stack:
         if isinstance(out, str):  # an address
-            if name not in WRITERS | READERS:
+            if name not in WRITERS | READERS.keys():
                 raise UsageError(f"OUT is {out}, expected a folder or file of this machine")
             from stereocell.mirror import opened
 
-            options.out = stack.enter_context(opened(out, name if name in WRITERS else ""))
+            is_writer = name in WRITERS
+            options.out = stack.enter_context(
+                opened(out, name) if is_writer else opened(out, only=READERS[name])
+            )
         elif name in WRITERS:
             from stereocell.lock import alone_in
 
@@ -115,7 +122,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
     "slices": (
         "write 8-bit PNG slices of one channel, with a JSON of spacing and window",
         "slices scans/head -o out/slices --preset mri --series 2",
-        flags.declare_input,
+        flags.declare_slices,
         commands.slices,
     ),
     "units": (
@@ -188,7 +195,8 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
 
 # One of them at a time in an OUT
 WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
-READERS = frozenset({"check", "view", "serve"})
+# ... and these, of an OUT on object storage, fetch this first: all, or what phones are shown
+READERS = {"check": "", "view": "bundle", "serve": "bundle"}
 
 if __name__ == "__main__":
     sys.exit(main())

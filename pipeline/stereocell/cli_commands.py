@@ -231,10 +231,11 @@ def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
     from stereocell.deep import check_deep
     from stereocell.engine import Engine
 
-    engine = Engine(options.workers, options.scheduler)
+    out = options.out.absolute()  # workers may stand elsewhere
+    is_kept = isinstance(options.shown, str)
+    engine = Engine(options.workers, options.scheduler, None if is_kept else out / "plan.json")
     try:
-        stage = options.stage and options.stage.absolute()  # workers may stand elsewhere
-        yield from check_deep(options.out.absolute(), engine, stage)
+        yield from check_deep(out, engine, options.stage and options.stage.absolute())
     finally:
         engine.close()
 

@@ -14,6 +14,11 @@ def declare_input(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def declare_slices(parser: argparse.ArgumentParser) -> None:
+    declare_source(parser)
+    parser.add_argument("-o", "--out", type=_place, required=True, help="folder of the pictures")
+
+
 def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
@@ -199,7 +204,7 @@ def declare_iso(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--channel", required=True, metavar="X", help="by name or index, as CD31")
     parser.add_argument("--tile", required=True, help="as a build names it: r0_c0")
     parser.add_argument(
-        "-o", "--out", type=Path, metavar="PNG", help="default: iso_CHANNEL_TILE.png here"
+        "-o", "--out", type=_place, metavar="PNG", help="default: iso_CHANNEL_TILE.png here"
     )
 
 
@@ -254,7 +259,7 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
 
 def declare_sample(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", choices=["cycif", "brain-cells", "mri"])
-    parser.add_argument("out", type=Path, metavar="OUT", help="file or folder to write")
+    parser.add_argument("out", type=_place, metavar="OUT", help="file or folder to write")
     parser.add_argument(
         "--seed", type=int, default=0, help="cycif, mri: another seed, another block or noise"
     )

@@ -3,11 +3,14 @@
 import json
 import re
 import socket
+from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from stereocell.errors import StereoCellError
+from stereocell.lineage import key_of, libraries_of
 
 _ANSWER_S = 8  # in which a scheduler has to answer
 _WORKER_S = 20  # and to have its first worker
@@ -26,8 +29,8 @@ def join(scheduler: str, shared: Path | None) -> Any:
     scheduler  address, as `tcp://host:8786`, or the path of a scheduler file
     shared     a file that all workers have to see, or None
 
-    Raises ClusterError if nobody answers, or the workers lack StereoCell, have another version of
-    it, or don't see the file.
+    Raises ClusterError if nobody answers, or the workers lack StereoCell, would make other bytes
+    than this process (another version, of a library too, or other code), or don't see the file.
     """
     is_file = Path(scheduler).is_file()
     address = _address_in(Path(scheduler)) if is_file else scheduler
@@ -66,24 +69,44 @@ def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
         client.wait_for_workers(1, timeout=_WORKER_S)
     except TimeoutError:
         raise ClusterError(f"--scheduler {scheduler}: has no workers") from None
-    ours = version("stereocell")
+    ours = _look("")
     for address, answer in client.run(_look, str(shared or ""), on_error="return").items():
         if isinstance(answer, BaseException):
             raise ClusterError(
                 f"worker {address}: can't run StereoCell: {type(answer).__name__}: {answer}"
             )
-        host, theirs, sees = answer
-        if theirs != ours:
+        who = f"worker {address} on {answer.host}"
+        for name, expected in ours.versions.items():
+            found = answer.versions.get(name, "none")
+            if found != expected:
+                raise ClusterError(f"{who}: has {name} {found}, expected {expected}")
+        if answer.code != ours.code:
             raise ClusterError(
-                f"worker {address} on {host}: has StereoCell {theirs}, expected {ours}"
+                f"{who}: runs other code than this command: expected the same installation of "
+                "StereoCell, and workers that were started after it"
             )
-        if not sees:
+        if not answer.sees:
             raise ClusterError(
-                f"worker {address} on {host}: does not see {shared}; expected OUT in a file system "
-                "that all of the cluster share"
+                f"{who}: does not see {shared}; expected OUT in a file system that all of the "
+                "cluster share"
             )
 
 
-def _look(shared: str) -> tuple[str, str, bool]:
-    """Return, on a worker: its host, its version, and whether it sees a file."""
-    return socket.gethostname(), version("stereocell"), not shared or Path(shared).exists()
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """A worker: versions of what makes the bytes, a digest of our code, whether it sees a file."""
+
+    host: str
+    versions: dict[str, str]
+    code: str
+    sees: bool
+
+
+def _look(shared: str) -> _Sight:
+    # by their names: what a cluster is asked belongs to no result's lineage
+    makers = [import_module(f"stereocell.{name}") for name in ("tasks", "staging")]
+    versions = {"StereoCell": version("stereocell")}
+    for maker in makers:
+        versions |= libraries_of(maker)
+    code = "".join(key_of("", maker) for maker in makers)
+    return _Sight(socket.gethostname(), versions, code, not shared or Path(shared).exists())

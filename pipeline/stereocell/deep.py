@@ -102,7 +102,7 @@ def _channel_lines(channel: Channel, findings: Sequence[UnitFinding]) -> Iterato
         stated, found, largest = (max(row[k] for row in rows) for k in range(3))
         yield CheckLine(
             f"{channel.name} lod{level} against source",
-            True,
+            not any(told.startswith(f"lod{level}: ") for unit in units for told in unit.problems),
             f"{len(rows)} surfaces within {found:.4g} um, {stated:.4g} stated; at most "
             f"{largest:.4g}",
         )

@@ -30,6 +30,7 @@ from stereocell.write.bundle import MANIFEST
 from stereocell.write.bundle_tile import read_image
 from stereocell.write.composed import (
     ComposedLod,
+    ComposedVolume,
     loaded,
     modality_of,
     open_stage,
@@ -100,10 +101,14 @@ def _hold_channel(look: ComposedLook, channel: dict[str, Any], bundle: Path) -> 
         "name": look.name,
         "window": list(look.window),
         "iso_value": look.iso_value,
+        "iso_normalized": look.iso_normalized,
+        "threshold_normalized": look.threshold_normalized,
+        "surface": "none" if channel["tileset"] is None else look.surface,
         "transfer_function": look.chosen,
         "transfer_functions": list(look.transfer_functions),
     }
     yield from _unlike(look.id, channel, expected)
+    yield from _unlike(look.id, channel["transfer_functions_2d"], {"names": list(look.shapes)})
     (rows,) = _texels(bundle / channel["lut"]["path"])
     for row, (name, points) in zip(rows[0], look.transfer_functions.items(), strict=True):
         if np.abs(row[:, 3] / 255 - evaluate(points)).max() > _COLOR:
@@ -124,7 +129,10 @@ def hold_tile(task: BundleTask) -> TileFinding:
     worst = 0.0
     stage = open_stage(task.stage_file)
     looks = read_looks(stage)
+    listed = next((one for one in manifest["tiles"] if one["id"] == task.tile_id), None)
     with loaded(stage, task.tile_id) as (tile, choice):
+        if listed is not None:  # else it is told of the manifest
+            problems += _unlike(task.tile_id, listed, {"representation": choice.representation})
         for look, channel in zip(looks, manifest["channels"], strict=True):
             name = f"{task.tile_id}/{look.id}"
             lods = list(read_lods(tile, look.id, choice.finest_lod))
@@ -139,8 +147,8 @@ def hold_tile(task: BundleTask) -> TileFinding:
                 apart, faults = _hold_surface(file, lod, error_um, is_last)
                 worst = max(worst, apart)
                 problems += [f"{name}: lod{level}: {fault}" for fault in faults]
-            if lods and min(lod.level for lod in lods) not in contents:
-                problems.append(f"{name}: the bundle lacks lod{min(lod.level for lod in lods)}")
+            lacking = sorted({lod.level for lod in lods} - contents.keys())
+            problems += [f"{name}: the bundle lacks lod{level}" for level in lacking]
             composed = read_volume(tile, look.id)
             entry = _volume_entry(task.bundle, channel, task.tile_id)
             if (composed is None) != (entry is None):
@@ -148,10 +156,21 @@ def hold_tile(task: BundleTask) -> TileFinding:
                 problems.append(f"{name}: the {which[0]} has no volume, the {which[1]} has one")
             elif composed is not None and entry is not None:
                 volumes += 1
+                problems += _unlike(name, entry, _placed(composed))
                 voxels = look.window_voxels(read_atlas(composed.atlas))
                 file = task.bundle / entry["file"]["path"]
                 problems += [f"{name}: {fault}" for fault in _hold_volume(file, voxels)]
     return TileFinding(task.tile_id, surfaces, volumes, worst, tuple(problems))
+
+
+def _placed(volume: ComposedVolume) -> dict[str, Any]:
+    """Return where a volume is, as the bundle says it."""
+    return {
+        "size": list(volume.size),
+        "apron": volume.apron,
+        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
+        "matrix": [float(number) for number in volume.matrix.ravel()],
+    }
 
 
 def _contents(

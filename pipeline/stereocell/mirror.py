@@ -342,11 +342,11 @@ def is_file(path: Path) -> bool:
 
 
 @contextmanager
-def opened(address: str, command: str = "") -> Iterator[Path]:
+def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
     """Yield the folder of this machine in which an OUT at an address is worked on.
 
-    Holds OUT for a `command` that writes there; without one, all of OUT is fetched. In errors from
-    inside the block, the address stands for the folder.
+    Holds OUT for a `command` that writes there; without one, all of OUT is fetched, or what lies
+    below one folder of it. In errors from inside the block, the address stands for the folder.
 
     Raises OutputError if nothing can be read there or another command writes there, UsageError for
     an address that can't be written.
@@ -356,13 +356,13 @@ def opened(address: str, command: str = "") -> Iterator[Path]:
             f"OUT is {address}: can't be written, expected a folder or an s3:// address"
         )
     _clear_scratch()
-    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{os.getpid()}."))
+    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{os.getpid()}.")).resolve()
     mirror = Mirror(Place(address.rstrip("/"), root))
     _open.append(mirror)
     try:
         with mirror.alone(command) if command else nullcontext():
             mirror.list_all()
-            keys = mirror.keys_of(root)
+            keys = mirror.keys_of(root / only)
             mirror.bring(key for key in keys if not command or _STEERING.fullmatch(key))
             yield root
     except StereoCellError as error:

@@ -11,6 +11,7 @@ import socket
 import ssl
 from collections.abc import Sequence
 
+import idna
 import segno
 import trustme
 
@@ -46,11 +47,20 @@ def find_names(addresses: Sequence[str]) -> list[str]:
     return list(dict.fromkeys([*addresses, host, f"{host}.local", "localhost", "127.0.0.1"]))
 
 
+def _can_be_certified(name: str) -> bool:
+    """Return whether a certificate takes it: no host name with an underscore, as Docker's."""
+    try:
+        return bool(idna.encode(name))
+    except idna.IDNAError:
+        return False
+
+
 def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
     """Return a server's TLS context for these names, and its certificate's SHA-256 fingerprint.
 
     trustme hands the key to OpenSSL by a file in the temporary folder that it removes at once.
     """
+    names = [name for name in names if _can_be_certified(name)]
     leaf = trustme.CA(organization_name="StereoCell", organization_unit_name="this run").issue_cert(
         *names, organization_name="StereoCell", organization_unit_name="this run"
     )

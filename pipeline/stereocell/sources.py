@@ -13,14 +13,16 @@ from stereocell.plan import Channel, Plan
 class SourceRef:
     """An address and what was asked of it.
 
-    spacing_um  (z, y, x), or empty for the file's own
-    series      of DICOM, from 1; 0: the largest
+    spacing_um   (z, y, x), or empty for the file's own
+    series       of DICOM, from 1; 0: the largest
+    fingerprint  that was planned: another volume may lie there by now; empty: whatever lies there
     """
 
     source: str
     time: int
     spacing_um: tuple[float, ...]
     series: int = 0
+    fingerprint: str = ""
 
 
 @lru_cache(maxsize=2)
@@ -36,6 +38,8 @@ def open_source(ref: SourceRef) -> read.Dataset:
 def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
     """Return the reference to a plan's source, or to that of one of its channels."""
     if channel is not None and channel.source:
-        return SourceRef(channel.source, 0, ())
+        return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
     options = plan.settings.plan
-    return SourceRef(plan.source, options.time, options.spacing_um, options.series)
+    return SourceRef(
+        plan.source, options.time, options.spacing_um, options.series, plan.fingerprint
+    )

@@ -2,7 +2,7 @@
 
     python scale.py FOLDER [TILE]      TILE: z,y,x voxels of the slope's tiles
 
-Small tiles, 4 to 32 of them, tell how time and memory grow with their number; one of
+Small tiles, 4 to 32 of them, all alike, tell how time and memory grow with their number; one of
 194 x 512 x 512, full of nuclei, tells what a real one takes: a quarter of an hour in all. Samples
 and builds stay in FOLDER: they are made once.
 """
@@ -24,7 +24,10 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+import zarr
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from phantoms import write_ome_zarr
 from stereocell.store import Store
 
 STEREOCELL = (sys.executable, "-m", "stereocell.cli")
@@ -82,6 +85,18 @@ def make_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int])
     return path
 
 
+def repeat_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
+    """Return GRID's tiles, copies of one: its nuclei, whose sizes would tell of themselves."""
+    path = folder / "copies.ome.zarr"
+    if not path.exists():
+        one: np.ndarray = zarr.open_array(make_sample(folder, (1, 1), tile) / "0")[0]  # type: ignore
+        copies = np.tile(one, (1, GRID[1], GRID[0]))[None]
+        made = folder / "half.ome.zarr"
+        write_ome_zarr(made, [copies], "czyx", chunks=(1, 16, tile[1], tile[2]))
+        made.rename(path)
+    return path
+
+
 def plan(
     source: str, out: Path, grid: tuple[int, int], tile: tuple[int, int, int], channels: str
 ) -> None:
@@ -118,7 +133,7 @@ def run_units(out: Path, workers: int) -> Run:
 
 
 def measure_slope(folder: Path, tile: tuple[int, int, int]) -> list[Run]:
-    source = make_sample(folder, GRID, tile)
+    source = repeat_sample(folder, tile)
     runs = []
     for workers in (1, 2):
         for columns, rows in COUNTS.values():
@@ -183,7 +198,7 @@ def measure_reading(folder: Path, tile: tuple[int, int, int]) -> tuple[float, fl
     """Return bytes that one unit's build reads over those of the chunks that it touches, bytes it
     reads over its window's as voxels, and the bytes that finding windows and iso-values reads, for
     each unit, in the same measure."""
-    source = make_sample(folder, GRID, tile)
+    source = make_sample(folder, (3, 3), tile)
     out = folder / "reading"
     window = 2 * int(np.prod(tile))
     with counting(source.parent) as (address, sent):
