@@ -134,7 +134,7 @@ test: setup browser ## All tests, in headless Chromium too
 
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
-BEHIND := $(if $(CI),setsid --wait sh -c 'echo 19 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 19
+BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
 # a process for each core, and of each one thread: others would wait for one another, busily
 test-python: setup
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $(WORKERS) --durations 25
