@@ -1,8 +1,8 @@
 """What the docs show works as they show it: code, commands, links, tables, the workflow.
 
-Every command in a block of the README or of docs/ is run, in the order of the pages, in one folder
-with small sources under the names that the docs use; what is in PARSED or begins with `make` is
-only held against the program's own parser, or against the Makefile by `make -n`.
+Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages, in one
+folder with small sources under the names that the docs use; what is in PARSED is only held against
+the program's own parser, `make` against the Makefile by `make -n`, `dask` against its own help.
 """
 
 import json
@@ -162,6 +162,29 @@ def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() ->
                 parse(" ".join(command.split()))
             used |= {start for start in PARSED if command.startswith(f"stereocell {start}")}
     assert used == set(PARSED)  # what the docs no longer show is no excuse
+
+
+def test_other_programs_are_those_that_other_tests_run() -> None:
+    """`dask` by test_cluster.py, `pip install` of a wheel by test_wheel.py."""
+    found = {line for page in PAGES for block in blocks(page, "sh") for line in block.splitlines()}
+    others = {line.split()[0] for line in found if line.strip() and line.lstrip()[0] != "#"}
+    others -= {"stereocell", ".venv/bin/stereocell", "make"}
+    assert others == {"dask", "pip"}
+    told = " ".join(line for line in found if line.startswith("dask "))
+    for command in ("scheduler", "worker"):
+        takes = subprocess.run(
+            [sys.executable, "-m", "dask", command, "--help"], capture_output=True, text=True
+        ).stdout
+        (line,) = re.findall(rf"dask {command} (.*?)(?:\s{{3,}}#|$|dask)", told)
+        flags = re.findall(r"--[a-z-]+", line)
+        assert flags
+        assert all(re.search(rf"{flag}\b", takes) for flag in flags), line
+
+
+def test_python_in_the_docs_compiles() -> None:
+    for page in PAGES:
+        for text in blocks(page, "python"):
+            compile(text, str(page), "exec")
 
 
 def test_targets_exist() -> None:

@@ -176,7 +176,12 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["units", "https://x.org/out"], 2, "can't be written, expected a folder or an s3://"),
+        (
+            ["units", "https://me:secret@x.org/out?sig=secret"],
+            2,
+            "OUT is https://x.org/out: expected a folder or an s3:// address",
+        ),
+        (["iso", "x.nii", "-o", "s3://a:b@c/x", "--channel", "0", "--tile", "r"], 2, "s3://c/x"),
         (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
         (["slices", "x.nii", "-o", "s3://bucket/x"], 2, "expected a folder or file of this"),
         (["sample", "mri", "s3://bucket/x"], 2, "expected a folder or file of this"),
@@ -199,6 +204,7 @@ def test_what_is_no_place_is_said_in_a_line(
     assert main(arguments) == code
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
+    assert "secret" not in line
 
 
 @pytest.mark.slow

@@ -55,7 +55,10 @@ def _run(options: argparse.Namespace) -> int:
     with ExitStack() as stack:
         if isinstance(out, str):  # an address
             if name not in WRITERS | READERS.keys():
-                raise UsageError(f"OUT is {out}, expected a folder or file of this machine")
+                from stereocell.read.location import Location
+
+                shown = Location.of(out).shown
+                raise UsageError(f"OUT is {shown}, expected a folder or file of this machine")
             from stereocell.mirror import opened
 
             is_writer = name in WRITERS

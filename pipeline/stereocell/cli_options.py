@@ -5,6 +5,7 @@ import os
 from collections.abc import Container
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 
 def declare_input(parser: argparse.ArgumentParser) -> None:
@@ -102,7 +103,7 @@ def _place(text: str) -> Path | str:
     scheme, mark, path = text.partition("://")
     if not mark:
         return Path(text)
-    return Path(path) if scheme == "file" else text
+    return Path(unquote(path)) if scheme == "file" else text
 
 
 def _count(text: str) -> int:

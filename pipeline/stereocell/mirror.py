@@ -352,8 +352,10 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
     an address that can't be written.
     """
     if address.partition("://")[0] in ("http", "https"):
+        from stereocell.read.location import Location
+
         raise UsageError(
-            f"OUT is {address}: can't be written, expected a folder or an s3:// address"
+            f"OUT is {Location.of(address).shown}: expected a folder or an s3:// address"
         )
     _clear_scratch()
     root = Path(tempfile.mkdtemp(prefix=f"stereocell.{os.getpid()}.")).resolve()
