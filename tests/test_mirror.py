@@ -5,7 +5,8 @@ import json
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -144,18 +145,28 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
     assert not fs.exists(lock)
 
 
+def _wait_for(fault: Callable[[], None]) -> None:
+    for _ in range(1000):
+        fault()
+        time.sleep(0.02)
+
+
 def test_a_lock_that_was_not_renewed_is_taken_over(
     store: ObjectStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stereocell.lock._SETTLE_S", 0.0)
     fs, path = store.files(), "bucket/renewed/.lock"
-    with alone_at(fs, path, "there", "build"):
+    monkeypatch.setattr("stereocell.lock.BEAT_S", 0.05)
+    with alone_at(fs, path, "there", "build") as require:
         refused = pytest.raises(OutputError, match="there: `stereocell build`")
         with refused, alone_at(fs, path, "there", "units"):
             pass
         monkeypatch.setattr("stereocell.lock.STALE_S", -1e6)
         with alone_at(fs, path, "there", "units"):
             assert json.loads(fs.cat_file(path))["command"] == "units"
+            with pytest.raises(OutputError, match=r"there: was taken over by .*: start it again"):
+                _wait_for(require)
+            assert json.loads(fs.cat_file(path))["command"] == "units"  # and stays so
         assert not fs.exists(path)
     assert not fs.exists(path)
 

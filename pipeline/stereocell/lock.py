@@ -16,7 +16,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -121,25 +121,38 @@ def _in_words(content: bytes) -> str:
 
 
 @contextmanager
-def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[None]:
+def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[[], None]]:
     """Hold an OUT on object storage: `path` is the lock's in a file system of fsspec.
 
-    Raises OutputError if another process holds it, naming that one. What the storage itself raises
-    is the caller's.
+    Yields what raises OutputError once the lock is another's: who slept past STALE_S, as a laptop
+    does, loses it. Raises OutputError if another process holds it, naming that one. What the
+    storage itself raises is the caller's.
     """
     content = json.dumps(_claim(command) | {"id": str(uuid4())}).encode()
     _create(fs, path, shown, content)
     over = threading.Event()
+    lost: list[str] = []
 
     def beat() -> None:
-        while not over.wait(BEAT_S):
+        while not lost and not over.wait(BEAT_S):
             with suppress(Exception):  # a storage that fails now is met where it matters
-                fs.pipe_file(path, content)
+                there = _read(fs, path)
+                if there is not None and there[0] == content:
+                    fs.pipe_file(path, content)
+                else:
+                    lost.append("another command" if there is None else _in_words(there[0]))
+
+    def require() -> None:
+        if lost:
+            raise OutputError(
+                f"{shown}: was taken over by {lost[0]}, as this command had not been heard of for "
+                "long: start it again when that one has ended"
+            )
 
     thread = threading.Thread(target=beat, daemon=True)
     thread.start()
     try:
-        yield
+        yield require
     finally:
         over.set()
         thread.join()

@@ -70,6 +70,7 @@ class Mirror:
         self.news: dict[str, Size] = {}
         self.making: set[Path] = set()  # folders that this process will keep as a whole
         self._folders: dict[str, set[str]] = {}
+        self._require_alone: Callable[[], None] = lambda: None
 
     @cached_property
     def _storage(self) -> tuple[Any, str]:
@@ -90,7 +91,9 @@ class Mirror:
         fs, base = self._storage
         with ExitStack() as stack:
             with self._telling(LOCK, "written"):
-                stack.enter_context(alone_at(fs, f"{base}/{LOCK}", self.place.shown, command))
+                self._require_alone = stack.enter_context(
+                    alone_at(fs, f"{base}/{LOCK}", self.place.shown, command)
+                )
             yield
 
     # --- what lies there
@@ -139,7 +142,8 @@ class Mirror:
                 yield from self._below(child)
 
     def learn(self, news: Mapping[str, Size]) -> None:
-        """Take in what a worker has put and removed."""
+        """Take in what a worker has put and removed. Raises OutputError if OUT is another's now."""
+        self._require_alone()
         for key, size in news.items():
             self._learn(key, size)
 
@@ -201,6 +205,7 @@ class Mirror:
                 file.unlink()
 
     def _put(self, here: Mapping[str, Path], there: Mapping[str, str]) -> None:
+        self._require_alone()
         fs, base = self._storage
         sizes = {key: file.stat().st_size for key, file in here.items()}
         sizes |= {key: self.keys_of(self.place.root / old)[old] for key, old in there.items()}
