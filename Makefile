@@ -142,7 +142,8 @@ test-python: setup
 test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test
 	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/demo
-	$(MAKE) --no-print-directory demo SAMPLE=brain-cells OUT=out/brain-cells
+	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
+	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
 	$(BIN)/python tests/assets.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
 	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit

@@ -9,8 +9,8 @@ from threading import Thread
 
 import pytest
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
 
+from patience import PATIENCE_S, connect
 from stereocell import serve as serve_module
 from stereocell.cli import main
 from stereocell.errors import StereoCellError
@@ -49,7 +49,7 @@ def port(bundle: Path) -> Iterator[int]:
 def ask(
     port: int, path: str, method: str = "GET", **headers: str
 ) -> tuple[http.client.HTTPResponse, bytes]:
-    connection = http.client.HTTPConnection(LOCALHOST, port, timeout=10)
+    connection = http.client.HTTPConnection(LOCALHOST, port, timeout=PATIENCE_S)
     try:
         connection.request(method, path, headers=headers)
         response = connection.getresponse()
@@ -225,12 +225,12 @@ def test_the_servers_own_page_and_programs_get_a_websocket(port: int) -> None:
     for origin in (f"http://localhost:{port}", None):
         with connect(f"ws://localhost:{port}/bricks", origin=origin) as client:
             client.send('{"type": "hello", "version": 1}')
-            assert '"welcome"' in client.recv(timeout=10)
+            assert '"welcome"' in client.recv(timeout=PATIENCE_S)
 
 
 def test_a_websocket_of_another_host_name_is_refused(port: int) -> None:
     with (
-        socket.create_connection((LOCALHOST, port), timeout=10) as stream,
+        socket.create_connection((LOCALHOST, port), timeout=PATIENCE_S) as stream,
         pytest.raises(InvalidStatus) as refused,
         connect("ws://evil.example/bricks", sock=stream),
     ):
@@ -325,7 +325,7 @@ def test_a_taken_port_is_named(bundle: Path) -> None:
 
 
 def test_a_client_that_goes_away_leaves_the_server_working(port: int) -> None:
-    with socket.create_connection((LOCALHOST, port), timeout=10) as client:
+    with socket.create_connection((LOCALHOST, port), timeout=PATIENCE_S) as client:
         client.sendall(b"GET /volumes/r0_c0/CD31.ktx2 HTTP/1.1\r\nHost: localhost\r\n\r\n")
         client.recv(10)
     assert ask(port, "/lod0.glb")[0].status == 200

@@ -16,9 +16,9 @@ from unittest.mock import patch
 
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from attack_wire import is_answer
+from patience import PATIENCE_S, connect
 from server_attacks import ATTACKS, MARK, attack, attacked, is_well, write_bundle
 from stereocell import serve_limits
 from stereocell.serve import BundleServer
@@ -92,7 +92,7 @@ def test_a_viewers_pace_is_served_by_the_server_itself(out: Path) -> None:
         port = targets["plain"].server.port
         ask = b"GET /data.bin HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-0\r\n\r\n"
         with ExitStack() as stack:
-            dial = partial(socket.create_connection, ("127.0.0.1", port), timeout=10)
+            dial = partial(socket.create_connection, ("127.0.0.1", port), timeout=PATIENCE_S)
             streams = [stack.enter_context(dial()) for _ in range(6)]
             for _ in range(40):
                 for stream in streams:
@@ -149,7 +149,7 @@ def begin_download(port: int) -> socket.socket:
     """Return a stream on which an answer of SLOW bytes has begun."""
     stream = socket.socket()
     stream.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
-    stream.settimeout(10)
+    stream.settimeout(PATIENCE_S)
     stream.connect(("127.0.0.1", port))
     ask = f"GET /large.bin HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-{SLOW - 1}\r\n\r\n"
     stream.sendall(ask.encode())
@@ -173,20 +173,20 @@ def read_all(stream: socket.socket, for_s: float) -> int:
 def test_a_signal_lets_transfers_end_and_nothing_begin(out: Path, kind: signal.Signals) -> None:
     with (
         command(out) as (process, port),
-        connect(f"ws://localhost:{port}/bricks", open_timeout=20) as client,
+        connect(f"ws://localhost:{port}/bricks") as client,
         begin_download(port) as stream,
     ):
         client.send('{"type": "hello", "version": 1}')
-        client.recv(timeout=10)
+        client.recv(timeout=PATIENCE_S)
         os.kill(process.pid, kind)
         with pytest.raises(ConnectionClosed) as closed:
-            client.recv(timeout=10)
+            client.recv(timeout=PATIENCE_S)
         assert closed.value.rcvd is not None
         assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1001, "the server ends")
         with pytest.raises(ConnectionError):
-            socket.create_connection(("127.0.0.1", port), timeout=10).recv(1)
+            socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S).recv(1)
         assert read_all(stream, for_s=1.5) == SLOW
-        told, faults = process.communicate(timeout=20)
+        told, faults = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, faults) == (0, "")
     assert told == "finishing 1 transfer, at most 8 s; Ctrl+C again stops at once\n"
 
@@ -198,7 +198,7 @@ def test_a_second_ctrl_c_stops_at_once(out: Path) -> None:
         assert "finishing" in process.stdout.readline()
         start = time.monotonic()
         os.kill(process.pid, signal.SIGINT)
-        _, faults = process.communicate(timeout=20)
+        _, faults = process.communicate(timeout=PATIENCE_S)
         assert time.monotonic() - start < 4
     assert process.returncode == 130
     assert len(faults.splitlines()) == 1

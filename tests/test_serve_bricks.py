@@ -8,10 +8,10 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from brick_bundles import phantom, replace_volume, write_out
 from brick_client import BrickClient, look_at, psnr, reconstruct
+from patience import PATIENCE_S, connect
 from stereocell import serve_bricks, serve_library, voxel_bvh
 from stereocell.serve import BundleServer
 
@@ -65,7 +65,7 @@ class Talk:
 
     def step(self):
         """Take one message in; return it if it is text."""
-        data = self.socket.recv(timeout=20)
+        data = self.socket.recv(timeout=PATIENCE_S)
         self.frames += isinstance(data, bytes)
         for answer in self.client.take(data, self.tables):
             if self.acks:

@@ -11,8 +11,8 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from websockets.sync.client import connect
 
+from patience import PATIENCE_S, connect
 from stereocell import serve as serve_module
 from stereocell.serve import BundleServer
 from stereocell.serve_deadline import HeadDeadline
@@ -51,7 +51,7 @@ def out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def plain(server: BundleServer) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", server.port), timeout=10)
+    return socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE_S)
 
 
 def encrypted(server: BundleServer) -> socket.socket:
@@ -124,7 +124,7 @@ def test_many_silent_clients_are_gone_and_others_are_served(
     with serving(out, lan=False) as server:
         silent = [plain(server) for _ in range(100)]
         await_connections(server, 100)
-        connection = http.client.HTTPConnection("localhost", server.port, timeout=10)
+        connection = http.client.HTTPConnection("localhost", server.port, timeout=PATIENCE_S)
         for _ in range(8):  # one connection, longer than the deadline in all
             connection.request("GET", "/index.html")
             assert connection.getresponse().read() == b"<!doctype html>"
@@ -154,7 +154,7 @@ def test_a_slow_answer_and_a_websocket_outlive_the_deadline(out: Path) -> None:
         with connect(f"ws://localhost:{server.port}/bricks", compression=None) as client:
             time.sleep(2 * DEADLINE_S)
             client.send('{"type": "hello", "version": 1}')
-            assert json.loads(client.recv(timeout=10))["type"] == "welcome"
+            assert json.loads(client.recv(timeout=PATIENCE_S))["type"] == "welcome"
 
 
 def test_a_handshake_that_does_not_come_is_cut_off(

@@ -12,8 +12,8 @@ import pytest
 import segno
 from cryptography import x509
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
 
+from patience import PATIENCE_S, connect
 from stereocell import serve as serve_module
 from stereocell.cli import main
 from stereocell.errors import StereoCellError
@@ -56,7 +56,9 @@ def context():
 
 
 def ask(server, context, path, method="GET", host=None, cookie=None):
-    connection = http.client.HTTPSConnection("127.0.0.1", server.port, timeout=10, context=context)
+    connection = http.client.HTTPSConnection(
+        "127.0.0.1", server.port, timeout=PATIENCE_S, context=context
+    )
     headers = {} if cookie is None else {"Cookie": cookie}
     if host is not None:
         headers["Host"] = host
@@ -133,7 +135,7 @@ def test_a_websocket_needs_the_session_too(server, context):
     own = f"https://127.0.0.1:{server.port}"
     with connect(address, ssl=context, origin=own, additional_headers=headers) as client:
         client.send('{"type": "hello", "version": 1}')
-        assert '"welcome"' in client.recv(timeout=10)
+        assert '"welcome"' in client.recv(timeout=PATIENCE_S)
     with (
         pytest.raises(InvalidStatus),
         connect(address, ssl=context, origin="https://a.example", additional_headers=headers),
@@ -147,7 +149,7 @@ def test_other_host_names_are_refused_even_with_a_session(server, context):
 
 
 def test_plain_http_gets_nothing_and_ends_nothing(server, context, capfd):
-    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as client:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE_S) as client:
         client.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
         assert b"HTTP/1.1 200" not in client.recv(1000)
     assert ask(server, context, "/")[0].status == 403

@@ -12,10 +12,10 @@ from threading import Thread
 
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from brick_bundles import phantom, write_out
 from brick_client import BrickClient, look_at
+from patience import PATIENCE_S, connect
 from stereocell.serve import BundleServer
 from stereocell.serve_limits import MESSAGE_BYTES
 
@@ -136,7 +136,7 @@ def is_well(port):
 
         def until(is_over):
             while not is_over():
-                for answer in client.take(stream.recv(timeout=20)):
+                for answer in client.take(stream.recv(timeout=PATIENCE_S)):
                     stream.send(json.dumps(answer))
 
         stream.send('{"type": "hello", "version": 1}')
@@ -156,7 +156,7 @@ def fate(port, message, hello):
             stream.send(message)
             stream.send(PROBE)
             while True:
-                answer = stream.recv(timeout=20)
+                answer = stream.recv(timeout=PATIENCE_S)
                 if isinstance(answer, str) and '"tile": "probe"' in answer:
                     return None
         except ConnectionClosed as closed:
@@ -196,7 +196,7 @@ def handshake():
 @contextmanager
 def raw_stream(port):
     """Yield a socket on which frames are next."""
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as stream:
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as stream:
         stream.sendall(handshake())
         answer = b""
         while b"\r\n\r\n" not in answer:
@@ -234,7 +234,7 @@ def test_every_broken_frame_ends_its_connection_alone(port, capfd, caplog):
         b"GET /" + b"a" * 70000,
     ]
     for head in heads:
-        with socket.create_connection(("127.0.0.1", port), timeout=10) as stream:
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as stream:
             stream.sendall(head)
             stream.shutdown(socket.SHUT_WR)
             with suppress(ConnectionError):
@@ -248,11 +248,11 @@ def test_every_broken_frame_ends_its_connection_alone(port, capfd, caplog):
 def test_clients_that_vanish_leave_nothing_behind(port, capfd, caplog):
     for wait in (0, 0.02):
         for _ in range(5):
-            stream = socket.create_connection(("127.0.0.1", port), timeout=10)
+            stream = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
             with connect(f"ws://localhost:{port}/bricks", sock=stream) as client:
                 client.send('{"type": "hello", "version": 1}')
                 client.send('{"type": "open", "volumes": [{"tile": "r0_c0", "channel": "CD31"}]}')
-                while '"type": "tree"' not in str(client.recv(timeout=20)):
+                while '"type": "tree"' not in str(client.recv(timeout=PATIENCE_S)):
                     pass
                 client.send(json.dumps(VALID[3] | {"texel_px": 0, "budget": 1 << 30}))
                 time.sleep(wait)

@@ -7,6 +7,7 @@ linearly, so that neighbouring tiles see the same value at the same place.
 """
 
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ SMOOTHING = 0.7  # sigma, in blocks: a block that a body fills all the same is d
 
 
 def find_background(
-    field: NDArray[np.float32],
+    field: NDArray[Any],
     region: Box,
     spacing_um: tuple[float, float, float],
     block_um: float,
@@ -41,7 +42,8 @@ def find_background(
     knots = np.empty(blocks)
     for place in product(*(range(count) for count in blocks)):
         block = tuple(slice(e[i], e[i + 1]) for e, i in zip(edges, place, strict=True))
-        knots[place] = np.percentile(field[block], PERCENTILE)
+        # block by block: all of the field as float32 would be what a small build's memory peaks at
+        knots[place] = np.percentile(field[block].astype(np.float32), PERCENTILE)
     z, y, x = (
         tuple(float(start + (a + b) / 2 * size / n - 0.5) for a, b in pairwise(edge))
         for edge, start, size, n in zip(edges, region.start, region.shape, field.shape, strict=True)

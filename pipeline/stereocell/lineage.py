@@ -90,11 +90,11 @@ def _needs(file: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
 
 def _assets(tree: ast.Module) -> Iterator[Path]:
     """Yield the files that ship beside the code and that a module finds by a literal name."""
-    calls = (n for n in ast.walk(tree) if isinstance(n, ast.Call))
-    for call in calls:
-        if ast.unparse(call.func) == "find_asset" and isinstance(call.args[0], ast.Constant):
-            asset = find_asset(str(call.args[0].value))
-            yield from asset.rglob("*.*") if asset.is_dir() else [asset]
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Name(id="find_asset"), args=[ast.Constant(value=name)]):
+                asset = find_asset(str(name))
+                yield from asset.rglob("*.*") if asset.is_dir() else [asset]
 
 
 def _imports(tree: ast.Module) -> Iterator[str]:

@@ -7,7 +7,7 @@ no more gradient than noise has are the materials.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, signal
+from scipy import ndimage
 
 NOISE_FACTOR = 1.9  # x the mode of the gradients: 93 % of such a vector's lengths lie below
 BRIGHT = 0.3  # values from which on noise is looked for that rises with the value
@@ -47,6 +47,8 @@ def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.flo
 
 def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tuple[float, ...]:
     """Return the values, 0..1, at which voxels without a boundary pile up."""
+    from scipy import signal  # a second's import: every command and worker would wait for it
+
     rows, columns = counts.shape
     is_flat = np.arange(rows)[:, np.newaxis] <= noise * (rows - 1)
     flat = np.where(is_flat, counts, 0).sum(axis=0).astype(np.float64)

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from stereocell import report, staging, tasks
+from stereocell import staging, tasks
 from stereocell.alphawrap import find_wrapper
 from stereocell.assets import viewer_dist
 from stereocell.config import Settings, to_dict, to_toml
@@ -186,6 +186,8 @@ def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
 
 def run_report(out: Path) -> None:
     """Write OUT/report/index.html: pictures, sizes, times."""
+    from stereocell import report  # what draws takes a while to import, and no other phase wants it
+
     store = Store(out)
     with _phase(store, "report") as phase:
         plan = store.plan()

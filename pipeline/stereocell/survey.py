@@ -21,6 +21,7 @@ from stereocell.transfer2d import NAME as NAME_2D
 from stereocell.transfer2d import fall_back, shapes_from
 
 BINS = 256
+_AT_ONCE = 1 << 20  # voxels
 NO_PROPOSAL = Proposal((), DEFAULT_GRADIENT_MAX, "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
@@ -50,10 +51,12 @@ def find_display(
 ) -> Display:
     """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide.
 
-    `window`, where it is known, is not sought.
+    `window`, where it is known, is not sought. The voxels are left in another order: a sorted copy
+    would be what the memory of a small build peaks at.
     """
     percentiles = (options.low_percentile, options.high_percentile)
-    low, high = (float(v) for v in np.percentile(voxels, percentiles))
+    voxels = voxels.reshape(-1)
+    low, high = (float(v) for v in np.percentile(voxels, percentiles, overwrite_input=True))
     if not high > low:  # sparse channels: fewer bright voxels than the percentile leaves out
         low, high = float(voxels.min()), float(voxels.max())
     if not high > low:
@@ -62,7 +65,10 @@ def find_display(
         low, high = window
     if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
         voxels = voxels.astype(np.float64)  # bins so narrow that float32 has no edges for them
-    counts, _ = np.histogram(np.clip(voxels, low, high), BINS, (low, high))
+    counts = np.zeros(BINS, np.int64)
+    for start in range(0, voxels.size, _AT_ONCE):  # clipped, an integer takes eight bytes
+        part = np.clip(voxels[start : start + _AT_ONCE], low, high)
+        counts += np.histogram(part, BINS, (low, high))[0]
     values = make_histogram(voxels, (low, high))
     return Display((low, high), tuple(int(n) for n in counts), background, values=values)
 

@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 WINDOW_SHARE = 0.10  # of the histogram's length
 CHANCE = 5.0  # standard deviations
 BINS = 256
+_AT_ONCE = 1 << 20  # voxels
 Reading = Literal["two peaks", "no peak before", "single peak"]
 
 
@@ -92,10 +93,13 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
         width = max(1.0, np.ceil((last - first + 1) / BINS))
         bins = max(1, int(np.ceil((last - first + 1) / width)))
         low, high = float(first - 0.5), float(first - 0.5 + bins * width)
-        inside = voxels[(voxels >= first) & (voxels <= last)]
-        counts, _ = np.histogram(inside, bins, (low, high))
-    else:
-        counts, _ = np.histogram(voxels, bins, (low, high))
+    # part by part: a mask of all, and a copy of what it lets through, are memory too
+    flat, counts = voxels.reshape(-1), np.zeros(bins, np.int64)
+    for start in range(0, flat.size, _AT_ONCE):
+        part = flat[start : start + _AT_ONCE]
+        if part.dtype.kind in "iub":
+            part = part[(part >= first) & (part <= last)]
+        counts += np.histogram(part, bins, (low, high))[0]
     return Histogram(tuple(int(n) for n in counts), float(low), float(high))
 
 

@@ -30,7 +30,7 @@ def main(images: str | None) -> None:
     print("|---|---|---|---|---|---|")
     for noise in (0.0, 0.01, 0.02, 0.05, 0.09):
         head = make_head(noise=noise, bias=0.2)
-        display = find_display(head.voxels, WINDOW)
+        display = find_display(head.voxels.copy(), WINDOW)
         found = display.threshold
         assert found is not None
         readings.append((f"{noise:.0%}", found))
@@ -46,7 +46,7 @@ def main(images: str | None) -> None:
         dataset = stereocell.read.open(images)
         voxels = dataset.read(0, Box((0, 0, 0), dataset.levels[0].shape), 0).voxels
         for name, window in (("images", WINDOW), ("full range", WindowOptions(0.0, 100.0))):
-            found = find_display(voxels, window).threshold
+            found = find_display(voxels.copy(), window).threshold
             if found is not None:
                 readings.append((name, found))
     print("\n| of | adaptive | how it was read |\n|---|---|---|")

@@ -327,7 +327,7 @@ export class Viewer {
     const inRoom = this.stereo.pose(this.picture.eyes);
     const isStereo = inRoom !== null;
     const { contents } = this;
-    const camera = inRoom ?? this.poseMono();
+    const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
     if (isStereo) this.stereo.hands.update(dt_s, this.head, this.state);
     const isChanging = this.advance(dt_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
@@ -363,8 +363,8 @@ export class Viewer {
     }
   }
 
-  private poseMono(): Camera {
-    this.navigation.update();
+  private poseMono(dt_s: number): Camera {
+    this.navigation.update(dt_s);
     this.picture.eyes.followScreen(this.renderer, this.navigation.camera);
     return this.navigation.camera;
   }

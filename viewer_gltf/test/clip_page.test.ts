@@ -296,17 +296,18 @@ describeInChromium("a cut in stereo", () => {
     return pictures;
   }
 
-  for (const [as, mode] of DRAWN) {
-    it(`by plane or box takes ${as} away in both eyes`, async () => {
+  for (const [[as, mode], clip] of [
+    [DRAWN[0], PLANE],
+    [DRAWN[1], BOX],
+  ] as const) {
+    it(`takes ${as} away in both eyes`, async () => {
       await addHeadset(page());
       const whole = await shoot(mode, "");
-      for (const clip of [PLANE, BOX]) {
-        const cut = await shoot(mode, clip.hash);
-        whole.forEach((picture, i) => {
-          const eye = eyeOf("front", XR_DISTANCE_M, 90, picture, (i - 0.5) * PUPILS_M);
-          expectCut(compare(picture, cut[i], eye, clip), 80, `${clip.hash}, eye ${i}`);
-        });
-      }
-    }, 400_000); // three times a session, in software
+      const cut = await shoot(mode, clip.hash);
+      whole.forEach((picture, i) => {
+        const eye = eyeOf("front", XR_DISTANCE_M, 90, picture, (i - 0.5) * PUPILS_M);
+        expectCut(compare(picture, cut[i], eye, clip), 80, `${clip.hash}, eye ${i}`);
+      });
+    }, 400_000); // twice a session, in software
   }
 });

@@ -12,6 +12,8 @@ import { distanceToSee, framingDistance, type Placement } from "./placement";
 const FIELD_OF_VIEW_DEG = 40;
 const NEAREST_M = 0.05;
 const FARTHEST_M = 8;
+/** Share of a glide that is left a second after the hand let go. */
+const LEFT_AFTER_A_SECOND = 0.88 ** 60;
 /** A key turns by this. */
 const TURN_RAD = Math.PI / 12;
 const ZOOM = 0.8;
@@ -39,7 +41,6 @@ export class Navigation {
     this.reach = new Vector3(...placement.size).multiplyScalar(0.5);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.12;
     this.controls.minDistance = NEAREST_M;
     this.controls.maxDistance = FARTHEST_M;
     this.controls.addEventListener("change", () => {
@@ -51,7 +52,9 @@ export class Navigation {
     });
   }
 
-  update(): void {
+  /** Go on with a glide, as long in seconds however few the frames; after so many of them. */
+  update(dt_s: number): void {
+    this.controls.dampingFactor = 1 - LEFT_AFTER_A_SECOND ** dt_s;
     this.controls.update();
     this.camera.updateMatrixWorld();
   }
