@@ -8,6 +8,7 @@ import spheres
 from stereocell import config
 from stereocell.assets import find_asset
 from stereocell.check import check
+from stereocell.cli import main
 from stereocell.engine import Engine
 from stereocell.errors import OutputError
 from stereocell.plan import Channel, make_plan
@@ -75,9 +76,23 @@ def test_what_needs_no_node_passes(made):
 @pytest.mark.parametrize("name", [".", "missing"])
 def test_a_folder_without_a_build_is_one_error(tmp_path, name):
     with pytest.raises(
-        OutputError, match=r"holds no build, expected plan\.json, stage/ and bundle/"
+        OutputError, match=r"holds no build, expected plan\.json, stage/ and bundle/, or a bundle's"
     ):
         lines(tmp_path / name)
+
+
+def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
+    whole, alone = lines(out), lines(out / "bundle")
+    assert alone == {name: whole[name] for name in alone}
+    assert set(whole) - set(alone) == {"plan", "stage", "stage files", "usdz"}
+    change_byte(out / "bundle" / VOLUME)
+    assert "hashes" in failed(out / "bundle")
+
+
+def test_a_bundle_by_itself_has_no_source_to_be_held_against(out, capfd):
+    assert main(["check", str(out / "bundle"), "--deep", "--workers", "0"]) == 1
+    *_, last = capfd.readouterr().err.splitlines()
+    assert "plan.json" in last
 
 
 def test_a_build_without_anything_in_it_fails_in_every_line(tmp_path):

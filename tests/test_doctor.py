@@ -47,16 +47,38 @@ def test_on_a_bare_machine(tmp_path: Path) -> None:
 def test_what_is_needed_fails(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    lacking = lambda name: ["numpy>=2", "no-such-package>=1; extra-less", "x>1; extra == 'y'"]  # noqa: E731
+    named = [
+        "numpy>=2",
+        "zarr>=99",
+        "no-such-package>=1; python_version > '3'",
+        "x>1; extra == 'y'",
+    ]
+    lacking = lambda name: named  # noqa: E731
     monkeypatch.setattr(doctor, "requires", lacking)
     monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage(0, 0, 3 << 30))
-    monkeypatch.setattr(doctor, "_available_bytes", lambda: 1 << 30)
+    monkeypatch.setattr(doctor, "available_bytes", lambda: 1 << 30)
     monkeypatch.setattr(
         doctor, "LOOKS", tuple(one for one in doctor.LOOKS if one is not doctor._opengl)
     )
     assert main(["doctor"]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert "missing packages: missing: no-such-package: what needs them fails" in lines[1]
+    assert lines[1].startswith("missing packages: zarr is ")
+    assert ", expected >=99; no-such-package is missing: what needs them fails" in lines[1]
     told = "\n".join(lines)
     assert "without memory: 1.0 GiB available: 0 workers" in told
     assert "without disk: 3.0 GiB free in this folder: a large build may not fit" in told
+
+
+def test_a_look_that_wants_a_missing_package_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def lacking() -> int:
+        import no_such_package  # noqa: F401
+
+        return 0
+
+    monkeypatch.setattr(doctor, "available_bytes", lacking)
+    assert main(["doctor"]) == 0
+    told = capsys.readouterr().out
+    assert "without memory: No module named 'no_such_package'" in told
+    assert "without disk" in told or "ok      disk" in told

@@ -1,4 +1,4 @@
-"""Hold what a build left against the rules of its formats: the body of `stereocell check OUT`.
+"""Hold what a build left against the rules of its formats: the body of `stereocell check`.
 
 Each check is one line, and none keeps the others from running. Other people's validators do most
 of it: JSON Schema, UsdValidation, the Khronos glTF validator, ktx-parse. The last two are node
@@ -38,6 +38,7 @@ _NODE_TIMEOUT_S = 1200.0
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
 _RUN_BUNDLE = "run `stereocell bundle OUT`"
+_Check = tuple[str, Callable[[], str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,19 +51,39 @@ class CheckLine:
 
 
 def check(out: Path) -> Iterator[CheckLine]:
-    """Yield a line for each check of a build's folder: plan, stage and bundle.
+    """Yield a line for each check of a build's folder: plan, stage and bundle; or of a bundle that
+    lies by itself, as on a web host.
 
-    Raises OutputError, before any line, where there is no build at all.
+    Raises OutputError, before any line, where there is neither.
     """
-    if not any((out / part).exists() for part in ("plan.json", "stage", "bundle")):
-        raise OutputError(f"{out}: holds no build, expected plan.json, stage/ and bundle/")
-    bundle = out / "bundle"
-    checks: list[tuple[str, Callable[[], str]]] = [
+    if any((out / part).exists() for part in ("plan.json", "stage", "bundle")):
+        checks = [*_checks_of_build(out), *_checks_of_bundle(out / "bundle")]
+    elif (out / MANIFEST).is_file():
+        checks = _checks_of_bundle(out)
+    else:
+        raise OutputError(
+            f"{out}: holds no build, expected plan.json, stage/ and bundle/, "
+            f"or a bundle's {MANIFEST}"
+        )
+    for name, run in checks:
+        try:
+            yield CheckLine(name, True, run())
+        except StereoCellError as error:
+            yield CheckLine(name, False, str(error))
+
+
+def _checks_of_build(out: Path) -> list[_Check]:
+    return [
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
         *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
+    ]
+
+
+def _checks_of_bundle(bundle: Path) -> list[_Check]:
+    return [
         ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
@@ -72,11 +93,6 @@ def check(out: Path) -> Iterator[CheckLine]:
         ("glTF validator", lambda: _check_meshes(bundle)),
         ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
     ]
-    for name, run in checks:
-        try:
-            yield CheckLine(name, True, run())
-        except StereoCellError as error:
-            yield CheckLine(name, False, str(error))
 
 
 def _check_json(path: Path, schema: str, remedy: str) -> str:

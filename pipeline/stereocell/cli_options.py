@@ -1,11 +1,12 @@
 """The flags of each command, and what they say as settings."""
 
 import argparse
-import os
 from collections.abc import Container
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
+
+from stereocell.processes import cores
 
 
 def declare_input(parser: argparse.ArgumentParser) -> None:
@@ -76,8 +77,8 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
 def declare_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",
-        type=_count,
-        default=_cores(),
+        type=_worker_count,
+        default="cores",  # counted only where it is not given
         help="worker processes; 0 runs inline (default: the cores that it may run on)",
     )
     parser.add_argument(
@@ -86,12 +87,6 @@ def declare_workers(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS|FILE",
         help="a running Dask cluster instead: tcp://host:8786, or its scheduler file",
     )
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def declare_out(parser: argparse.ArgumentParser) -> None:
@@ -104,6 +99,10 @@ def _place(text: str) -> Path | str:
     if not mark:
         return Path(text)
     return Path(unquote(path)) if scheme == "file" else text
+
+
+def _worker_count(text: str) -> int:
+    return cores() if text == "cores" else _count(text)
 
 
 def _count(text: str) -> int:

@@ -11,7 +11,10 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 
+from packaging.requirements import Requirement
+
 from stereocell.assets import viewer_dist
+from stereocell.processes import available_bytes, cores
 
 _GIB = 1 << 30
 UNIT_BYTES = 3.5 * _GIB  # what a unit of 194 x 512 x 512 voxels is allowed for
@@ -38,7 +41,11 @@ class Finding:
 def examine() -> Iterator[Finding]:
     """Yield what was found, one thing after another. Changes nothing on this machine."""
     for look in LOOKS:
-        yield look()
+        try:
+            yield look()
+        except ImportError as error:  # the line of the packages says which are missing
+            name = look.__name__.strip("_")
+            yield Finding(name, False, str(error), "not looked at: install StereoCell anew")
 
 
 def _python() -> Finding:
@@ -49,50 +56,35 @@ def _python() -> Finding:
 
 def _packages() -> Finding:
     """Look for the packages that StereoCell names, by their metadata alone: nothing is imported."""
-    missing, count = [], 0
+    faults, count = [], 0
     for line in requires("stereocell") or ():
-        if "extra ==" in line:
+        wanted = Requirement(line)
+        if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
             continue
         count += 1
-        name = line.split(";")[0].split(">")[0].split("=")[0].split("[")[0].strip()
         try:
-            version(name)
+            found = version(wanted.name)
         except PackageNotFoundError:
-            missing.append(name)
-    found = f"missing: {', '.join(missing)}" if missing else f"all {count}"
+            faults.append(f"{wanted.name} is missing")
+            continue
+        if not wanted.specifier.contains(found, prereleases=True):
+            faults.append(f"{wanted.name} is {found}, expected {wanted.specifier}")
     cost = "what needs them fails: install StereoCell anew"
-    return _finding("packages", not missing, found, cost, is_needed=True)
+    return _finding("packages", not faults, "; ".join(faults) or f"all {count}", cost, True)
 
 
 def _cores() -> Finding:
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
+    found = cores()
     return _finding(
-        "cores", cores > 1, str(cores), "units are built one after another, not side by side"
+        "cores", found > 1, str(found), "units are built one after another, not side by side"
     )
 
 
 def _memory() -> Finding:
-    available = _available_bytes()
-    if available is None:
-        return _finding("memory", True, "not told by this system", "")
+    available = available_bytes()
     workers = int(available // UNIT_BYTES)
     found = f"{available / _GIB:.1f} GiB available: {workers} workers on tiles of 194 x 512 x 512"
     return _finding("memory", workers >= 1, found, "smaller tiles are needed (--tile-size)")
-
-
-def _available_bytes() -> int | None:
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        entries = dict(line.split(":", 1) for line in lines)
-        return int(entries["MemAvailable"].split()[0]) * 1024
-    except (OSError, KeyError, ValueError):
-        pass
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ValueError, OSError, AttributeError):
-        return None
 
 
 def _disk() -> Finding:

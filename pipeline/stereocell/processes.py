@@ -1,6 +1,21 @@
-"""Other processes of this machine."""
+"""Other processes of this machine, and what there is for them."""
 
 import os
+
+
+def cores() -> int:
+    """Return how many cores this process may use: by its affinity, and by its container's quota."""
+    from dask.system import cpu_count  # takes a while, and most commands don't ask
+
+    return int(cpu_count())
+
+
+def available_bytes() -> int:
+    """Return the memory that is free to use, of the machine or of the container."""
+    import psutil
+    from distributed.system import memory_limit
+
+    return int(min(psutil.virtual_memory().available, memory_limit()))
 
 
 def is_alive(process: int) -> bool:

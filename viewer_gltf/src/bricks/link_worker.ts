@@ -244,9 +244,9 @@ async function openOne(volume: Volume): Promise<void> {
   }
 }
 
-/** Trees whose table is here. */
+/** Trees whose table is here, and of which the server knows what the cache has. */
 function readyTrees(): readonly number[] {
-  return [...trees].filter(([, { table }]) => table !== null).map(([number]) => number);
+  return [...trees].filter(([, { isBegun }]) => isBegun).map(([number]) => number);
 }
 
 /** Ask for what the view wants of all trees that are open. */
