@@ -13,6 +13,7 @@ import { listenForHandles } from "./marks/pointer";
 import { ERROR_TARGET_PX } from "./mesh/surface_set";
 import { GatherPace } from "./quality/gather_pace";
 import { Pace } from "./quality/pace";
+import { RestPace } from "./quality/rest_pace";
 import type { Look } from "./share/look";
 import { type Action, initialState, newNotice, reduce, type ViewerState } from "./state";
 import { CANT, type Command } from "./ui/commands";
@@ -53,11 +54,15 @@ export class Viewer {
   private readonly hybrid: Hybrid;
   private pace: Pace;
   private readonly gathering: GatherPace;
+  private readonly resting: RestPace;
   private readonly contents: Contents;
   private readonly size: StageSize;
   private readonly disposed = new AbortController();
   private last_ms = 0;
+  /** Whether what is looked at, or from where, has changed since the last frame. */
   private isStale = true;
+  /** Whether something has come for the picture since the last frame, which may be at rest. */
+  private hasCome = false;
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
   private waiting: (() => void)[] = [];
@@ -82,28 +87,30 @@ export class Viewer {
     this.state = initialState(manifest, gl.getExtension("EXT_color_buffer_float") !== null);
     const canvas = this.renderer.domElement;
 
-    const refresh = () => {
-      this.isStale = true;
-    };
     this.room = new Room(manifest);
     this.hybrid = new Hybrid(manifest);
     this.picture = new Picture(this.renderer, this.room, this.hybrid);
     this.pace = new Pace(gl);
     this.gathering = new GatherPace(gl);
+    this.resting = new RestPace(gl);
     this.contents = new Contents({
       bundle,
       renderer: this.renderer,
       picture: this.picture,
       state: this.state,
       dispatch: (action) => this.dispatch(action),
-      onChange: refresh,
+      onChange: () => {
+        this.hasCome = true;
+      },
       onError: (error) => this.report(error),
     });
     const { marks, surfaces, volumes } = this.contents;
     stage.append(...marks.overlayElements);
     this.room.specimen.group.add(surfaces.group, marks.group);
 
-    this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), refresh);
+    this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), () => {
+      this.isStale = true;
+    });
     this.stereo = new Stereo(this.renderer, {
       scene: this.room.scene,
       specimen: this.room.specimen,
@@ -141,6 +148,7 @@ export class Viewer {
       volumes.forget(); // their texels went with the context
       this.contents.traced.forget();
       this.gathering.forget();
+      this.resting.forget();
     });
     canvas.addEventListener("webglcontextrestored", () => {
       volumes.forget(); // those that have come since
@@ -329,11 +337,13 @@ export class Viewer {
     const { contents } = this;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
     if (isStereo) this.stereo.hands.update(dt_s, this.head, this.state);
-    const isChanging = this.advance(dt_s);
+    const { isChanging, isFading } = this.advance(dt_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
-    if (!isStereo && !this.isStale && !wasLoading && !this.wasMoving && !isGathering) return;
-    // a picture that came to rest is drawn once more, as well as can be
+    const isDue = this.resting.isDue(time_ms) && this.hasCome;
     const isMoving = isStereo || this.isStale;
+    // a picture that came to rest is drawn once more, as well as can be
+    const isWanted = isMoving || this.wasMoving || isGathering || isDue;
+    if (!isWanted && !wasLoading && !this.hasCome) return;
     const settings = this.pace.begin(isMoving, interval_ms, this.stereo.headset.rate_hz);
     this.picture.marchFrame.uSteps.value = settings.steps;
     this.hybrid.radiusShare = settings.discShare;
@@ -347,17 +357,20 @@ export class Viewer {
         ERROR_TARGET_PX * settings.errorFactor,
       );
     }
-    if (isMoving || this.wasMoving || isGathering) {
+    if (isWanted) {
       this.isStale = isChanging;
+      this.hasCome = isFading;
+      contents.surfaces.dressAll();
       const { passes } = this.gathering;
       this.draw(camera, { resolution: settings.resolution, isMoving, passes });
       if (isGathering) this.gathering.submit(time_ms);
+      if (!isMoving) this.resting.submit(time_ms);
       this.frames++;
       this.onFrame();
     }
     this.pace.end();
     this.wasMoving = isMoving;
-    const isAtRest = isStereo || !isMoving;
+    const isAtRest = isStereo || (!isMoving && !this.hasCome);
     if (this.waiting.length > 0 && !this.contents.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
@@ -369,8 +382,8 @@ export class Viewer {
     return this.navigation.camera;
   }
 
-  /** Follow the gaze, and go on with what moves or fades; whether the next frame differs by itself. */
-  private advance(dt_s: number): boolean {
+  /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */
+  private advance(dt_s: number): Readonly<{ isChanging: boolean; isFading: boolean }> {
     const { hybrid, contents, head, navigation, stage, state } = this;
     const { specimen } = this.room;
     const { group } = specimen;
@@ -391,10 +404,10 @@ export class Viewer {
       isPanelOpen: this.stereo.hands.panel.isOpen,
       dt_s,
     });
-    const isChanging = isMoving || isFading || hybrid.isChanging(state);
+    const isChanging = isMoving || hybrid.isChanging(state);
     if (isChanging) this.isStale = true;
-    if (this.isStale) contents.surfaces.dressAll();
-    return isChanging;
+    if (isFading) this.hasCome = true;
+    return { isChanging, isFading };
   }
 
   private draw(camera: Camera, pace: FramePace): void {

@@ -58,19 +58,20 @@ export class Hybrid {
     this.axis_um.copy(this.axis).transformDirection(this.toSpecimen);
     const before = this.nearby;
     const couldRefine = this.mayRefine;
-    const limit_rad = state.discRadius_deg * RADIANS * this.radiusShare;
+    const set_rad = state.discRadius_deg * RADIANS;
+    const limit_rad = set_rad * this.radiusShare;
     this.nearby = advanceNearby(before, {
       gaze: { origin: this.apex_um.toArray(), direction: this.axis_um.toArray() },
       tiles: shownTiles(this.manifest.tiles, state.isolated),
       clip: state.clip,
       switchDistance_um: state.switchDistance_m / specimen.getMaxScaleOnAxis(),
-      discRadius_rad: limit_rad,
+      discRadius_rad: set_rad, // a tile does not come and go with the frame's budget
       dt_s,
     });
     const isSame =
       before.gazed === this.nearby.gazed && before.disc.join() === this.nearby.disc.join();
     this.rested_s = isSame ? this.rested_s + dt_s : 0;
-    const reach = discReach(this.nearby, limit_rad, isReady);
+    const reach = Math.min(limit_rad, discReach(this.nearby, set_rad, isReady));
     const opened = this.outer_rad + (limit_rad / OPENING_S) * dt_s;
     this.outer_rad = state.mode === "disc" ? Math.min(reach, opened) : 0;
     this.reach_rad = reach;
