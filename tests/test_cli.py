@@ -111,8 +111,11 @@ def test_workers_are_the_cores_that_we_may_run_on(
 
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3}, raising=False)
     assert cli._parser().parse_args(["units", "out"]).workers == 1
-    monkeypatch.delattr(os, "sched_getaffinity")
-    assert cli._parser().parse_args(["units", "out"]).workers == os.cpu_count()
+    monkeypatch.undo()
+    assert 1 <= cli._parser().parse_args(["units", "out"]).workers <= (os.cpu_count() or 1)
+    # a container with half of a core's time
+    monkeypatch.setattr("dask.system._try_extract_cgroup_cpu_quota", lambda: (50_000, 100_000))
+    assert cli._parser().parse_args(["units", "out"]).workers == 1
 
 
 def test_help_says_what_a_region_counts(capsys: pytest.CaptureFixture[str]) -> None:
@@ -140,6 +143,12 @@ def test_a_machine_is_answered_in_json(
     assert told.err == f"stereocell: {answer['error']}\n"
     assert main(["plan", str(source), "-o", out, "--level", "9", "--json"]) == 2
     assert json.loads(capsys.readouterr().out)["exit_code"] == 2
+    assert main(["plan", "--nonsense", "--json"]) == 2
+    told = capsys.readouterr()
+    assert json.loads(told.out)["exit_code"] == 2
+    (line,) = told.err.splitlines()
+    assert line.startswith("stereocell: the following arguments are required: input")
+    assert "`stereocell plan --help`" in line
 
 
 def test_without_a_terminal_progress_is_a_line_a_unit_without_colours(

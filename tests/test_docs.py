@@ -25,6 +25,7 @@ import yaml
 import phantoms
 import stereocell
 from stereocell import cli, phases
+from stereocell.errors import UsageError
 from stereocell.read import opening
 from stereocell.read.location import Location
 from stereocell.samples.head import make_head
@@ -75,8 +76,8 @@ def parse(command: str) -> Any:
     """Return the command's options. Fails where the program does not take it."""
     try:
         return cli._parser().parse_args(shlex.split(command.partition(" > ")[0])[1:])
-    except SystemExit:
-        pytest.fail(f"not a command of this version: {command}")
+    except UsageError as error:
+        pytest.fail(f"not a command of this version: {command}: {error}")
 
 
 @pytest.fixture

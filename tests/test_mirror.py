@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +17,7 @@ import phantoms
 from assets import make_assets
 from digests import digests_of
 from object_store import ObjectStore, serving
+from stereocell import mirror
 from stereocell.cli import main
 from stereocell.errors import OutputError
 from stereocell.lock import alone_at
@@ -231,3 +234,25 @@ def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: 
     here = {key: sha for key, sha in digests_of(tmp_path / "out").items() if "tissue/" in key}
     assert here == {key: sha for key, sha in found.items() if key.startswith("tissue/")}
     assert main(["check", "s3://bucket/classes"]) == 0
+
+
+def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    ours, week_s = mirror._machine(), 7 * 24 * 3600
+    folders = {
+        f"stereocell.{ours}.{dead.pid}.killed": False,
+        f"stereocell.{ours}.{os.getpid()}.working": True,
+        f"stereocell.0000beef.{dead.pid}.ofanother": True,  # its process is on that machine
+        f"stereocell.0000beef.{dead.pid}.longago": False,
+        "stereocell.notes": True,
+    }
+    for name in folders:
+        (tmp_path / name / "units").mkdir(parents=True)
+    long_ago = time.time() - week_s - 60
+    os.utime(tmp_path / f"stereocell.0000beef.{dead.pid}.longago", (long_ago, long_ago))
+    mirror._clear_scratch()
+    assert {name: (tmp_path / name).exists() for name in folders} == folders

@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from typing import NoReturn
 
 from stereocell import cli_commands as commands
 from stereocell import cli_options as flags
@@ -12,7 +13,7 @@ from stereocell.errors import StereoCellError, UsageError
 from stereocell.interrupts import Terminated, answering_sigterm
 
 EXIT_CODES = """exit codes:
-  0    done
+  0    done; `view`, `serve`: stopped
   1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
   2    wrong usage
   130  stopped by Ctrl+C: the same command goes on from there
@@ -21,8 +22,10 @@ EXIT_CODES = """exit codes:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
-    options = _parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else arguments
+    options = argparse.Namespace(json="--json" in words)  # until they are read
     try:
+        options = _parser().parse_args(words)
         with answering_sigterm():
             return _run(options)
     except StereoCellError as error:
@@ -77,8 +80,15 @@ def _run(options: argparse.Namespace) -> int:
         return commands.answer(options, handler(options))
 
 
+class _Parser(argparse.ArgumentParser):
+    """Refuses as the commands do: in a line, and in JSON where that is asked for."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message}; `{self.prog} --help` says what there is")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="stereocell",
         description="Turn a multi-channel volume into a USD stage, a web bundle and a stereo view.",
         epilog="example: stereocell build my.ome.zarr -o out/mine && stereocell view out/mine\n\n"

@@ -11,10 +11,13 @@ name on its own machine:
 In any other folder these do nothing, so that readers and writers just call them.
 """
 
+import hashlib
 import os
 import re
 import shutil
+import socket
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
@@ -38,7 +41,9 @@ _STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
     r"|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
 )
-_SCRATCH = re.compile(r"stereocell\.(\d+)\.\w+")
+# of whose command: the machine's name, hashed, and the process there
+_SCRATCH = re.compile(r"stereocell\.([0-9a-f]{8})\.(\d+)\.\w+")
+_LONGEST_S = 7 * 24 * 3600.0  # no command of another machine works for so long in one folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,7 +368,7 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
             f"OUT is {Location.of(address).shown}: expected a folder or an s3:// address"
         )
     _clear_scratch()
-    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{os.getpid()}.")).resolve()
+    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{_machine()}.{os.getpid()}.")).resolve()
     mirror = Mirror(Place(address.rstrip("/"), root))
     _open.append(mirror)
     try:
@@ -380,12 +385,21 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
         shutil.rmtree(root, ignore_errors=True)
 
 
+def _machine() -> str:
+    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
+
+
 def _clear_scratch() -> None:
-    """Remove what killed commands of this machine left."""
+    """Remove what killed commands left here: this machine's, and others' whose workers ran here."""
     for folder in Path(tempfile.gettempdir()).glob("stereocell.*"):
         name = _SCRATCH.fullmatch(folder.name)
-        if name is not None and not is_alive(int(name[1])):
-            shutil.rmtree(folder, ignore_errors=True)
+        if name is None:
+            continue
+        with suppress(OSError):  # another command removes it, too
+            is_ours = name[1] == _machine()
+            age_s = time.time() - folder.stat().st_mtime
+            if not is_alive(int(name[2])) if is_ours else age_s > _LONGEST_S:
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 @dataclass(frozen=True, slots=True)
