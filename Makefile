@@ -39,11 +39,11 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer wheel docs lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser need-input FORCE
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
 
@@ -168,6 +168,9 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
 	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/test_blender.py; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
+
+object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
+	GOBIN=$(abspath $(BIN)) go install github.com/versity/versitygw/cmd/versitygw@latest
 
 torture: setup ## 50 builds killed at random moments; all malformed inputs
 	$(BIN)/python tests/torture.py 50

@@ -16,7 +16,7 @@ import s3fs
 from zarr.core.sync import _get_loop as zarr_loop
 
 KEY, SECRET = "tester", "not-a-secret"
-# go install github.com/versity/versitygw/cmd/versitygw@latest; on the PATH, or beside Python
+# on the PATH, or beside Python (`make object-store`)
 VERSITYGW = shutil.which("versitygw", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
 
 

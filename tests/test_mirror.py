@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import socket
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from stereocell import mirror
 from stereocell.cli import main
 from stereocell.errors import OutputError
 from stereocell.lock import alone_at
+from stereocell.processes import machine
 from stereocell.tissue_channels import TissueRequest, add_tissue
 from test_tissue import blobs
 
@@ -137,7 +137,7 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
     )
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    gone = {**owner, "process": dead.pid, "host": socket.gethostname()}
+    gone = {**owner, "process": dead.pid, "machine": machine()}
     fs.pipe_file(lock, json.dumps(gone).encode())
     assert main(["units", "s3://bucket/held"]) == 1
     (line,) = capsys.readouterr().err.splitlines()
@@ -242,7 +242,7 @@ def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    ours, week_s = mirror._machine(), 7 * 24 * 3600
+    ours, week_s = machine(), 7 * 24 * 3600
     folders = {
         f"stereocell.{ours}.{dead.pid}.killed": False,
         f"stereocell.{ours}.{os.getpid()}.working": True,

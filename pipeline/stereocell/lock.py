@@ -24,7 +24,7 @@ from typing import Any
 from uuid import uuid4
 
 from stereocell.errors import OutputError
-from stereocell.processes import is_alive
+from stereocell.processes import is_alive, machine
 
 if sys.platform != "win32":
     import fcntl
@@ -99,6 +99,7 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
 def _claim(command: str) -> dict[str, Any]:
     return {
         "process": os.getpid(),
+        "machine": machine(),
         "host": socket.gethostname(),
         "command": command,
         "since": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -198,6 +199,6 @@ def _read(fs: Any, path: str) -> tuple[bytes, float] | None:
 def _is_stale(content: bytes, age_s: float) -> bool:
     with suppress(ValueError, KeyError, TypeError):
         owner = json.loads(content)
-        if owner["host"] == socket.gethostname() and not is_alive(int(owner["process"])):
+        if owner["machine"] == machine() and not is_alive(int(owner["process"])):
             return True
     return age_s > STALE_S

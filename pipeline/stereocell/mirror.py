@@ -11,11 +11,9 @@ name on its own machine:
 In any other folder these do nothing, so that readers and writers just call them.
 """
 
-import hashlib
 import os
 import re
 import shutil
-import socket
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -27,7 +25,7 @@ from typing import Any, Generic, TypeVar
 
 from stereocell.errors import OutputError, StereoCellError, UsageError
 from stereocell.lock import LOCK, alone_at
-from stereocell.processes import is_alive
+from stereocell.processes import is_alive, machine
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -41,7 +39,7 @@ _STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
     r"|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
 )
-# of whose command: the machine's name, hashed, and the process there
+# of whose command: where it runs, and its process
 _SCRATCH = re.compile(r"stereocell\.([0-9a-f]{8})\.(\d+)\.\w+")
 _LONGEST_S = 7 * 24 * 3600.0  # no command of another machine works for so long in one folder
 
@@ -368,7 +366,7 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
             f"OUT is {Location.of(address).shown}: expected a folder or an s3:// address"
         )
     _clear_scratch()
-    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{_machine()}.{os.getpid()}.")).resolve()
+    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{machine()}.{os.getpid()}.")).resolve()
     mirror = Mirror(Place(address.rstrip("/"), root))
     _open.append(mirror)
     try:
@@ -385,10 +383,6 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
         shutil.rmtree(root, ignore_errors=True)
 
 
-def _machine() -> str:
-    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
-
-
 def _clear_scratch() -> None:
     """Remove what killed commands left here: this machine's, and others' whose workers ran here."""
     for folder in Path(tempfile.gettempdir()).glob("stereocell.*"):
@@ -396,7 +390,7 @@ def _clear_scratch() -> None:
         if name is None:
             continue
         with suppress(OSError):  # another command removes it, too
-            is_ours = name[1] == _machine()
+            is_ours = name[1] == machine()
             age_s = time.time() - folder.stat().st_mtime
             if not is_alive(int(name[2])) if is_ours else age_s > _LONGEST_S:
                 shutil.rmtree(folder, ignore_errors=True)

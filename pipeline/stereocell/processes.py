@@ -1,6 +1,9 @@
 """Other processes of this machine, and what there is for them."""
 
+import hashlib
 import os
+import socket
+from contextlib import suppress
 
 
 def cores() -> int:
@@ -16,6 +19,15 @@ def available_bytes() -> int:
     from distributed.system import memory_limit
 
     return int(min(psutil.virtual_memory().available, memory_limit()))
+
+
+def machine() -> str:
+    """Return 8 hexadecimal digits for where a process's id means something: this machine, or this
+    container, whose processes have ids of their own and whose name others may have, too."""
+    place = socket.gethostname()
+    with suppress(OSError):  # Linux has it
+        place += os.readlink("/proc/self/ns/pid")
+    return hashlib.sha256(place.encode()).hexdigest()[:8]
 
 
 def is_alive(process: int) -> bool:
