@@ -154,15 +154,23 @@ describeInChromium("volumes", () => {
       }, PATIENT)
       .toBe(true);
     await tick(page(), 100, 10);
+    for (let i = 0; i < 2; i++) await tick(page(), 2000); // nothing is being drawn any more
     const coarse = await takePicture(page());
     const { volumeBytes: coarseBytes } = await stand.viewer.snapshot();
     release();
     await expect.poll(async () => areAt(await volumes(), FINEST), PATIENT).toBe(true); // no frame yet
 
+    const frames = async () => (await page().evaluate(() => window.stereocell?.frames)) ?? 0;
     const bytes: number[] = [];
     const pictures: Picture[] = [];
     for (let i = 0; i < 6; i++) {
+      const before = await frames();
       await tick(page(), 40); // a fifth of the fade
+      const isDrawn = async () => {
+        await tick(page(), 0.1); // once the picture before is done
+        return (await frames()) > before;
+      };
+      if (i < 5) await expect.poll(isDrawn, PATIENT).toBe(true);
       pictures.push(await takePicture(page()));
       bytes.push((await stand.viewer.snapshot()).volumeBytes);
     }

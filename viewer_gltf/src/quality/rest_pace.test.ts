@@ -24,7 +24,8 @@ function run(picture_ms: number, until_ms: number): number[] {
 
 describe("a picture at rest, for which things come", () => {
   it("is drawn at once, and then as often as the display can where that is little work", () => {
-    expect(run(5, 60)).toEqual([0, 20, 40]);
+    expect(run(5, 40)).toEqual([0, 10, 20, 30]);
+    expect(run(40, 100)).toEqual([0, 40, 80]);
   });
 
   it("leaves half of the time to what comes", () => {

@@ -1,9 +1,11 @@
 /**
- * When a picture at rest is drawn anew while things come for it: the one before is done then, and
- * as long as it took has gone by. So what loads has at least half of the time, whatever draws.
+ * When a picture at rest is drawn anew while things come for it: the one before is done then, and if
+ * that took long, as long again has gone by. So what loads has half of the time, whatever draws.
  */
 import type { FencedContext } from "./gather_pace";
 
+/** A picture that took no longer keeps nothing waiting. */
+const LITTLE_MS = 50;
 /** A page that slept did not draw for as long. */
 const MOST_MS = 1000;
 const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
@@ -24,7 +26,7 @@ export class RestPace {
       gl.deleteSync(fence);
       this.fence = null;
       const spent_ms = now_ms - this.began_ms;
-      this.due_ms = now_ms + Math.min(MOST_MS, spent_ms);
+      this.due_ms = now_ms + (spent_ms > LITTLE_MS ? Math.min(MOST_MS, spent_ms) : 0);
     }
     return this.fence === null && now_ms >= this.due_ms;
   }
