@@ -213,26 +213,49 @@ def counting(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
         thread.join()
 
 
-def measure_reading(folder: Path, tile: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Return bytes that one unit's build reads over those of the chunks that its window touches,
-    bytes it reads over its tile's as voxels, and the bytes that finding windows and iso-values
-    reads, for each unit, in the same measure."""
+@dataclass(frozen=True)
+class Reading:
+    """Bytes that builds read, as they are stored.
+
+    ratio   a unit's, over those of the chunks that its window touches
+    voxel   a voxel's
+    survey  for windows and iso-values, for each voxel of a unit
+    check   what a command reads to see that the source is the one that was planned (64 MB at most)
+    """
+
+    ratio: float
+    voxel: float
+    survey: float
+    check: int
+
+
+def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
     source = make_sample(folder, (3, 3), tile)
     out = folder / "reading"
-    window = 2 * int(np.prod(tile))
     with counting(source.parent) as (address, sent):
-        plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
 
-        def run(*only: str) -> dict[str, int]:
+        def bytes_read() -> int:
+            return sum(size for file, size in sent.items() if not file.endswith(".json"))
+
+        def run(unit: str) -> int:
             sent.clear()
-            _call("units", str(out), "--workers", "0", *only)
-            return {file: size for file, size in sent.items() if not file.endswith(".json")}
+            _call("units", str(out), "--workers", "0", "--only", unit)
+            return bytes_read()
 
-        run("--only", "r0_c0/0")  # windows and iso-values of all nine, and one unit
-        survey_and_one = sum(sent.values())
-        one = sum(run("--only", "r1_c1/0").values())  # it has neighbours all round
-    chunks = sum(file.stat().st_size for file in touched_chunks(source, out, "r1_c1"))
-    return one / chunks, one / window, (survey_and_one - one) / 9 / window
+        plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
+        check = bytes_read()  # a plan reads nothing else
+        first = run("r0_c0/0")  # windows and iso-values of all nine, and one unit
+        middle = run("r1_c1/0")  # it has neighbours all round
+    corner, chunks = (list(touched_chunks(source, out, tile)) for tile in ("r0_c0", "r1_c1"))
+    size = sum(file.stat().st_size for file in chunks)
+    voxels = len(chunks) * np.prod(zarr.open_array(source / "0", mode="r").chunks)
+    survey = first - check - sum(file.stat().st_size for file in corner)
+    return Reading(
+        ratio=(middle - check) / size,
+        voxel=float(size / voxels),
+        survey=float(survey / 9 / np.prod(tile)),
+        check=check,
+    )
 
 
 def touched_chunks(source: Path, out: Path, tile_id: str) -> Iterator[Path]:
@@ -268,10 +291,10 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     print(f"Slope, tiles of {' x '.join(map(str, tile))}, one channel, {os.cpu_count()} cores")
     growths = print_slope(measure_slope(folder, tile))
 
-    reading, of_window, survey = measure_reading(folder, tile)
-    print(f"Read by a unit: {reading:.2f} x the chunks that its window touches (bound "
-          f"{MOST_READ}); stored bytes {of_window:.2f} x its voxels', for windows and iso-values "
-          f"{survey:.2f} x")  # fmt: skip
+    reading = measure_reading(folder, tile)
+    print(f"Read by a unit: {reading.ratio:.2f} x the chunks that its window touches (bound "
+          f"{MOST_READ}); for windows and iso-values {reading.survey:.2f} bytes a voxel; by a "
+          f"command, to see that the source is the same, {reading.check / 1e6:.1f} MB")  # fmt: skip
 
     print(f"A unit of {' x '.join(map(str, REAL))}")
     source, out = make_sample(folder, (1, 1), REAL), folder / "real"
@@ -285,14 +308,17 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
         print(f"    {most / GIB:5.2f}  {place}")
 
     hours = seconds * WHOLE / 3600
+    halo = plan_file.from_json(json.loads((out / "plan.json").read_text())).halo
+    window = (REAL[0], REAL[1] + 2 * halo[1], REAL[2] + 2 * halo[2])  # of one with neighbours
+    read = reading.ratio * reading.voxel * np.prod(window) + reading.survey * np.prod(REAL)
     print(f"{WHOLE} units of that size, without stage, bundle and report: {hours:.0f} core-hours, "
-          f"{WHOLE * (of_window + survey) * 2 * np.prod(REAL) / 1e12:.2f} TB read, "
+          f"{WHOLE * read / 1e12:.2f} TB read (windows of {' x '.join(map(str, window))}), "
           f"{WHOLE * size / 1e12:.2f} TB of units written, "
           f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
 
     kept = {
         "peaks": max(growths) <= MOST_GROWTH,
-        "reading": reading <= MOST_READ,
+        "reading": reading.ratio <= MOST_READ,
         "memory": max(seen.values()) <= MOST_BYTES,
     }
     for name, is_kept in kept.items():
