@@ -90,7 +90,7 @@ def _memory() -> Finding:
 def _disk() -> Finding:
     free = shutil.disk_usage(Path.cwd()).free
     found = f"{free / _GIB:.1f} GiB free in this folder"
-    cost = "a large build may not fit: some 1 GB for each tile of 194 x 512 x 512 and channel"
+    cost = "a large build may not fit: some 0.2 GB for each tile of 194 x 512 x 512 and channel"
     return _finding("disk", free >= _LEAST_FREE, found, cost)
 
 
