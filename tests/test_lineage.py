@@ -1,6 +1,7 @@
 """A result's key follows all the code, files and libraries that make it, and nothing else."""
 
 import shutil
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,7 @@ def _forget() -> None:
     lineage._digest.cache_clear()
     lineage._lineage.cache_clear()
     lineage._needs.cache_clear()
+    lineage._modules.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -72,3 +74,9 @@ def test_key_changes_with_what_makes_the_result(copy: Path, file: str, reached: 
 def test_versions_of_libraries_count_those_of_lone_extension_modules_too() -> None:
     assert {"numpy", "vtk", "xatlas", "edt", "zarr"} <= lineage.libraries_of(tasks).keys()
     assert {"usd-core", "OpenEXR"} <= lineage.libraries_of(staging).keys()
+
+
+def test_packages_are_found_as_python_finds_them() -> None:
+    found = lineage._distributions()
+    for top, names in packages_distributions().items():
+        assert {package.name for package in found[top]} == set(names), top

@@ -9,9 +9,9 @@ import ast
 import hashlib
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from importlib.metadata import packages_distributions, version
+from importlib.metadata import Distribution, distributions
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +20,7 @@ from stereocell.assets import find_asset
 
 _PACKAGE = Path(__file__).parent
 _NAME = _PACKAGE.name
+_FINDER = find_asset.__name__
 
 
 def key_of(content: Any, maker: ModuleType) -> str:
@@ -56,51 +57,72 @@ def _lineage(module: str) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]
         if name.split(".")[0] != _NAME:
             foreign.add(name.split(".")[0])
             continue
-        file = _source(name)
+        file = _modules().get(name)  # none if it is the name of something inside a module
         if file is not None and file not in found:
             found[file] = None
             assets, imports = _needs(file)
             found.update(dict.fromkeys(assets))
             waiting += imports
-    known = _distributions()  # a lone extension module isn't in it: it has its own name
+    known = _distributions()
     tops = foreign - sys.stdlib_module_names
-    names = {name for top in tops for name in known.get(top, (top,))}
-    return tuple(sorted(found)), tuple((name, version(name)) for name in sorted(names))
+    versions = {made.name: made.version for top in tops for made in known[top]}
+    return tuple(sorted(found)), tuple(sorted(versions.items()))
 
 
 @cache
-def _distributions() -> Mapping[str, list[str]]:
-    """Return the names of the installed packages by what they are imported as: a second's work."""
-    return packages_distributions()
+def _distributions() -> Mapping[str, tuple[Distribution, ...]]:
+    """Return the installed packages by what they are imported as.
+
+    As importlib.metadata.packages_distributions() tells it, which makes a path of each of their
+    files, needs a second for that, and passes over a package that is one extension module.
+    """
+    found: dict[str, list[Distribution]] = {}
+    for package in distributions():
+        tops = (package.read_text("top_level.txt") or "").split() or {
+            line.partition(",")[0].partition("/")[0].partition(".")[0]
+            for line in (package.read_text("RECORD") or "").splitlines()
+        }
+        for top in tops:
+            found.setdefault(top, []).append(package)
+    return {top: tuple(packages) for top, packages in found.items()}
 
 
-def _source(name: str) -> Path | None:
-    """Return the file of one of our modules; None if the name is something inside a module."""
-    path = _PACKAGE.joinpath(*name.split(".")[1:])
-    candidates = (path.with_suffix(".py"), path / "__init__.py")
-    return next((file for file in candidates if file.is_file()), None)
+@cache
+def _modules() -> Mapping[str, Path]:
+    """Return the files of our modules by their dotted names."""
+    return {
+        ".".join((_NAME, *file.relative_to(_PACKAGE).with_suffix("").parts)).removesuffix(
+            ".__init__"
+        ): file
+        for file in _PACKAGE.rglob("*.py")
+    }
 
 
 @cache
 def _needs(file: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Return what ships beside the code and the modules that a file of ours names."""
-    tree = ast.parse(file.read_bytes())
-    return tuple(_assets(tree)), tuple(_imports(tree))
+    code = file.read_bytes()
+    tree = ast.parse(code)
+    assets = _assets(tree) if _FINDER.encode() in code else ()
+    return tuple(assets), tuple(_imports(tree.body))
 
 
 def _assets(tree: ast.Module) -> Iterator[Path]:
     """Yield the files that ship beside the code and that a module finds by a literal name."""
     for node in ast.walk(tree):
         match node:
-            case ast.Call(func=ast.Name(id="find_asset"), args=[ast.Constant(value=name)]):
+            case ast.Call(func=ast.Name(id=id), args=[ast.Constant(value=name)]) if id == _FINDER:
                 asset = find_asset(str(name))
                 yield from asset.rglob("*.*") if asset.is_dir() else [asset]
 
 
-def _imports(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+def _imports(statements: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield what is imported by statements and by those inside them; expressions hold none."""
+    for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
             yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        for inside in ("body", "handlers", "cases", "orelse", "finalbody"):
+            yield from _imports(getattr(node, inside, ()))

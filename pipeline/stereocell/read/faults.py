@@ -2,6 +2,7 @@
 
 import logging
 import struct
+import sys
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -9,7 +10,6 @@ from contextlib import contextmanager
 from json import JSONDecodeError
 from xml.etree.ElementTree import ParseError
 
-from aiohttp import ClientError
 from bioio_base.exceptions import UnsupportedFileFormatError
 from botocore.exceptions import BotoCoreError  # type: ignore[import-untyped]
 from pydantic import ValidationError
@@ -36,10 +36,15 @@ _FAULTS = (
     struct.error,
     zlib.error,
     ZstdError,
-    ClientError,
     BotoCoreError,
     UnsupportedFileFormatError,
 )
+
+
+def _faults() -> tuple[type[BaseException], ...]:
+    """Return what is caught: aiohttp's errors too where something has imported it, slowly."""
+    aiohttp = sys.modules.get("aiohttp")
+    return _FAULTS if aiohttp is None else (*_FAULTS, aiohttp.ClientError)
 
 
 @contextmanager
@@ -54,7 +59,7 @@ def one_line(
         yield
     except StereoCellError:
         raise
-    except _FAULTS as error:
+    except _faults() as error:
         raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
 
 
