@@ -231,13 +231,15 @@ def test_one_unit_s_run_says_how_many_are_missing(
 
 
 # The command, which interrupts itself and its workers once a worker writes: however slow the
-# machine is, it is not done then.
+# machine is, it is not done then, for it waits before its last file.
 _INTERRUPTED = """
 import os, signal, sys, threading, time
 from pathlib import Path
 from stereocell.cli import main
+from stereocell.write import bundle
 
 out = Path(sys.argv[1])
+bundle.describe_bundle = lambda *_: time.sleep(600)
 
 def interrupt():
     while not list(out.glob(".bundle.*.partial/volumes/*/*")):
