@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +13,15 @@ from pxr import Sdf, Usd, Vt
 
 import phantoms
 from assets import make_assets
+from stereocell import deep
 from stereocell.check import CheckLine
 from stereocell.cli import main
 from stereocell.deep import check_deep
+from stereocell.deep_bundle import _texels
 from stereocell.engine import Engine
+from stereocell.errors import SourceError
 from stereocell.write.exr import read_atlas, write_atlas
+from stereocell.write.ktx2 import encode_2d, encode_3d
 
 TILE = "stage/tiles/r0_c0/tile.usdc"
 
@@ -43,13 +48,15 @@ def failures(out: Path) -> dict[str, str]:
     return {name: line.detail for name, line in lines_of(out).items() if not line.ok}
 
 
-def edit_mesh(out: Path, change: Callable[[Sdf.AttributeSpec], None], name: str) -> None:
-    """Change an attribute of the finest mesh of r0_c0 in its own layer."""
+def edit_mesh(
+    out: Path, change: Callable[[Sdf.AttributeSpec], None], name: str, within: str = "lod=lod0"
+) -> None:
+    """Change an attribute of the finest mesh of r0_c0, or of another prim, in its own layer."""
     layer = Sdf.Layer.FindOrOpen(str(out / TILE))
     found: list[Sdf.Path] = []
     layer.Traverse(
         Sdf.Path.absoluteRootPath,
-        lambda path: found.append(path) if path.name == name and "lod=lod0" in str(path) else None,
+        lambda path: found.append(path) if path.name == name and within in str(path) else None,
     )
     assert len(found) == 1, found
     change(layer.GetAttributeAtPath(found[0]))
@@ -79,6 +86,96 @@ def state_half_the_distance(out: Path) -> None:
         distance.default = distance.default / 2
 
     edit_mesh(out, change, "stereocell:distance")
+
+
+def turn_inside_out(out: Path) -> None:
+    def turn(indices: Sdf.AttributeSpec) -> None:
+        turned = np.ascontiguousarray(np.array(indices.default).reshape(-1, 3)[:, ::-1].ravel())
+        indices.default = Vt.IntArray.FromNumpy(turned)
+
+    def flip(normals: Sdf.AttributeSpec) -> None:
+        normals.default = Vt.Vec3fArray.FromNumpy(-np.array(normals.default))
+
+    edit_mesh(out, turn, "faceVertexIndices")
+    edit_mesh(out, flip, "normals")
+
+
+def mirror_the_uvs(out: Path) -> None:
+    def change(uvs: Sdf.AttributeSpec) -> None:
+        mirrored = np.ascontiguousarray(np.array(uvs.default)[:, ::-1])
+        uvs.default = Vt.Vec2fArray.FromNumpy(mirrored)
+
+    edit_mesh(out, change, "primvars:st", "lod=lod1")
+
+
+def name_another_vdb(out: Path) -> None:
+    def change(path: Sdf.AttributeSpec) -> None:
+        path.default = Sdf.AssetPath("../r0_c1/F.vdb")
+
+    edit_mesh(out, change, "filePath", "F_r0_c0_volume")
+
+
+def double_the_iso_value(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
+    value = stage.GetPrimAtPath("/Specimen/Channels/F").GetAttribute("stereocell:isoValue")
+    value.Set(2 * value.Get())
+    stage.GetRootLayer().Save()
+
+
+def edit_tileset(out: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change every tile of the channel's tileset."""
+    file = out / "bundle" / "channels" / "F" / "tileset.json"
+    tileset = json.loads(file.read_bytes())
+    waiting = [tileset["root"]]
+    while waiting:
+        tile = waiting.pop()
+        waiting += tile.get("children", [])
+        change(tile)
+    file.write_text(json.dumps(tileset))
+
+
+def turn_the_tileset(out: Path) -> None:
+    matrix = [0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    edit_tileset(out, lambda tile: tile.update(transform=matrix))
+
+
+def shrink_the_boxes(out: Path) -> None:
+    box = [1, 1, 1, 1e-7, 0, 0, 0, 1e-7, 0, 0, 0, 1e-7]
+    edit_tileset(out, lambda tile: tile.update(boundingVolume={"box": box}))
+
+
+def overstate_the_errors(out: Path) -> None:
+    edit_tileset(out, lambda tile: tile.update(geometricError=1000 * tile["geometricError"]))
+
+
+def move_the_bounds(out: Path) -> None:
+    file = out / "bundle" / "manifest.json"
+    manifest = json.loads(file.read_bytes())
+    manifest["tiles"][0]["bounds_um"]["min"][0] -= 1
+    file.write_text(json.dumps(manifest))
+
+
+def empty_the_bricks(out: Path) -> None:
+    file = out / "bundle" / "volumes" / "r0_c0" / "F_bricks.ktx2"
+    (bricks,) = _texels(file)
+    file.write_bytes(encode_3d([np.zeros_like(bricks)]).data)
+
+
+def empty_the_histogram(out: Path) -> None:
+    file = out / "bundle" / "channels" / "F" / "histogram2d.ktx2"
+    file.write_bytes(encode_2d(np.zeros_like(_texels(file)[0][0])).data)
+
+
+def invert_the_lookup_table(out: Path) -> None:
+    file = out / "bundle" / "luts" / "F.ktx2"
+    rows = _texels(file)[0][0].copy()
+    rows[..., 0] = 255 - rows[..., 0]
+    file.write_bytes(encode_2d(rows).data)
+
+
+def narrow_the_lookup_table(out: Path) -> None:
+    file = out / "bundle" / "luts" / "F.ktx2"
+    file.write_bytes(encode_2d(np.ascontiguousarray(_texels(file)[0][0][:, :-1])).data)
 
 
 def drop_a_tile(out: Path) -> None:
@@ -175,6 +272,7 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
             {
                 "tiles of the stage": "r0_c1 is missing",
                 MANIFEST: "tiles are r0_c0, r0_c1, the stage's r0_c0",
+                BUNDLE: "F: its histogram of value and gradient is not its volumes'",
             },
         ),
         (change_a_colour, {MANIFEST: "F: color is ", BUNDLE: "drawn in "}),
@@ -186,6 +284,35 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
         (choose_the_volume, {BUNDLE: "r0_c0: representation is 'mesh', the stage's 'volume'"}),
         (lose_a_level, {BUNDLE: "r0_c1/F: the bundle lacks lod2"}),
         (rename_a_channel, {MANIFEST: "F: name is 'G', the stage's 'F'"}),
+        (
+            turn_inside_out,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "lod0: its triangles face inwards",
+                BUNDLE: "lod0: 100% of its area faces the other way",
+            },
+        ),
+        (
+            mirror_the_uvs,
+            {
+                "F lod1 against source": " stated; at most ",
+                SOURCE: "lod1: its UVs are not the unit's",
+                BUNDLE: "of its area lies elsewhere in the maps",
+            },
+        ),
+        (name_another_vdb, {SOURCE: "F.vdb: not the file that the source gives"}),
+        (double_the_iso_value, {SOURCE: "F: isoValue is ", MANIFEST: "F: iso_value is "}),
+        (turn_the_tileset, {BUNDLE: "tileset.json: found a tile with a transform"}),
+        (shrink_the_boxes, {BUNDLE: "a box of the tileset is not round the surfaces"}),
+        (overstate_the_errors, {BUNDLE: "lod1: the tileset states "}),
+        (
+            move_the_bounds,
+            {MANIFEST: "specimen: bounds_um is ", BUNDLE: "r0_c0: bounds_um is "},
+        ),
+        (empty_the_bricks, {BUNDLE: "F_bricks.ktx2: not the least and most"}),
+        (empty_the_histogram, {BUNDLE: "F: its histogram of value and gradient is not"}),
+        (invert_the_lookup_table, {MANIFEST: "F: the lookup table of 'default' is not"}),
+        (narrow_the_lookup_table, {MANIFEST: "F: its lookup table has 5 x 255 x 4 values"}),
     ],
 )
 def test_a_fault_put_in_by_hand_is_named(
@@ -196,6 +323,53 @@ def test_a_fault_put_in_by_hand_is_named(
     assert found.keys() == expected.keys(), found
     for name, part in expected.items():
         assert part in found[name]
+
+
+@pytest.mark.slow
+def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
+    out: Path, tmp_path: Path
+) -> None:
+    layer = tmp_path / "edit.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths.append(str(out / "stage" / "stage.usda"))
+    prim = stage.GetPrimAtPath("/Specimen/Channels/F")
+    variants = prim.GetVariantSet("transferFunction")
+    chosen = variants.GetVariantSelection()
+    variants.AddVariant("mine")
+    variants.SetVariantSelection("mine")
+    with variants.GetVariantEditContext():
+        points = Vt.Vec2fArray([(0, 0), (1, 0.5)])
+        prim.GetAttribute("stereocell:opacityPoints").Set(points)
+    variants.SetVariantSelection(chosen)
+    stage.GetRootLayer().Save()
+    told = ["--stage", str(layer)]
+    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    found = failures(out)
+    assert found.keys() == {MANIFEST}
+    assert "F: transfer_functions is ['default', 'mine'" in found[MANIFEST]
+    assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+
+
+@pytest.mark.slow
+def test_without_its_source_the_bundle_is_held_against_the_stage_all_the_same(
+    built: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise SourceError("f.ome.tif: not found")
+
+    monkeypatch.setattr(deep, "require_input", refuse)
+    found = lines_of(out)
+    assert {name: line.detail for name, line in found.items() if not line.ok} == {
+        "stage against source": "f.ome.tif: not found"
+    }
+    assert {MANIFEST, BUNDLE} <= found.keys()
+
+
+def test_a_bundle_by_itself_is_not_held_against_a_stage(
+    built: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(built / "bundle"), "--deep", "--workers", "0"]) == 1
+    assert "a bundle by itself, expected OUT" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -6,14 +6,17 @@ from pathlib import Path
 
 from stereocell.as_planned import require_added, require_input
 from stereocell.check import CheckLine, raise_on
-from stereocell.deep_bundle import BundleTask, hold_manifest, hold_tile
+from stereocell.deep_bundle import BundleTask, hold_histograms, hold_manifest, hold_tile
 from stereocell.deep_source import SourceTask, UnitFinding, hold_unit
-from stereocell.engine import Engine, TasksFailedError
-from stereocell.errors import StereoCellError
+from stereocell.engine import Engine
+from stereocell.errors import OutputError, StereoCellError
 from stereocell.plan import Channel, Plan
 from stereocell.rounds import unit_tasks
 from stereocell.store import Store
+from stereocell.write.bundle import MANIFEST
 from stereocell.write.composed import open_stage, tile_prims
+from stereocell.write.composed_look import read_looks
+from stereocell.write.composed_values import shortest
 
 
 def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
@@ -21,22 +24,27 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
 
     stage  what the bundle was exported from, if not OUT's own
 
-    Raises StereoCellError where plan, units or source are missing, or are no longer what was built.
+    A source that is gone is one failed line: the bundle is held against the stage all the same.
+    Raises StereoCellError where there is no plan.
     """
     store = Store(out)
+    if not store.plan_file.exists() and (out / MANIFEST).is_file():
+        raise OutputError(
+            f"{out}: a bundle by itself, expected OUT: a bundle is held against OUT/stage"
+        )
     plan = store.plan()
-    store.require_units_of(plan)
-    require_input(plan)
-    require_added(plan)
     yield _line("tiles of the stage", lambda: _hold_tiles(store, plan))
-    tasks = list(_source_tasks(store, plan))
     try:
-        findings: Sequence[UnitFinding] = engine.run("source", hold_unit, tasks)
-    except TasksFailedError as error:
+        store.require_units_of(plan)
+        require_input(plan)
+        require_added(plan)
+        odd = list(_odd_iso_values(store, plan))
+        findings = engine.run("source", hold_unit, list(_source_tasks(store, plan)))
+    except StereoCellError as error:
         yield CheckLine("stage against source", False, _one_line(error))
-        findings = ()
-    for channel in plan.channels if findings else ():
-        yield from _channel_lines(channel, findings)
+    else:
+        for channel in plan.channels if findings else ():
+            yield from _channel_lines(channel, findings, odd)
     exported, bundle = stage or store.stage_file, store.bundle_dir
     yield _line("manifest against stage", lambda: _hold_manifest(exported, bundle))
     yield _line("bundle against stage", lambda: _hold_bundle(exported, bundle, engine))
@@ -68,6 +76,17 @@ def _hold_tiles(store: Store, plan: Plan) -> str:
     return f"{len(there)}, as planned"
 
 
+def _odd_iso_values(store: Store, plan: Plan) -> Iterator[str]:
+    """Yield which channel of the stage has another iso-value than was found in the source."""
+    stage = open_stage(store.stage_file)
+    survey = store.survey()
+    looks = {look.id: look.iso_value for look in read_looks(stage)}
+    for channel in plan.channels:
+        found, built = looks.get(channel.id), survey[channel.id]["look"]["iso_value"]
+        if found != (None if built is None else shortest(built)):
+            yield f"{channel.id}: isoValue is {found}, {built} was found"
+
+
 def _source_tasks(store: Store, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
     there = set(_tiles_in(store.stage_file))
     index = store.index()
@@ -94,7 +113,9 @@ def _source_tasks(store: Store, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
         )
 
 
-def _channel_lines(channel: Channel, findings: Sequence[UnitFinding]) -> Iterator[CheckLine]:
+def _channel_lines(
+    channel: Channel, findings: Sequence[UnitFinding], odd: Sequence[str]
+) -> Iterator[CheckLine]:
     """Yield a row for each level of a channel's surface, and one for its volumes and problems."""
     units = [unit for unit in findings if unit.name.split("/")[1] == channel.id]
     for level in range(max(len(unit.levels) for unit in units)):
@@ -106,7 +127,8 @@ def _channel_lines(channel: Channel, findings: Sequence[UnitFinding]) -> Iterato
             f"{len(rows)} surfaces within {found:.4g} um, {stated:.4g} stated; at most "
             f"{largest:.4g}",
         )
-    problems = [f"{unit.name}: {problem}" for unit in units for problem in unit.problems]
+    problems = [problem for problem in odd if problem.startswith(f"{channel.id}: ")]
+    problems += [f"{unit.name}: {problem}" for unit in units for problem in unit.problems]
 
     def sum_up() -> str:
         raise_on(problems)
@@ -124,9 +146,10 @@ def _hold_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
     tasks = [(name, BundleTask(stage, bundle, name)) for name in _tiles_in(stage)]
     tiles = engine.run("bundle", hold_tile, tasks)
     raise_on([problem for tile in tiles for problem in tile.problems])
+    raise_on(list(hold_histograms(bundle, tiles)))
     surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
     worst = max((tile.worst for tile in tiles), default=0.0)
     return (
         f"{surfaces} surfaces within {worst:.2f} lattice steps, their colours and maps; "
-        f"{volumes} volumes, every voxel of every level"
+        f"{volumes} volumes, every voxel of every level, their bricks and histograms"
     )

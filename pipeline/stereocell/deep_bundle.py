@@ -1,15 +1,18 @@
 """Hold a bundle against the stage that it was exported from: what each file decodes to.
 
 Surfaces: every vertex of a decoded .glb lies within the lattice's half diagonal of a vertex of the
-composed mesh, and the other way round, triangle by triangle too; colours within 1/255; maps as the
-stage's images would be encoded now. Volumes: every voxel of every mip level. And what the manifest
-says of each channel and tile.
+composed mesh, and the other way round, triangle by triangle too, which face the same way and have
+the same place in the maps; colours within 1/255; maps as the stage's images would be encoded now.
+Boxes and errors of the tilesets: as the surfaces and the stage give them. Volumes: every voxel of
+every mip level, the bricks' least and most, the histograms of value and gradient. And what the
+manifest says of each channel and tile.
 """
 
 import io
+import json
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +23,16 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from stereocell.bricks import mip_levels
+from stereocell.bricks import min_max_bricks, mip_levels
 from stereocell.documents import read_json
 from stereocell.errors import CheckError
+from stereocell.histogram2d import log_scaled
 from stereocell.mesh import Mesh
 from stereocell.specimen import evaluate
-from stereocell.tilesets import walk
+from stereocell.tilesets import Content, walk
 from stereocell.write.bundle import MANIFEST
-from stereocell.write.bundle_tile import read_image
+from stereocell.write.bundle_tile import find_bounds, read_image
+from stereocell.write.bundle_transfer2d import count_tile, sum_tiles
 from stereocell.write.composed import (
     ComposedLod,
     ComposedVolume,
@@ -47,6 +52,10 @@ from stereocell.write.ktx2 import encode_color_map, encode_normal_map, encode_oc
 _COLOR = 1 / 255 + 1e-6
 _UM_PER_METRE = 1e6
 _MAP_DIFFERENCE = 1.0  # of 255, in the mean: the same image by another version of the encoder
+_ODD_SHARE = 0.01  # of a surface's area: slivers that the lattice turns over
+_UV_STEP = 1e-4  # of a map's edge; 16 bits hold a sixth of it
+_ROUNDED = 1.001  # four digits, upwards
+_BOX_M = 2e-9  # whole nm, outwards
 _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
     "normalTexture": ("normal", encode_normal_map),
     "occlusionTexture": ("occlusion", encode_occlusion_map),
@@ -66,12 +75,17 @@ class BundleTask:
 
 @dataclass(frozen=True, slots=True)
 class TileFinding:
-    """What was seen of one tile. `worst`: a vertex's way from its place, in lattice steps."""
+    """What was seen of one tile.
+
+    worst   a vertex's way from its place, in lattice steps
+    joints  each volume's histogram of value and gradient, packed, by channel
+    """
 
     name: str
     surfaces: int
     volumes: int
     worst: float
+    joints: dict[str, bytes]
     problems: tuple[str, ...]
 
 
@@ -85,6 +99,12 @@ def hold_manifest(stage_file: Path, bundle: Path) -> list[str]:
     listed = [tile["id"] for tile in manifest["tiles"]]
     if tiles != listed:
         problems.append(f"tiles are {', '.join(listed)}, the stage's {', '.join(tiles)}")
+    ends = [
+        [pick(tile["bounds_um"][end][axis] for tile in manifest["tiles"]) for axis in range(3)]
+        for end, pick in (("min", min), ("max", max))
+    ]
+    whole = {"bounds_um": dict(zip(("min", "max"), ends, strict=True))}
+    problems += _unlike("specimen", manifest["specimen"], whole, "its tiles'")
     looks = read_looks(stage)
     if [look.id for look in looks] != [channel["id"] for channel in manifest["channels"]]:
         return [*problems, "the channels are not the stage's"]
@@ -109,58 +129,88 @@ def _hold_channel(look: ComposedLook, channel: dict[str, Any], bundle: Path) -> 
     }
     yield from _unlike(look.id, channel, expected)
     yield from _unlike(look.id, channel["transfer_functions_2d"], {"names": list(look.shapes)})
-    (rows,) = _texels(bundle / channel["lut"]["path"])
-    for row, (name, points) in zip(rows[0], look.transfer_functions.items(), strict=True):
-        if np.abs(row[:, 3] / 255 - evaluate(points)).max() > _COLOR:
+    shapes = _transfer2d(bundle, channel)
+    drawn = {
+        "gradient_max": look.gradient_max,
+        "functions": {name: [asdict(one) for one in all_] for name, all_ in look.shapes.items()},
+    }
+    yield from _unlike(look.id, shapes, json.loads(json.dumps(drawn)))
+    rows = _texels(bundle / channel["lut"]["path"])[0][0]
+    if rows.shape != (len(look.transfer_functions), 256, 4):
+        yield (
+            f"{look.id}: its lookup table has {' x '.join(map(str, rows.shape))} values, expected "
+            f"{len(look.transfer_functions)} x 256 x 4"
+        )
+        return
+    for row, (name, points) in zip(rows, look.transfer_functions.items(), strict=True):
+        if (row[:, :3] != 255).any() or np.abs(row[:, 3] / 255 - evaluate(points)).max() > _COLOR:
             yield f"{look.id}: the lookup table of {name!r} is not the stage's"
 
 
-def _unlike(name: str, found: dict[str, Any], expected: dict[str, Any]) -> Iterator[str]:
+def hold_histograms(bundle: Path, tiles: Sequence[TileFinding]) -> Iterator[str]:
+    """Yield which channel's histogram of value and gradient its volumes do not give."""
+    manifest = read_json(bundle / MANIFEST, "bundle.schema.json", _REMEDY)
+    for channel in manifest["channels"]:
+        name = channel["id"]
+        counts = sum_tiles(tile.joints[name] for tile in tiles if name in tile.joints)
+        shapes = _transfer2d(bundle, channel)
+        expected = log_scaled(counts)
+        found = _texels(bundle / shapes["histogram"]["path"])[0][0, ..., 0]
+        if found.shape != expected.shape or (found != expected).any():
+            yield f"{name}: its histogram of value and gradient is not its volumes'"
+        yield from _unlike(name, shapes, {"most": int(counts.max())}, "its volumes'")
+
+
+def _transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
+    path = bundle / channel["transfer_functions_2d"]["file"]["path"]
+    return dict(read_json(path, "transfer2d.schema.json", _REMEDY))
+
+
+def _unlike(
+    name: str, found: dict[str, Any], expected: dict[str, Any], whose: str = "the stage's"
+) -> Iterator[str]:
     for key, value in expected.items():
         if found[key] != value:
-            yield f"{name}: {key} is {found[key]!r}, the stage's {value!r}"
+            yield f"{name}: {key} is {found[key]!r}, {whose} {value!r}"
 
 
 def hold_tile(task: BundleTask) -> TileFinding:
     """Return how one tile's files agree with the composed stage. Raises StereoCellError."""
     manifest = read_json(task.bundle / MANIFEST, "bundle.schema.json", _REMEDY)
+    channels = {channel["id"]: channel for channel in manifest["channels"]}
     problems: list[str] = []
-    surfaces = volumes = 0
+    joints: dict[str, bytes] = {}
+    surfaces = 0
     worst = 0.0
     stage = open_stage(task.stage_file)
-    looks = read_looks(stage)
+    # what the manifest lacks is told of the manifest
+    looks = [look for look in read_looks(stage) if look.id in channels]
     listed = next((one for one in manifest["tiles"] if one["id"] == task.tile_id), None)
     with loaded(stage, task.tile_id) as (tile, choice):
-        if listed is not None:  # else it is told of the manifest
-            problems += _unlike(task.tile_id, listed, {"representation": choice.representation})
-        for look, channel in zip(looks, manifest["channels"], strict=True):
-            name = f"{task.tile_id}/{look.id}"
-            lods = list(read_lods(tile, look.id, choice.finest_lod))
+        volumes = [read_volume(tile, look.id) for look in looks]
+        if listed is not None:
+            low, high = find_bounds(tile, volumes)
+            bounds = {"min": list(low), "max": list(high)}
+            told = {"representation": choice.representation, "bounds_um": bounds}
+            problems += _unlike(task.tile_id, listed, told)
+        for look, composed in zip(looks, volumes, strict=True):
+            channel, name = channels[look.id], f"{task.tile_id}/{look.id}"
+            lods = {lod.level: lod for lod in read_lods(tile, look.id, choice.finest_lod)}
             contents = dict(_contents(task.bundle, channel, task.tile_id))
-            for level, (file, error_um) in contents.items():
-                surfaces += 1
-                lod = next((lod for lod in lods if lod.level == level), None)
-                if lod is None:
-                    problems.append(f"{name}: lod{level} is not in the stage")
-                    continue
-                is_last = level == max(contents) and len(contents) > 1
-                apart, faults = _hold_surface(file, lod, error_um, is_last)
-                worst = max(worst, apart)
-                problems += [f"{name}: lod{level}: {fault}" for fault in faults]
-            lacking = sorted({lod.level for lod in lods} - contents.keys())
-            problems += [f"{name}: the bundle lacks lod{level}" for level in lacking]
-            composed = read_volume(tile, look.id)
+            surfaces += len(contents)
+            apart, faults = _hold_surfaces(contents, lods)
+            worst = max(worst, apart)
+            problems += [f"{name}: {fault}" for fault in faults]
             entry = _volume_entry(task.bundle, channel, task.tile_id)
             if (composed is None) != (entry is None):
                 which = ("stage", "bundle") if composed is None else ("bundle", "stage")
                 problems.append(f"{name}: the {which[0]} has no volume, the {which[1]} has one")
             elif composed is not None and entry is not None:
-                volumes += 1
                 problems += _unlike(name, entry, _placed(composed))
                 voxels = look.window_voxels(read_atlas(composed.atlas))
-                file = task.bundle / entry["file"]["path"]
-                problems += [f"{name}: {fault}" for fault in _hold_volume(file, voxels)]
-    return TileFinding(task.tile_id, surfaces, volumes, worst, tuple(problems))
+                problems += [f"{name}: {fault}" for fault in _hold_volume(task, entry, voxels)]
+                joints[look.id] = count_tile(voxels, composed, look.gradient_max)
+    return TileFinding(task.tile_id, surfaces, len(joints), worst, joints, tuple(problems))
 
 
 def _placed(volume: ComposedVolume) -> dict[str, Any]:
@@ -173,23 +223,67 @@ def _placed(volume: ComposedVolume) -> dict[str, Any]:
     }
 
 
-def _contents(
-    bundle: Path, channel: dict[str, Any], tile_id: str
-) -> Iterator[tuple[int, tuple[Path, float]]]:
-    """Yield level, file and stated distance (um) of a tile's surfaces in a channel's tileset."""
+def _contents(bundle: Path, channel: dict[str, Any], tile_id: str) -> Iterator[tuple[int, Content]]:
+    """Yield a tile's surfaces in a channel's tileset, by level."""
     if channel["tileset"] is None:
         return
     for content in walk(bundle, bundle / channel["tileset"]["path"], tile_id):
         if not content.is_tileset:
-            level = int(content.path.stem.removeprefix("lod"))
-            yield level, (content.path, content.error_m * _UM_PER_METRE)
+            yield int(content.path.stem.removeprefix("lod")), content
 
 
-def _hold_surface(
-    file: Path, lod: ComposedLod, error_um: float, is_last: bool
+def _hold_surfaces(
+    contents: dict[int, Content], lods: dict[int, ComposedLod]
 ) -> tuple[float, list[str]]:
     """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
-    drawn = read_glb(file)
+    problems = [f"lod{level} is not in the stage" for level in contents if level not in lods]
+    problems += [f"the bundle lacks lod{level}" for level in sorted(lods.keys() - contents.keys())]
+    worst, error_m, corners = 0.0, 0.0, []
+    for level in sorted(contents.keys() & lods.keys()):
+        content, lod = contents[level], lods[level]
+        is_last = level == max(contents) and len(contents) > 1
+        drawn = read_glb(content.path)
+        apart, faults = _hold_surface(drawn, lod, is_last)
+        worst = max(worst, apart)
+        problems += [f"lod{level}: {fault}" for fault in faults]
+        # a coarser one states no less than a finer one; the finest, which all are held to, nothing
+        if level > min(contents):
+            moved_m = math.sqrt(3) / 2 * drawn.step_m if is_last else 0.0
+            error_m = max(error_m, lod.distance_um / _UM_PER_METRE + moved_m)
+        if not error_m * (1 - 1e-6) <= content.error_m <= error_m * _ROUNDED:
+            problems.append(
+                f"lod{level}: the tileset states {content.error_m * _UM_PER_METRE:.4g} um, "
+                f"expected {error_m * _UM_PER_METRE:.4g}"
+            )
+        corners.append((drawn.positions_m.min(axis=0), drawn.positions_m.max(axis=0)))
+    problems += _hold_boxes(contents, corners)
+    return worst, problems
+
+
+def _hold_boxes(
+    contents: dict[int, Content], corners: Sequence[tuple[NDArray[Any], NDArray[Any]]]
+) -> Iterator[str]:
+    """Yield which box of a tileset isn't that of the surfaces in it; `corners`: theirs, metres."""
+    if not corners:
+        return
+    low = np.min([low for low, _ in corners], axis=0).astype(np.float64)
+    high = np.max([high for _, high in corners], axis=0).astype(np.float64)
+    # y up, which boxes are not
+    low, high = np.array([low[0], -high[2], low[1]]), np.array([high[0], -low[2], high[1]])
+    slack = _BOX_M + 4e-7 * max(float(np.abs(low).max()), float(np.abs(high).max()))
+    for level, content in contents.items():
+        for k, box in enumerate(content.boxes):
+            centre, half = np.array(box[:3]), np.array(box[3:]).reshape(3, 3)
+            reach = np.abs(half).sum(axis=0)
+            lacks = max((centre - reach - low).max(), (high - centre - reach).max())
+            exceeds = max((low - centre + reach).max(), (centre + reach - high).max())
+            if lacks > slack or (k == 0 and exceeds > slack):
+                yield f"lod{level}: a box of the tileset is not round the surfaces: {list(box)}"
+                break
+
+
+def _hold_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
+    """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
     problems = []
     triangles = lod.mesh.triangles
     if len(drawn.triangles) != len(triangles):
@@ -198,23 +292,52 @@ def _hold_surface(
     decoded = drawn.positions_m.astype(np.float64)
     # float32 metres of a viewer, beside half the diagonal of a lattice cell
     limit_m = math.sqrt(3) / 2 * drawn.step_m + 4e-7 * float(np.abs(places).max())
-    apart = max(
-        _farthest(places, decoded),
-        _farthest(places[triangles].mean(axis=1), decoded[drawn.triangles].mean(axis=1)),
-    )
+    there, here = places[triangles], decoded[drawn.triangles]
+    apart = max(_farthest(places, decoded), _farthest(there.mean(axis=1), here.mean(axis=1)))
     if apart > limit_m:
         problems.append(
             f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place, the lattice allows "
             f"{limit_m * _UM_PER_METRE:.4g}"
         )
-    if lod.level and error_um < lod.distance_um * (1 - 1e-6):
-        problems.append(f"the tileset states {error_um:.4g} um, the stage {lod.distance_um:.4g}")
+    else:
+        problems += _hold_faces(there, here, triangles, drawn, lod.mesh)
     away = max(abs(a - b) for a, b in zip(drawn.color, lod.material.color, strict=True))
     if away > _COLOR:
         problems.append(f"drawn in {drawn.color}, the stage's colour is {lod.material.color}")
     problems += _hold_vertex_colors(drawn, lod.mesh, places, decoded)
     problems += _hold_maps(drawn, lod, is_last)
     return apart / drawn.step_m, problems
+
+
+def _hold_faces(
+    there: NDArray[np.float64],
+    here: NDArray[np.float64],
+    triangles: NDArray[np.uint32],
+    drawn: Drawn,
+    mesh: Mesh,
+) -> Iterator[str]:
+    """Yield what is wrong with the way that triangles face, and with their place in the maps.
+
+    there, here  corners (n, 3, 3) of the stage's and of the bundle's
+    """
+    _, twins = cKDTree(here.mean(axis=1)).query(there.mean(axis=1))
+    normals, turned = (
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for corners in (there, here[np.asarray(twins)])
+    )
+    areas = np.linalg.norm(normals, axis=1)
+    whole = float(areas.sum())
+    odd = float(areas[(normals * turned).sum(axis=1) < 0].sum())
+    if odd > _ODD_SHARE * whole:
+        yield f"{odd / whole:.0%} of its area faces the other way"
+    if drawn.uvs is None or mesh.uvs is None:
+        return  # a map without them is told of the map
+    wanted = mesh.uvs.astype(np.float64)[triangles].mean(axis=1)
+    found = drawn.uvs[drawn.triangles].mean(axis=1)[np.asarray(twins)]
+    off = np.abs(found - np.stack([wanted[:, 0], 1 - wanted[:, 1]], axis=1)).max(axis=1)
+    odd = float(areas[off > _UV_STEP].sum())
+    if odd > _ODD_SHARE * whole:
+        yield f"{odd / whole:.0%} of its area lies elsewhere in the maps"
 
 
 def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
@@ -266,7 +389,11 @@ def _volume_entry(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[s
     return next((one for one in content["volumes"] if one["tile"] == tile_id), None)
 
 
-def _hold_volume(file: Path, voxels: NDArray[np.uint8]) -> Iterator[str]:
+def _hold_volume(
+    task: BundleTask, entry: dict[str, Any], voxels: NDArray[np.uint8]
+) -> Iterator[str]:
+    """Yield what is wrong with a volume's levels and with its bricks; uint8 (z, y, x)."""
+    file = task.bundle / entry["file"]["path"]
     found, expected = _texels(file), mip_levels(voxels)
     if [level.shape[:3] for level in found] != [level.shape for level in expected]:
         yield f"{file.name}: its levels have other sizes than the stage's volume gives"
@@ -275,6 +402,10 @@ def _hold_volume(file: Path, voxels: NDArray[np.uint8]) -> Iterator[str]:
         wrong = int((level[..., 0] != wanted).sum())
         if wrong:
             yield f"{file.name}: level {k}: {wrong} of {wanted.size} voxels are not the stage's"
+    file = task.bundle / entry["bricks"]["path"]
+    (bricks,), ends = _texels(file), min_max_bricks(voxels)
+    if bricks.shape != ends.shape or (bricks != ends).any():
+        yield f"{file.name}: not the least and most of the stage's bricks"
 
 
 def _texels(file: Path) -> list[NDArray[np.uint8]]:

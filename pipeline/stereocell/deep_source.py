@@ -3,7 +3,8 @@
 Surfaces: the iso-surface of the unit's own voxels, before any level of detail is made of it, and
 from it, and to it, the distance of each level: by the same measure as a level's stated distance
 (the 99th percentile over both areas), and the largest of all, vertices too, as the unit's record
-has it. Volumes: every voxel in 8 bits, and the .vdb byte by byte.
+has it. They face as it does, and have the unit's places in the maps. Volumes: every voxel in 8
+bits, and the .vdb that the stage names byte by byte.
 """
 
 import tempfile
@@ -15,20 +16,28 @@ import numpy as np
 
 from stereocell.distance import Nearest, measure_distance, measure_spread
 from stereocell.errors import StereoCellError
-from stereocell.mesh import Mesh
+from stereocell.mesh import Lod, Mesh
 from stereocell.mirror import at_hand
 from stereocell.placement import Matrix
 from stereocell.sources import open_source
 from stereocell.specimen import APRON
 from stereocell.tasks import UnitTask
 from stereocell.unit import find_surface, to_eight_bit
-from stereocell.unit_files import load_quality, load_record
-from stereocell.write.composed import ComposedLod, loaded, open_stage, read_lods, read_volume
+from stereocell.unit_files import load_lods, load_quality, load_record
+from stereocell.write.composed import (
+    ComposedLod,
+    ComposedVolume,
+    loaded,
+    open_stage,
+    read_lods,
+    read_volume,
+)
 from stereocell.write.exr import read_atlas
 from stereocell.write.vdb import write_vdb
 
 # what float32 and another order of the same triangles may do to a distance
 _SHARE, _HAIR_UM = 0.02, 1e-3
+_UV_STEP = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +83,12 @@ def hold_unit(task: SourceTask) -> UnitFinding:
         record = load_record(task.unit.directory)
         levels, faults = _hold_lods(_placed(fine, task.placement), lods, record, task.samples)
         problems += faults
+        problems += _hold_maps(lods, load_lods(task.unit.directory))
         if composed is None:
             problems.append("no volume in the stage")
         else:
             eight_bit = to_eight_bit(volume.voxels, given)
-            problems += _hold_volume(eight_bit, composed.atlas, task)
+            problems += _hold_volume(eight_bit, composed, task)
     return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
 
 
@@ -119,6 +129,8 @@ def _hold_lods(
             )
         if largest > _slack(bound):
             problems.append(f"{name}: up to {largest:.4g} um away, {bound:.4g} when it was built")
+        if _facing(lod.mesh, to_fine) < 0:
+            problems.append(f"{name}: its triangles face inwards")
         built_um = stored["distance_um"]
         if abs(lod.distance_um - built_um) > _HAIR_UM + 1e-5 * built_um:
             problems.append(
@@ -127,12 +139,43 @@ def _hold_lods(
     return tuple(levels), problems
 
 
+def _facing(mesh: Mesh, fine: Nearest) -> float:
+    """Return how far a mesh faces as the finest surface does where it is near: 1 all of it, to -1.
+
+    The mean over its area of the cosine between its normal and the nearest triangle's.
+    """
+    near = fine.nearest_triangles(mesh.positions.astype(np.float64)[mesh.triangles].mean(axis=1))
+    own, other = (
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for corners in (
+            mesh.positions.astype(np.float64)[mesh.triangles],
+            fine.vertices[fine.triangles[near]],
+        )
+    )
+    lengths = np.maximum(np.linalg.norm(other, axis=1), np.finfo(np.float64).tiny)
+    area = float(np.linalg.norm(own, axis=1).sum())
+    return float(((own * other).sum(axis=1) / lengths).sum()) / area
+
+
+def _hold_maps(lods: list[ComposedLod], built: tuple[Lod, ...]) -> list[str]:
+    """Return which levels have other places in their maps than the unit's meshes have."""
+    odd = []
+    for lod in lods:
+        uvs, wanted = lod.mesh.uvs, built[min(lod.level, len(built) - 1)].mesh.uvs
+        if uvs is None or wanted is None or lod.maps.normal is None:
+            continue
+        if uvs.shape != wanted.shape or np.abs(uvs - wanted).max() > _UV_STEP:
+            odd.append(f"lod{lod.level}: its UVs are not the unit's")
+    return odd
+
+
 def _slack(um: float) -> float:
     return um * (1 + _SHARE) + _HAIR_UM
 
 
-def _hold_volume(eight_bit: Any, atlas: Path, task: SourceTask) -> list[str]:
+def _hold_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) -> list[str]:
     problems = []
+    atlas, vdb = composed.atlas, composed.field
     stored = read_atlas(atlas)
     if stored.shape != eight_bit.shape:
         return [
@@ -142,7 +185,8 @@ def _hold_volume(eight_bit: Any, atlas: Path, task: SourceTask) -> list[str]:
     if wrong:
         problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels are not the source's")
     own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
-    vdb = atlas.with_suffix(".vdb")
+    if vdb is None:
+        return [*problems, "its volume has no field with a file"]
     with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
         anew = Path(folder) / vdb.name
         write_vdb(anew, own, task.first_um, task.spacing_um)

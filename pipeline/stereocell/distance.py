@@ -28,6 +28,11 @@ class Nearest:
         squares, _, _ = self._tree.squared_distance(self.vertices, self.triangles, points)
         return np.sqrt(np.asarray(squares).ravel())
 
+    def nearest_triangles(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the index of the triangle that is nearest to each of the points (n, 3)."""
+        _, indices, _ = self._tree.squared_distance(self.vertices, self.triangles, points)
+        return np.asarray(indices, np.int64).ravel()
+
 
 def measure_enclosure(source: Nearest, target: Nearest) -> float:
     """Return the share of the source's area that lies inside the target or on it, 0..1.

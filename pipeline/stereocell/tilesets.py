@@ -23,6 +23,7 @@ class Content:
     named     the content as it stands there: `uri`, `extras`
     error_m   geometricError of its tile
     limit_m   that of the tile's parent
+    boxes     of the tile, its parent and so on: 12 numbers each, z up
     """
 
     tileset: Path
@@ -30,6 +31,7 @@ class Content:
     named: dict[str, Any]
     error_m: float
     limit_m: float
+    boxes: tuple[tuple[float, ...], ...]
 
     @property
     def is_tileset(self) -> bool:
@@ -46,22 +48,32 @@ def walk(bundle: Path, tileset: Path, tile_id: str | None = None) -> Iterator[Co
     was met before.
     """
     place = _place(tileset)
-    yield from _walk_file(_place(bundle), tileset, tile_id, None, {place})
+    yield from _walk_file(_place(bundle), tileset, tile_id, None, (), {place})
 
 
 def _walk_file(
-    bundle: Path, tileset: Path, tile_id: str | None, parent_m: float | None, met: set[Path]
+    bundle: Path,
+    tileset: Path,
+    tile_id: str | None,
+    parent_m: float | None,
+    around: tuple[tuple[float, ...], ...],
+    met: set[Path],
 ) -> Iterator[Content]:
     content = read_json(tileset, None, _REMEDY)
     try:
         whole_m = content["geometricError"]
-        waiting = [
-            (content["root"], float(whole_m) if parent_m is None else min(float(whole_m), parent_m))
-        ]
+        most_m = float(whole_m) if parent_m is None else min(float(whole_m), parent_m)
+        waiting = [(content["root"], most_m, around)]
         while waiting:
-            tile, limit_m = waiting.pop()
+            tile, limit_m, holding = waiting.pop()
             error_m = float(tile["geometricError"])
-            waiting += [(child, error_m) for child in reversed(tile.get("children", ()))]
+            if "transform" in tile:
+                raise CheckError(
+                    f"{tileset}: found a tile with a transform, expected none: surfaces lie in the "
+                    "world"
+                )
+            boxes = (tuple(float(n) for n in tile["boundingVolume"]["box"]), *holding)
+            waiting += [(child, error_m, boxes) for child in reversed(tile.get("children", ()))]
             if "content" not in tile:
                 continue
             uri = tile["content"]["uri"]
@@ -73,13 +85,13 @@ def _walk_file(
                 raise CheckError(f"{tileset}: {uri} is outside the bundle")
             if tile_id is not None and place.parent.name != tile_id:
                 continue
-            found = Content(tileset, path, tile["content"], error_m, limit_m)
+            found = Content(tileset, path, tile["content"], error_m, limit_m, boxes)
             yield found
             if found.is_tileset:
                 if place in met:
                     raise CheckError(f"{tileset}: {uri} is a tileset that was named before")
                 met.add(place)
-                yield from _walk_file(bundle, path, tile_id, error_m, met)
+                yield from _walk_file(bundle, path, tile_id, error_m, boxes, met)
     except (AttributeError, KeyError, OSError, TypeError, ValueError) as error:
         raise CheckError(f"{tileset}: no 3D Tiles tileset: {error!r:.200}") from error
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -98,22 +99,27 @@ def export_tile(
     """
     stage = open_stage(stage_path)
     with loaded(stage, tile_id) as (tile, choice):
-        channels, boxes = [], []
-        for look in looks:
-            volume = read_volume(tile, look.id)
-            if volume is not None:
-                boxes.append(move_box(np.array(volume.low), np.array(volume.high), volume.matrix))
-            channels.append(_export_channel(root, tile, look, volume, choice.finest_lod, step_m))
-        low, high = (
-            np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True)
-        )
-    return BundleTile(
-        tile_id,
-        choice.representation,
-        _point(low.min(axis=0)),
-        _point(high.max(axis=0)),
-        tuple(channels),
-    )
+        volumes = [read_volume(tile, look.id) for look in looks]
+        channels = [
+            _export_channel(root, tile, look, volume, choice.finest_lod, step_m)
+            for look, volume in zip(looks, volumes, strict=True)
+        ]
+        low, high = find_bounds(tile, volumes)
+    return BundleTile(tile_id, choice.representation, low, high, tuple(channels))
+
+
+def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tuple[Point, Point]:
+    """Return the corners (x, y, z), world um, of a loaded tile's volumes; without any, of its box.
+
+    Raises StageError.
+    """
+    boxes = [
+        move_box(np.array(volume.low), np.array(volume.high), volume.matrix)
+        for volume in volumes
+        if volume is not None
+    ]
+    low, high = (np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True))
+    return _point(low.min(axis=0)), _point(high.max(axis=0))
 
 
 def _export_channel(

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol
 
 from stereocell.errors import StageError
 from stereocell.mesh import Mesh
@@ -52,12 +52,14 @@ class ComposedLod:
 class ComposedVolume:
     """One volume: the file with its voxels, and where they are.
 
+    field       the .vdb that other programs draw; None: the stage names none
     size        voxels (x, y, z) with the apron
     low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
     matrix      (4, 4) for row vectors, to world um
     """
 
     atlas: Path
+    field: Path | None
     size: tuple[int, int, int]
     apron: int
     low: Point
@@ -208,12 +210,21 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
         )
     return ComposedVolume(
         file_of(prim.GetAttribute("stereocell:atlas")),
+        _field_of(prim),
         (width, height, depth),
         apron,
         point_of(prim, "stereocell:boundsMin"),
         point_of(prim, "stereocell:boundsMax"),
         _to_world(prim),
     )
+
+
+def _field_of(volume: Usd.Prim) -> Path | None:
+    """Return the file of a volume's one field; None where there is none."""
+    for prim in UsdVol.Volume(volume).GetFieldPaths().values():
+        asset = UsdVol.FieldAsset(volume.GetStage().GetPrimAtPath(prim)).GetFilePathAttr().Get()
+        return Path(asset.resolvedPath) if asset and asset.resolvedPath else None
+    return None
 
 
 def _check_composition(stage: Usd.Stage) -> None:

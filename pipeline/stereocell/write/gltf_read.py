@@ -33,6 +33,7 @@ class Drawn:
     colors       of the vertices, 0..1 (n, 3), or None
     color        of the material, linear RGB 0..1
     maps         KTX2 files by their names in the material
+    uvs          of the vertices, v downwards (n, 2), or None
     step_m       between two places that a vertex may have
     """
 
@@ -41,6 +42,7 @@ class Drawn:
     colors: NDArray[np.float64] | None
     color: tuple[float, float, float]
     maps: dict[str, bytes]
+    uvs: NDArray[np.float64] | None
     step_m: float
 
 
@@ -74,6 +76,10 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     colors = None
     if "COLOR_0" in attributes:
         colors = _decode(document, binary, attributes["COLOR_0"])[:, :3] / 255.0
+    uvs = None
+    if "TEXCOORD_0" in attributes:
+        stored = _decode(document, binary, attributes["TEXCOORD_0"])
+        uvs = stored / (0xFFFF if stored.dtype == np.uint16 else 1.0)
     material = document["materials"][primitive["material"]]
     shading = material["pbrMetallicRoughness"]
     red, green, blue, _ = shading["baseColorFactor"]
@@ -88,6 +94,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
             for name in holder
             if name.endswith("Texture")
         },
+        uvs,
         float(scale[0]),
     )
 
