@@ -365,13 +365,6 @@ def test_without_its_source_the_bundle_is_held_against_the_stage_all_the_same(
     assert {MANIFEST, BUNDLE} <= found.keys()
 
 
-def test_a_bundle_by_itself_is_not_held_against_a_stage(
-    built: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["check", str(built / "bundle"), "--deep", "--workers", "0"]) == 1
-    assert "a bundle by itself, expected OUT" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["channels/F/r0_c0/lod0.glb", "volumes/r0_c1/F.ktx2"])
 def test_a_cut_file_is_named_in_a_line(out: Path, name: str) -> None:

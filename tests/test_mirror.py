@@ -3,12 +3,14 @@
 import hashlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -121,6 +123,40 @@ def test_what_is_lost_or_half_made_there_is_made_again(
     assert main(["check", there]) == 1
     assert f"FAIL manifest: {there}/bundle/manifest.json is missing" in capsys.readouterr().out
     fs.pipe_file("bucket/there/bundle/manifest.json", manifest)
+
+
+@pytest.mark.slow
+def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
+    store: ObjectStore, volume: Path, local: dict[str, str]
+) -> None:
+    fs, out = store.files(), "s3://bucket/killed"
+    finished: dict[str, object] = {}  # objects of finished units: when they were put there
+    for part in ("units/r0_c", "bundle/volumes/"):
+        command = [sys.executable, "-m", "stereocell.cli", "build", str(volume), "-o", out]
+        build = subprocess.Popen(
+            [*command, *ARGUMENTS], stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        while build.poll() is None and not _objects(fs, f"bucket/killed/{part}"):
+            time.sleep(0.01)
+        os.killpg(build.pid, signal.SIGKILL)
+        assert build.wait() == -signal.SIGKILL
+        for name, found in _objects(fs, "bucket/killed/units/r0_c").items():
+            finished.setdefault(name, found)
+    assert finished
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    assert of_parts(kept(store, "bucket/killed")) == of_parts(local)
+    now = _objects(fs, "bucket/killed/units/r0_c")
+    assert {name: now[name] for name in finished} == finished
+
+
+def _objects(fs: Any, start: str) -> dict[str, object]:
+    """When each object was put there whose name starts so."""
+    fs.invalidate_cache()
+    return {
+        name: found["LastModified"]
+        for name, found in fs.find("bucket/killed", detail=True).items()
+        if name.startswith(start)
+    }
 
 
 def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(

@@ -30,7 +30,8 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
     store = Store(out)
     if not store.plan_file.exists() and (out / MANIFEST).is_file():
         raise OutputError(
-            f"{out}: a bundle by itself, expected OUT: a bundle is held against OUT/stage"
+            f"{out}: a bundle by itself, expected OUT, with its plan.json: there is the stage that "
+            "the bundle is held against"
         )
     plan = store.plan()
     yield _line("tiles of the stage", lambda: _hold_tiles(store, plan))
