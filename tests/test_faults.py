@@ -1,10 +1,12 @@
 """What a build depends on goes away in the middle and comes back: one line, then the same bytes."""
 
+import socket
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import fsspec
 import pytest
 
 import phantoms
@@ -13,6 +15,7 @@ from faulty_store import FAULTS, Faults, before
 from object_store import ObjectStore, serving
 from stereocell import rounds
 from stereocell.cli import main
+from stereocell.read import location
 from torture import asset_digests
 
 GRID = "2x1"
@@ -155,3 +158,32 @@ def test_a_store_that_is_down_is_named_and_the_build_goes_on_when_it_is_up(
         assert "s3://bucket/" in only_line(capsys)
     assert make_assets(source, out, GRID, "--workers", "0") == 0
     assert kept(files, "bucket/down", tmp_path / "down") == undisturbed
+
+
+@pytest.fixture
+def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The address of a host that takes connections and says nothing."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        host = f"127.0.0.1:{server.getsockname()[1]}"
+        # another file system than that of the tests before, which has an endpoint already
+        told = {"anon": True, "config_kwargs": {"user_agent_extra": host}}
+        monkeypatch.setitem(fsspec.config.conf, "s3", told)
+        yield host
+
+
+@pytest.mark.parametrize("source", ["s3://b/f.ome.zarr", "http://HOST/f.ome.zarr", ""])
+def test_a_silent_store_is_told_in_a_line(
+    source: str,
+    silent: str,
+    volume: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{silent}")
+    monkeypatch.setattr(location, "ANSWER_S", 1.0)
+    source = source.replace("HOST", silent)
+    out = tmp_path / "out" if source else "s3://b/out"
+    assert main(["plan", source or str(volume), "-o", str(out)]) == 1
+    where = source or out
+    assert only_line(capsys).startswith(f"stereocell: {where}: no answer within ")

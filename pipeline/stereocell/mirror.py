@@ -80,12 +80,16 @@ class Mirror:
         """The file system of fsspec, and OUT's path in it."""
         import fsspec
 
-        from stereocell.read.location import Location
+        from stereocell.read.location import ANSWER_S, Location, does_answer
 
         address = self.place.address
         options = Location.of(address).storage_options
         with self._telling("", "read"):
             fs, path = fsspec.core.url_to_fs(address, use_listings_cache=False, **options)
+        if not does_answer(fs, path):
+            raise OutputError(
+                f"{self.place.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
+            )
         return fs, str(path).rstrip("/")
 
     @contextmanager

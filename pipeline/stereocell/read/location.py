@@ -8,6 +8,9 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import fsspec
+from fsspec import AbstractFileSystem
+from fsspec.asyn import AsyncFileSystem, sync
+from fsspec.exceptions import FSTimeoutError
 
 from stereocell.errors import UsageError
 
@@ -17,6 +20,8 @@ _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
+ANSWER_S = 30.0
+_CONNECT_S, _SILENCE_S = 15.0, 30.0  # of one request, which is tried again
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
     "AWS_PROFILE",
@@ -102,13 +107,15 @@ class Location:
 
         s3: signed requests if this machine's environment holds credentials or `FSSPEC_S3` says
         so, else anonymous ones, which public buckets take. The endpoint comes from the usual
-        environment (`AWS_ENDPOINT_URL`).
+        environment (`AWS_ENDPOINT_URL`), and what `FSSPEC_S3` says of waiting goes first.
         """
         if urlsplit(self.source).scheme not in ("s3", "s3a"):
             return {}
         configured = fsspec.config.conf.get("s3", {})
+        waits = {"connect_timeout": _CONNECT_S, "read_timeout": _SILENCE_S}
+        options = {"config_kwargs": {**waits, **configured.get("config_kwargs", {})}}
         if "anon" in configured:
-            return {"anon": configured["anon"]}
+            return {**options, "anon": configured["anon"]}
         files = (
             os.environ.get("AWS_SHARED_CREDENTIALS_FILE", "~/.aws/credentials"),
             os.environ.get("AWS_CONFIG_FILE", "~/.aws/config"),
@@ -116,7 +123,23 @@ class Location:
         signed = any(name in os.environ for name in _AWS_CREDENTIALS) or any(
             os.path.exists(os.path.expanduser(file)) for file in files
         )
-        return {"anon": not signed}
+        return {**options, "anon": not signed}
+
+
+def does_answer(files: AbstractFileSystem, path: str) -> bool:
+    """Return whether a store says anything at all within ANSWER_S; errors are an answer too.
+
+    Each request is tried again, with its own wait: without this one, a host that takes connections
+    and is silent would be waited for for minutes.
+    """
+    if isinstance(files, AsyncFileSystem):
+        try:
+            sync(files.loop, files._exists, path, timeout=ANSWER_S)
+        except FSTimeoutError:
+            return False
+        except Exception:  # told by who reads, better
+            pass
+    return True
 
 
 def require_apart(source: str | Path, out: Path) -> None:

@@ -5,12 +5,14 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import fsspec
 import numpy as np
 
 from stereocell.errors import SourceError, UsageError
 from stereocell.read.dataset import ChannelInfo, Dataset
+from stereocell.read.faults import one_line
 from stereocell.read.image import Image
-from stereocell.read.location import Location
+from stereocell.read.location import ANSWER_S, Location, does_answer
 from stereocell.read.spacing import Triple, levels_of
 
 DTYPES = ("uint8", "uint16", "int16", "float32")
@@ -70,6 +72,13 @@ def open(
             "expected OME-Zarr (NAME.zarr), OME-TIFF (NAME.ome.tif), NIfTI (NAME.nii, NAME.nii.gz) "
             "or DICOM (a folder or a file, on this machine)"
         )
+    if not location.is_local:
+        with one_line(location.shown, "an address that fsspec opens"):
+            files, path = fsspec.url_to_fs(location.source, **location.storage_options)
+        if not does_answer(files, path):
+            raise SourceError(
+                f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
+            )
     if location.format == "dicom":
         from stereocell.read.dicom import read_image
 
