@@ -169,7 +169,7 @@ def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
     told = capsys.readouterr().out
-    assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130", "143"))
+    assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130", "141", "143"))
 
 
 def test_no_color_leaves_the_colours_out() -> None:
@@ -189,3 +189,50 @@ def test_no_color_leaves_the_colours_out() -> None:
 
     assert "\x1b[31m" in colours()
     assert colours(NO_COLOR="1") == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["settings"], 141, ""),
+        (["settings", "--json"], 141, ""),
+        (["check", "no-such-folder", "--json"], 141, "stereocell: no-such-folder: "),
+    ],
+)
+def test_who_goes_away_in_the_middle_of_an_answer_is_no_error(
+    arguments: list[str], code: int, told: str
+) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "stereocell.cli", *arguments]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert done.returncode == code
+    assert done.stderr.startswith(told)
+    assert len(done.stderr.splitlines()) == bool(told)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+@pytest.mark.parametrize("flags", [[], ["--json"]])
+def test_an_answer_for_which_there_is_no_space_is_an_error_of_one_line(flags: list[str]) -> None:
+    command = [sys.executable, "-m", "stereocell.cli", "settings", *flags]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "stereocell: stdout: No space left on device\n"
+
+
+def test_a_port_that_there_is_not_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["view", "out/mine", "--port", "99999"]) == 2
+    assert "'99999' is no port, expected 0 to 65535" in capsys.readouterr().err
+
+
+def test_a_bundle_by_itself_is_not_viewed_but_told_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "manifest.json").write_text("{}")
+    assert main(["view", str(tmp_path), "--no-browser"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(
+        f"stereocell: {tmp_path}: a bundle by itself, expected the OUT that holds"
+    )

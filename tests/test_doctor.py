@@ -82,3 +82,29 @@ def test_a_look_that_wants_a_missing_package_says_so(
     told = capsys.readouterr().out
     assert "without memory: No module named 'no_such_package'" in told
     assert "without disk" in told or "ok      disk" in told
+
+
+def test_a_folder_that_is_gone_does_not_end_the_looks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert main(["doctor"]) == 0
+    told = capsys.readouterr().out
+    assert "without disk: No such file or directory: not looked at\n" in told
+    assert "GPU" in told
+
+
+def test_a_browser_and_a_node_are_there_and_new_enough_or_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = tmp_path / "node"
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    for version, is_new in (("v18.2.0", False), ("v20.19.0", True), ("oh", False)):
+        node.write_text(f"#!/bin/sh\necho {version}\n")
+        node.chmod(0o755)
+        assert doctor._node().ok == is_new
+    for browser, is_there in (("no-such-browser", False), ("no-such:node %s", True)):
+        monkeypatch.setenv("BROWSER", browser)
+        assert doctor._browser().ok == is_there

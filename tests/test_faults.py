@@ -187,3 +187,56 @@ def test_a_silent_store_is_told_in_a_line(
     assert main(["plan", source or str(volume), "-o", str(out)]) == 1
     where = source or out
     assert only_line(capsys).startswith(f"stereocell: {where}: no answer within ")
+
+
+class Moody(SimpleHTTPRequestHandler):
+    """Serves files; of the finest level in drips, or not at all once `is_hushed`."""
+
+    is_hushed = Event()
+    is_over = Event()
+
+    def copyfile(self, source: Any, outputfile: Any) -> None:
+        if "/0/" not in self.path:
+            return super().copyfile(source, outputfile)
+        if self.is_hushed.is_set():
+            self.is_over.wait(30)
+            return
+        content = source.read()
+        for part in range(8):
+            outputfile.write(content[len(content) * part // 8 : len(content) * (part + 1) // 8])
+            outputfile.flush()
+            time.sleep(0.1)
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_web_host_may_be_slow_but_not_silent(
+    volume: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(location, "SILENCE_S", 0.5)
+    Moody.is_hushed.clear()
+    Moody.is_over.clear()
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Moody, directory=str(volume.parent)))
+    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    source = f"http://127.0.0.1:{server.server_address[1]}/{volume.name}"
+    try:
+        begin = time.monotonic()
+        dataset = read.open(source)  # the array's metadata drip, too
+        dataset.read(0, dataset.levels[0].box)
+        assert time.monotonic() - begin > 1.0
+        Moody.is_hushed.set()
+        with pytest.raises(SourceError, match=r"f\.ome\.zarr.*did not answer within 0\.5 s"):
+            dataset.read(0, dataset.levels[0].box)
+    finally:
+        Moody.is_over.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def test_what_the_user_has_of_web_clients_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = {"timeout": ClientTimeout(total=7), "trust_env": True}
+    monkeypatch.setitem(fsspec.config.conf, "http", {"client_kwargs": told})
+    assert Location.of("https://a/b.ome.zarr").storage_options == {"client_kwargs": told}

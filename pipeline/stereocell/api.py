@@ -50,9 +50,15 @@ def build(
     from stereocell.mirror import opened
     from stereocell.read.location import Location, require_apart
 
-    if workers < 0:
-        raise UsageError(f"workers is {workers}, expected 0 or more")
-    wanted = load(preset, None if config is None else Path(config), dict(settings or {}))
+    if not isinstance(workers, int) or workers < 0:
+        raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")
+    if not isinstance(settings, Mapping | None):
+        raise UsageError(
+            f"settings are {settings!r:.60}, expected sections and keys, as "
+            "{'plan': {'level': 1}}"
+        )
+    file = None if config is None else Path(config)
+    wanted = load(preset, file, settings or {}, "settings")
     place = Location.of(out)
     with ExitStack() as stack:
         if place.is_local:

@@ -1,6 +1,7 @@
 """The command `stereocell`: one subcommand per phase, and one that runs them all."""
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -17,12 +18,25 @@ EXIT_CODES = """exit codes:
   1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
   2    wrong usage
   130  stopped by Ctrl+C: the same command goes on from there
+  141  who read the answer went away, as `| head` does
   143  stopped by SIGTERM, likewise"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
-    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        return _main(sys.argv[1:] if arguments is None else arguments)
+    except commands.StdoutLost as lost:
+        # Python would try again at its end what stdout still holds
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        error = lost.error
+    if isinstance(error, BrokenPipeError):
+        return 141  # as a shell has it of what SIGPIPE ends
+    print(f"stereocell: stdout: {error.strerror or error}", file=sys.stderr)
+    return 1
+
+
+def _main(words: Sequence[str]) -> int:
     options = argparse.Namespace(json="--json" in words)  # until they are read
     try:
         options = _parser().parse_args(words)
@@ -41,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
     print(f"stereocell: {_shortened(line)}", file=sys.stderr)
     if options.json:
-        print(commands.to_json({"error": line, "exit_code": code}))
+        commands.tell(commands.to_json({"error": line, "exit_code": code}))
     return code
 
 

@@ -29,10 +29,26 @@ class Answer:
 Handler = Callable[[argparse.Namespace], Answer]
 
 
+class StdoutLost(Exception):
+    """What is answered can't be told: stdout takes no more. `error` says why."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(error)
+        self.error = error
+
+
+def tell(text: str) -> None:
+    """Print a line on stdout, now. Raises StdoutLost."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        raise StdoutLost(error) from error
+
+
 def say(options: argparse.Namespace, text: str) -> None:
     """Tell a person something."""
     if not options.json:
-        print(plain(_as_given(options, text)), flush=True)
+        tell(plain(_as_given(options, text)))
 
 
 def plain(text: str) -> str:
@@ -45,7 +61,7 @@ def plain(text: str) -> str:
 def answer(options: argparse.Namespace, found: Answer) -> int:
     """Tell a machine what was found, if one asked; return the exit code."""
     if options.json and found.data:
-        print(_as_given(options, to_json(found.data)))
+        tell(_as_given(options, to_json(found.data)))
     return found.code
 
 

@@ -111,6 +111,12 @@ def _count(text: str) -> int:
     return int(text)
 
 
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 0xFFFF:
+        raise argparse.ArgumentTypeError(f"{text!r} is no port, expected 0 to 65535")
+    return int(text)
+
+
 def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
     from stereocell.errors import UsageError
 
@@ -280,7 +286,7 @@ def declare_view(parser: argparse.ArgumentParser) -> None:
 
 def declare_serve(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
-    parser.add_argument("--port", type=_count, default=8000, help="default 8000; 0: any free one")
+    parser.add_argument("--port", type=_port, default=8000, help="default 8000; 0: any free one")
     parser.add_argument(
         "--lan",
         action="store_true",

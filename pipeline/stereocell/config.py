@@ -173,17 +173,19 @@ _BY_CHANNEL = {
 }
 
 
-def load(preset: str | None, config: Path | None, flags: Mapping[str, Any]) -> Settings:
+def load(
+    preset: str | None, config: Path | None, flags: Mapping[str, Any], where: str = "command line"
+) -> Settings:
     """Return the settings of a preset (name or TOML file), a TOML file and flags, in that order.
 
-    `flags` is nested as the TOML is: {"plan": {"level": 1}}. Raises UsageError.
+    `flags` is nested as the TOML is: {"plan": {"level": 1}}; `where` they stand. Raises UsageError.
     """
     settings = Settings()
     if preset is not None:
         settings = apply(settings, _read(preset_path(preset)), f"preset {preset}")
     if config is not None:
         settings = apply(settings, _read(config), str(config))
-    return apply(settings, flags, "command line")
+    return apply(settings, flags, where)
 
 
 def preset_path(preset: str) -> Path:

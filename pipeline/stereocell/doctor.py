@@ -3,6 +3,7 @@
 import os
 import platform
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -12,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from packaging.requirements import Requirement
+from packaging.version import InvalidVersion, Version
 
 from stereocell.assets import viewer_dist
 from stereocell.processes import available_bytes, cores
@@ -19,6 +21,7 @@ from stereocell.processes import available_bytes, cores
 _GIB = 1 << 30
 UNIT_BYTES = 3.5 * _GIB  # what a unit of 194 x 512 x 512 voxels is allowed for
 _LEAST_FREE = 20 * _GIB
+_NODE = Version("20.19")
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "open")
 
 
@@ -46,6 +49,9 @@ def examine() -> Iterator[Finding]:
         except ImportError as error:  # the line of the packages says which are missing
             name = look.__name__.strip("_")
             yield Finding(name, False, str(error), "not looked at: install StereoCell anew")
+        except OSError as error:  # a folder that is gone, or not to be read
+            name = look.__name__.strip("_")
+            yield Finding(name, False, error.strerror or str(error), "not looked at")
 
 
 def _python() -> Finding:
@@ -120,16 +126,28 @@ def _viewer() -> Finding:
 
 
 def _browser() -> Finding:
-    named = os.environ.get("BROWSER") or os.environ.get("CHROMIUM")
-    found = named or next((name for name in _BROWSERS if shutil.which(name)), "")
+    named = os.environ.get("BROWSER") or os.environ.get("CHROMIUM") or ""
+    # BROWSER is a list of commands, maybe with arguments
+    names = [one.split()[0] for one in named.split(os.pathsep) if one.strip()] or _BROWSERS
+    found = next((name for name in names if shutil.which(name)), "")
+    lacking = f"BROWSER names {named}, which is not there" if named else "none on the PATH"
     cost = "`stereocell view` opens no window here: open its address on another machine (--lan)"
-    return _finding("browser", bool(found), found or "none on the PATH", cost)
+    return _finding("browser", bool(found), found or lacking, cost)
 
 
 def _node() -> Finding:
-    found = shutil.which("node")
+    path = shutil.which("node")
     cost = "`stereocell check` can't run the validators of glTF and KTX2; viewing needs none"
-    return _finding("Node.js", found is not None, found or "none on the PATH", cost)
+    if path is None:
+        return _finding("Node.js", False, "none on the PATH", cost)
+    try:
+        told = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=20)
+        there = Version(told.stdout.strip())
+    except (subprocess.TimeoutExpired, InvalidVersion):
+        return _finding("Node.js", False, f"{path} does not tell its version", cost)
+    is_new = there >= _NODE
+    found = f"{there} at {path}" + ("" if is_new else f", expected {_NODE} or newer")
+    return _finding("Node.js", is_new, found, cost)
 
 
 def _gpu() -> Finding:

@@ -90,6 +90,11 @@ class BundleServer:
     def __init__(self, out: Path, port: int, lan: bool) -> None:
         """Raises StereoCellError if there is no bundle, the port is taken, or no network."""
         bundle = out / "bundle"
+        if not bundle.exists() and (out / "manifest.json").is_file():
+            raise StereoCellError(
+                f"{out}: a bundle by itself, expected the OUT that holds it as its `bundle`; any "
+                "static web server shows it, too"
+            )
         for name in ("manifest.json", "index.html"):
             if not (bundle / name).is_file():
                 raise StereoCellError(

@@ -17,6 +17,7 @@ from zarr.errors import NodeNotFoundError
 from zstandard import ZstdError
 
 from stereocell.errors import SourceError, StereoCellError
+from stereocell.read import location
 
 # Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
 # KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
@@ -91,6 +92,8 @@ def _reason(error: BaseException) -> str:
         return f"metadata: {error}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
+    if isinstance(error, TimeoutError):  # aiohttp's, by which it means silence
+        return f"did not answer within {location.SILENCE_S:g} s"
     return _shortened(str(error)) or type(error).__name__
 
 

@@ -20,8 +20,8 @@ _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
-ANSWER_S = 30.0
-_CONNECT_S, _SILENCE_S = 15.0, 30.0  # of one request, which is tried again
+ANSWER_S = 25.0  # less than SILENCE_S: of a timeout fsspec's http makes "does not exist"
+_CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs tries it again
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
     "AWS_PROFILE",
@@ -108,11 +108,15 @@ class Location:
         s3: signed requests if this machine's environment holds credentials or `FSSPEC_S3` says
         so, else anonymous ones, which public buckets take. The endpoint comes from the usual
         environment (`AWS_ENDPOINT_URL`), and what `FSSPEC_S3` says of waiting goes first.
+        http: waits for silence alone, else aiohttp gives up what takes 5 minutes, however it goes.
         """
-        if urlsplit(self.source).scheme not in ("s3", "s3a"):
+        scheme = urlsplit(self.source).scheme
+        if scheme in ("http", "https"):
+            return {"client_kwargs": _http_client()}
+        if scheme not in ("s3", "s3a"):
             return {}
         configured = fsspec.config.conf.get("s3", {})
-        waits = {"connect_timeout": _CONNECT_S, "read_timeout": _SILENCE_S}
+        waits = {"connect_timeout": _CONNECT_S, "read_timeout": SILENCE_S}
         options = {"config_kwargs": {**waits, **configured.get("config_kwargs", {})}}
         if "anon" in configured:
             return {**options, "anon": configured["anon"]}
@@ -124,6 +128,17 @@ class Location:
             os.path.exists(os.path.expanduser(file)) for file in files
         )
         return {**options, "anon": not signed}
+
+
+def _http_client() -> dict[str, Any]:
+    """Return aiohttp's settings: ours, and over them what the user has for fsspec."""
+    from aiohttp import ClientTimeout  # slow to import, and only the network wants it
+
+    waits = ClientTimeout(total=None, sock_connect=SILENCE_S, sock_read=SILENCE_S)
+    configured: dict[str, Any] = {}
+    for protocol in ("http", "https"):  # one file system to fsspec: either's settings are both's
+        configured |= fsspec.config.conf.get(protocol, {}).get("client_kwargs", {})
+    return {"timeout": waits, **configured}
 
 
 def does_answer(files: AbstractFileSystem, path: str) -> bool:

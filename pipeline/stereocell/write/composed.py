@@ -73,7 +73,9 @@ def open_stage(path: Path) -> Usd.Stage:
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     except Tf.ErrorException as error:
-        raise StageError(f"{path}: can't be opened as a USD stage: {one_line(error)}") from error
+        raise StageError(
+            f"{path}: can't be opened, expected a USD stage or layer: {one_line(error)}"
+        ) from error
     finally:
         del quiet
     _check_composition(stage)
