@@ -1,6 +1,7 @@
 """Fixtures that several test modules share: tiny sources on disk, and servers on loopback."""
 
 import subprocess
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -20,8 +21,17 @@ from object_store import VERSITYGW
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
 
 
-def pytest_report_header() -> str:
-    return f"object store of the tests: {'moto' if VERSITYGW is None else 'versitygw'}"
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say what ran and what did not: the header is not shown by `-q`."""
+    store = "moto" if VERSITYGW is None else "versitygw"
+    terminalreporter.write_line(f"object store of the tests: {store}")
+    reasons = Counter(
+        str(report.longrepr[2]).removeprefix("Skipped: ")
+        for report in terminalreporter.stats.get("skipped", ())
+        if isinstance(report.longrepr, tuple)
+    )
+    for reason, count in sorted(reasons.items()):
+        terminalreporter.write_line(f"skipped {count}: {reason}")
 
 
 @pytest.fixture

@@ -2,20 +2,27 @@
 
 import socket
 import subprocess
+import time
 from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import fsspec
 import pytest
+from aiohttp import ClientTimeout
 
 import phantoms
 from assets import make_assets
 from faulty_store import FAULTS, Faults, before
 from object_store import ObjectStore, serving
-from stereocell import rounds
+from stereocell import read, rounds
 from stereocell.cli import main
+from stereocell.errors import SourceError
 from stereocell.read import location
+from stereocell.read.location import Location
 from torture import asset_digests
 
 GRID = "2x1"

@@ -1,10 +1,13 @@
 """A result's key follows all the code, files and libraries that make it, and nothing else."""
 
 import shutil
-from importlib.metadata import packages_distributions
+import sys
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from stereocell import assets, lineage, report, staging, tasks
 from stereocell.write import bundle
@@ -80,3 +83,15 @@ def test_packages_are_found_as_python_finds_them() -> None:
     found = lineage._distributions()
     for top, names in packages_distributions().items():
         assert {package.name for package in found[top]} == set(names), top
+
+
+def test_what_is_imported_is_declared() -> None:
+    """A package that comes along with another one is gone when that one does without it."""
+    declared = {canonicalize_name(Requirement(line).name) for line in requires("stereocell") or ()}
+    installed = lineage._distributions()
+    for file in (ROOT / "pipeline" / "stereocell").rglob("*.py"):
+        for name in lineage._needs(file)[1]:
+            top = name.split(".")[0]
+            if top not in sys.stdlib_module_names and top != "stereocell":
+                owners = {canonicalize_name(package.name) for package in installed[top]}
+                assert owners & declared, f"{file.name} imports {top}"

@@ -16,8 +16,8 @@ from pydantic import ValidationError
 from zarr.errors import NodeNotFoundError
 from zstandard import ZstdError
 
+import stereocell.read.location as location
 from stereocell.errors import SourceError, StereoCellError
-from stereocell.read import location
 
 # Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
 # KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
@@ -92,8 +92,9 @@ def _reason(error: BaseException) -> str:
         return f"metadata: {error}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
-    if isinstance(error, TimeoutError):  # aiohttp's, by which it means silence
-        return f"did not answer within {location.SILENCE_S:g} s"
+    if isinstance(error, TimeoutError):  # aiohttp says more of silence than of other waits
+        is_silence = bool(str(error))
+        return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"
     return _shortened(str(error)) or type(error).__name__
 
 

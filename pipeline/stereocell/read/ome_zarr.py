@@ -36,7 +36,9 @@ def read_image(location: Location) -> Image:
     with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
         if location.is_local:
             require_metadata(Path(location.source))
-        reader = Reader(location.source, fs_kwargs=location.storage_options)
+        options = location.storage_options
+        options.pop("client_kwargs", None)  # bioio's file system goes through JSON, aiohttp's not
+        reader = Reader(location.source, fs_kwargs=options)
         metadata = reader.metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
