@@ -43,8 +43,8 @@ def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
         ({"workers": 2.5}, "workers is 2.5, expected a whole number, 0 or more"),
         ({"settings": [1]}, "settings are [1], expected sections and keys, as {'plan'"),
         ({"settings": {"plan": {"grid": 3}}}, "settings: plan.grid is 3"),
-        ({"preset": 3}, "preset is 3, expected a name or a path"),
-        ({"config": 3}, "config is 3, expected a name or a path"),
+        ({"preset": 3}, "preset is 3, expected a name or a TOML file's"),
+        ({"config": 3}, "config is 3, expected a TOML file"),
         ({"out": None}, "out is None, expected a path or an address"),
     ],
 )

@@ -181,7 +181,7 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
         ("tiles/r0_c1/CD31.exr", r"CD31_r0_c1_volume\.stereocell:atlas: no file at './CD31.exr'"),
         ("tiles/r0_c1/tile.usdc", r"tile\.usdc@ for payload .*/Specimen/Tiles/r0_c1"),
         ("looks/channels.usda", r"looks/channels\.usda"),
-        ("stage.usda", r"stage\.usda: can't be opened"),
+        ("stage.usda", r"stage\.usda: can't be opened, expected a USD layer \(\.usda, "),
     ],
 )
 def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):

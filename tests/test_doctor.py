@@ -108,3 +108,12 @@ def test_a_browser_and_a_node_are_there_and_new_enough_or_not(
     for browser, is_there in (("no-such-browser", False), ("no-such:node %s", True)):
         monkeypatch.setenv("BROWSER", browser)
         assert doctor._browser().ok == is_there
+
+
+def test_what_few_need_is_told_as_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "find_spec", lambda module: None)
+    found = {one.name: one for one in doctor.examine()}
+    for name, wanted_by in (("pymeshlab", "--wrap alpha-wrap"), ("onnxruntime", "--model")):
+        assert not found[name].ok
+        assert found[name].cost.startswith("optional, ")
+        assert wanted_by in found[name].cost

@@ -314,6 +314,34 @@ def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(
         assert "`stereocell bundle OUT`" in line
 
 
+def test_a_bundle_is_served_by_its_own_folder_with_bricks_where_it_is_a_builds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of_build, by_itself = tmp_path / "out" / "bundle", tmp_path / "sent" / "bundle"
+    for folder in (of_build, by_itself):
+        folder.mkdir(parents=True)
+        (folder / "manifest.json").write_text("{}")
+        (folder / "index.html").write_text("<!doctype html>")
+    (tmp_path / "out" / "plan.json").write_text("{}")
+    monkeypatch.chdir(of_build)
+    for folder, has_bricks in ((of_build, True), (Path(), True), (by_itself, False)):
+        server = BundleServer(folder, 0, lan=False)
+        thread = Thread(target=server.run)
+        thread.start()
+        while not server.has_started:
+            time.sleep(0.01)
+        try:
+            response, body = ask(server.port, "/manifest.json")
+            assert (response.status, body) == (200, b"{}")
+            assert ("Stereocell-Bricks" in response.headers) == has_bricks
+            if not has_bricks:
+                with pytest.raises(InvalidStatus), connect(f"ws://localhost:{server.port}/bricks"):
+                    pass
+        finally:
+            server.stop()
+            thread.join()
+
+
 def test_a_taken_port_is_named(bundle: Path) -> None:
     with socket.socket() as taken:
         taken.bind((LOCALHOST, 0))

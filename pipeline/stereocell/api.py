@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from stereocell.errors import UsageError
@@ -52,6 +53,17 @@ def build(
 
     if not isinstance(workers, int) or workers < 0:
         raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")
+    path = (str, Path)
+    kinds: tuple[tuple[str, Any, tuple[type, ...], str], ...] = (
+        ("source", source, path, "a path or an address"),
+        ("out", out, path, "a path or an address"),
+        ("preset", preset, (str, NoneType), "a name or a TOML file's"),
+        ("config", config, (*path, NoneType), "a TOML file"),
+        ("scheduler", scheduler, (str,), "an address or a file's name"),
+    )
+    for name, value, types, expected in kinds:
+        if not isinstance(value, types):
+            raise UsageError(f"{name} is {value!r:.60}, expected {expected}")
     if not isinstance(settings, Mapping | None):
         raise UsageError(
             f"settings are {settings!r:.60}, expected sections and keys, as "

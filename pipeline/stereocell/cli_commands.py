@@ -269,15 +269,19 @@ def doctor(options: argparse.Namespace) -> Answer:
 
 
 def view(options: argparse.Namespace) -> Answer:
-    from stereocell.serve import serve
-
     # on the LAN everybody needs the code that is shown here
-    serve(options.out, options.port, options.lan, not (options.no_browser or options.lan))
-    return Answer()
+    return _serve(options, not (options.no_browser or options.lan))
 
 
 def serve(options: argparse.Namespace) -> Answer:
+    return _serve(options, False)
+
+
+def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
     from stereocell.serve import serve
 
-    serve(options.out, options.port, options.lan, open_browser=False)
+    try:
+        serve(options.out, options.port, options.lan, open_browser)
+    except BrokenPipeError as error:  # of who was to read its address
+        raise StdoutLost(error) from error
     return Answer()

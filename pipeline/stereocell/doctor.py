@@ -185,11 +185,11 @@ LOOKS: tuple[Callable[[], Finding], ...] = (
     _extra(
         "pymeshlab",
         "pymeshlab",
-        "no --wrap alpha-wrap; the default wrap needs none (pip install 'stereocell[alpha-wrap]')",
+        "optional, for `--wrap alpha-wrap` alone (pip install 'stereocell[alpha-wrap]')",
     ),
     _extra(
         "onnxruntime",
         "onnxruntime",
-        "no network of your own for `stereocell tissue --model` (pip install 'stereocell[onnx]')",
+        "optional, for `stereocell tissue --model` alone (pip install 'stereocell[onnx]')",
     ),
 )

@@ -8,6 +8,7 @@ a client sent. What the other modules refuse, and from whom, is listed in docs/b
 """
 
 import logging
+import os
 import signal
 import socket
 import ssl
@@ -19,7 +20,7 @@ from pathlib import Path
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp
 
 from stereocell.errors import StereoCellError
@@ -27,7 +28,7 @@ from stereocell.serve_access import Access, Gate
 from stereocell.serve_bricks import BrickEndpoint
 from stereocell.serve_files import BundleFiles
 from stereocell.serve_lan import draw_qr, explain, find_addresses, find_names, make_certificate
-from stereocell.serve_library import BrickLibrary
+from stereocell.serve_library import MANIFEST, BrickLibrary
 from stereocell.serve_lifetime import Lifetime
 from stereocell.serve_limits import MESSAGE_BYTES, STOP_S
 from stereocell.serve_protocol import GuardedHttp
@@ -38,14 +39,15 @@ _OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
 
 
 def serve(out: Path, port: int, lan: bool, open_browser: bool) -> None:
-    """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one.
+    """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
 
     Returns when the transfers that run have ended, or STOP_S later. Raises KeyboardInterrupt at
     once at a second Ctrl+C; StereoCellError if there is no bundle, the port is taken, or there is
     no network.
     """
     server = BundleServer(out, port, lan)
-    print(f"{server.address} shows {out / 'bundle'}; Ctrl+C ends it", flush=True)
+    alone = "" if server.has_bricks else " (a bundle by itself: its volumes come whole)"
+    print(f"{server.address} shows {server.bundle}{alone}; Ctrl+C ends it", flush=True)
     server.invite()
     if open_browser:
         webbrowser.open(server.address)
@@ -60,28 +62,41 @@ def serve(out: Path, port: int, lan: bool, open_browser: bool) -> None:
 
 
 def make_app(
-    out: Path, names: tuple[str, ...], gate: Gate | None, library: BrickLibrary | None = None
+    bundle: Path, library: BrickLibrary | None, names: tuple[str, ...], gate: Gate | None
 ) -> ASGIApp:
-    """Return the application: OUT/bundle's files, and `/bricks`.
+    """Return the application: the bundle's files, and `/bricks`.
 
-    names  the hosts that it answers to
-    gate   who may ask on the LAN; None: everybody on this machine
+    library  of the bundle; None: there is no `/bricks`
+    names    the hosts that it answers to
+    gate     who may ask on the LAN; None: everybody on this machine
     """
-    endpoint = BrickEndpoint(library or BrickLibrary(out / "bundle", out / "bricks"))
+    files = BundleFiles(bundle, library is not None)
+    endpoint = None if library is None else BrickEndpoint(library)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         yield
-        endpoint.close()
+        if endpoint is not None:
+            endpoint.close()
 
-    app = Starlette(
-        routes=[
-            WebSocketRoute("/bricks", endpoint.talk),
-            Route("/{path:path}", BundleFiles(out / "bundle").answer, methods=["GET"]),
-        ],
-        lifespan=lifespan,
-    )
-    return Access(app, names, gate)
+    routes: list[BaseRoute] = [Route("/{path:path}", files.answer, methods=["GET"])]
+    if endpoint is not None:
+        routes.insert(0, WebSocketRoute("/bricks", endpoint.talk))
+    return Access(Starlette(routes=routes, lifespan=lifespan), names, gate)
+
+
+def _places(out: Path) -> tuple[Path, Path | None]:
+    """Return the folders of a bundle and its trees of bricks: of OUT, or where OUT is a bundle.
+
+    None: a bundle by itself, beside which nothing is ours to write.
+    """
+    if (out / "bundle").exists() or not (out / MANIFEST).is_file():
+        return out / "bundle", out / "bricks"
+    holder = Path(os.path.abspath(out)).parent
+    is_of_build = (holder / "bundle" / MANIFEST).is_file() and (holder / "plan.json").is_file()
+    if is_of_build and os.path.samefile(holder / "bundle", out):
+        return out, holder / "bricks"
+    return out, None
 
 
 class BundleServer:
@@ -89,13 +104,10 @@ class BundleServer:
 
     def __init__(self, out: Path, port: int, lan: bool) -> None:
         """Raises StereoCellError if there is no bundle, the port is taken, or no network."""
-        bundle = out / "bundle"
-        if not bundle.exists() and (out / "manifest.json").is_file():
-            raise StereoCellError(
-                f"{out}: a bundle by itself, expected the OUT that holds it as its `bundle`; any "
-                "static web server shows it, too"
-            )
-        for name in ("manifest.json", "index.html"):
+        bundle, bricks = _places(out)
+        library = None if bricks is None else BrickLibrary(bundle, bricks)
+        self.bundle, self.has_bricks = bundle, bricks is not None
+        for name in (MANIFEST, "index.html"):
             if not (bundle / name).is_file():
                 raise StereoCellError(
                     f"{bundle / name}: expected a built bundle, found no such file; "
@@ -116,7 +128,7 @@ class BundleServer:
         self.port: int = self._socket.getsockname()[1]
         self.address = f"{scheme}://{host}:{self.port}/"
         config = uvicorn.Config(
-            make_app(out, names, self.gate),
+            make_app(bundle, library, names, self.gate),
             log_config=None,
             log_level="error",
             access_log=False,

@@ -35,10 +35,11 @@ _DIGITS = 18  # of a number in a Range header: no file has more bytes
 
 
 class BundleFiles:
-    """The folder that is served."""
+    """The folder that is served, and whether pages learn of bricks beside it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, has_bricks: bool) -> None:
         self._root = folder.resolve()
+        self._headers = _HEADERS | (BRICKS_HEADER if has_bricks else {})
 
     async def answer(self, request: Request) -> Response:
         """Answer a GET or HEAD."""
@@ -47,7 +48,7 @@ class BundleFiles:
             return PlainTextResponse("not found", 404)
         path, status = found
         kind = _TYPES.get(path.suffix, "application/octet-stream")
-        headers = {**_HEADERS, **BRICKS_HEADER, **policy(kind)}
+        headers = {**self._headers, **policy(kind)}
         response = FileResponse(path, headers=headers, media_type=kind, stat_result=status)
         response.headers["content-type"] = kind
         tag = response.headers["etag"]

@@ -74,7 +74,8 @@ def open_stage(path: Path) -> Usd.Stage:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     except Tf.ErrorException as error:
         raise StageError(
-            f"{path}: can't be opened, expected a USD stage or layer: {one_line(error)}"
+            f"{path}: can't be opened, expected a USD layer (.usda, .usdc, .usd, .usdz): "
+            f"{one_line(error)}"
         ) from error
     finally:
         del quiet
