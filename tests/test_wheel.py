@@ -2,12 +2,17 @@
 
 import json
 import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
 import venv
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 
@@ -16,14 +21,43 @@ from stereocell.assets import viewer_dist
 ROOT = Path(__file__).parents[1]
 
 
-def run(*command: object, cwd: Path, path: str = "") -> subprocess.CompletedProcess[str]:
-    """Run a command that finds neither the checkout nor, without a `path`, any other program."""
+def environment() -> dict[str, str]:
+    """One in which neither the checkout nor any other program is found."""
     ours = ("PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME")
-    kept = {key: value for key, value in os.environ.items() if key not in ours}
+    return {**{key: value for key, value in os.environ.items() if key not in ours}, "PATH": ""}
+
+
+def run(*command: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     words = [str(word) for word in command]
     return subprocess.run(
-        words, cwd=cwd, env={**kept, "PATH": path}, capture_output=True, text=True, check=False
+        words, cwd=cwd, env=environment(), capture_output=True, text=True, check=False
     )
+
+
+@contextmanager
+def viewing(command: Path, out: Path) -> Iterator[str]:
+    """Run `stereocell view`, which SIGTERM ends; yields its address."""
+    words = [command, "view", out, "--no-browser", "--port", "0"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        words, cwd=out.parent, env=environment(), stdout=pipe, stderr=pipe, text=True
+    ) as view:
+        try:
+            assert view.stdout is not None
+            address, _, told = view.stdout.readline().partition(" shows ")
+            assert told, view.communicate(timeout=30)[1]
+            yield address.rstrip("/")
+            view.send_signal(signal.SIGTERM)
+            _, complaints = view.communicate(timeout=30)
+            assert (view.returncode, complaints) == (0, "")
+        finally:
+            view.kill()
+
+
+def fetch(address: str) -> bytes:
+    with urlopen(address, timeout=30) as answer:
+        content: bytes = answer.read()
+    return content
 
 
 def make_wheel(checkout: Path, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -63,6 +97,14 @@ def test_a_wheel_alone_builds_and_has_the_viewer(tmp_path: Path) -> None:
     assert (out / "report" / "index.html").is_file()
     page = {file.name for file in (package / "viewer_gltf" / "dist").rglob("*") if file.is_file()}
     assert page <= {file.name for file in (out / "bundle").rglob("*")}
+
+    with viewing(command, out) as address:
+        shown = fetch(f"{address}/")
+        assert shown == (out / "bundle" / "index.html").read_bytes()
+        scripts = re.findall(r'<script[^>]* src="\./([^"]+\.js)"', shown.decode())
+        assert scripts
+        for script in scripts:
+            assert fetch(f"{address}/{script}") == (out / "bundle" / script).read_bytes()
 
     checked = run(command, "check", out, "--json", cwd=tmp_path)
     lines = json.loads(checked.stdout)["checks"]

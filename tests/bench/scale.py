@@ -2,28 +2,23 @@
 
     python scale.py FOLDER [TILE]      TILE: z,y,x voxels of the slope's tiles
 
-Small tiles, 4 to 32 of them, all alike, tell how time and memory grow with their number; one of
-194 x 512 x 512, full of nuclei, tells what a real one takes: a quarter of an hour in all. Samples
-and builds stay in FOLDER: they are made once. Ends with 1 where a bound is not kept.
+Small tiles, 4 to 32 of them, all alike, tell how time and memory grow with their number, hundreds
+of the smallest what the command itself keeps of each, and one of 194 x 512 x 512, full of nuclei,
+what a real one takes: twenty minutes in all. Samples and builds stay in FOLDER: they are made once.
+Ends with 1 where a bound is not kept.
 
 The dataset's figures are those of its units, which nearly all of the work is. Its stage, bundle and
-report are not in them.
+report are not in them. What it reads: reading.py.
 """
 
-import itertools
 import json
+import math
 import os
-import shutil
 import subprocess
 import sys
-import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
@@ -31,18 +26,28 @@ import psutil
 import zarr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from phantoms import write_ome_zarr
-from stereocell import plan_file
-from stereocell.store import Store
+from commands import STEREOCELL, make_sample, plan
+from reading import (
+    CHANNELS,
+    MOST_READ,
+    REAL,
+    REGION,
+    measure_reading,
+    measure_survey,
+    print_reading,
+    print_whole,
+    stored,
+)
 
-STEREOCELL = (sys.executable, "-m", "stereocell.cli")
-GRID = (8, 4)  # columns x rows of the slope's sample
-COUNTS = {4: (2, 2), 8: (4, 2), 16: (4, 4), 32: (8, 4)}  # units: columns x rows
-REAL = (194, 512, 512)
-WHOLE = 242 * 70  # units of the CyCIF dataset
+from phantoms import write_ome_zarr
+from stereocell.store import Store
+from stereocell.tiling import cut
+
+COUNTS = ((2, 2), (4, 2), (4, 4), (8, 4))  # columns x rows: 4 to 32 units
+MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512
+WHOLE = len(cut(REGION, REAL)) * CHANNELS  # units of the CyCIF dataset
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
-MOST_READ = 1.3  # bytes read over those of the chunks that a unit's window touches
 MOST_GROWTH = 0.1  # of a process's peak, from some tiles to four times as many
 MOST_BYTES = 3.5e9  # of the process that builds a unit of REAL
 
@@ -87,35 +92,16 @@ class Run:
     peaks: dict[str, int]
 
 
-def make_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int]) -> Path:
-    path = folder / f"{grid[0]}x{grid[1]}_{'_'.join(map(str, tile))}.ome.zarr"
-    size, tiles = ",".join(map(str, tile)), f"{grid[0]}x{grid[1]}"
-    _call("sample", "cycif", str(path), "--grid", tiles, "--tile-size", size)
-    return path
-
-
-def repeat_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
-    """Return GRID's tiles, copies of one: its nuclei, whose sizes would tell of themselves."""
-    path = folder / "copies.ome.zarr"
+def repeat_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int]) -> Path:
+    """Return tiles that are copies of one: its nuclei, whose sizes would tell of themselves."""
+    path = folder / f"copies_{'_'.join(map(str, grid + tile))}.ome.zarr"
     if not path.exists():
         one: np.ndarray = zarr.open_array(make_sample(folder, (1, 1), tile) / "0")[0]  # type: ignore
-        copies = np.tile(one, (1, GRID[1], GRID[0]))[None]
+        copies = np.tile(one, (1, grid[1], grid[0]))[None]
         made = folder / "half.ome.zarr"
         write_ome_zarr(made, [copies], "czyx", chunks=(1, 16, tile[1], tile[2]))
         made.rename(path)
     return path
-
-
-def plan(
-    source: str, out: Path, grid: tuple[int, int], tile: tuple[int, int, int], channels: str
-) -> None:
-    """Plan the first columns x rows of tiles."""
-    shutil.rmtree(out, ignore_errors=True)
-    depth, height, width = tile
-    region = f"0:{depth},0:{grid[1] * height},0:{grid[0] * width}"
-    size = ",".join(map(str, tile))
-    _call("plan", source, "-o", str(out), "--preset", "cycif", "--level", "0",
-          "--region", region, "--tile-size", size, "--channels", channels)  # fmt: skip
 
 
 def run_units(out: Path, workers: int) -> Run:
@@ -143,13 +129,18 @@ def run_units(out: Path, workers: int) -> Run:
     return Run(units, workers, time.perf_counter() - start, dict(peaks))
 
 
-def measure_slope(folder: Path, tile: tuple[int, int, int]) -> list[Run]:
-    source = repeat_sample(folder, tile)
+def measure_slope(
+    folder: Path,
+    tile: tuple[int, int, int],
+    grids: tuple[tuple[int, int], ...] = COUNTS,
+    on: tuple[int, ...] = (1, 2),
+) -> list[Run]:
+    source = repeat_sample(folder, grids[-1], tile)
     runs = []
-    for workers in (1, 2):
-        for columns, rows in COUNTS.values():
+    for workers in on:
+        for grid in grids:
             out = folder / "slope"
-            plan(str(source), out, (columns, rows), tile, "0")
+            plan(str(source), out, grid, tile, "0")
             runs.append(run_units(out, workers))
             last = runs[-1]
             peaks = ", ".join(f"{role} {most / GIB:.3f}" for role, most in last.peaks.items())
@@ -176,6 +167,13 @@ def print_slope(runs: list[Run]) -> list[float]:
     return growths
 
 
+def print_command(runs: list[Run]) -> None:
+    peaks = [run.peaks["command"] for run in runs]
+    each, base = np.polyfit([run.units for run in runs], peaks, 1)
+    print(f"  the command keeps {each / 1e6:.3f} MB of a unit beside {base / GIB:.3f} GiB: "
+          f"{(base + each * WHOLE) / GIB:.2f} GiB with {WHOLE}, if that goes on so")  # fmt: skip
+
+
 def watch_memory(out: Path) -> dict[str, int]:
     """Build OUT's one unit in a process that watches itself; return most bytes by function."""
     answer = subprocess.run(
@@ -186,93 +184,6 @@ def watch_memory(out: Path) -> dict[str, int]:
     return {"(interpreter and libraries)": seen["before"], **seen["most"]}
 
 
-@contextmanager
-def counting(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
-    """Serve a folder; count the bytes of each file that were sent."""
-    sent: dict[str, int] = defaultdict(int)
-    lock = threading.Lock()
-
-    class Handler(SimpleHTTPRequestHandler):
-        def copyfile(self, source: object, outputfile: object) -> None:
-            file = Path(self.translate_path(self.path))
-            with lock:
-                sent[str(file)] += file.stat().st_size
-            super().copyfile(source, outputfile)  # type: ignore[arg-type]
-
-        def log_message(self, *_: object) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder)))
-    thread = threading.Thread(target=server.serve_forever)
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_address[1]}", sent
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
-
-
-@dataclass(frozen=True)
-class Reading:
-    """Bytes that builds read, as they are stored.
-
-    ratio   a unit's, over those of the chunks that its window touches
-    voxel   a voxel's
-    survey  for windows and iso-values, for each voxel of a unit
-    check   what a command reads to see that the source is the one that was planned (64 MB at most)
-    """
-
-    ratio: float
-    voxel: float
-    survey: float
-    check: int
-
-
-def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
-    source = make_sample(folder, (3, 3), tile)
-    out = folder / "reading"
-    with counting(source.parent) as (address, sent):
-
-        def bytes_read() -> int:
-            return sum(size for file, size in sent.items() if not file.endswith(".json"))
-
-        def run(unit: str) -> int:
-            sent.clear()
-            _call("units", str(out), "--workers", "0", "--only", unit)
-            return bytes_read()
-
-        plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
-        check = bytes_read()  # a plan reads nothing else
-        first = run("r0_c0/0")  # windows and iso-values of all nine, and one unit
-        middle = run("r1_c1/0")  # it has neighbours all round
-    corner, chunks = (list(touched_chunks(source, out, tile)) for tile in ("r0_c0", "r1_c1"))
-    size = sum(file.stat().st_size for file in chunks)
-    voxels = len(chunks) * np.prod(zarr.open_array(source / "0", mode="r").chunks)
-    survey = first - check - sum(file.stat().st_size for file in corner)
-    return Reading(
-        ratio=(middle - check) / size,
-        voxel=float(size / voxels),
-        survey=float(survey / 9 / np.prod(tile)),
-        check=check,
-    )
-
-
-def touched_chunks(source: Path, out: Path, tile_id: str) -> Iterator[Path]:
-    """Yield the files of the first channel's chunks that a unit's window touches, by the plan."""
-    settled = plan_file.from_json(json.loads((out / "plan.json").read_text()))
-    window = settled.tile(tile_id).lattice(settled.region).grown(settled.halo, settled.region)
-    array = zarr.open_array(source / "0", mode="r")
-    along = [
-        range(low // chunk, (high - 1) // chunk + 1)
-        for low, high, chunk in zip(window.start, window.stop, array.chunks[1:], strict=True)
-    ]
-    for place in itertools.product([0], *along):
-        file = source / "0" / array.metadata.encode_chunk_key(place)
-        if file.exists():  # one of nothing but the fill value is not stored
-            yield file
-
-
 def _peak_of(pid: int) -> int:
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():
         if line.startswith("VmHWM:"):
@@ -280,21 +191,16 @@ def _peak_of(pid: int) -> int:
     return 0
 
 
-def _call(*arguments: str) -> None:
-    done = subprocess.run([*STEREOCELL, *arguments], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(done.stderr)
-
-
 def main(folder: Path, tile: tuple[int, int, int]) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     print(f"Slope, tiles of {' x '.join(map(str, tile))}, one channel, {os.cpu_count()} cores")
     growths = print_slope(measure_slope(folder, tile))
 
-    reading = measure_reading(folder, tile)
-    print(f"Read by a unit: {reading.ratio:.2f} x the chunks that its window touches (bound "
-          f"{MOST_READ}); for windows and iso-values {reading.survey:.2f} bytes a voxel; by a "
-          f"command, to see that the source is the same, {reading.check / 1e6:.1f} MB")  # fmt: skip
+    print(f"The command's memory, tiles of {' x '.join(map(str, SMALLEST))}, 2 workers")
+    print_command(measure_slope(folder, SMALLEST, MANY, (2,)))
+
+    reading, survey = measure_reading(folder, tile), measure_survey(folder, tile)
+    print_reading(reading, survey)
 
     print(f"A unit of {' x '.join(map(str, REAL))}")
     source, out = make_sample(folder, (1, 1), REAL), folder / "real"
@@ -308,17 +214,15 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
         print(f"    {most / GIB:5.2f}  {place}")
 
     hours = seconds * WHOLE / 3600
-    halo = plan_file.from_json(json.loads((out / "plan.json").read_text())).halo
-    window = (REAL[0], REAL[1] + 2 * halo[1], REAL[2] + 2 * halo[2])  # of one with neighbours
-    read = reading.ratio * reading.voxel * np.prod(window) + reading.survey * np.prod(REAL)
     print(f"{WHOLE} units of that size, without stage, bundle and report: {hours:.0f} core-hours, "
-          f"{WHOLE * read / 1e12:.2f} TB read (windows of {' x '.join(map(str, window))}), "
           f"{WHOLE * size / 1e12:.2f} TB of units written, "
           f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
+    box = Store(out).plan().region
+    print_whole(reading, survey, stored(source, box) / math.prod(box.shape), Store(out).plan().halo)
 
     kept = {
         "peaks": max(growths) <= MOST_GROWTH,
-        "reading": reading.ratio <= MOST_READ,
+        "reading": max(reading.chunks, survey.windows, survey.isos) <= MOST_READ,
         "memory": max(seen.values()) <= MOST_BYTES,
     }
     for name, is_kept in kept.items():

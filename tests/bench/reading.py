@@ -1,0 +1,218 @@
+"""What builds read of their source, and what the whole CyCIF dataset's would.
+
+How much more a build reads than the chunks that it touches is measured, on small tiles; how many
+chunks the dataset's tiles touch is counted, one by one, as small tiles touch other shares of them.
+"""
+
+import itertools
+import math
+import sys
+import threading
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import numpy as np
+import zarr
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from commands import call, make_sample, plan
+
+from phantoms import write_ome_zarr
+from stereocell.histogram2d import sample_boxes
+from stereocell.rounds import display_task, iso_task
+from stereocell.store import Store
+from stereocell.tasks import JOINT_VOXELS, SURVEY_VOXELS, read_iso_field, run_display
+from stereocell.tiling import Box, cut
+
+REAL = (194, 512, 512)
+REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # the dataset
+CHUNK = (32, 128, 128)  # as the sample's: four to a tile's width, six to its depth
+MOST_READ = 1.3  # bytes read over those of the chunks that what is wanted touches
+
+
+@contextmanager
+def counting(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
+    """Serve a folder; count the bytes of each file that were sent."""
+    sent: dict[str, int] = defaultdict(int)
+    lock = threading.Lock()
+
+    class Handler(SimpleHTTPRequestHandler):
+        def copyfile(self, source: object, outputfile: object) -> None:
+            file = Path(self.translate_path(self.path))
+            if file.is_file():  # no listing of a folder
+                with lock:
+                    sent[str(file)] += file.stat().st_size
+            super().copyfile(source, outputfile)  # type: ignore[arg-type]
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder)))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}", sent
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Bytes that builds read, as they are stored.
+
+    chunks   a unit's, over those of the chunks that its window touches
+    window   a unit's, over those of the window itself
+    check    what a command reads to see that the source is the one that was planned (64 MB at most)
+    """
+
+    chunks: float
+    window: float
+    check: int
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Bytes read before any unit, tiles as wide as with REAL and CHUNK: four chunks.
+
+    windows  a channel's, over those of the chunks that a window is found from
+    isos     all iso-values', over those of the chunks that the tiles touch
+    tiles    all iso-values', over those of the tiles themselves
+    """
+
+    windows: float
+    isos: float
+    tiles: float
+
+
+def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
+    source = make_sample(folder, (3, 3), tile)
+    out = folder / "reading"
+    with counting(folder) as (address, sent):
+        plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
+        check = take(sent)  # a plan reads nothing else
+        for unit in ("r0_c0/0", "r1_c1/0"):  # the first one, and the survey of all nine
+            take(sent)
+            call("units", str(out), "--workers", "0", "--only", unit)
+        read = take(sent) - check
+    settled = Store(out).plan()
+    middle = settled.tile("r1_c1")  # it has neighbours all round
+    window = middle.lattice(settled.region).grown(settled.halo, settled.region)
+    size = stored(source, window)
+    share = math.prod(window.shape) / touched(window, chunk_of(source), settled.region)
+    return Reading(read / size, read / (size * share), check)
+
+
+def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
+    """Survey 3 x 3 tiles, in this process, so that windows and iso-values are told apart."""
+    source = chop_sample(folder, tile)
+    out = folder / "survey"
+    with counting(folder) as (address, sent):
+        plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
+        settled = Store(out).plan()
+        (channel,) = settled.channels
+        take(sent)
+        display = run_display(display_task(settled, channel))
+        windows = take(sent)
+        for each in settled.tiles:
+            read_iso_field(iso_task(settled, each, channel, display))
+        isos = take(sent)
+    region, chunk = settled.region, chunk_of(source)
+    voxel = stored(source, region) / math.prod(region.shape)
+    return Survey(
+        windows / (voxel * surveyed(region, chunk)),
+        isos / (voxel * sum(touched(each.box, chunk, region) for each in settled.tiles)),
+        isos / (voxel * sum(math.prod(each.box.shape) for each in settled.tiles)),
+    )
+
+
+def chop_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
+    """Return 3 x 3 tiles of which each has as many chunks as one of REAL has of CHUNK."""
+    path = folder / f"chopped_{'_'.join(map(str, tile))}.ome.zarr"
+    if not path.exists():
+        voxels: np.ndarray = zarr.open_array(make_sample(folder, (3, 3), tile) / "0")[:1]  # type: ignore
+        made = folder / "half.ome.zarr"
+        chunk = [max(1, n * c // real) for n, c, real in zip(tile, CHUNK, REAL, strict=True)]
+        write_ome_zarr(made, [voxels], "czyx", chunks=(1, *chunk))
+        made.rename(path)
+    return path
+
+
+def take(sent: dict[str, int]) -> int:
+    """Return the bytes of voxels that were sent, and count from 0."""
+    size = sum(size for file, size in sent.items() if not file.endswith(".json"))
+    sent.clear()
+    return size
+
+
+def chunk_of(source: Path) -> tuple[int, ...]:
+    return zarr.open_array(source / "0", mode="r").chunks[1:]
+
+
+def stored(source: Path, box: Box) -> int:
+    """Return the bytes of the first channel's chunks that a box touches."""
+    array = zarr.open_array(source / "0", mode="r")
+    along = [
+        range(low // chunk, (high - 1) // chunk + 1)
+        for low, high, chunk in zip(box.start, box.stop, array.chunks[1:], strict=True)
+    ]
+    places = itertools.product([0], *along)
+    files = [source / "0" / array.metadata.encode_chunk_key(place) for place in places]
+    return sum(file.stat().st_size for file in files if file.exists())  # not where all is 0
+
+
+def touched(box: Box, chunk: tuple[int, ...], region: Box) -> int:
+    """Return how many voxels of the region lie in chunks that a box touches."""
+    ends = zip(box.start, box.stop, chunk, region.stop, strict=True)
+    return math.prod(min(-(-high // c) * c, end) - low // c * c for low, high, c, end in ends)
+
+
+def surveyed(region: Box, chunk: tuple[int, ...]) -> int:
+    """Return how many voxels a channel's window is found from, by the program's own limits.
+
+    They are those of a level that is small enough, and the chunks that blocks touch.
+    """
+    blocks = [box.grown((1, 1, 1), region) for box in sample_boxes(region, JOINT_VOXELS)]
+    level = min(SURVEY_VOXELS, math.prod(region.shape))
+    return level + sum(touched(block, chunk, region) for block in blocks)
+
+
+def print_reading(reading: Reading, survey: Survey) -> None:
+    print(f"Read by a unit: {reading.chunks:.2f} x the chunks that its window touches (bound "
+          f"{MOST_READ}), {reading.window:.2f} x the window itself; by a command, to see that the "
+          f"source is the same, {reading.check / 1e6:.1f} MB")  # fmt: skip
+    print(f"Read for iso-values, tiles of four chunks' width: {survey.isos:.2f} x the chunks that "
+          f"they touch (bound {MOST_READ}), {survey.tiles:.2f} x the tiles themselves; for a "
+          f"channel's window {survey.windows:.2f} x the level and the blocks that it comes from "
+          f"(bound {MOST_READ})")  # fmt: skip
+
+
+def print_whole(reading: Reading, survey: Survey, voxel: float, halo: tuple[int, int, int]) -> None:
+    """Print what the dataset reads: chunks that are counted, times the ratios that were measured.
+
+    voxel  bytes of one, as it is stored
+    """
+    tiles = cut(REGION, REAL)
+    windows = [tile.lattice(REGION).grown(halo, REGION) for tile in tiles]
+    own = sum(math.prod(window.shape) for window in windows)
+    around = sum(touched(window, CHUNK, REGION) for window in windows)
+    boxes = sum(touched(tile.box, CHUNK, REGION) for tile in tiles)
+    units, isos, displays = (
+        CHANNELS * voxel * ratio * voxels
+        for ratio, voxels in (
+            (reading.chunks, around),
+            (survey.isos, boxes),
+            (survey.windows, surveyed(REGION, CHUNK)),
+        )
+    )
+    print(f"  of {' x '.join(map(str, REGION.shape))} voxels, {voxel:.2f} bytes each as stored, in "
+          f"chunks of {' x '.join(map(str, CHUNK))}, {CHANNELS} channels: {units / 1e12:.2f} TB "
+          f"read by units ({around / own:.2f} x their windows), {isos / 1e12:.2f} TB for "
+          f"iso-values ({boxes / math.prod(REGION.shape):.2f} x the dataset), "
+          f"{displays / 1e12:.3f} TB for windows, where there are coarse levels")  # fmt: skip
