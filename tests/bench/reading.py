@@ -79,15 +79,13 @@ class Reading:
 
 @dataclass(frozen=True)
 class Survey:
-    """Bytes read before any unit, tiles as wide as with REAL and CHUNK: four chunks.
+    """Bytes read for iso-values, tiles as wide as with REAL and CHUNK: four chunks.
 
-    windows  a channel's, over those of the chunks that a window is found from
-    isos     all iso-values', over those of the chunks that the tiles touch
-    tiles    all iso-values', over those of the tiles themselves
+    chunks  over those of the chunks that the tiles touch
+    tiles   over those of the tiles themselves
     """
 
-    windows: float
-    isos: float
+    chunks: float
     tiles: float
 
 
@@ -110,26 +108,40 @@ def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
 
 
 def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
-    """Survey 3 x 3 tiles, in this process, so that windows and iso-values are told apart."""
+    """Survey 3 x 3 tiles, in this process, so that iso-values are told from windows."""
     source = chop_sample(folder, tile)
     out = folder / "survey"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
         settled = Store(out).plan()
         (channel,) = settled.channels
-        take(sent)
         display = run_display(display_task(settled, channel))
-        windows = take(sent)
+        take(sent)
         for each in settled.tiles:
             read_iso_field(iso_task(settled, each, channel, display))
         isos = take(sent)
     region, chunk = settled.region, chunk_of(source)
     voxel = stored(source, region) / math.prod(region.shape)
     return Survey(
-        windows / (voxel * surveyed(region, chunk)),
         isos / (voxel * sum(touched(each.box, chunk, region) for each in settled.tiles)),
         isos / (voxel * sum(math.prod(each.box.shape) for each in settled.tiles)),
     )
+
+
+def measure_windows(folder: Path, source: Path) -> float:
+    """Return what is read for the window of one tile of REAL, over what that is found from."""
+    out = folder / "windows"
+    with counting(folder) as (address, sent):
+        plan(f"{address}/{source.name}", out, (1, 1), REAL, "0")
+        settled = Store(out).plan()
+        take(sent)
+        run_display(display_task(settled, settled.channels[0]))
+        coarse = {Path(file) for file in sent if not file.startswith(f"{source / '0'}/")}
+        read = take(sent)
+    region = settled.region
+    voxel = stored(source, region) / math.prod(region.shape)
+    level = sum(file.stat().st_size for file in coarse if file.suffix != ".json")
+    return read / (level + voxel * under_blocks(region, chunk_of(source)))
 
 
 def chop_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
@@ -173,42 +185,41 @@ def touched(box: Box, chunk: tuple[int, ...], region: Box) -> int:
     return math.prod(min(-(-high // c) * c, end) - low // c * c for low, high, c, end in ends)
 
 
-def surveyed(region: Box, chunk: tuple[int, ...]) -> int:
-    """Return how many voxels a channel's window is found from, by the program's own limits.
-
-    They are those of a level that is small enough, and the chunks that blocks touch.
-    """
+def under_blocks(region: Box, chunk: tuple[int, ...]) -> int:
+    """Return how many voxels lie in the chunks of the blocks that edges are looked for in."""
     blocks = [box.grown((1, 1, 1), region) for box in sample_boxes(region, JOINT_VOXELS)]
-    level = min(SURVEY_VOXELS, math.prod(region.shape))
-    return level + sum(touched(block, chunk, region) for block in blocks)
+    return sum(touched(block, chunk, region) for block in blocks)
 
 
-def print_reading(reading: Reading, survey: Survey) -> None:
+def print_reading(reading: Reading, survey: Survey, windows: float) -> None:
     print(f"Read by a unit: {reading.chunks:.2f} x the chunks that its window touches (bound "
           f"{MOST_READ}), {reading.window:.2f} x the window itself; by a command, to see that the "
           f"source is the same, {reading.check / 1e6:.1f} MB")  # fmt: skip
-    print(f"Read for iso-values, tiles of four chunks' width: {survey.isos:.2f} x the chunks that "
-          f"they touch (bound {MOST_READ}), {survey.tiles:.2f} x the tiles themselves; for a "
-          f"channel's window {survey.windows:.2f} x the level and the blocks that it comes from "
+    print(f"Read for iso-values, tiles of four chunks' width: {survey.chunks:.2f} x the chunks "
+          f"that they touch (bound {MOST_READ}), {survey.tiles:.2f} x the tiles themselves; for a "
+          f"channel's window {windows:.2f} x the level and the blocks that it comes from "
           f"(bound {MOST_READ})")  # fmt: skip
 
 
-def print_whole(reading: Reading, survey: Survey, voxel: float, halo: tuple[int, int, int]) -> None:
+def print_whole(
+    reading: Reading, survey: Survey, windows: float, voxel: float, halo: tuple[int, int, int]
+) -> None:
     """Print what the dataset reads: chunks that are counted, times the ratios that were measured.
 
-    voxel  bytes of one, as it is stored
+    windows  what measure_windows() returns
+    voxel    bytes of one, as it is stored
     """
     tiles = cut(REGION, REAL)
-    windows = [tile.lattice(REGION).grown(halo, REGION) for tile in tiles]
-    own = sum(math.prod(window.shape) for window in windows)
-    around = sum(touched(window, CHUNK, REGION) for window in windows)
+    grown = [tile.lattice(REGION).grown(halo, REGION) for tile in tiles]
+    own = sum(math.prod(window.shape) for window in grown)
+    around = sum(touched(window, CHUNK, REGION) for window in grown)
     boxes = sum(touched(tile.box, CHUNK, REGION) for tile in tiles)
     units, isos, displays = (
         CHANNELS * voxel * ratio * voxels
         for ratio, voxels in (
             (reading.chunks, around),
-            (survey.isos, boxes),
-            (survey.windows, surveyed(REGION, CHUNK)),
+            (survey.chunks, boxes),
+            (windows, SURVEY_VOXELS + under_blocks(REGION, CHUNK)),
         )
     )
     print(f"  of {' x '.join(map(str, REGION.shape))} voxels, {voxel:.2f} bytes each as stored, in "

@@ -34,6 +34,7 @@ from reading import (
     REGION,
     measure_reading,
     measure_survey,
+    measure_windows,
     print_reading,
     print_whole,
     stored,
@@ -199,11 +200,12 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     print(f"The command's memory, tiles of {' x '.join(map(str, SMALLEST))}, 2 workers")
     print_command(measure_slope(folder, SMALLEST, MANY, (2,)))
 
+    source, out = make_sample(folder, (1, 1), REAL), folder / "real"
     reading, survey = measure_reading(folder, tile), measure_survey(folder, tile)
-    print_reading(reading, survey)
+    windows = measure_windows(folder, source)
+    print_reading(reading, survey, windows)
 
     print(f"A unit of {' x '.join(map(str, REAL))}")
-    source, out = make_sample(folder, (1, 1), REAL), folder / "real"
     plan(str(source), out, (1, 1), REAL, "0")
     start = time.perf_counter()
     seen = watch_memory(out)
@@ -217,12 +219,13 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     print(f"{WHOLE} units of that size, without stage, bundle and report: {hours:.0f} core-hours, "
           f"{WHOLE * size / 1e12:.2f} TB of units written, "
           f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
-    box = Store(out).plan().region
-    print_whole(reading, survey, stored(source, box) / math.prod(box.shape), Store(out).plan().halo)
+    settled = Store(out).plan()
+    voxel = stored(source, settled.region) / math.prod(settled.region.shape)
+    print_whole(reading, survey, windows, voxel, settled.halo)
 
     kept = {
         "peaks": max(growths) <= MOST_GROWTH,
-        "reading": max(reading.chunks, survey.windows, survey.isos) <= MOST_READ,
+        "reading": max(reading.chunks, survey.chunks, windows) <= MOST_READ,
         "memory": max(seen.values()) <= MOST_BYTES,
     }
     for name, is_kept in kept.items():
