@@ -1,12 +1,15 @@
 """What a build depends on goes away in the middle and comes back: one line, then the same bytes."""
 
+import os
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from shutil import which
 from threading import Event, Thread
 from typing import Any
 
@@ -102,6 +105,53 @@ def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
         assert main([*phase, *(["--workers", "0"] if phase[0] == "units" else [])]) == 0
     assert make_assets(volume, out, GRID, "--workers", "0") == 0
     assert assets(asset_digests(out)) == undisturbed
+
+
+# The command, with an OUT that can't be written once the first tile of a phase is done
+IN_THE_MIDDLE = """
+import os, sys
+from stereocell import engine
+from stereocell.cli import main
+
+phase, out = sys.argv[1:3]
+tell = engine.console.print
+
+def forbid(text, **how):
+    tell(text, **how)
+    if text.startswith(f"{phase}: 1/"):
+        for folder, *_ in os.walk(out):
+            os.chmod(folder, 0o555)
+
+engine.console.print = forbid
+sys.exit(main([phase, out, "--workers", "0"]))
+"""
+# root may write anywhere, but for this
+BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(BOUND) and which(BOUND[0]) is None, reason="root without setpriv")
+def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goes_on(
+    volume: Path, undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
+    for phase in ("units", "stage", "bundle"):
+        command = [*BOUND, sys.executable, "-c", IN_THE_MIDDLE, phase, str(out)]
+        ended = subprocess.run(command, capture_output=True, text=True)
+        assert ended.returncode == 1, ended.stderr
+        (line,) = [line for line in ended.stderr.splitlines() if line.startswith("stereocell: ")]
+        assert str(out) in line
+        assert "Permission denied" in line
+        assert "Traceback" not in ended.stderr
+        finished = {file: file.stat().st_mtime_ns for file in out.glob("units/r*/*/*/*")}
+        assert finished
+        for folder, *_ in os.walk(out):
+            os.chmod(folder, 0o755)
+        assert main([phase, str(out), "--workers", "0"]) == 0
+        assert {file: file.stat().st_mtime_ns for file in finished} == finished
+    assert assets(asset_digests(out)) == undisturbed
+    assert not [path for path in out.rglob(".*") if path.name != ".nojekyll"]
 
 
 @pytest.fixture(scope="module")
