@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from torture import Torture
+from torture import Folder, Torture
 
 KINDS = ("session", "scheduler")
 
 
 @pytest.mark.slow
 def test_killed_at_any_moment_a_build_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
-    torture = Torture(tmp_path, seed=3)
+    torture = Torture(tmp_path, Folder(tmp_path / "out"), seed=3)
     for kind in KINDS:
         for _ in range(5):  # on a busy machine a build may end before its moment
             if torture.kill(kind):

@@ -3,9 +3,10 @@
     python tests/torture.py [KILLS [SEED]]
 
 A build of two tiles and two channels is killed and started again, over and over: the command
-alone, with all its workers, one of its workers, or the scheduler of a cluster. When it has come to
-its end, every byte must be as in an undisturbed build, no unit that was finished before a kill may
-have been written again, and nothing half written may be left.
+alone, with all its workers, one of its workers, the scheduler or a worker of a cluster; one whose
+OUT is a folder, and one whose OUT is on object storage. When it has come to its end, every byte
+must be as in an undisturbed build, no unit that was finished before a kill may have been written
+again, and nothing half written may be left.
 """
 
 import os
@@ -21,15 +22,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import psutil
 
 import phantoms
 from digests import digests_of
+from object_store import ObjectStore, serving
 from stereocell.lock import LOCK
 
-KINDS = ("command", "session", "worker", "scheduler")
+KINDS = ("command", "session", "worker", "scheduler", "cluster worker")
 STEREOCELL = (sys.executable, "-m", "stereocell.cli")
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 PATIENCE_S = 300.0
@@ -39,39 +42,114 @@ class TortureError(AssertionError):
     """A build did not come back to what it should be."""
 
 
+class Place(Protocol):
+    """Where an OUT lies."""
+
+    @property
+    def address(self) -> str: ...
+
+    @property
+    def environment(self) -> dict[str, str]: ...
+
+    def find(self) -> dict[str, object]:
+        """Return every file by its name in OUT, and when it was written."""
+
+    def digests(self) -> dict[str, str]:
+        """Return the SHA-256 of every file."""
+
+    def clear(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Folder:
+    out: Path
+
+    @property
+    def address(self) -> str:
+        return str(self.out)
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return {}
+
+    def find(self) -> dict[str, object]:
+        found: dict[str, object] = {}
+        for path in self.out.rglob("*"):
+            with suppress(FileNotFoundError):  # it was moved since
+                found[str(path.relative_to(self.out))] = path.stat().st_mtime_ns
+        return found
+
+    def digests(self) -> dict[str, str]:
+        return digests_of(self.out)
+
+    def clear(self) -> None:
+        shutil.rmtree(self.out)
+
+
+@dataclass(frozen=True)
+class Bucket:
+    store: ObjectStore
+    out: str
+
+    @property
+    def address(self) -> str:
+        return f"s3://{self.out}"
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return self.store.environment
+
+    def find(self) -> dict[str, object]:
+        found = self.store.files().find(self.out, detail=True)
+        return {
+            name[len(self.out) + 1 :]: at["LastModified"]
+            for name, at in found.items()
+            if at["type"] == "file"
+        }
+
+    def digests(self) -> dict[str, str]:
+        with tempfile.TemporaryDirectory() as folder:
+            self.store.files().get(self.out, f"{folder}/out", recursive=True)
+            return digests_of(Path(folder) / "out")
+
+    def clear(self) -> None:
+        self.store.files().rm(self.out, recursive=True)
+
+
 @dataclass
 class Torture:
-    """One OUT that is killed and goes on. `outcomes` counts by kind of kill, and ends."""
+    """A build in one place, which is killed and goes on. `outcomes` counts kills and ends."""
 
     folder: Path
+    place: Place
     seed: int
     outcomes: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
         self._source = _write_source(self.folder)
-        self._out = self.folder / "out"
-        self._finished: dict[str, int] = {}  # files of finished units: when they were written
+        self._finished: dict[str, object] = {}  # files of finished units: when they were written
         self._undisturbed, self._seconds = self._build_undisturbed()
 
     def kill(self, kind: str) -> bool:
         """Start or go on with the build and kill it at a random moment; return whether it came to
         that before its end."""
         moment = self._random.uniform(0, self._seconds)
-        with _cluster(self.folder) if kind == "scheduler" else nullcontext() as scheduler:
-            told = ["--scheduler", scheduler.file] if scheduler else ["--workers", "2"]
+        is_cluster = kind in ("scheduler", "cluster worker")
+        environment = {**os.environ, **self.place.environment}
+        with _cluster(self.folder, environment) if is_cluster else nullcontext() as cluster:
+            told = ["--scheduler", cluster.file] if cluster else ["--workers", "2"]
             build = self._start(told)
             if not self._await_moment(build, moment):
                 self._require_ended(build)
                 return False
-            if kind == "scheduler":
-                assert scheduler is not None
-                scheduler.process.kill()
+            if cluster:
+                kill_session(cluster.scheduler if kind == "scheduler" else cluster.workers[0])
             elif kind == "worker":
                 self._random.choice(_workers_of(build) or [build]).kill()
             family = psutil.Process(build.pid).children(recursive=True)
             if kind == "session":
-                os.killpg(build.pid, signal.SIGKILL)
+                kill_session(build)
             elif kind == "command":
                 build.kill()
             code = build.wait(PATIENCE_S)
@@ -98,18 +176,23 @@ class Torture:
         if build.wait(PATIENCE_S):
             raise TortureError("the undisturbed build failed")
         seconds = time.monotonic() - start
-        digests = asset_digests(self._out)
-        shutil.rmtree(self._out)
+        digests = of_assets(self.place.digests())
+        self.place.clear()
         return digests, seconds
 
     def _start(self, told: list[str]) -> subprocess.Popen[bytes]:
-        command = [*STEREOCELL, "build", str(self._source), "-o", str(self._out), "--grid", "2x1"]
-        return subprocess.Popen([*command, *told], start_new_session=True, **QUIET)
+        out = ["-o", self.place.address]
+        return subprocess.Popen(
+            [*STEREOCELL, "build", str(self._source), *out, "--grid", "2x1", *told],
+            env={**os.environ, **self.place.environment},
+            start_new_session=True,
+            **QUIET,
+        )
 
     def _await_moment(self, build: subprocess.Popen[bytes], moment_s: float) -> bool:
         """Wait until the build is at work for so long; return whether it hasn't ended before."""
-        while build.poll() is None and not (self._out / LOCK).exists():
-            time.sleep(0.005)
+        while build.poll() is None and LOCK not in self.place.find():
+            time.sleep(0.01)
         with suppress(subprocess.TimeoutExpired):
             build.wait(moment_s)
         return build.poll() is None
@@ -120,36 +203,45 @@ class Torture:
         self._require_whole()
 
     def _require_whole(self) -> None:
-        found = asset_digests(self._out)
+        found = of_assets(self.place.digests())
         if found != self._undisturbed:
             names = {name for name, _ in found.items() ^ self._undisturbed.items()}
             raise TortureError(f"other bytes than undisturbed: {sorted(names)}")
-        again = [name for name, at in self._finished.items() if self._written_at(name) != at]
+        now = self.place.find()
+        again = [name for name, at in self._finished.items() if now[name] != at]
         if again:
             raise TortureError(f"finished units were written again: {again}")
-        left = [path for path in self._out.rglob(".*") if path.name != ".nojekyll"]
+        left = [name for name in now if "/." in f"/{name}" and not name.endswith(".nojekyll")]
         if left:
             raise TortureError(f"left over: {left}")
         self.outcomes["ended"] += 1
         self._finished.clear()
-        shutil.rmtree(self._out)
+        self.place.clear()
 
     def _remember_finished(self) -> None:
-        for record in self._out.glob("units/*/*/*/unit.json"):
-            if not record.parent.name.startswith("."):
-                for file in record.parent.iterdir():
-                    name = str(file.relative_to(self._out))
-                    self._finished.setdefault(name, self._written_at(name))
+        now = self.place.find()
+        units = [name.removesuffix("unit.json") for name in now if name.endswith("/unit.json")]
+        for unit in units:
+            if "/." not in unit:
+                files = (name for name in now if name.startswith(unit))
+                self._finished = {name: now[name] for name in files} | self._finished
 
-    def _written_at(self, name: str) -> int:
-        return (self._out / name).stat().st_mtime_ns
+
+def kill_session(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process and what it has started, at once."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def asset_digests(out: Path) -> dict[str, str]:
     """Return the SHA-256 of every asset; without seconds."""
+    return of_assets(digests_of(out))
+
+
+def of_assets(digests: dict[str, str]) -> dict[str, str]:
     return {
         name: digest
-        for name, digest in digests_of(out).items()
+        for name, digest in digests.items()
         if name.split("/")[0] in ("units", "stage", "bundle") and not name.endswith("/seconds.json")
     }
 
@@ -170,48 +262,68 @@ def _workers_of(build: subprocess.Popen[bytes]) -> list[psutil.Process]:
 
 
 @dataclass(frozen=True)
-class _Scheduler:
-    process: subprocess.Popen[bytes]
+class _Cluster:
+    scheduler: subprocess.Popen[bytes]
+    workers: list[subprocess.Popen[bytes]]
     file: str
 
 
 @contextmanager
-def _cluster(folder: Path) -> Iterator[_Scheduler]:
+def _cluster(folder: Path, environment: dict[str, str]) -> Iterator[_Cluster]:
     """A `dask scheduler` with two workers."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     told = ["--scheduler-file", str(file), "--no-dashboard"]
     processes = []
-    for kind, more in (("scheduler", ["--port", "0"]), *[("worker", ["--nthreads", "1"])] * 2):
+    # without a nanny: it would start a worker that was killed again
+    for kind, more in (
+        ("scheduler", ["--port", "0"]),
+        *[("worker", ["--nthreads", "1", "--no-nanny"])] * 2,
+    ):
         command = [sys.executable, "-m", "dask", kind, *more, *told]
-        processes.append(subprocess.Popen(command, cwd=folder, start_new_session=True, **QUIET))
+        processes.append(
+            subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, **QUIET)
+        )
     try:
         end = time.monotonic() + 60
         while not file.exists() and time.monotonic() < end:
             time.sleep(0.05)
-        yield _Scheduler(processes[0], str(file))
+        yield _Cluster(processes[0], processes[1:], str(file))
     finally:
         for process in processes:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            kill_session(process)
             process.wait()
 
 
 def main(kills: int, seed: int) -> None:
-    with tempfile.TemporaryDirectory(prefix="stereocell-torture-") as folder:
+    with (
+        tempfile.TemporaryDirectory(prefix="stereocell-torture-") as name,
+        serving(Path(name)) as store,
+    ):
         start = time.monotonic()
-        torture = Torture(Path(folder), seed)
+        folder = Path(name)
+        store.files().mkdir("bucket")
+        tortures = {
+            "folder": Torture(folder, Folder(folder / "out"), seed),
+            store.kind: Torture(folder, Bucket(store, "bucket/out"), seed),
+        }
+        turns = [(place, kind) for kind in KINDS for place in tortures]
         done = 0
         while done < kills:
-            kind = KINDS[done % len(KINDS)]
-            if torture.kill(kind):
+            place, kind = turns[done % len(turns)]
+            if tortures[place].kill(kind):
                 done += 1
-                print(f"{done:3} {kind:<10} {time.monotonic() - start:6.0f} s", flush=True)
-        torture.end()
-        ends = torture.outcomes.pop("ended")
-        kinds = ", ".join(f"{count} x {kind}" for kind, count in torture.outcomes.items())
-        print(f"{done} kills ({kinds}); {ends} builds came to their end, each with the bytes of an "
-              "undisturbed one")  # fmt: skip
+                print(
+                    f"{done:3} {place:<9} {kind:<14} {time.monotonic() - start:6.0f} s", flush=True
+                )
+        for place, torture in tortures.items():
+            torture.end()
+            ends = torture.outcomes.pop("ended")
+            kinds = ", ".join(f"{count} x {kind}" for kind, count in torture.outcomes.items())
+            print(
+                f"{place}: {torture.outcomes.total()} kills ({kinds}); {ends} builds came to their "
+                "end, each with the bytes of an undisturbed one"
+            )
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ import { writeFixture } from "./fixture/bundle";
 
 const STEREOCELL =
   process.env.STEREOCELL_COMMAND ?? new URL("../../.venv/bin/stereocell", import.meta.url).pathname;
-const VIEWPORT = { width: 360, height: 240 };
+const VIEWPORT = { width: 240, height: 160 }; // small: software draws it
 const QUERY = "?mode=all&quality=high";
 
 /** `stereocell serve OUT` on a free port, and its address. */
@@ -138,7 +138,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
         values: [0.4, 1],
         gradients: [0.1, 1],
       };
-      const link = `#v=1&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town`;
+      const link = `#v=1&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town&light=many:false`;
       for (const mode of ["all", "traced"]) {
         const drawn = async (address: string) => {
           const { page, viewer, counted } = await open(`${address}?mode=${mode}${link}`);
@@ -157,7 +157,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
         expect(bricks.counted.files).toEqual([]);
         expect(bricks.counted.sockets).toBeGreaterThan(0);
         const isBlue = ([r, , b]: Pixel) => b > r + 40;
-        expect(files.picture.count(isBlue)).toBeGreaterThan(500);
+        expect(files.picture.count(isBlue)).toBeGreaterThan(220);
         expect(apart(bricks.picture, files.picture), mode).toBeLessThan(mode === "all" ? 0.5 : 4);
       }
     });

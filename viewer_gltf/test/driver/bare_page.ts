@@ -45,17 +45,18 @@ export function prepareBarePage<H extends Calls>(harness?: URL): BarePage<H> {
       return page;
     },
     async call(name, ...given) {
+      // as text: volumes are long, and what carries them else wraps every number by itself
       const answer = await page.evaluate(
         ([name, given]) => {
           const { harness } = window as {
             harness?: Record<string, (...each: unknown[]) => unknown>;
           };
-          return harness?.[name]?.(...given);
+          return JSON.stringify(harness?.[name]?.(...JSON.parse(given)));
         },
-        [name, given] as const,
+        [name, JSON.stringify(given)] as const,
       );
       if (answer === undefined) throw new Error(`the page has no harness with ${name}`);
-      return answer as ReturnType<H[typeof name]>;
+      return JSON.parse(answer) as ReturnType<H[typeof name]>;
     },
     async run(names, head, body, textures = {}) {
       const includes = names.map((name) => `#include <chunks/${name}>`).join("\n");

@@ -69,6 +69,20 @@ export async function addHeadset(page: Page): Promise<void> {
     device.installRuntime({ forceInstall: true }); // Chromium has a runtime, but no headset
     device.position.set(0, 1.6, 0);
     Object.assign(window, { headset: device }); // for tests to move
+    // The emulator draws frame after frame; half of the time here is left to what goes on beside
+    const next = window.requestAnimationFrame.bind(window);
+    const cancelled = new Set<number>();
+    let handles = 0;
+    window.requestAnimationFrame = (draw) => {
+      const handle = ++handles;
+      const start = performance.now();
+      next(() => {
+        const took_ms = performance.now() - start; // of the frame that was drawn before
+        setTimeout(() => next((time) => cancelled.delete(handle) || draw(time)), took_ms);
+      });
+      return handle;
+    };
+    window.cancelAnimationFrame = (handle) => cancelled.add(handle);
     // The emulator gives the canvas the window's size; the page's own style would squash it.
     document.addEventListener("DOMContentLoaded", () => {
       const sheet = new CSSStyleSheet(); // the page's policy allows no other

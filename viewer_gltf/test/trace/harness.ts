@@ -139,8 +139,12 @@ function looksOf(run: Run) {
   return Array.from({ length: count }, () => ({ color: run.color, table, plane }));
 }
 
+// One for all runs, and no tracer of it is disposed: what one has compiled does for the next
+let shared: WebGLRenderer | undefined;
+
 function gather(run: Run): Gathered {
-  const renderer = new WebGLRenderer();
+  shared ??= new WebGLRenderer();
+  const renderer = shared;
   renderer.setSize(run.pixels, run.pixels, false);
   const depth = new DepthPass(new Cuts());
   const scene = new Scene();
@@ -207,8 +211,6 @@ function gather(run: Run): Gathered {
     batches,
     samples: tracer.samples,
   };
-  tracer.dispose();
-  renderer.dispose();
   return found;
 }
 
