@@ -30,7 +30,7 @@ const SLAB_OPACITY = 0.03;
 const FUNCTION = "soft";
 
 const BACKGROUND_RED = 11;
-const VIEWPORT = { width: 528, height: 300 };
+const VIEWPORT = { width: 704, height: 400 };
 
 type Vec3 = readonly [number, number, number];
 type Spot = Readonly<{ x: number; y: number }>;
@@ -180,7 +180,7 @@ describeInChromium("an artist's layer over the stage", () => {
             farthest = Math.max(farthest, apart(before, after, x, y));
           }
         }
-        expect(shared).toBeGreaterThan(2500);
+        expect(shared).toBeGreaterThan(5000);
         expect(farthest).toBeLessThanOrEqual(2);
       },
     );
