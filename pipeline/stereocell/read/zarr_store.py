@@ -101,12 +101,6 @@ def require_regular(path: Path, most: int) -> None:
         raise OSError(f"{path.name}: {status.st_size} bytes, over the {most} that it may have")
 
 
-def require_metadata(group: Path) -> None:
-    """Raise OSError where one of a local group's own metadata files is no regular file."""
-    for name in _METADATA:
-        require_regular(group / name, _METADATA_BYTES)
-
-
 def _of_zstd(data: bytes, most: int) -> int:
     size: int = zstandard.get_frame_parameters(data).content_size
     if 0 <= size < 1 << 62:  # else it isn't said
