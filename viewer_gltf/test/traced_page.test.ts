@@ -263,8 +263,9 @@ describeInChromium("the path-traced page", () => {
     const green = await shoot();
     expect(drawn(green)).toBeGreaterThan(340);
     const isGreen = hasColor([0, 1, 0]);
-    const others = green.count((pixel) => Math.max(...pixel) > 60 && !isGreen(pixel));
-    expect(others).toBeLessThan(0.03 * drawn(green));
+    const others = (picture: Picture) =>
+      picture.count((pixel) => Math.max(...pixel) > 60 && !isGreen(pixel));
+    expect(others(green)).toBeLessThan(0.03 * drawn(green));
 
     const call = (name: "loseContext" | "restoreContext") =>
       page().evaluate((each) => {
@@ -282,10 +283,11 @@ describeInChromium("the path-traced page", () => {
     await stand.viewer.settled();
     const back = await shoot();
     // of all pixels together: each by itself is noisy after a few samples, and a busy machine's
-    // picture is coarser
+    // picture is coarser, so that its outlines take more of it
     expect(Math.abs(drawn(back) / drawn(green) - 1)).toBeLessThan(0.25);
+    expect(others(back)).toBeLessThan(0.03 * drawn(back));
     const [was, is] = [green, back].map(meanColor);
-    for (const [k, v] of is.entries()) expect(Math.abs(v - was[k])).toBeLessThan(8);
+    for (const [k, v] of is.entries()) expect(Math.abs(v - was[k])).toBeLessThan(20);
   });
 
   it("says once that the light can't be had, and tries again when asked", async () => {
