@@ -42,7 +42,10 @@ def read_image(location: Location) -> Image:
         raise SourceError(f"{where}: attribute `ome`: found {ome!r:.60}, expected a table")
     multiscales = ome.get("multiscales")
     if not isinstance(multiscales, list) or not multiscales:
-        kind = next((key for key in ("plate", "well", "labels") if key in ome), None)
+        kind = next(
+            (key for key in ("plate", "well", "labels", "bioformats2raw.layout") if key in ome),
+            None,
+        )
         found = f"found a {kind}" if kind else "not found"
         raise SourceError(
             f"{where}: no multiscales: {found}, expected the attribute `multiscales` of an image"
