@@ -28,6 +28,13 @@ from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.read.zarr_store import GuardedStore, codec_name
 
 _MAX_LEVELS = 64
+# Groups that hold images, or belong to one, by the attribute that they have in place of one's own
+_OTHERS = {
+    "plate": "a plate",
+    "well": "a well",
+    "labels": "a list of labels",
+    "bioformats2raw.layout": "several series (bioformats2raw.layout), of which one is at /0",
+}
 
 
 def read_image(location: Location) -> Image:
@@ -42,11 +49,7 @@ def read_image(location: Location) -> Image:
         raise SourceError(f"{where}: attribute `ome`: found {ome!r:.60}, expected a table")
     multiscales = ome.get("multiscales")
     if not isinstance(multiscales, list) or not multiscales:
-        kind = next(
-            (key for key in ("plate", "well", "labels", "bioformats2raw.layout") if key in ome),
-            None,
-        )
-        found = f"found a {kind}" if kind else "not found"
+        found = next((f"found {_OTHERS[key]}" for key in _OTHERS if key in ome), "not found")
         raise SourceError(
             f"{where}: no multiscales: {found}, expected the attribute `multiscales` of an image"
         )
