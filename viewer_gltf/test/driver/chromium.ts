@@ -59,8 +59,13 @@ export async function launch(
   };
 }
 
-/** Give the page an emulated headset (iwer, `window.headset`), before its own scripts run. */
-export async function addHeadset(page: Page): Promise<void> {
+/**
+ * Give the page an emulated headset (iwer, `window.headset`), before its own scripts run.
+ *
+ * It draws frame after frame; unless a test needs many, half of the time is left to what goes on
+ * beside.
+ */
+export async function addHeadset(page: Page, needsFrames = false): Promise<void> {
   const script = new URL(import.meta.resolve("iwer/build/iwer.min.js"));
   await page.addInitScript(await readFile(script, "utf8"));
   await page.addInitScript(() => {
@@ -69,7 +74,17 @@ export async function addHeadset(page: Page): Promise<void> {
     device.installRuntime({ forceInstall: true }); // Chromium has a runtime, but no headset
     device.position.set(0, 1.6, 0);
     Object.assign(window, { headset: device }); // for tests to move
-    // The emulator draws frame after frame; half of the time here is left to what goes on beside
+    // The emulator gives the canvas the window's size; the page's own style would squash it.
+    document.addEventListener("DOMContentLoaded", () => {
+      const sheet = new CSSStyleSheet(); // the page's policy allows no other
+      sheet.replaceSync(
+        "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }",
+      );
+      document.adoptedStyleSheets.push(sheet);
+    });
+  });
+  if (needsFrames) return;
+  await page.addInitScript(() => {
     const next = window.requestAnimationFrame.bind(window);
     const cancelled = new Set<number>();
     let handles = 0;
@@ -83,13 +98,5 @@ export async function addHeadset(page: Page): Promise<void> {
       return handle;
     };
     window.cancelAnimationFrame = (handle) => cancelled.add(handle);
-    // The emulator gives the canvas the window's size; the page's own style would squash it.
-    document.addEventListener("DOMContentLoaded", () => {
-      const sheet = new CSSStyleSheet(); // the page's policy allows no other
-      sheet.replaceSync(
-        "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }",
-      );
-      document.adoptedStyleSheets.push(sheet);
-    });
   });
 }
