@@ -128,6 +128,7 @@ class Torture:
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
         self._source = _write_source(self.folder)
+        self._said = self.folder / "stderr"
         self._finished: dict[str, object] = {}  # files of finished units: when they were written
         self._undisturbed, self._seconds = self._build_undisturbed()
 
@@ -182,12 +183,14 @@ class Torture:
 
     def _start(self, told: list[str]) -> subprocess.Popen[bytes]:
         out = ["-o", self.place.address]
-        return subprocess.Popen(
-            [*STEREOCELL, "build", str(self._source), *out, "--grid", "2x1", *told],
-            env={**os.environ, **self.place.environment},
-            start_new_session=True,
-            **QUIET,
-        )
+        with self._said.open("wb") as said:
+            return subprocess.Popen(
+                [*STEREOCELL, "build", str(self._source), *out, "--grid", "2x1", *told],
+                env={**os.environ, **self.place.environment},
+                start_new_session=True,
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+            )
 
     def _await_moment(self, build: subprocess.Popen[bytes], moment_s: float) -> bool:
         """Wait until the build is at work for so long; return whether it hasn't ended before."""
@@ -199,7 +202,8 @@ class Torture:
 
     def _require_ended(self, build: subprocess.Popen[bytes]) -> None:
         if build.returncode:
-            raise TortureError(f"the build that went on ended with {build.returncode}")
+            said = self._said.read_text()
+            raise TortureError(f"the build that went on ended with {build.returncode}: {said}")
         self._require_whole()
 
     def _require_whole(self) -> None:
