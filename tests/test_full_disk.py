@@ -19,8 +19,8 @@ def _resize(disk: Path, size: str) -> None:
 def test_full_disk_is_one_line_leaves_no_half_file_and_the_build_goes_on_later(
     tmp_path: Path, small_disk: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    body = phantoms.f_phantom(2)[np.newaxis]
-    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body, "CZYX")
+    body = np.stack([phantoms.f_phantom(2)] * 2)
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body, "CZYX", names=["a", "b"])
 
     def build(out: Path) -> int:
         return main(["build", str(source), "-o", str(out), "--workers", "0", "--grid", "2x1"])

@@ -51,7 +51,6 @@ from stereocell.write.ktx2 import encode_color_map, encode_normal_map, encode_oc
 
 _COLOR = 1 / 255 + 1e-6
 _UM_PER_METRE = 1e6
-_ENCODED = 2.0  # of 255, in the mean: what encoding takes, but of noise; that is encoded again
 _MAP_DIFFERENCE = 1.0  # of 255, in the mean: the same image by another version of the encoder
 _ODD_SHARE = 0.01  # of a surface's area: slivers that the lattice turns over
 _UV_STEP = 1e-4  # of a map's edge; 16 bits hold a sixth of it
@@ -371,15 +370,12 @@ def _hold_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str]:
         if name not in drawn.maps:
             yield f"the map {path.name} is missing"
             continue
-        image, found = read_image(path), _pixels(drawn.maps[name])
-        if _is_alike(found, image, _ENCODED):
+        anew = encode(read_image(path))
+        if anew == drawn.maps[name]:
             continue
-        if not _is_alike(found, _pixels(encode(image)), _MAP_DIFFERENCE):
+        found, wanted = _pixels(drawn.maps[name]), _pixels(anew)
+        if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
             yield f"the map {path.name} is another image in the stage"
-
-
-def _is_alike(a: NDArray[Any], b: NDArray[Any], most: float) -> bool:
-    return a.shape == b.shape and float(np.abs(a - b).mean()) <= most
 
 
 def _pixels(ktx2: bytes) -> NDArray[np.float64]:
