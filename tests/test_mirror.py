@@ -22,7 +22,7 @@ from stereocell import mirror
 from stereocell.cli import main
 from stereocell.errors import OutputError
 from stereocell.lock import alone_at
-from stereocell.processes import machine
+from stereocell.processes import machine, start_of
 from stereocell.tissue_channels import TissueRequest, add_tissue
 from test_tissue import blobs
 
@@ -171,17 +171,29 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
         "stereocell: s3://bucket/held: `stereocell build` (process 7 on elsewhere, since "
         "2026-01-01T00:00:00) is writing here: wait until it has ended"
     )
-    dead = subprocess.Popen([sys.executable, "-c", ""])
+    here = {**owner, "process": os.getpid(), "machine": machine()}
+    for own in ({}, {"start": start_of(os.getpid())}):
+        fs.pipe_file(lock, json.dumps({**here, **own}).encode())
+        assert main(["units", "s3://bucket/held"]) == 1
+        assert " is writing here: " in capsys.readouterr().err
+    dead, ended = (subprocess.Popen([sys.executable, "-c", ""]) for _ in range(2))
     dead.wait()
-    gone = {**owner, "process": dead.pid, "machine": machine()}
-    fs.pipe_file(lock, json.dumps(gone).encode())
-    assert main(["units", "s3://bucket/held"]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line == (
-        "stereocell: s3://bucket/held/plan.json is missing: run `stereocell plan INPUT -o OUT` "
-        "first"
-    )
-    assert not fs.exists(lock)
+    os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)  # its id is not free yet
+    for gone in (
+        {"process": dead.pid},
+        {"process": dead.pid, "start": "another"},
+        {"process": ended.pid, "start": "another"},
+        {"start": "another"},  # its id has been given away again: to us
+    ):
+        fs.pipe_file(lock, json.dumps({**here, **gone}).encode())
+        assert main(["units", "s3://bucket/held"]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line == (
+            "stereocell: s3://bucket/held/plan.json is missing: run `stereocell plan INPUT -o OUT`"
+            " first"
+        )
+        assert not fs.exists(lock)
+    ended.wait()
 
 
 def _wait_for(fault: Callable[[], None]) -> None:

@@ -24,7 +24,7 @@ from typing import Any
 from uuid import uuid4
 
 from stereocell.errors import OutputError
-from stereocell.processes import is_alive, machine
+from stereocell.processes import is_alive, machine, start_of
 
 if sys.platform != "win32":
     import fcntl
@@ -99,6 +99,7 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
 def _claim(command: str) -> dict[str, Any]:
     return {
         "process": os.getpid(),
+        "start": start_of(os.getpid()),
         "machine": machine(),
         "host": socket.gethostname(),
         "command": command,
@@ -199,6 +200,6 @@ def _read(fs: Any, path: str) -> tuple[bytes, float] | None:
 def _is_stale(content: bytes, age_s: float) -> bool:
     with suppress(ValueError, KeyError, TypeError):
         owner = json.loads(content)
-        if owner["machine"] == machine() and not is_alive(int(owner["process"])):
-            return True
+        if owner["machine"] == machine():
+            return not is_alive(int(owner["process"]), owner.get("start", "")) or age_s > STALE_S
     return age_s > STALE_S

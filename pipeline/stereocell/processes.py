@@ -4,6 +4,7 @@ import hashlib
 import os
 import socket
 from contextlib import suppress
+from pathlib import Path
 
 
 def cores() -> int:
@@ -30,14 +31,26 @@ def machine() -> str:
     return hashlib.sha256(place.encode()).hexdigest()[:8]
 
 
-def is_alive(process: int) -> bool:
-    """Return whether a process of that id runs; elsewhere than on POSIX it is taken to."""
-    if os.name != "posix":  # os.kill asks nothing there, it kills
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # somebody else's
-        pass
-    return True
+def start_of(process: int) -> str:
+    """Return what tells a running process from all that had or will have its id.
+
+    Empty: it can't be seen, or there is none.
+    """
+    import psutil
+
+    with suppress(OSError, psutil.Error):
+        if not Path("/proc/self/stat").exists():
+            return str(psutil.Process(process).create_time())
+        # what psutil returns moves with the clock on Linux: ticks since the machine's start don't
+        state, *fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        machine_start = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        return "ended" if state in "ZX" else f"{machine_start} {fields[18]}"
+    return ""
+
+
+def is_alive(process: int, start: str = "") -> bool:
+    """Return whether a process of that id runs, and where its start is known: that very one."""
+    import psutil
+
+    now = start_of(process)
+    return psutil.pid_exists(process) and (not start or not now or now == start)
