@@ -1,4 +1,4 @@
-"""A proxy before an object store that fails as real ones do: 500, 503, slow, cut and short."""
+"""A proxy before an object store, failing as real ones do: 500, 503, slow, cut, lost and short."""
 
 import http.client
 import random
@@ -11,26 +11,32 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlsplit
 
-FAULTS = ("500", "503", "slow", "cut", "short")
+# cut: before anything is done; lost: it is done, and nobody is told
+FAULTS = ("500", "503", "slow", "cut", "lost", "short")
 _CODES = {"500": "InternalError", "503": "SlowDown"}
 _HOP = ("connection", "transfer-encoding", "keep-alive")
 
 
 @dataclass
 class Faults:
-    """`rate`: share of requests that go wrong; `only`: these kinds. `seen` counts them."""
+    """`rate`: share of requests that go wrong; `only`: these kinds; `once`: the next of a method
+    and an address that ends so. `seen` counts them."""
 
     endpoint: str
     rate: float = 0.0
     only: tuple[str, ...] = FAULTS
+    once: dict[tuple[str, str], str] = field(default_factory=dict)
     seen: Counter[str] = field(default_factory=Counter)
     dice: random.Random = field(default_factory=lambda: random.Random(0))
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def draw(self, method: str) -> str:
+    def draw(self, method: str, path: str) -> str:
         """Return what is to go wrong with a request, or nothing."""
         with self.lock:
             fault = self.dice.choice(self.only) if self.dice.random() < self.rate else ""
+            for wanted in [each for each in self.once if each[0] == method]:
+                if urlsplit(path).path.endswith(wanted[1]):
+                    fault = self.once.pop(wanted)
             if fault == "short" and method != "GET":
                 fault = "cut"
             self.seen[fault or "none"] += 1
@@ -67,7 +73,7 @@ class _Proxy(BaseHTTPRequestHandler):
 
     def _forward(self) -> None:
         body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-        fault = self.faults.draw(self.command)
+        fault = self.faults.draw(self.command, self.path)
         if fault == "cut":
             self.close_connection = True
             return
@@ -89,6 +95,9 @@ class _Proxy(BaseHTTPRequestHandler):
             content = answer.read()
         finally:
             back.close()
+        if fault == "lost":
+            self.close_connection = True
+            return
         headers = [(k, v) for k, v in answer.getheaders() if k.lower() not in _HOP]
         self._answer(answer.status, headers, content, is_short=fault == "short")
 

@@ -1,8 +1,11 @@
 """A cluster that others have started does the work of `--workers`, to the same bytes."""
 
 import hashlib
+import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +16,10 @@ import phantoms
 from assets import make_assets
 from object_store import ObjectStore, serving
 from stereocell.cli import main
-from stereocell.cluster import ClusterError, join
+from stereocell.cluster import ClusterError, able, join
+from stereocell.engine import Engine, TasksFailedError
+from stereocell.lock import LOCK, alone_in
+from stereocell.write.atomic import write_bytes
 
 GRID = "2x1"
 Cluster = tuple[str, ObjectStore]
@@ -46,7 +52,9 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 def _start(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "dask", *arguments]
     quiet = subprocess.DEVNULL
-    return subprocess.Popen(command, cwd=cwd, stdout=quiet, stderr=quiet)
+    # workers find what is to be run in this file
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    return subprocess.Popen(command, cwd=cwd, env=environment, stdout=quiet, stderr=quiet)
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +144,96 @@ def test_workers_that_would_make_other_bytes_are_refused(
     monkeypatch.setattr(f"stereocell.cluster.{name}", ours)
     with pytest.raises(ClusterError, match=rf"worker tcp://.* {said}"):
         join(cluster[0], None)
+
+
+@pytest.mark.slow
+def test_a_worker_that_came_later_is_held_to_the_same(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine = Engine(0, cluster[0], tmp_path)
+    try:
+        assert engine.run("good", str, [("a", 1), ("b", 2)]) == ["1", "2"]
+        monkeypatch.setattr("stereocell.cluster.version", lambda _: "99")
+        with pytest.raises(TasksFailedError, match=r"a worker on .*: has StereoCell .*expected 99"):
+            engine.run("bad", str, [("a", 1), ("b", 2)])
+    finally:
+        engine.close()
+    with pytest.raises(ClusterError, match=r"does not see /nowhere/.lock; expected OUT in"):
+        able(str, Path("/nowhere/.lock"))(1)
+
+
+def write_when(task: tuple[Path, Path, Path]) -> None:
+    begun, told, file = task
+    begun.touch()
+    while not told.exists():
+        time.sleep(0.05)
+    try:
+        write_bytes(file, b"late")
+    finally:
+        told.with_suffix(".over").touch()
+
+
+@pytest.mark.slow
+def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
+    cluster: Cluster, tmp_path: Path
+) -> None:
+    out, begun, told = tmp_path / "out", tmp_path / "begun", tmp_path / "told"
+
+    def interrupt() -> None:
+        while not begun.exists():
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def build() -> None:
+        with alone_in(out, "build"):
+            engine = Engine(0, cluster[0], out / LOCK)
+            threading.Thread(target=interrupt).start()
+            try:
+                engine.run("late", write_when, [("a", (begun, told, out / "tile" / "a"))])
+            finally:
+                engine.close()
+
+    with pytest.raises(KeyboardInterrupt):
+        build()
+    assert not out.exists()
+    told.touch()
+    while not told.with_suffix(".over").exists():
+        time.sleep(0.05)
+    assert not out.exists()
+
+
+@pytest.mark.slow
+def test_a_cluster_whose_workers_are_all_killed_is_not_waited_for_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stereocell.engine._LOOK_S", 0.5)
+    monkeypatch.setattr("stereocell.engine._LOOKS", 3)
+    file = tmp_path / "scheduler.json"
+    told = ["--scheduler-file", str(file), "--no-dashboard"]
+    processes = [_start("scheduler", "--port", "0", *told, cwd=tmp_path)]
+    # without a nanny: it would start a worker that was killed again
+    worker = _start("worker", "--nthreads", "1", "--no-nanny", *told, cwd=tmp_path)
+    begun = tmp_path / "begun"
+
+    def kill() -> None:
+        while not begun.exists():
+            time.sleep(0.05)
+        worker.kill()
+
+    threading.Thread(target=kill).start()
+    try:
+        while not file.exists():
+            time.sleep(0.05)
+        engine = Engine(0, str(file), tmp_path)
+        never = tmp_path / "never"
+        tasks = [(name, (begun, never, tmp_path / name)) for name in "ab"]
+        with pytest.raises(TasksFailedError, match="a, b: its workers are gone and did not come"):
+            engine.run("none", write_when, tasks)
+        engine.close()
+    finally:
+        for process in (*processes, worker):
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x"])

@@ -1,6 +1,7 @@
 """What a build depends on goes away in the middle and comes back: one line, then the same bytes."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -125,6 +126,23 @@ def forbid(text, **how):
 engine.console.print = forbid
 sys.exit(main([phase, out, "--workers", "0"]))
 """
+# The command, killed once the first tile of a phase is done
+KILLED = """
+import os, signal, sys
+from stereocell import engine
+from stereocell.cli import main
+
+phase, out = sys.argv[1:3]
+tell = engine.console.print
+
+def end(text, **how):
+    tell(text, **how)
+    if text.startswith(f"{phase}: 1/"):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+engine.console.print = end
+sys.exit(main([phase, out, "--workers", "0"]))
+"""
 # root may write anywhere, but for this
 BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
 
@@ -143,6 +161,7 @@ def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goe
         (line,) = [line for line in ended.stderr.splitlines() if line.startswith("stereocell: ")]
         assert str(out) in line
         assert "Permission denied" in line
+        assert "/.lock" not in line  # that it can't be removed either is not the news
         assert "Traceback" not in ended.stderr
         finished = {file: file.stat().st_mtime_ns for file in out.glob("units/r*/*/*/*")}
         assert finished
@@ -152,6 +171,52 @@ def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goe
         assert {file: file.stat().st_mtime_ns for file in finished} == finished
     assert assets(asset_digests(out)) == undisturbed
     assert not [path for path in out.rglob(".*") if path.name != ".nojekyll"]
+
+
+@pytest.mark.slow
+def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
+    volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    for phase, made in (("stage", "stage/tiles"), ("bundle", "bundle_parts/*")):
+        ended = subprocess.run([sys.executable, "-c", KILLED, phase, str(out)], check=False)
+        assert ended.returncode == -signal.SIGKILL
+        (tile,) = out.glob(f"{made}/r0_c[01]")
+        finished = {file.relative_to(tile): file.stat().st_mtime_ns for file in tile.rglob("*.*")}
+        assert len(finished) > 3
+        capsys.readouterr()
+        assert main([phase, str(out), "--workers", "0"]) == 0
+        (told,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]
+        assert told.startswith(f"{phase}: 1/1 r0_c")
+        assert tile.name not in told
+        final = tile if phase == "stage" else out / "bundle"
+        for name, written in finished.items():
+            if name.name != "tile.json":  # stays behind with the parts
+                assert (final / name).stat().st_mtime_ns == written
+    assert not (out / "bundle_parts").exists()
+    assert assets(asset_digests(out)) == undisturbed
+
+
+@pytest.mark.slow
+def test_a_finished_tile_that_is_damaged_or_of_other_settings_is_made_again(
+    volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    (grid,) = out.glob("stage/tiles/r0_c1/*.vdb")
+    grid.write_bytes(b"cut")
+    capsys.readouterr()
+    assert main(["stage", str(out), "--workers", "0"]) == 0
+    assert "stage: 1/1 r0_c1" in capsys.readouterr().err
+    subprocess.run([sys.executable, "-c", KILLED, "bundle", str(out)], check=False)
+    (part,) = out.glob("bundle_parts/*/r0_c[01]")
+    next(part.rglob("*.glb")).write_bytes(b"cut")
+    capsys.readouterr()
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    assert "bundle: 2/2" in capsys.readouterr().err
+    assert assets(asset_digests(out)) == undisturbed
 
 
 @pytest.fixture(scope="module")

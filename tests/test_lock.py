@@ -11,7 +11,9 @@ import pytest
 
 from stereocell.cli import main
 from stereocell.errors import OutputError
-from stereocell.lock import LOCK, alone_in
+from stereocell.lock import LOCK, alone_in, held, working_for
+from stereocell.processes import machine
+from stereocell.write.atomic import replacing, replacing_folder, write_bytes
 
 HOLD = """
 import sys, time
@@ -64,6 +66,68 @@ def test_what_a_killed_command_held_is_free(tmp_path: Path, end: signal.Signals)
     with alone_in(tmp_path, "stage"):
         assert b'"stage"' in (tmp_path / LOCK).read_bytes()
     assert not (tmp_path / LOCK).exists()
+
+
+def test_a_lock_that_can_not_be_removed_is_free_and_hides_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, missing_ok: bool = False) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    def fail() -> None:
+        with monkeypatch.context() as patch, alone_in(tmp_path, "build"):
+            patch.setattr(Path, "unlink", refuse)
+            raise ValueError("the fault")
+
+    with pytest.raises(ValueError, match="the fault"):
+        fail()
+    assert (tmp_path / LOCK).exists()
+    with alone_in(tmp_path, "stage"):
+        pass
+    assert not (tmp_path / LOCK).exists()
+
+
+def test_work_for_a_command_that_has_ended_leaves_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with alone_in(out, "build"):
+        claim = held()
+        assert claim is not None
+        with working_for(claim):
+            write_bytes(out / "in_time", b"x")
+        (out / "in_time").unlink()
+    refused = r"out: the command that asked for this has ended"
+    with working_for(claim), pytest.raises(OutputError, match=refused):
+        write_bytes(out / "late", b"x")
+    assert not out.exists()
+    with alone_in(out, "build"), working_for(claim):  # another one
+        with pytest.raises(OutputError, match=refused), replacing_folder(out / "late"):
+            pass
+        assert [path.name for path in out.iterdir()] == [LOCK]
+
+
+def test_what_ends_while_a_file_is_written_leaves_the_old_one(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a", b"old")
+    with alone_in(tmp_path, "build"):
+        claim = held()
+    assert claim is not None
+    (tmp_path / LOCK).write_bytes(claim.content)
+
+    def write() -> None:
+        with working_for(claim), replacing(tmp_path / "a") as temporary:
+            temporary.write_bytes(b"new")
+            (tmp_path / LOCK).write_bytes(b"another's")
+
+    with pytest.raises(OutputError, match="the command that asked for this has ended"):
+        write()
+    assert (tmp_path / "a").read_bytes() == b"old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [LOCK, "a"]
+
+
+def test_another_machine_of_the_same_name_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = machine()
+    assert machine() == here
+    monkeypatch.setattr(Path, "read_text", lambda _: "started at another time")
+    assert (machine() != here) == Path("/proc/sys/kernel/random/boot_id").exists()
 
 
 def test_of_many_at_once_one_is_in_at_a_time(tmp_path: Path) -> None:

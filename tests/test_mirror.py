@@ -3,12 +3,14 @@
 import hashlib
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import pytest
 import phantoms
 from assets import make_assets
 from digests import digests_of
+from faulty_store import before
 from object_store import ObjectStore, serving
 from stereocell import mirror
 from stereocell.cli import main
@@ -24,6 +27,7 @@ from stereocell.errors import OutputError
 from stereocell.lock import alone_at
 from stereocell.processes import machine, start_of
 from stereocell.tissue_channels import TissueRequest, add_tissue
+from stereocell.write.atomic import write_bytes
 from test_tissue import blobs
 
 GRID = "2x1"
@@ -126,6 +130,32 @@ def test_what_is_lost_or_half_made_there_is_made_again(
 
 
 @pytest.mark.slow
+def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_alone(
+    store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs, out = store.files(), "bucket/there"
+    before = of_parts(kept(store, out))
+    phases = json.loads(fs.cat_file(f"{out}/phases.json"))
+    phases["bundle"]["key"] = ""  # begun
+    fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
+    fs.rm(f"{out}/bundle/manifest.json")  # it comes last
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert of_parts(kept(store, out)) == before
+    fs.rm(f"{out}/bundle", recursive=True)
+    del phases["bundle"]
+    fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
+    fs.pipe_file(f"{out}/bundle/thesis.tex", b"years of work")
+    for _ in range(2):
+        capsys.readouterr()
+        assert main(["bundle", there, "--workers", "0"]) == 1
+        assert f"{there}/bundle: exists and is no bundle: no manifest" in capsys.readouterr().err
+        assert fs.cat_file(f"{out}/bundle/thesis.tex") == b"years of work"
+    fs.rm(f"{out}/bundle/thesis.tex")
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert of_parts(kept(store, out)) == before
+
+
+@pytest.mark.slow
 def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
     store: ObjectStore, volume: Path, local: dict[str, str]
 ) -> None:
@@ -194,6 +224,58 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
         )
         assert not fs.exists(lock)
     ended.wait()
+
+
+def test_a_lock_whose_putting_was_done_and_not_told_is_held(store: ObjectStore) -> None:
+    with before(store.endpoint) as faults:
+        fs = ObjectStore(store.kind, faults.endpoint).files()
+        faults.once["PUT", "/.lock"] = "lost"
+        with alone_at(fs, "bucket/untold/.lock", "there", "build"):
+            assert faults.seen["lost"] == 1
+            refused = pytest.raises(OutputError, match=r"`stereocell build` .* is writing here")
+            with refused, alone_at(fs, "bucket/untold/.lock", "there", "units"):
+                pass
+        assert not fs.exists("bucket/untold/.lock")
+
+
+def test_who_reads_leaves_what_a_command_is_making_there(store: ObjectStore) -> None:
+    fs = store.files()
+    owner = {"process": os.getpid(), "machine": machine(), "start": start_of(os.getpid())}
+    made = {
+        "bucket/read/.lock": json.dumps(owner).encode(),
+        "bucket/read/units/r0_c0/F/.0123456789.deadbeef.partial/volume.npy": b"half",
+        "bucket/read/plan.json": b"{}",
+    }
+    fs.pipe(made)
+    for command in (["check"], ["check", "--deep", "--workers", "0"]):
+        assert main([*command, "s3://bucket/read"]) == 1
+        assert set(fs.find("bucket/read")) == set(made)
+
+
+def _put_slowly(file: Path) -> None:
+    write_bytes(file, b"x")
+    time.sleep(0.2)
+
+
+def test_each_thread_of_a_worker_tells_what_it_put_itself(store: ObjectStore) -> None:
+    with mirror.opened("s3://bucket/threads", "build") as root, ThreadPoolExecutor(2) as threads:
+        work, _ = mirror.carried(_put_slowly)
+        told = list(threads.map(work, [root / "a", root / "b"]))
+    assert told == [(None, {"a": 1}), (None, {"b": 1})]
+
+
+def test_work_for_a_command_that_has_ended_puts_nothing_there(store: ObjectStore) -> None:
+    fs = store.files()
+    with mirror.opened("s3://bucket/late", "build") as root:
+        work, _ = mirror.carried(_put_slowly)
+    carried = pickle.dumps(work)  # to a cluster's worker
+    for lock in (None, b"another's"):
+        if lock is not None:
+            fs.pipe_file("bucket/late/.lock", lock)
+        with pytest.raises(OutputError, match=r"bucket/late: the command that asked .* has ended"):
+            pickle.loads(carried)(root / "a")
+        assert "bucket/late/a" not in fs.find("bucket/late")
+    mirror._forget(root)
 
 
 def _wait_for(fault: Callable[[], None]) -> None:

@@ -5,8 +5,8 @@
 A build of two tiles and two channels is killed and started again, over and over: the command
 alone, with all its workers, one of its workers, the scheduler or a worker of a cluster; one whose
 OUT is a folder, and one whose OUT is on object storage. When it has come to its end, every byte
-must be as in an undisturbed build, no unit that was finished before a kill may have been written
-again, and nothing half written may be left.
+must be as in an undisturbed build, no unit or tile that was finished before a kill may have been
+written again, and nothing half written may be left.
 """
 
 import os
@@ -129,7 +129,7 @@ class Torture:
         self._random = random.Random(self.seed)
         self._source = _write_source(self.folder)
         self._said = self.folder / "stderr"
-        self._finished: dict[str, object] = {}  # files of finished units: when they were written
+        self._finished: dict[str, object] = {}  # files of what is finished: when they were written
         self._undisturbed, self._seconds = self._build_undisturbed()
 
     def kill(self, kind: str) -> bool:
@@ -212,9 +212,7 @@ class Torture:
             names = {name for name, _ in found.items() ^ self._undisturbed.items()}
             raise TortureError(f"other bytes than undisturbed: {sorted(names)}")
         now = self.place.find()
-        again = [name for name, at in self._finished.items() if now[name] != at]
-        if again:
-            raise TortureError(f"finished units were written again: {again}")
+        self._require_written_once(now)
         left = [name for name in now if "/." in f"/{name}" and not name.endswith(".nojekyll")]
         if left:
             raise TortureError(f"left over: {left}")
@@ -222,13 +220,25 @@ class Torture:
         self._finished.clear()
         self.place.clear()
 
+    def _require_written_once(self, now: dict[str, object]) -> None:
+        def look(name: str) -> object:  # the bundle's parts go when it is whole
+            gone = self._finished[name] if name.startswith("bundle_parts/") else None
+            return now.get(name, gone)
+
+        again = [name for name, at in self._finished.items() if look(name) != at]
+        if again:
+            raise TortureError(f"finished things were written again: {again}")
+
     def _remember_finished(self) -> None:
         now = self.place.find()
-        units = [name.removesuffix("unit.json") for name in now if name.endswith("/unit.json")]
-        for unit in units:
-            if "/." not in unit:
-                files = (name for name in now if name.startswith(unit))
-                self._finished = {name: now[name] for name in files} | self._finished
+        self._require_written_once(now)
+        for name in (name for name in now if "/." not in f"/{name}"):
+            folder, _, last = name.rpartition("/")
+            if last == "stage.json":  # written after the tile's folder
+                folder = f"stage/tiles/{folder.rpartition('/')[2]}"
+            if last in ("unit.json", "stage.json", "tile.json"):
+                files = (file for file in now if file.startswith(f"{folder}/"))
+                self._finished = {file: now[file] for file in files} | self._finished
 
 
 def kill_session(process: subprocess.Popen[bytes]) -> None:

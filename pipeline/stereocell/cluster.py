@@ -3,14 +3,18 @@
 import json
 import re
 import socket
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from stereocell.errors import StereoCellError
 from stereocell.lineage import key_of, libraries_of
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 _ANSWER_S = 8  # in which a scheduler has to answer
 _WORKER_S = 20  # and to have its first worker
@@ -69,27 +73,21 @@ def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
         client.wait_for_workers(1, timeout=_WORKER_S)
     except TimeoutError:
         raise ClusterError(f"--scheduler {scheduler}: has no workers") from None
-    ours = _look("")
-    for address, answer in client.run(_look, str(shared or ""), on_error="return").items():
+    ours = _look()
+    for address, answer in client.run(_look_at, str(shared or ""), on_error="return").items():
         if isinstance(answer, BaseException):
             raise ClusterError(
                 f"worker {address}: can't run StereoCell: {type(answer).__name__}: {answer}"
             )
-        who = f"worker {address} on {answer.host}"
-        for name, expected in ours.versions.items():
-            found = answer.versions.get(name, "none")
-            if found != expected:
-                raise ClusterError(f"{who}: has {name} {found}, expected {expected}")
-        if answer.code != ours.code:
-            raise ClusterError(
-                f"{who}: runs other code than this command: expected the same installation of "
-                "StereoCell, and workers that were started after it"
-            )
-        if not answer.sees:
-            raise ClusterError(
-                f"{who}: does not see {shared}; expected OUT in a file system that all of the "
-                "cluster share"
-            )
+        _require_alike(f"worker {address} on", answer, ours, shared)
+
+
+def able(function: Callable[[T], R], shared: Path | None) -> Callable[[T], R]:
+    """Return a function that first holds its worker to what `join` asks of those that are there.
+
+    Workers may come while others are at work.
+    """
+    return _Able(function, _look(), shared)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,16 +95,50 @@ class _Sight:
     """A worker: versions of what makes the bytes, a digest of our code, whether it sees a file."""
 
     host: str
-    versions: dict[str, str]
+    versions: tuple[tuple[str, str], ...]
     code: str
-    sees: bool
+    sees: bool = True
 
 
-def _look(shared: str) -> _Sight:
+@dataclass(frozen=True, slots=True)
+class _Able(Generic[T, R]):
+    function: Callable[[T], R]
+    ours: _Sight
+    shared: Path | None
+
+    def __call__(self, task: T) -> R:
+        here = _look_at(str(self.shared or ""))
+        _require_alike("a worker on", here, self.ours, self.shared)
+        return self.function(task)
+
+
+def _require_alike(who: str, worker: _Sight, ours: _Sight, shared: Path | None) -> None:
+    who = f"{who} {worker.host}"
+    found = dict(worker.versions)
+    for name, expected in ours.versions:
+        if found.get(name) != expected:
+            raise ClusterError(f"{who}: has {name} {found.get(name, 'none')}, expected {expected}")
+    if worker.code != ours.code:
+        raise ClusterError(
+            f"{who}: runs other code than this command: expected the same installation of "
+            "StereoCell, and workers that were started after it"
+        )
+    if not worker.sees:
+        raise ClusterError(
+            f"{who}: does not see {shared}; expected OUT in a file system that all of the "
+            "cluster share"
+        )
+
+
+def _look_at(shared: str) -> _Sight:
+    return replace(_look(), sees=not shared or Path(shared).exists())
+
+
+def _look() -> _Sight:
     # by their names: what a cluster is asked belongs to no result's lineage
     makers = [import_module(f"stereocell.{name}") for name in ("tasks", "staging")]
     versions = {"StereoCell": version("stereocell")}
     for maker in makers:
         versions |= libraries_of(maker)
     code = "".join(key_of("", maker) for maker in makers)
-    return _Sight(socket.gethostname(), versions, code, not shared or Path(shared).exists())
+    return _Sight(socket.gethostname(), tuple(versions.items()), code)

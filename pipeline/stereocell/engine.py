@@ -6,6 +6,7 @@ Its workers have to see OUT and the input under the same paths, and to run the s
 """
 
 import logging
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +22,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from stereocell.cluster import ClusterError, join
+from stereocell.cluster import ClusterError, able, join
 from stereocell.errors import StereoCellError
 from stereocell.interrupts import children_ignore_interrupts
 from stereocell.mirror import carried, forget_scratch
@@ -31,6 +32,8 @@ R = TypeVar("R")
 
 _START_S = 300  # for workers of this machine to answer: it may be busy
 _LOOK_S, _LOOKS = 15, 12  # for workers, while a task waits for one; a killed one is started anew
+_POLL_S = 0.05
+_GONE = "its workers are gone and did not come back: the same command goes on from here"
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -60,6 +63,8 @@ class Engine:
 
         A task that fails doesn't stop the others. Raises TasksFailedError at the end.
         """
+        if not tasks:
+            return []
         results: dict[int, R] = {}
         failures: dict[int, str] = {}
         try:
@@ -95,19 +100,22 @@ class Engine:
                 else:
                     yield place, result, None
             return
-        from distributed import as_completed
-
         client = self._start()
         work, settle = carried(function)
+        if self._scheduler:
+            work = able(work, self._shared)
         futures = {client.submit(work, task, pure=False): place for place, task in enumerate(tasks)}
         suspects = []
-        for future in as_completed(futures):
+        for future in _as_they_end(client, list(futures)):
+            place = futures.pop(future)
             result, failure = _outcome_of(client, future)
             if _is_killed(failure):
-                suspects.append(futures[future])
+                suspects.append(place)
             else:
-                yield futures[future], None if failure else settle(result), failure
+                yield place, None if failure else settle(result), failure
             future.release()
+        for place in futures.values():
+            yield place, None, ClusterError(_GONE)
         # whoever waited on a worker when another task killed it is blamed too: each once more, by
         # itself, and only the one to blame fails again
         for place in sorted(suspects):
@@ -164,6 +172,22 @@ def _started_in_time() -> Iterator[None]:
         ) from None
 
 
+def _as_they_end(client: Any, futures: Sequence[Any]) -> Iterator[Any]:
+    """Yield futures as they end; no more once there have been no workers for long."""
+    from distributed import as_completed
+
+    ended = as_completed(futures)
+    looked, missed = time.monotonic(), 0
+    while not ended.is_empty() and missed < _LOOKS:
+        if ended.has_ready():
+            yield next(ended)
+            continue
+        time.sleep(_POLL_S)
+        if time.monotonic() - looked > _LOOK_S:
+            looked = time.monotonic()
+            missed = 0 if client.scheduler_info()["workers"] else missed + 1
+
+
 def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
     """Wait for a task and return its result and None, or None and why it failed.
 
@@ -182,8 +206,7 @@ def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
             return None, ClusterError(gone)
         except TimeoutError:
             missed = 0 if client.scheduler_info()["workers"] else missed + 1
-    gone = "its workers are gone and did not come back: the same command goes on from here"
-    return None, ClusterError(gone)
+    return None, ClusterError(_GONE)
 
 
 def _is_killed(error: BaseException | None) -> bool:

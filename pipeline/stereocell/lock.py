@@ -8,6 +8,9 @@ On object storage nothing ends by itself: the object is written anew every BEAT_
 that has not been for STALE_S, or whose process on this machine is gone, is taken over. The clocks
 of machine and storage may differ by minutes. Only one can create it where the storage knows
 conditional writes (AWS since 2024); elsewhere two that begin within a second may both get in.
+
+A command's workers may outlive it, as a cluster's do: before they put anything in its place, they
+look whether OUT's lock still says what it said when they were asked.
 """
 
 import json
@@ -18,6 +21,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -32,6 +37,51 @@ if sys.platform != "win32":
 LOCK = ".lock"
 BEAT_S, STALE_S = 60.0, 600.0
 _SETTLE_S = 1.0  # after taking over: another may have done so at once
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What OUT/.lock says while one command is at work there: for its workers. Picklable."""
+
+    file: Path
+    content: bytes
+
+    def require(self) -> None:
+        """Raise OutputError once that command has ended."""
+        with suppress(OSError):
+            if self.file.read_bytes() == self.content:
+                return
+        raise has_ended(str(self.file.parent))
+
+
+def has_ended(out: str) -> OutputError:
+    return OutputError(f"{out}: the command that asked for this has ended")
+
+
+_held: ContextVar[Claim | None] = ContextVar("held", default=None)
+_worked_for: ContextVar[Claim | None] = ContextVar("worked_for", default=None)
+
+
+def held() -> Claim | None:
+    """Return the claim that this command has on the folder that it works in."""
+    return _held.get()
+
+
+@contextmanager
+def working_for(claim: Claim) -> Iterator[None]:
+    """Write within the block for the command that has this claim, and only as long as it has."""
+    before = _worked_for.set(claim)
+    try:
+        yield
+    finally:
+        _worked_for.reset(before)
+
+
+def require_asked() -> None:
+    """Raise OutputError if this is work for a command that has ended."""
+    claim = _worked_for.get()
+    if claim is not None:
+        claim.require()
 
 
 @contextmanager
@@ -56,9 +106,14 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
                 from stereocell.write.atomic import clear_remains  # needs mirror, which needs this
 
                 clear_remains(out)
-            yield
+            before = _held.set(Claim((out / LOCK).absolute(), os.pread(file, 4096, 0)))
+            try:
+                yield
+            finally:
+                _held.reset(before)
         finally:
-            (out / LOCK).unlink(missing_ok=True)  # while it is held: nobody waits at this file
+            with suppress(OSError):  # OUT can't be written any more: whoever comes takes it over
+                (out / LOCK).unlink(missing_ok=True)  # while it is held: nobody waits at this file
             os.close(file)
     finally:
         for folder in made:
@@ -98,6 +153,7 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
 
 def _claim(command: str) -> dict[str, Any]:
     return {
+        "id": str(uuid4()),
         "process": os.getpid(),
         "start": start_of(os.getpid()),
         "machine": machine(),
@@ -130,21 +186,29 @@ def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[
     does, loses it. Raises OutputError if another process holds it, naming that one. What the
     storage itself raises is the caller's.
     """
-    content = json.dumps(_claim(command) | {"id": str(uuid4())}).encode()
+    content = json.dumps(_claim(command)).encode()
     _create(fs, path, shown, content)
     over = threading.Event()
     lost: list[str] = []
+    renewed = time.time()
+
+    def renew() -> None:
+        nonlocal renewed
+        with suppress(Exception):  # a storage that fails now is met where it matters
+            there = _read(fs, path)
+            if there is not None and there[0] == content:
+                fs.pipe_file(path, content)
+                renewed = time.time()
+            else:
+                lost.append("another command" if there is None else _in_words(there[0]))
 
     def beat() -> None:
         while not lost and not over.wait(BEAT_S):
-            with suppress(Exception):  # a storage that fails now is met where it matters
-                there = _read(fs, path)
-                if there is not None and there[0] == content:
-                    fs.pipe_file(path, content)
-                else:
-                    lost.append("another command" if there is None else _in_words(there[0]))
+            renew()
 
     def require() -> None:
+        if not lost and time.time() - renewed > 2 * BEAT_S:  # it has slept
+            renew()
         if lost:
             raise OutputError(
                 f"{shown}: was taken over by {lost[0]}, as this command had not been heard of for "
@@ -172,6 +236,8 @@ def _create(fs: Any, path: str, shown: str, content: bytes) -> None:
                 fs.pipe_file(path, content, mode="create")
                 break
             there = _read(fs, path)
+        if there is not None and there[0] == content:
+            break  # it was put, and only the storage's answer to that was lost
         if there is not None:
             if not _is_stale(*there):
                 raise OutputError(

@@ -15,6 +15,7 @@ import os
 import re
 import shutil
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from stereocell.errors import OutputError, StereoCellError, UsageError
-from stereocell.lock import LOCK, alone_at
+from stereocell.lock import LOCK, Claim, alone_at, has_ended, held, working_for
 from stereocell.processes import is_alive, machine
 
 T = TypeVar("T")
@@ -33,11 +34,11 @@ Size = int | None  # of an object in bytes; None: it is gone
 
 _SMALL_BYTES = 1 << 16
 # what tells of others is put after them, in this order
-_LAST = ("tile.usdc", "stage.usda", "files.json", "manifest.json", "unit.json")
+_LAST = ("tile.usdc", "stage.usda", "files.json", "manifest.json", "unit.json", "tile.json")
 # what steers a build: a few objects for each unit, all small
 _STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
-    r"|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
+    r"|units/[^/]+/stage\.json|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
 )
 # of whose command: where it runs, and its process
 _SCRATCH = re.compile(r"stereocell\.([0-9a-f]{8})\.(\d+)\.\w+")
@@ -64,16 +65,19 @@ class Mirror:
 
     sizes  of all objects by key, where they are known (in the process that runs the command, which
            alone is in OUT); None: the storage is asked each time
+    claim  what OUT's lock says as long as the command is at work for which this process works
     news   what this process has put and removed since somebody asked
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: Place, claim: bytes = b"") -> None:
         self.place = place
+        self.claim = claim
         self.sizes: dict[str, int] | None = None
         self.news: dict[str, Size] = {}
         self.making: set[Path] = set()  # folders that this process will keep as a whole
+        self.moves: dict[str, str] = {}  # into one of them: from where, by what it is called there
         self._folders: dict[str, set[str]] = {}
-        self._require_alone: Callable[[], None] = lambda: None
+        self._require_alone: Callable[[], None] = self._require_claim
 
     @cached_property
     def _storage(self) -> tuple[Any, str]:
@@ -101,17 +105,28 @@ class Mirror:
                 self._require_alone = stack.enter_context(
                     alone_at(fs, f"{base}/{LOCK}", self.place.shown, command)
                 )
+                self.claim = fs.cat_file(f"{base}/{LOCK}")
             yield
+
+    def _require_claim(self) -> None:
+        """Raise OutputError if the command that this worker works for has ended."""
+        if self.claim:
+            fs, base = self._storage
+            there = b""
+            with self._telling(LOCK, "read"), suppress(FileNotFoundError):
+                there = fs.cat_file(f"{base}/{LOCK}")
+            if there != self.claim:
+                raise has_ended(self.place.shown)
 
     # --- what lies there
 
     def list_all(self) -> None:
-        """Learn of every object; what killed commands left half-made is removed."""
+        """Learn of every object; who holds OUT removes what killed commands left half-made."""
         self.sizes = {}
         found = self._find("")
         for key, size in found.items():
             self._learn(key, size)
-        if LOCK in found:  # held by us: what others left half-made is nobody's
+        if self.claim:
             self._remove([key for key in found if "/." in f"/{key}" and key != LOCK])
 
     def keys_of(self, path: Path) -> dict[str, int]:
@@ -193,31 +208,25 @@ class Mirror:
 
     # --- to there
 
-    def keep(self, path: Path, half_made: Path | None = None) -> None:
-        """Put a file, or all of a folder in place of what was there.
-
-        half_made  a folder of which others have kept parts already: they are moved
-        """
+    def keep(self, path: Path) -> None:
+        """Put a file, or all of a folder in place of what was there; see `move`."""
         files = [path] if path.is_file() else [f for f in path.rglob("*") if f.is_file()]
         here = {self._key(file): file for file in files}
-        there: dict[str, str] = {}
-        if half_made is not None:
-            old, new = self._key(half_made), self._key(path)
-            there = {new + key[len(old) :]: key for key in self.keys_of(half_made)}
+        there, self.moves = self.moves, {}
         stale = [key for key in self.keys_of(path) if key not in here and key not in there]
-        self._put({key: file for key, file in here.items() if key not in there}, there)
+        self._put(here, there)
         self._remove([*stale, *there.values()])
         for key, file in here.items():
             if file.stat().st_size > _SMALL_BYTES and not _STEERING.fullmatch(key):
                 file.unlink()
 
     def _put(self, here: Mapping[str, Path], there: Mapping[str, str]) -> None:
-        self._require_alone()
         fs, base = self._storage
         sizes = {key: file.stat().st_size for key, file in here.items()}
         sizes |= {key: self.keys_of(self.place.root / old)[old] for key, old in there.items()}
         ranks = [(rank, key) for key in sizes for rank in [_rank(key)]]
         for rank in sorted({rank for rank, _ in ranks}):
+            self._require_alone()
             keys = sorted(key for r, key in ranks if r == rank)
             own, moved = [k for k in keys if k in here], [k for k in keys if k in there]
             with self._telling(keys[0], "written"):
@@ -311,9 +320,25 @@ def making(folder: Path, final: Path) -> Iterator[None]:
     mirror.making.add(folder)
     try:
         yield
-        mirror.keep(final, folder)
+        old, new = mirror._key(folder), mirror._key(final)
+        mirror.moves = {new + key[len(old) :]: kept for key, kept in mirror.moves.items()}
+        mirror.keep(final)
     finally:
         mirror.making.discard(folder)
+        mirror.moves = {}
+
+
+def move(file: Path, to: Path) -> None:
+    """Have a file that is kept in a folder that is being made, too; it may be gone from its own."""
+    mirror = _of(file)
+    if mirror is not None and not file.is_file():
+        mirror.moves[mirror._key(to)] = mirror._key(file)
+        return
+    to.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, to)
+    except OSError:  # a file system without
+        os.replace(file, to)
 
 
 def remove(path: Path) -> None:
@@ -400,27 +425,45 @@ def _clear_scratch() -> None:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
+_working = threading.Lock()  # a worker of several threads does one task at a time
+
+
 @dataclass(frozen=True, slots=True)
 class _Carried(Generic[T, R]):
     """A function that finds its OUT on any machine, and tells what it has put there."""
 
     function: Callable[[T], R]
     place: Place
+    claim: bytes
 
     def __call__(self, task: T) -> tuple[R, dict[str, Size]]:
-        mirror = next((mirror for mirror in _open if mirror.place == self.place), None)
-        if mirror is None:
-            mirror = Mirror(self.place)
-            _open[:] = [mirror]
-        self.place.root.mkdir(parents=True, exist_ok=True)
-        mirror.news.clear()
-        return self.function(task), dict(mirror.news)
+        with _working:
+            mirror = next((mirror for mirror in _open if mirror.place == self.place), None)
+            if mirror is None:
+                mirror = Mirror(self.place, self.claim)
+                _open[:] = [mirror]
+            self.place.root.mkdir(parents=True, exist_ok=True)
+            mirror.news.clear()
+            return self.function(task), dict(mirror.news)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked(Generic[T, R]):
+    """A function that writes into a folder as long as the command is at work that asked for it."""
+
+    function: Callable[[T], R]
+    claim: Claim
+
+    def __call__(self, task: T) -> R:
+        with working_for(self.claim):
+            return self.function(task)
 
 
 def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[Any], R]]:
     """Return what workers are to run instead of a function, and what makes its result of theirs."""
     if not _open:
-        return function, lambda result: result
+        claim = held()
+        return function if claim is None else _Asked(function, claim), lambda result: result
     mirror = _open[0]
 
     def settle(answer: tuple[R, dict[str, Size]]) -> R:
@@ -428,7 +471,7 @@ def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[A
         mirror.learn(news)
         return result
 
-    return _Carried(function, mirror.place), settle
+    return _Carried(function, mirror.place, mirror.claim), settle
 
 
 def forget_scratch(client: Any) -> None:

@@ -3,7 +3,6 @@
 Every phase skips what is done already: results are named by what they depend on.
 """
 
-import hashlib
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -19,12 +18,12 @@ from stereocell.documents import write_json
 from stereocell.engine import Engine, console
 from stereocell.errors import OutputError
 from stereocell.lineage import key_of, libraries_of
-from stereocell.mirror import is_file, objects_below, sizes_below
+from stereocell.mirror import is_file, objects_below, remove
 from stereocell.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
-from stereocell.staging import run_tile, tile_task
+from stereocell.staging import digest_of, run_tile, tile_task
 from stereocell.store import Store
 from stereocell.survey import look_from
 from stereocell.write import bundle, usd, usdz
@@ -137,7 +136,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         small = store.stage_dir / usdz.USDZ_NAME
         if phase.is_done(key, store.stage_file, small, store.stage_dir / "looks", *folders):
             return
-        engine.run("stage", run_tile, tiles)
+        engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
         extents = [
             usd.TileExtent(t.content.id, t.content.first_um, t.content.last_um, plan.spacing_um)
             for _, t in tiles
@@ -169,10 +168,14 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         made_of = [str(path.absolute()), _states(dependencies(path))] if kept is None else kept
         page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
         key = key_of([made_of, page], bundle)
-        if phase.is_done(key, store.bundle_dir):
-            return
-        bundle.write_bundle(path, store.bundle_dir, viewer, engine)
-    if viewer is None:
+        if kept is not None and store.is_begun("bundle"):
+            bundle.remove_half(store.bundle_dir)
+        bundle.require_bundle(store.bundle_dir)  # before it is written down that it was begun
+        if not phase.is_done(key, store.bundle_dir):
+            store.remove_other_folders(store.parts_dir, {key})
+            bundle.write_bundle(path, store.bundle_dir, viewer, engine, store.parts_dir / key)
+    remove(store.parts_dir)
+    if viewer is None and not phase.is_up_to_date:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
@@ -213,24 +216,10 @@ class _Phase:
         """Return whether `results` (files, folders) stand whole and come from the same things."""
         self.key, self.results = key, results
         entry = self.store.phases().get(self.name, {})
-        self.is_up_to_date = entry.get("key") == key and entry["results"] == _digest(results)
+        self.is_up_to_date = entry.get("key") == key and entry["results"] == digest_of(results)
         if not self.is_up_to_date:
             self.store.save_phase(self.name, "", "", 0.0, "")  # killed half-way, it is not done
         return self.is_up_to_date
-
-
-def _digest(results: Iterable[Path]) -> str:
-    """Return a digest of all files' names and sizes: what a damage alters.
-
-    Of a USD layer only whether it can be opened: a size that an artist's edit changed is no damage.
-    """
-    digest = hashlib.sha256()
-    for result in results:
-        for file, size in (sizes_below(result) or {result: -1}).items():
-            if size >= 0 and file.suffix in usd.LAYER_SUFFIXES:
-                size = int(usd.is_layer(file) if file.is_file() else True)  # kept: put as a whole
-            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
-    return digest.hexdigest()[:20]
 
 
 @contextmanager
@@ -243,5 +232,5 @@ def _phase(store: Store, name: str) -> Iterator[_Phase]:
     if phase.is_up_to_date:
         console.print(f"{name}: up to date")
     else:
-        store.save_phase(name, phase.key, _digest(phase.results), seconds, phase.about)
+        store.save_phase(name, phase.key, digest_of(phase.results), seconds, phase.about)
         console.print(f"{name}: {seconds:.1f} s")

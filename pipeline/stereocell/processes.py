@@ -24,15 +24,16 @@ def available_bytes() -> int:
 
 def machine() -> str:
     """Return 8 hexadecimal digits for where a process's id means something: this machine, or this
-    container, whose processes have ids of their own and whose name others may have, too."""
+    container, since it was started. Others may have its name, and a container's host its start."""
     place = socket.gethostname()
-    with suppress(OSError):  # Linux has it
+    with suppress(OSError):  # Linux has them
+        place += Path("/proc/sys/kernel/random/boot_id").read_text()
         place += os.readlink("/proc/self/ns/pid")
     return hashlib.sha256(place.encode()).hexdigest()[:8]
 
 
 def start_of(process: int) -> str:
-    """Return what tells a running process from all that had or will have its id.
+    """Return what tells a running process of this machine from all that had or will have its id.
 
     Empty: it can't be seen, or there is none.
     """
@@ -43,8 +44,7 @@ def start_of(process: int) -> str:
             return str(psutil.Process(process).create_time())
         # what psutil returns moves with the clock on Linux: ticks since the machine's start don't
         state, *fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-        machine_start = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
-        return "ended" if state in "ZX" else f"{machine_start} {fields[18]}"
+        return "ended" if state in "ZX" else fields[18]
     return ""
 
 

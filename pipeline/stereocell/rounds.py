@@ -24,7 +24,7 @@ from stereocell.repair import RepairOptions
 from stereocell.sources import source_of
 from stereocell.store import Store
 from stereocell.survey import Display, display_from_json, display_to_json, make_look
-from stereocell.tasks import DisplayTask, IsoTask, UnitTask, run_display, run_unit, write_iso
+from stereocell.tasks import DisplayTask, IsoTask, UnitTask, run_unit, write_display, write_iso
 from stereocell.tiling import Box, Tile
 from stereocell.unit import UnitInput
 from stereocell.unit_files import is_whole
@@ -236,10 +236,8 @@ def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
         file = store.display_file(channel.id, key_of(depends, maker))
         files[channel.id] = file
         if find_json(file, _DISPLAY) is None:
-            tasks.append((channel.id, task))
-    displays = _run(plan, engine, "windows", run_display, tasks)
-    for (channel_id, _), display in zip(tasks, displays, strict=True):
-        write_json(files[channel_id], display_to_json(display))
+            tasks.append((channel.id, (task, file)))
+    _run(plan, engine, "windows", write_display, tasks)
     found = {}
     for channel_id, file in files.items():
         content = read_json(file, _DISPLAY, _AGAIN)

@@ -1,13 +1,17 @@
 """What a worker is given and does to write one tile of the stage from its units. Picklable.
 
-The key of the stage holds this module's whole lineage: see lineage.py.
+The keys of the stage and of its tiles hold this module's whole lineage: see lineage.py.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import hashlib
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from stereocell.mirror import at_hand
+from stereocell.documents import find_json, write_json
+from stereocell.lineage import key_of
+from stereocell.mirror import at_hand, remove, sizes_below
 from stereocell.plan import Plan
 from stereocell.specimen import ChannelContent, PaintColors, TileContent
 from stereocell.store import Store
@@ -15,14 +19,35 @@ from stereocell.tiling import Tile
 from stereocell.unit_files import find_closed, load_lods, load_volume
 from stereocell.write import usd
 
+_RECORD = "units.schema.json#StageTile"
+
 
 @dataclass(frozen=True, slots=True)
 class TileTask:
-    """content: the tile without its channels; units: id, unit folder and paint of each channel."""
+    """One tile of the stage.
+
+    content  the tile without its channels
+    units    id, unit folder and paint of each channel
+    record   where is kept from what the tile was made, and what it is: units/<tile>/stage.json
+    key      from what it is to be made
+    """
 
     stage_dir: Path
     content: TileContent
     units: tuple[tuple[str, Path, PaintColors | None], ...]
+    record: Path
+    key: str
+
+    @property
+    def folder(self) -> Path:
+        return self.stage_dir / "tiles" / self.content.id
+
+    def is_done(self) -> bool:
+        """Return whether the tile stands whole and comes from the same things."""
+        return bool(find_json(self.record, _RECORD) == self.describe())
+
+    def describe(self) -> dict[str, str]:
+        return {"key": self.key, "results": digest_of([self.folder])}
 
 
 def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) -> TileTask:
@@ -45,11 +70,15 @@ def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) ->
         own_shape=tile.box.shape,
         channels=(),
     )
-    return TileTask(store.stage_dir, content, units)
+    made_of = [(channel_id, folder.name, paint) for channel_id, folder, paint in units]
+    depends = [asdict(content), [(*one, paint and asdict(paint)) for *one, paint in made_of]]
+    key = key_of(depends, sys.modules[__name__])
+    return TileTask(store.stage_dir, content, units, store.tile_file(tile.id), key)
 
 
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units. Raises OutputError."""
+    remove(task.record)
     with at_hand(*(folder for _, folder, _ in task.units)):
         channels = tuple(
             ChannelContent(
@@ -58,3 +87,18 @@ def run_tile(task: TileTask) -> None:
             for channel_id, folder, paint in task.units
         )
         usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
+    write_json(task.record, task.describe())
+
+
+def digest_of(results: Iterable[Path]) -> str:
+    """Return a digest of all files' names and sizes: what a damage alters.
+
+    Of a USD layer only whether it can be opened: a size that an artist's edit changed is no damage.
+    """
+    digest = hashlib.sha256()
+    for result in results:
+        for file, size in (sizes_below(result) or {result: -1}).items():
+            if size >= 0 and file.suffix in usd.LAYER_SUFFIXES:
+                size = int(usd.is_layer(file) if file.is_file() else True)  # kept: put as a whole
+            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
+    return digest.hexdigest()[:20]

@@ -38,6 +38,7 @@ class Store:
         self.stage_dir = out / "stage"
         self.stage_file = self.stage_dir / "stage.usda"
         self.bundle_dir = out / "bundle"
+        self.parts_dir = out / "bundle_parts"  # its finished tiles, until it is whole
         self.report_file = out / "report" / "index.html"
 
     def require_writable(self) -> None:
@@ -102,6 +103,9 @@ class Store:
     def unit_dir(self, tile_id: str, channel_id: str, key: str) -> Path:
         return self.out / "units" / tile_id / channel_id / key
 
+    def tile_file(self, tile_id: str) -> Path:
+        return self.out / "units" / tile_id / "stage.json"
+
     def survey(self) -> dict[str, Any]:
         """Return each channel's display, iso-values by tile, and look, by channel id."""
         return dict(read_json(self.survey_file, "units.schema.json#Survey", _RUN_UNITS))
@@ -147,9 +151,13 @@ class Store:
         """Return what is known of each phase; damaged, nothing counts as done."""
         return dict(find_json(self.phases_file, _PHASES) or {})
 
+    def is_begun(self, name: str) -> bool:
+        """Return whether a phase was begun and never came to its end."""
+        return not self.phases().get(name, {"key": "done"})["key"]
+
     def require_finished(self, name: str) -> None:
         """Raise OutputError if a phase was begun and never came to its end."""
-        if not self.phases().get(name, {"key": "done"})["key"]:
+        if self.is_begun(name):
             raise OutputError(
                 f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
             )

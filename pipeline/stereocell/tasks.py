@@ -29,7 +29,7 @@ from stereocell.isovalue import ADAPTIVE, IsoValue, IsoValueOptions, find_iso_va
 from stereocell.latticefield import LatticeField
 from stereocell.read import Dataset
 from stereocell.sources import SourceRef, open_source
-from stereocell.survey import Display, find_display
+from stereocell.survey import Display, display_to_json, find_display
 from stereocell.threshold import Histogram, make_histogram
 from stereocell.tiling import Box
 from stereocell.unit import UnitInput, build_unit
@@ -75,6 +75,12 @@ class UnitTask:
     given: UnitInput
     directory: Path
     painted: int | None = None  # the channel that is painted on the surface
+
+
+def write_display(task_and_file: tuple[DisplayTask, Path]) -> None:
+    """Find a channel's window and write it down."""
+    task, file = task_and_file
+    write_json(file, display_to_json(run_display(task)))
 
 
 def run_display(task: DisplayTask) -> Display:

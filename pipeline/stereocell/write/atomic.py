@@ -1,7 +1,8 @@
 """Write a file under a temporary name beside it, flush it, rename it: the whole file or none.
 
-Temporary names are never used twice: whoever was cut off from a build that has gone on without it,
-as a worker whose scheduler was killed, spoils nothing. Who writes next clears away what it left.
+Temporary names are never used twice, and who works for a command that has ended puts nothing in its
+place: whoever was cut off from a build that has gone on without it, as a worker whose scheduler was
+killed, spoils nothing. Who writes next clears away what it left.
 
 Where OUT is on object storage, it is put there then: see mirror.py.
 """
@@ -15,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from stereocell.errors import OutputError
+from stereocell.lock import require_asked
 from stereocell.mirror import keep, making
 
 # of a file .STEM.TOKEN.SUFFIX, of a folder .NAME.TOKEN.partial and .NAME.TOKEN.old
@@ -29,6 +31,7 @@ def replacing(path: Path) -> Iterator[Path]:
     (rights, space).
     """
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    require_asked()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _clear_beside(path)
@@ -37,6 +40,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
+            require_asked()
             os.replace(temporary, path)
             keep(path)
         finally:
@@ -58,6 +62,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     If the body raises, `path` stays as it was. What a killed run left is cleared away first.
     Raises OutputError where the system refuses (rights, space).
     """
+    require_asked()
     token = secrets.token_hex(4)
     new, old = (path.with_name(f".{path.name}.{token}.{word}") for word in ("partial", "old"))
     try:
@@ -70,6 +75,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
                     if file.is_file():
                         with file.open("rb+") as opened:
                             os.fsync(opened.fileno())
+                require_asked()
                 _swap(new, path, old)
             finally:
                 shutil.rmtree(new, ignore_errors=True)

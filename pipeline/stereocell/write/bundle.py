@@ -7,10 +7,12 @@
     luts/<channel>.ktx2
     index.html  assets/                            the viewer
 
-The stage is the only source. It is written beside its place and put there as a whole.
+The stage is the only source. Tiles are exported each by itself, as parts that stay until the bundle
+is whole; it is put together beside its place and put there as a whole.
 """
 
 import json
+import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -22,10 +24,17 @@ import numpy as np
 from stereocell.documents import compact_json
 from stereocell.engine import Engine
 from stereocell.errors import OutputError, StageError
-from stereocell.mirror import is_file, sizes_below
+from stereocell.mirror import is_file, move, remove, sizes_below
 from stereocell.specimen import evaluate
 from stereocell.write.atomic import replacing_folder
-from stereocell.write.bundle_tile import BundleTile, FileRef, TileChannel, export_tile, write_file
+from stereocell.write.bundle_tile import (
+    BundleTile,
+    FileRef,
+    TileChannel,
+    export_tile,
+    find_part,
+    write_file,
+)
 from stereocell.write.bundle_transfer2d import describe, encode_histogram, sum_tiles
 from stereocell.write.composed import (
     hinted_box,
@@ -45,25 +54,45 @@ FILES = "files.json"
 
 
 def write_bundle(
-    stage_path: Path, bundle_dir: Path, viewer_dist: Path | None, engine: Engine
+    stage_path: Path,
+    bundle_dir: Path,
+    viewer_dist: Path | None,
+    engine: Engine,
+    parts: Path | None = None,
 ) -> None:
     """Write the bundle of a stage, or of a layer over it, in place of an older one.
 
     viewer_dist  the built viewer, copied into the bundle; None: no viewer
     engine       whose workers share the tiles; the bytes don't depend on their number
+    parts        a folder for the tiles that are finished, of this very stage: those that are in it
+                 are taken, and all are left there; None: none are kept if this does not end well
 
     Raises StageError where the stage lacks something, naming prim and file (TasksFailedError where
     a tile does); OutputError where `bundle_dir` can't be written, or is something else.
     """
-    if _holds(bundle_dir) and not is_file(bundle_dir / MANIFEST):
-        raise OutputError(f"{bundle_dir}: exists and is no bundle: no {MANIFEST} in it")
+    require_bundle(bundle_dir)
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
     with replacing_folder(bundle_dir) as folder:
-        _fill(stage_path, folder, viewer_dist, engine)
+        _fill(stage_path, folder, viewer_dist, engine, parts or folder / ".parts")
+        shutil.rmtree(folder / ".parts", ignore_errors=True)
 
 
-def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine) -> None:
+def require_bundle(place: Path) -> None:
+    """Raise OutputError if something else than a bundle lies there."""
+    if _holds(place) and not is_file(place / MANIFEST):
+        raise OutputError(f"{place}: exists and is no bundle: no {MANIFEST} in it")
+
+
+def remove_half(place: Path) -> None:
+    """Remove a bundle whose command was killed while it put it on object storage, file by file."""
+    if _holds(place) and not is_file(place / MANIFEST):
+        remove(place)
+
+
+def _fill(
+    stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine, parts: Path
+) -> None:
     stage = open_stage(stage_path)
     looks = read_looks(stage)
     prims = tile_prims(stage)
@@ -74,14 +103,22 @@ def _fill(stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine
     export = partial(
         export_tile,
         stage_path,
-        root,
+        parts,
         looks=tuple(looks),
         step_m=step_m,
     )
     names = [str(prim.GetName()) for prim in prims]
-    tiles = engine.run("bundle", export, [(name, name) for name in names])
-
-    files = [ref for tile in tiles for channel in tile.channels for ref in channel.files]
+    found = {name: find_part(parts / name) for name in names}
+    missing = [name for name in names if found[name] is None]
+    exported = engine.run("bundle", export, [(name, name) for name in missing])
+    found |= dict(zip(missing, exported, strict=True))
+    tiles = [tile for tile in found.values() if tile is not None]
+    files = []
+    for tile in tiles:
+        refs = [ref for channel in tile.channels for ref in channel.files]
+        for ref in refs:
+            move(parts / tile.id / ref.path, root / ref.path)
+        files += refs
     channels = []
     for i, look in enumerate(looks):
         entry, written = _write_channel(root, look, [(t.id, t.channels[i]) for t in tiles])

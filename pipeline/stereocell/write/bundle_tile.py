@@ -1,9 +1,14 @@
-"""Write what one tile brings to a bundle: its meshes and volumes. Tiles are independent."""
+"""Write what one tile brings to a bundle: its meshes and volumes. Tiles are independent.
+
+A tile's part is a folder that holds its files under their names in the bundle, and tile.json, which
+says what the bundle's own files need to know of it.
+"""
 
 import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from pxr import Usd
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from stereocell.bricks import min_max_bricks, mip_levels
-from stereocell.errors import StageError
+from stereocell.documents import read_json, write_json
+from stereocell.errors import OutputError, StageError
 from stereocell.mesh import Mesh
-from stereocell.write.atomic import write_bytes
+from stereocell.mirror import is_file, sizes_below
+from stereocell.write.atomic import replacing_folder, write_bytes
 from stereocell.write.bundle_transfer2d import count_tile
 from stereocell.write.composed import (
     ComposedLod,
@@ -42,6 +50,7 @@ from stereocell.write.usd_layer import move_box
 
 _COARSE_STEPS = 16  # of the lattice, to one of the coarsest LODs': some 3/4 of a large tile's voxel
 _UM_PER_METRE = 1e6
+_RECORD = "tile.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +72,8 @@ class TileChannel:
     files      all that was written
     joint      the volume's histogram of value and gradient, packed; see bundle_transfer2d.py
     """
+
+    __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
 
     channel_id: str
     lods: tuple[TileLod, ...]
@@ -89,23 +100,43 @@ def write_file(root: Path, path: str, content: bytes) -> FileRef:
     return FileRef(path, len(content), hashlib.sha256(content).hexdigest())
 
 
+@cache
+def _records() -> TypeAdapter[BundleTile]:
+    return TypeAdapter(BundleTile)
+
+
+def find_part(part: Path) -> BundleTile | None:
+    """Return the tile whose part lies in a folder, or None where it isn't there as a whole."""
+    if not is_file(part / _RECORD):
+        return None
+    try:
+        tile = _records().validate_python(read_json(part / _RECORD, None, ""))
+    except (OutputError, ValidationError):
+        return None
+    sizes = {file.relative_to(part).as_posix(): size for file, size in sizes_below(part).items()}
+    refs = [ref for channel in tile.channels for ref in channel.files]
+    return tile if all(sizes.get(ref.path) == ref.bytes for ref in refs) else None
+
+
 def export_tile(
-    stage_path: Path, root: Path, tile_id: str, looks: tuple[ComposedLook, ...], step_m: float
+    stage_path: Path, parts: Path, tile_id: str, looks: tuple[ComposedLook, ...], step_m: float
 ) -> BundleTile:
-    """Write one tile of a stage below `root`; see gltf.py for the lattice step, in metres.
+    """Write one tile's part, `parts`/<tile>/; see gltf.py for the lattice step, in metres.
 
     Opens the stage anew and loads this tile only, so that it runs in any process and the memory
     of the others does not grow. Raises StageError and OutputError.
     """
     stage = open_stage(stage_path)
-    with loaded(stage, tile_id) as (tile, choice):
+    with replacing_folder(parts / tile_id) as root, loaded(stage, tile_id) as (tile, choice):
         volumes = [read_volume(tile, look.id) for look in looks]
         channels = [
             _export_channel(root, tile, look, volume, choice.finest_lod, step_m)
             for look, volume in zip(looks, volumes, strict=True)
         ]
         low, high = find_bounds(tile, volumes)
-    return BundleTile(tile_id, choice.representation, low, high, tuple(channels))
+        made = BundleTile(tile_id, choice.representation, low, high, tuple(channels))
+        write_json(root / _RECORD, _records().dump_python(made, mode="json"))
+    return made
 
 
 def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tuple[Point, Point]:
