@@ -85,6 +85,32 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
 
 
 @pytest.mark.slow
+def test_a_source_that_vanishes_under_workers_is_named_and_their_units_are_made_when_it_is_back(
+    volume: Path, tmp_path: Path
+) -> None:
+    grid, away, out = "3x2", volume.with_name("away"), tmp_path / "out"
+    assert make_assets(volume, tmp_path / "whole", grid, "--workers", "0") == 0
+    command = [sys.executable, "-m", "stereocell.cli", "build", str(volume), "-o", str(out)]
+    told = ["--grid", grid, "--workers", "2"]
+    build = subprocess.Popen([*command, *told], stderr=subprocess.PIPE, text=True)
+    while build.poll() is None and not list(out.glob("units/r*/*/*/unit.json")):
+        time.sleep(0.01)
+    volume.rename(away)
+    _, printed = build.communicate()
+    away.rename(volume)
+    assert build.returncode == 1, printed
+    assert "Traceback" not in printed
+    lines = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
+    assert lines
+    assert all("f.ome.zarr: " in line or " failed" in line for line in lines), lines
+    finished = {file: file.stat().st_mtime_ns for file in out.glob("units/r*/*/*/*")}
+    assert 0 < len({file.parent for file in finished}) < 6
+    assert make_assets(volume, out, grid, "--workers", "2") == 0
+    assert {file: file.stat().st_mtime_ns for file in finished} == finished
+    assert asset_digests(out) == asset_digests(tmp_path / "whole")
+
+
+@pytest.mark.slow
 def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
     volume: Path,
     undisturbed: dict[str, str],

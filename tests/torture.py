@@ -147,7 +147,11 @@ class Torture:
             if cluster:
                 kill_session(cluster.scheduler if kind == "scheduler" else cluster.workers[0])
             elif kind == "worker":
-                self._random.choice(_workers_of(build) or [build]).kill()
+                workers = _await_workers_of(build)
+                if not workers:
+                    self._require_ended(build)
+                    return False
+                self._random.choice(workers).kill()
             family = psutil.Process(build.pid).children(recursive=True)
             if kind == "session":
                 kill_session(build)
@@ -266,13 +270,20 @@ def _write_source(folder: Path) -> Path:
     return phantoms.write_ome_tiff(folder / "f.ome.tif", channels, "CZYX", names=["a", "b"])
 
 
-def _workers_of(build: subprocess.Popen[bytes]) -> list[psutil.Process]:
-    """Return the processes that do the units."""
-    return [
-        process
-        for process in psutil.Process(build.pid).children(recursive=True)
-        if "spawn_main" in " ".join(process.cmdline())
-    ]
+def _await_workers_of(build: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    """Return the processes that do the units, once there are some; none: the build has ended."""
+    command = psutil.Process(build.pid)
+    while build.poll() is None:
+        with suppress(psutil.Error):  # one has ended since
+            workers = [
+                process
+                for process in command.children(recursive=True)
+                if "spawn_main" in " ".join(process.cmdline())
+            ]
+            if workers:
+                return workers
+        time.sleep(0.02)
+    return []
 
 
 @dataclass(frozen=True)

@@ -440,6 +440,7 @@ class _Carried(Generic[T, R]):
         with _working:
             mirror = next((mirror for mirror in _open if mirror.place == self.place), None)
             if mirror is None:
+                _clear_scratch()
                 mirror = Mirror(self.place, self.claim)
                 _open[:] = [mirror]
             self.place.root.mkdir(parents=True, exist_ok=True)
