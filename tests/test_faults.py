@@ -134,41 +134,27 @@ def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
     assert assets(asset_digests(out)) == undisturbed
 
 
-# The command, with an OUT that can't be written once the first tile of a phase is done
+# The command: killed, or with an OUT that can't be written, once the first tile of a phase is done
 IN_THE_MIDDLE = """
-import os, sys
-from stereocell import engine
-from stereocell.cli import main
-
-phase, out = sys.argv[1:3]
-tell = engine.console.print
-
-def forbid(text, **how):
-    tell(text, **how)
-    if text.startswith(f"{phase}: 1/"):
-        for folder, *_ in os.walk(out):
-            os.chmod(folder, 0o555)
-
-engine.console.print = forbid
-sys.exit(main([phase, out, "--workers", "0"]))
-"""
-# The command, killed once the first tile of a phase is done
-KILLED = """
 import os, signal, sys
 from stereocell import engine
 from stereocell.cli import main
 
-phase, out = sys.argv[1:3]
+phase, out, fault = sys.argv[1:4]
 tell = engine.console.print
 
-def end(text, **how):
+def befall(text, **how):
     tell(text, **how)
     if text.startswith(f"{phase}: 1/"):
-        os.kill(os.getpid(), signal.SIGKILL)
+        if fault == "killed":
+            os.kill(os.getpid(), signal.SIGKILL)
+        for folder, *_ in os.walk(out):
+            os.chmod(folder, 0o555)
 
-engine.console.print = end
+engine.console.print = befall
 sys.exit(main([phase, out, "--workers", "0"]))
 """
+IN_THE_MIDDLE_OF = (sys.executable, "-c", IN_THE_MIDDLE)
 # root may write anywhere, but for this
 BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
 
@@ -181,7 +167,7 @@ def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goe
     out = tmp_path / "out"
     assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
     for phase in ("units", "stage", "bundle"):
-        command = [*BOUND, sys.executable, "-c", IN_THE_MIDDLE, phase, str(out)]
+        command = [*BOUND, *IN_THE_MIDDLE_OF, phase, str(out), "read-only"]
         ended = subprocess.run(command, capture_output=True, text=True)
         assert ended.returncode == 1, ended.stderr
         (line,) = [line for line in ended.stderr.splitlines() if line.startswith("stereocell: ")]
@@ -207,7 +193,7 @@ def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
     assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
     for phase, made in (("stage", "stage/tiles"), ("bundle", "bundle_parts/*")):
-        ended = subprocess.run([sys.executable, "-c", KILLED, phase, str(out)], check=False)
+        ended = subprocess.run([*IN_THE_MIDDLE_OF, phase, str(out), "killed"], check=False)
         assert ended.returncode == -signal.SIGKILL
         (tile,) = out.glob(f"{made}/r0_c[01]")
         finished = {file.relative_to(tile): file.stat().st_mtime_ns for file in tile.rglob("*.*")}
@@ -236,7 +222,7 @@ def test_a_finished_tile_that_is_damaged_or_of_other_settings_is_made_again(
     capsys.readouterr()
     assert main(["stage", str(out), "--workers", "0"]) == 0
     assert "stage: 1/1 r0_c1" in capsys.readouterr().err
-    subprocess.run([sys.executable, "-c", KILLED, "bundle", str(out)], check=False)
+    subprocess.run([*IN_THE_MIDDLE_OF, "bundle", str(out), "killed"], check=False)
     (part,) = out.glob("bundle_parts/*/r0_c[01]")
     next(part.rglob("*.glb")).write_bytes(b"cut")
     capsys.readouterr()
