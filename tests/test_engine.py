@@ -6,7 +6,7 @@ import dask
 import pytest
 
 from stereocell.cluster import ClusterError
-from stereocell.engine import Engine, TasksFailedError, _outcome_of
+from stereocell.engine import _AHEAD, Engine, TasksFailedError, _outcome_of
 from stereocell.errors import SourceError
 
 
@@ -33,6 +33,30 @@ def test_results_come_in_the_tasks_order_and_failures_at_the_end(workers: int) -
         "t4: ValueError: four is a bug",
         "bad: 3 of 5 failed",
     ]
+
+
+@pytest.mark.slow
+def test_few_tasks_wait_at_a_time_however_many_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, open_ = Engine(2), []
+    try:
+        assert engine.run("first", double, [("a", 1), ("b", 2)]) == [2, 4]
+        client = engine._client
+        submit = client.submit
+
+        def count(*arguments: object, **how: object) -> object:
+            open_.append(len(client.futures))
+            return submit(*arguments, **how)
+
+        monkeypatch.setattr(client, "submit", count)
+        numbers = range(10, 10 + 5 * _AHEAD)
+        assert engine.run("many", double, [(str(n), n) for n in numbers]) == [
+            2 * n for n in numbers
+        ]
+    finally:
+        engine.close()
+    assert doubled == [2 * n for n in numbers]
+    assert len(open_) == len(numbers)
+    assert max(open_) <= _AHEAD + 2
 
 
 def die(value: int) -> int:

@@ -6,9 +6,10 @@ Its workers have to see OUT and the input under the same paths, and to run the s
 """
 
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,6 +34,7 @@ R = TypeVar("R")
 _START_S = 300  # for workers of this machine to answer: it may be busy
 _LOOK_S, _LOOKS = 15, 12  # for workers, while a task waits for one; a killed one is started anew
 _POLL_S = 0.05
+_AHEAD = 64  # tasks that wait for a worker
 _GONE = "its workers are gone and did not come back: the same command goes on from here"
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -104,9 +106,17 @@ class Engine:
         work, settle = carried(function)
         if self._scheduler:
             work = able(work, self._shared)
-        futures = {client.submit(work, task, pure=False): place for place, task in enumerate(tasks)}
+        left, futures = iter(range(len(tasks))), {}
+
+        def submit() -> Any:
+            for place in left:
+                future = client.submit(work, tasks[place], pure=False)
+                futures[future] = place
+                return future
+            return None
+
         suspects = []
-        for future in _as_they_end(client, list(futures)):
+        for future in _as_they_end(client, submit):
             place = futures.pop(future)
             result, failure = _outcome_of(client, future)
             if _is_killed(failure):
@@ -114,7 +124,7 @@ class Engine:
             else:
                 yield place, None if failure else settle(result), failure
             future.release()
-        for place in futures.values():
+        for place in (*futures.values(), *left):
             yield place, None, ClusterError(_GONE)
         # whoever waited on a worker when another task killed it is blamed too: each once more, by
         # itself, and only the one to blame fails again
@@ -172,20 +182,33 @@ def _started_in_time() -> Iterator[None]:
         ) from None
 
 
-def _as_they_end(client: Any, futures: Sequence[Any]) -> Iterator[Any]:
-    """Yield futures as they end; no more once there have been no workers for long."""
+def _as_they_end(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
+    """Yield the futures that `submit` returns, until it returns None, as they end.
+
+    Few more than there are workers wait at a time: each takes the scheduler's memory. No more are
+    yielded once there have been no workers for long.
+    """
     from distributed import as_completed
 
-    ended = as_completed(futures)
-    looked, missed = time.monotonic(), 0
-    while not ended.is_empty() and missed < _LOOKS:
-        if ended.has_ready():
-            yield next(ended)
-            continue
-        time.sleep(_POLL_S)
+    ended = as_completed()
+    looked, missed, waiting, most = -math.inf, 0, 0, 0
+    while missed < _LOOKS:
         if time.monotonic() - looked > _LOOK_S:
-            looked = time.monotonic()
-            missed = 0 if client.scheduler_info()["workers"] else missed + 1
+            threads = 0
+            with suppress(Exception):  # a scheduler that is gone: its futures are told so
+                threads = sum(client.nthreads().values())
+            looked, missed = time.monotonic(), 0 if threads else missed + 1
+            most = max(_AHEAD, 2 * threads)
+        while waiting < most and (future := submit()) is not None:
+            ended.add(future)
+            waiting += 1
+        if waiting == 0:
+            return
+        if ended.has_ready():
+            waiting -= 1
+            yield next(ended)
+        else:
+            time.sleep(_POLL_S)
 
 
 def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:

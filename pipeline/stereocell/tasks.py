@@ -220,7 +220,7 @@ def _find(task: IsoTask) -> dict[str, Any]:
     return result
 
 
-def run_unit(task: UnitTask) -> dict[str, Any]:
+def run_unit(task: UnitTask) -> None:
     """Build one unit and write it down."""
     start = time.perf_counter()
     source, window = open_source(task.ref), task.given.window
@@ -228,4 +228,4 @@ def run_unit(task: UnitTask) -> dict[str, Any]:
     painted = None if task.painted is None else source.read(task.painted, window, task.level)
     seconds = time.perf_counter() - start
     built = build_unit(volume, task.given, painted)
-    return save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))
+    save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))

@@ -26,8 +26,8 @@ SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
 
 
-def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
-    """Write a unit as a folder under its final name, and return its record. Raises OutputError."""
+def save_unit(directory: Path, unit: Unit) -> None:
+    """Write a unit as a folder under its final name. Raises OutputError."""
     lods = [
         {
             "triangles": len(lod.mesh.triangles),
@@ -59,7 +59,6 @@ def save_unit(directory: Path, unit: Unit) -> dict[str, Any]:
         write_json(folder / _RECORD, record)
         # after the files were listed: a unit is whole without
         write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
-    return record
 
 
 def is_whole(directory: Path) -> bool:
