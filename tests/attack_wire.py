@@ -9,7 +9,7 @@ import struct
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stereocell.serve import BundleServer
 
@@ -32,10 +32,11 @@ class Target:
     """A server that is attacked."""
 
     server: BundleServer
+    shakes_hands: bool = True  # where there is TLS
 
     def dial(self) -> socket.socket:
         stream = socket.create_connection(("127.0.0.1", self.server.port), timeout=WAIT_S)
-        if self.server.gate is None:
+        if self.server.gate is None or not self.shakes_hands:
             return stream
         context = ssl.create_default_context()
         context.check_hostname = False
@@ -51,7 +52,7 @@ class Attack:
     sent: str
     act: Callable[[Target], str]
     right: tuple[str, ...]
-    server: str = "plain"  # or "lan", or "few": with small limits by number
+    server: str = "plain"  # or "lan"; or "few", "few, lan": with small limits by number
 
 
 def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], bool]) -> bytes:
@@ -170,6 +171,25 @@ def crowd(target: Target) -> str:
     try:
         time.sleep(0.1)
         return raw(get("/"))(target)
+    finally:
+        for stream in streams:
+            stream.close()
+        time.sleep(0.1)
+
+
+def without_tls(act: Callable[[Target], str]) -> Callable[[Target], str]:
+    """Return an attack that does not shake hands."""
+    return lambda target: act(replace(target, shakes_hands=False))
+
+
+def silent_crowd(target: Target) -> str:
+    """Open more connections than a client may have, and say nothing; the next one is cut off."""
+    streams = [replace(target, shakes_hands=False).dial() for _ in range(20)]
+    try:
+        time.sleep(0.05)
+        return raw(get("/"))(target)
+    except (ConnectionError, ssl.SSLError):
+        return "closed"
     finally:
         for stream in streams:
             stream.close()

@@ -35,14 +35,17 @@ from attack_wire import (
     handshake,
     never_reading,
     raw,
+    silent_crowd,
     slowly,
     socket_crowd,
     used_token,
+    without_tls,
 )  # fmt: skip
 from stereocell import serve as serve_module
 from stereocell import serve_bricks, serve_limits, serve_socket
 from stereocell.serve import BundleServer
 from stereocell.serve_deadline import HeadDeadline
+from stereocell.serve_lifetime import Lifetime
 from stereocell.serve_limits import (
     HEAD_BYTES,
     MAX_HEADERS,
@@ -55,6 +58,7 @@ MARK = "PATIENT-NAME"  # in what clients send: the server must not write it anyw
 DEADLINES = [
     (HeadDeadline, "head_s", DEADLINE_S),
     (GuardedHttp, "stall_s", DEADLINE_S),
+    (Lifetime, "handshake_s", DEADLINE_S),
     (serve_socket, "FRAGMENTS_S", DEADLINE_S),
     (serve_bricks, "HELLO_S", 4 * DEADLINE_S),
     (serve_module, "find_addresses", lambda: ["127.0.0.1"]),
@@ -70,6 +74,7 @@ FEW = [
 # --- the list
 
 CHUNKED = "Transfer-Encoding: chunked"
+FEW_LAN = "few, lan"
 WHOLE = ("200",)  # RFC 9110, section 14.2: a Range that makes no sense is ignored
 ABSENT = ("404",)
 FOREIGN = ("403",)
@@ -313,6 +318,15 @@ def _strangers() -> Iterator[Attack]:
     )
     data = b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * (1 << 20)
     yield Attack("LAN, headers: too long", "1 MB", raw(data), ("431", "closed"), "lan")
+    plain = without_tls(raw(get("/")))
+    yield Attack("LAN, without TLS", "`GET /`", plain, CUT, "lan")
+    yield Attack("LAN, silence", "no handshake", without_tls(raw(b"")), CUT, "lan")
+    hello = b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(500)
+    drip = without_tls(slowly(b"", hello))
+    yield Attack("LAN, slow-loris: handshake", "a byte every 50 ms", drip, CUT, "lan")
+    yield Attack(
+        "LAN, a crowd that keeps silent", "20 are allowed here", silent_crowd, CUT, FEW_LAN
+    )
 
 
 ATTACKS: tuple[Attack, ...] = (
@@ -349,15 +363,15 @@ def write_bundle(out: Path) -> Path:
 
 @contextmanager
 def attacked(out: Path) -> Iterator[dict[str, Target]]:
-    """Serve an OUT: "plain" and "lan" with short deadlines, "few" with small limits as well."""
+    """Serve an OUT: all with short deadlines, "few" with small limits as well."""
     patches = [patch.object(*one) for one in DEADLINES]
     servers: dict[str, BundleServer] = {}
     threads = []
     for one in patches:
         one.start()
     try:
-        for name in ("plain", "lan", "few"):
-            servers[name] = BundleServer(out, 0, lan=name == "lan")
+        for name in ("plain", "lan", "few", FEW_LAN):
+            servers[name] = BundleServer(out, 0, lan="lan" in name)
             threads.append(Thread(target=servers[name].run))
             threads[-1].start()
         while not all(server.has_started for server in servers.values()):
@@ -374,7 +388,7 @@ def attacked(out: Path) -> Iterator[dict[str, Target]]:
 
 def attack(one: Attack, targets: dict[str, Target]) -> str:
     """Return the answer to an attack."""
-    patches = [patch.object(*few) for few in FEW] if one.server == "few" else []
+    patches = [patch.object(*few) for few in FEW] if "few" in one.server else []
     for limit in patches:
         limit.start()
     try:
