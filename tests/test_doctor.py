@@ -1,10 +1,12 @@
 """What `stereocell doctor` finds on this machine, and on one that has nothing."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
 from collections import namedtuple
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -42,6 +44,35 @@ def test_on_a_bare_machine(tmp_path: Path) -> None:
     assert "--lan" in found["browser"]["cost"]
     assert not found["Node.js"]["ok"]
     assert answer.stderr == ""
+
+
+def test_where_no_package_is_installed_they_are_named_without_a_traceback(tmp_path: Path) -> None:
+    about = Path(str(metadata.distribution("stereocell")._path))  # type: ignore[attr-defined]
+    shutil.copytree(about, tmp_path / about.name)
+    code = Path(doctor.__file__).parents[1]
+    told = {}
+    for name in ("doctor", "settings", "plan"):
+        command = [sys.executable, "-S", "-m", "stereocell.cli", name]
+        ended = subprocess.run(
+            [*command, *(["x.tif", "-o", "out"] if name == "plan" else [])],
+            env={"PYTHONPATH": f"{code}:{tmp_path}", "PATH": ""},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert ended.returncode == 1
+        told[name] = (ended.stdout, ended.stderr)
+    said, faults = told["doctor"]
+    assert faults == ""
+    (packages,) = [line for line in said.splitlines() if line.startswith("missing packages: ")]
+    assert {"numpy", "zarr", "usd-core", "vtk"} <= set(re.findall(r"[\w-]+", packages))
+    for name in ("settings", "plan"):
+        assert re.fullmatch(
+            r"stereocell: the package \w+ is missing: install StereoCell anew; "
+            r"`stereocell doctor` lists what else is\n",
+            told[name][1],
+        )
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_needed_fails(

@@ -2,11 +2,18 @@
 
 import hashlib
 import http.client
+import json
+import os
 import re
 import socket
 import ssl
+import subprocess
+import sys
 import time
+from contextlib import contextmanager
+from subprocess import PIPE
 from threading import Thread
+from urllib.request import urlopen
 
 import pytest
 import segno
@@ -224,6 +231,67 @@ def test_the_code_says_the_address():
         if bare:
             rows += zip(*(halves[mark] for mark in bare), strict=True)
     assert [list(row) for row in rows[: len(dark)]] == dark
+
+
+def test_the_code_is_drawn_without_blocks_where_the_terminal_has_none():
+    address = "https://192.168.7.9:8000/?token=" + "x" * 43
+    dark = [list(row) for row in segno.make(address, error="l", micro=False).matrix_iter(border=2)]
+    text = draw_qr(address, "latin-1")
+    assert text.isascii()
+    rows = []
+    for line in text.splitlines():
+        runs = re.findall("\x1b\\[(7|49)m( +)", line)  # inverted is light; a module is two spaces
+        rows.append([int(ground == "49") for ground, run in runs for _ in run[::2]])
+    assert [row for row in rows if row] == dark
+    assert draw_qr(address, "utf-8") == draw_qr(address)
+
+
+@contextmanager
+def serving(arguments, encoding):
+    command = [sys.executable, "-m", "stereocell.cli", "serve", *arguments, "--port", "0"]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    with subprocess.Popen(
+        command, env=environment, stdout=PIPE, stderr=PIPE, encoding=encoding
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+            assert process.communicate(timeout=30)[1] == ""
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_program_is_told_the_address_in_json_and_a_person_in_any_encoding(tmp_path, encoding):
+    bundle = tmp_path / "\u00fc\u4e2d" / "bundle"
+    bundle.mkdir(parents=True)
+    for name in ("manifest.json", "index.html"):
+        (bundle / name).write_text("{}")
+    with serving([str(bundle.parent)], encoding) as process:
+        line = process.stdout.readline()
+        assert line.startswith("http://localhost:")
+        shown = str(bundle).encode(encoding, "backslashreplace").decode(encoding)
+        assert f" shows {shown}; Ctrl+C ends it" in line
+    with serving([str(bundle.parent), "--json"], encoding) as process:
+        told = json.loads(process.stdout.readline())
+        assert told["bundle"] == str(bundle)
+        assert (told["bricks"], told["fingerprint"]) == (True, "")
+        assert urlopen(told["address"], timeout=30).status == 200
+
+
+def test_a_program_is_told_each_invitation(tmp_path, monkeypatch, capsys):
+    for name in ("manifest.json", "index.html"):
+        (tmp_path / name).write_text("{}")
+    monkeypatch.setattr(serve_module, "find_addresses", lambda: ["127.0.0.1"])
+    server = BundleServer(tmp_path, 0, lan=True, for_program=True)
+    server.introduce()
+    server.invite()
+    first = server.gate.token
+    server.gate.exchange(first)
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert told[0]["fingerprint"] == server.fingerprint
+    tokens = (first, server.gate.token)
+    assert told[1:] == [{"invitation": f"{server.address}?token={token}"} for token in tokens]
+    server._socket.close()
 
 
 def test_tokens_and_sessions_are_long_and_differ():

@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from io import TextIOWrapper
 from typing import NoReturn
 
 from stereocell import cli_commands as commands
@@ -24,6 +25,9 @@ EXIT_CODES = """exit codes:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # what its encoding lacks is escaped
+            stream.reconfigure(errors="backslashreplace")
     try:
         return _main(sys.argv[1:] if arguments is None else arguments)
     except commands.StdoutLost as lost:
@@ -44,6 +48,9 @@ def _main(words: Sequence[str]) -> int:
             return _run(options)
     except StereoCellError as error:
         return _fail(options, str(error), error.exit_code)
+    except ModuleNotFoundError as error:
+        told = f"the package {error.name} is missing: install StereoCell anew"
+        return _fail(options, f"{told}; `stereocell doctor` lists what else is", 1)
     except OSError as error:  # the disk is full, a folder was taken away
         place = f"{error.filename}: " if error.filename else ""
         return _fail(options, f"{place}{error.strerror or error}", 1)
@@ -119,11 +126,9 @@ def _parser() -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         declare(command)
-        command.set_defaults(handler=handler, command=name, json=False)
-        if name not in ("view", "serve"):  # which don't end
-            command.add_argument(
-                "--json", action="store_true", help="answer with one JSON object on stdout"
-            )
+        command.set_defaults(handler=handler, command=name)
+        told = "one JSON object" if name not in ("view", "serve") else "JSON objects, one a line,"
+        command.add_argument("--json", action="store_true", help=f"answer with {told} on stdout")
     return parser
 
 

@@ -7,6 +7,7 @@ wait until they are needed, so that --help is quick.
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import chain
@@ -68,7 +69,16 @@ def answer(options: argparse.Namespace, found: Answer) -> int:
 def to_json(data: Mapping[str, Any]) -> str:
     """Return one line of JSON in the words of its names, which a lone surrogate is none of."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False)
-    return text if text.isprintable() else json.dumps(data, allow_nan=False)
+    return text if _can_be_told(text) else json.dumps(data, allow_nan=False)
+
+
+def _can_be_told(text: str) -> bool:
+    """Return whether stdout has all of its letters, and a terminal no trouble with them."""
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return False
+    return text.isprintable()
 
 
 def _as_given(options: argparse.Namespace, text: str) -> str:
@@ -281,7 +291,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
     from stereocell.serve import serve
 
     try:
-        serve(options.out, options.port, options.lan, open_browser)
+        serve(options.out, options.port, options.lan, open_browser, for_program=options.json)
     except BrokenPipeError as error:  # of who was to read its address
         raise StdoutLost(error) from error
     return Answer()

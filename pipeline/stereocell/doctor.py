@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -12,16 +13,13 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 
-from packaging.requirements import Requirement
-from packaging.version import InvalidVersion, Version
-
 from stereocell.assets import viewer_dist
 from stereocell.processes import available_bytes, cores
 
 _GIB = 1 << 30
 UNIT_BYTES = 3.5 * _GIB  # what a unit of 194 x 512 x 512 voxels is allowed for
 _LEAST_FREE = 20 * _GIB
-_NODE = Version("20.19")
+_NODE = "20.19"
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "open")
 
 
@@ -62,6 +60,13 @@ def _python() -> Finding:
 
 def _packages() -> Finding:
     """Look for the packages that StereoCell names, by their metadata alone: nothing is imported."""
+    cost = "what needs them fails: install StereoCell anew"
+    try:
+        from packaging.requirements import Requirement
+    except ImportError:
+        names = [line for line in requires("stereocell") or () if "extra ==" not in line]
+        lacking = [name for line in names for name in re.findall(r"^[\w.-]+", line) if _lacks(name)]
+        return _finding("packages", False, f"missing: {', '.join(lacking)}", cost, True)
     faults, count = [], 0
     for line in requires("stereocell") or ():
         wanted = Requirement(line)
@@ -75,8 +80,15 @@ def _packages() -> Finding:
             continue
         if not wanted.specifier.contains(found, prereleases=True):
             faults.append(f"{wanted.name} is {found}, expected {wanted.specifier}")
-    cost = "what needs them fails: install StereoCell anew"
     return _finding("packages", not faults, "; ".join(faults) or f"all {count}", cost, True)
+
+
+def _lacks(name: str) -> bool:
+    try:
+        version(name)
+    except PackageNotFoundError:
+        return True
+    return False
 
 
 def _cores() -> Finding:
@@ -136,6 +148,8 @@ def _browser() -> Finding:
 
 
 def _node() -> Finding:
+    from packaging.version import InvalidVersion, Version
+
     path = shutil.which("node")
     cost = "`stereocell check` can't run the validators of glTF and KTX2; viewing needs none"
     if path is None:
@@ -145,7 +159,7 @@ def _node() -> Finding:
         there = Version(told.stdout.strip())
     except (subprocess.TimeoutExpired, InvalidVersion):
         return _finding("Node.js", False, f"{path} does not tell its version", cost)
-    is_new = there >= _NODE
+    is_new = there >= Version(_NODE)
     found = f"{there} at {path}" + ("" if is_new else f", expected {_NODE} or newer")
     return _finding("Node.js", is_new, found, cost)
 

@@ -7,6 +7,7 @@ logged but faults of the program itself and of the bundle: no request, so no tok
 a client sent. What the other modules refuse, and from whom, is listed in docs/brick-stream.md.
 """
 
+import json
 import logging
 import os
 import signal
@@ -38,21 +39,26 @@ LOCALHOST = "127.0.0.1"
 _OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
 
 
-def serve(out: Path, port: int, lan: bool, open_browser: bool) -> None:
+def serve(
+    out: Path, port: int, lan: bool, open_browser: bool, *, for_program: bool = False
+) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
+
+    What a person is told on stdout, a program gets as lines of JSON: first the address, then, with
+    `lan`, an address that lets in one device, anew whenever one has come in.
 
     Returns when the transfers that run have ended, or STOP_S later. Raises KeyboardInterrupt at
     once at a second Ctrl+C; StereoCellError if there is no bundle, the port is taken, or there is
     no network.
     """
-    server = BundleServer(out, port, lan)
-    alone = "" if server.has_bricks else " (a bundle by itself: its volumes come whole)"
-    print(f"{server.address} shows {server.bundle}{alone}; Ctrl+C ends it", flush=True)
-    server.invite()
-    if open_browser:
-        webbrowser.open(server.address)
-    before = signal.signal(signal.SIGTERM, lambda *_: None)  # uvicorn ends by it, then repeats it
+    server = BundleServer(out, port, lan, for_program)
+    # uvicorn ends by it once it runs, and then repeats it
+    before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
     try:
+        server.introduce()
+        server.invite()
+        if open_browser:
+            webbrowser.open(server.address)
         with suppress(KeyboardInterrupt):
             server.run()
     finally:
@@ -102,11 +108,12 @@ def _places(out: Path) -> tuple[Path, Path | None]:
 class BundleServer:
     """A bound server: `address` is where it listens; run() until stop()."""
 
-    def __init__(self, out: Path, port: int, lan: bool) -> None:
+    def __init__(self, out: Path, port: int, lan: bool, for_program: bool = False) -> None:
         """Raises StereoCellError if there is no bundle, the port is taken, or no network."""
         bundle, bricks = _places(out)
         library = None if bricks is None else BrickLibrary(bundle, bricks)
         self.bundle, self.has_bricks = bundle, bricks is not None
+        self.for_program = for_program
         for name in (MANIFEST, "index.html"):
             if not (bundle / name).is_file():
                 raise StereoCellError(
@@ -139,7 +146,7 @@ class BundleServer:
             ws_per_message_deflate=False,  # bricks are compressed
         )
         logging.getLogger("uvicorn.error").addFilter(_is_ours)
-        self._server = Lifetime(config, context, _tell_wait)
+        self._server = Lifetime(config, context, self._tell_wait)
 
     @property
     def has_started(self) -> bool:
@@ -151,11 +158,33 @@ class BundleServer:
         """Whether a second Ctrl+C cut its end short."""
         return self._server.force_exit
 
+    def introduce(self) -> None:
+        """Print the address, and what is there."""
+        if self.for_program:
+            about = {"bundle": str(self.bundle), "bricks": self.has_bricks}
+            _print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
+            return
+        alone = "" if self.has_bricks else " (a bundle by itself: its volumes come whole)"
+        print(f"{self.address} shows {self.bundle}{alone}; Ctrl+C ends it", flush=True)
+
     def invite(self) -> None:
         """Print the QR code for the next device on the LAN, and what to make of its warning."""
-        if self.gate is not None:
-            code = draw_qr(f"{self.address}?token={self.gate.token}")
-            print(explain(self.address, self.fingerprint, code), flush=True)
+        if self.gate is None:
+            return
+        invitation = f"{self.address}?token={self.gate.token}"
+        if self.for_program:
+            _print_json({"invitation": invitation})
+            return
+        code = draw_qr(invitation, sys.stdout.encoding or "utf-8")
+        print(explain(self.address, self.fingerprint, code), flush=True)
+
+    def _tell_wait(self, transfers: int) -> None:
+        print(
+            f"finishing {transfers} transfer{'s' * (transfers > 1)}, at most {STOP_S:g} s; "
+            "Ctrl+C again stops at once",
+            file=sys.stderr if self.for_program else sys.stdout,
+            flush=True,
+        )
 
     def run(self) -> None:
         """Answer until stop(), or a signal in the main thread."""
@@ -169,12 +198,8 @@ class BundleServer:
         self._server.should_exit = True
 
 
-def _tell_wait(transfers: int) -> None:
-    print(
-        f"finishing {transfers} transfer{'s' * (transfers > 1)}, at most {STOP_S:g} s; "
-        "Ctrl+C again stops at once",
-        flush=True,
-    )
+def _print_json(content: dict[str, object]) -> None:
+    print(json.dumps(content), flush=True)
 
 
 def _bind(host: str, port: int) -> socket.socket:

@@ -72,10 +72,17 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
     return context, ":".join(digest[i : i + 2] for i in range(0, len(digest), 2))
 
 
-def draw_qr(address: str) -> str:
-    """Return a QR code for a terminal, of half blocks."""
+def draw_qr(address: str, encoding: str = "utf-8") -> str:
+    """Return a QR code for a terminal, of half blocks; of spaces on coloured ground where its
+    encoding has none."""
+    code = segno.make(address, error="l", micro=False)
     text = io.StringIO()
-    segno.make(address, error="l", micro=False).terminal(text, border=2, compact=True)
+    code.terminal(text, border=2, compact=True)
+    try:
+        text.getvalue().encode(encoding)
+    except UnicodeEncodeError:
+        text = io.StringIO()
+        code.terminal(text, border=2)
     return text.getvalue()
 
 
