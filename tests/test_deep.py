@@ -100,6 +100,21 @@ def turn_inside_out(out: Path) -> None:
     edit_mesh(out, flip, "normals")
 
 
+def shade_by_other_normals(out: Path) -> None:
+    def turn(normals: Sdf.AttributeSpec) -> None:
+        turned = np.ascontiguousarray(np.array(normals.default)[:, [1, 2, 0]])
+        normals.default = Vt.Vec3fArray.FromNumpy(turned)
+
+    edit_mesh(out, turn, "normals")
+
+
+def hide_all_vertices(out: Path) -> None:
+    def change(openness: Sdf.AttributeSpec) -> None:
+        openness.default = Vt.FloatArray.FromNumpy(np.zeros_like(np.array(openness.default)))
+
+    edit_mesh(out, change, "primvars:occlusion")
+
+
 def mirror_the_uvs(out: Path) -> None:
     def change(uvs: Sdf.AttributeSpec) -> None:
         mirrored = np.ascontiguousarray(np.array(uvs.default)[:, ::-1])
@@ -275,6 +290,8 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
                 BUNDLE: "F: its histogram of value and gradient is not its volumes'",
             },
         ),
+        (shade_by_other_normals, {BUNDLE: "of its area is shaded by other normals"}),
+        (hide_all_vertices, {BUNDLE: "of its area has other colours or occlusion at its"}),
         (change_a_colour, {MANIFEST: "F: color is ", BUNDLE: "drawn in "}),
         (leave_a_texture_stale, {BUNDLE: "F_lod1_normal.png is another image in the stage"}),
         (

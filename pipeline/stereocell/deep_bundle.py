@@ -46,6 +46,7 @@ from stereocell.write.composed import (
 )
 from stereocell.write.composed_look import ComposedLook, read_looks
 from stereocell.write.exr import read_atlas
+from stereocell.write.gltf import AMBIENT_SHARE
 from stereocell.write.gltf_read import Drawn, read_glb
 from stereocell.write.ktx2 import encode_color_map, encode_normal_map, encode_occlusion_map
 
@@ -53,6 +54,7 @@ _COLOR = 1 / 255 + 1e-6
 _UM_PER_METRE = 1e6
 _MAP_DIFFERENCE = 1.0  # of 255, in the mean: the same image by another version of the encoder
 _ODD_SHARE = 0.01  # of a surface's area: slivers that the lattice turns over
+_ALONG = math.cos(math.radians(3))  # a normal's 8 bits on an octahedron, and as much again
 _UV_STEP = 1e-4  # of a map's edge; 16 bits hold a sixth of it
 _ROUNDED = 1.001  # four digits, upwards
 _BOX_M = 2e-9  # whole nm, outwards
@@ -330,6 +332,23 @@ def _hold_faces(
     odd = float(areas[(normals * turned).sum(axis=1) < 0].sum())
     if odd > _ODD_SHARE * whole:
         yield f"{odd / whole:.0%} of its area faces the other way"
+    here_of = drawn.triangles[np.asarray(twins)]
+    along = (_means(mesh.normals, triangles) * _means(drawn.normals, here_of)).sum(axis=1)
+    odd = float(areas[along < _ALONG].sum())
+    if odd > _ODD_SHARE * whole:
+        yield f"{odd / whole:.0%} of its area is shaded by other normals"
+    dimmed = _dimmed(mesh)
+    if (dimmed is None) != (drawn.colors is None):
+        yield (
+            "its vertices have colours, the stage's none"
+            if dimmed is None
+            else ("the occlusion at its vertices is lost")
+        )
+    elif dimmed is not None and drawn.colors is not None:
+        off = np.abs(dimmed[triangles].mean(axis=1) - drawn.colors[here_of].mean(axis=1))
+        odd = float(areas[off.max(axis=1) > _COLOR].sum())
+        if odd > _ODD_SHARE * whole:
+            yield f"{odd / whole:.0%} of its area has other colours or occlusion at its vertices"
     if drawn.uvs is None or mesh.uvs is None:
         return  # a map without them is told of the map
     wanted = mesh.uvs.astype(np.float64)[triangles].mean(axis=1)
@@ -338,6 +357,25 @@ def _hold_faces(
     odd = float(areas[off > _UV_STEP].sum())
     if odd > _ODD_SHARE * whole:
         yield f"{odd / whole:.0%} of its area lies elsewhere in the maps"
+
+
+def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the direction (m, 3) of each triangle's three normals."""
+    means = normals.astype(np.float64)[triangles].sum(axis=1)
+    return np.asarray(means / np.maximum(np.linalg.norm(means, axis=1, keepdims=True), 1e-12))
+
+
+def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
+    """Return what the colour of each vertex is multiplied by (n, 3), or None: see gltf.py."""
+    if mesh.colors is None and mesh.openness is None:
+        return None
+    colors = np.ones((len(mesh.positions), 3))
+    if mesh.colors is not None:
+        colors = np.clip(mesh.colors.astype(np.float64), 0, 1)
+    if mesh.openness is None:
+        return colors
+    openness = np.clip(mesh.openness.astype(np.float64), 0, 1)[:, np.newaxis]
+    return np.asarray(colors * (1 - AMBIENT_SHARE * (1 - openness)))
 
 
 def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

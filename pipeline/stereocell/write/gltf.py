@@ -30,7 +30,7 @@ _METRES_PER_UM = 1e-6
 _MOST_STEPS = 0xFFFF  # that 16 bits span
 _WANTED_STEPS = 1 << 14  # as fine as a 20th of a voxel, and the low bits don't compress
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
-_AMBIENT_SHARE = 0.4  # of the light in the viewer's room, about
+AMBIENT_SHARE = 0.4  # of the light in the viewer's room, about
 _OF_COLOR = {"baseColorTexture"}  # the maps that lie one level deeper in a material
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
 
@@ -219,7 +219,7 @@ def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> 
         colors *= np.clip(mesh.colors[order], 0, 1)
     if mesh.openness is not None:
         hidden = 1 - np.clip(mesh.openness[order].astype(np.float64), 0, 1)
-        colors *= (1 - _AMBIENT_SHARE * hidden)[:, np.newaxis]
+        colors *= (1 - AMBIENT_SHARE * hidden)[:, np.newaxis]
     values = _padded(np.rint(colors * 255).astype(np.uint8))
     return buffers.add_attribute(
         values, {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "VEC3"}

@@ -30,6 +30,7 @@ class Drawn:
 
     positions_m  float32 (n, 3), world metres
     triangles    (m, 3)
+    normals      of the vertices, unit vectors (n, 3)
     colors       of the vertices, 0..1 (n, 3), or None
     color        of the material, linear RGB 0..1
     maps         KTX2 files by their names in the material
@@ -39,6 +40,7 @@ class Drawn:
 
     positions_m: NDArray[np.float32]
     triangles: NDArray[np.int64]
+    normals: NDArray[np.float64]
     colors: NDArray[np.float64] | None
     color: tuple[float, float, float]
     maps: dict[str, bytes]
@@ -72,6 +74,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     (primitive,) = mesh["primitives"]
     attributes = primitive["attributes"]
     offsets = _decode(document, binary, attributes["POSITION"]).astype(np.float32)
+    directions = _decode(document, binary, attributes["NORMAL"])
     scale, translation = (np.array(node[key], np.float32) for key in ("scale", "translation"))
     colors = None
     if "COLOR_0" in attributes:
@@ -86,6 +89,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     return Drawn(
         offsets * scale + translation,
         _decode(document, binary, primitive["indices"]).reshape(-1, 3).astype(np.int64),
+        directions / float(np.iinfo(directions.dtype).max),
         colors,
         (red, green, blue),
         {
