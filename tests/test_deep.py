@@ -1,6 +1,7 @@
 """`check --deep` passes what was built, and names each fault that is put in by hand."""
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -134,6 +135,15 @@ def double_the_iso_value(out: Path) -> None:
     stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
     value = stage.GetPrimAtPath("/Specimen/Channels/F").GetAttribute("stereocell:isoValue")
     value.Set(2 * value.Get())
+    stage.GetRootLayer().Save()
+
+
+def double_the_threshold_and_window(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
+    prim = stage.GetPrimAtPath("/Specimen/Channels/F")
+    for name in ("threshold", "volumeWindow"):
+        value = prim.GetAttribute(f"stereocell:{name}")
+        value.Set(2 * value.Get())
     stage.GetRootLayer().Save()
 
 
@@ -290,10 +300,39 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
                 BUNDLE: "F: its histogram of value and gradient is not its volumes'",
             },
         ),
-        (shade_by_other_normals, {BUNDLE: "of its area is shaded by other normals"}),
-        (hide_all_vertices, {BUNDLE: "of its area has other colours or occlusion at its"}),
+        (
+            shade_by_other_normals,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "r0_c0/F: lod0: its normals are not the unit's",
+                BUNDLE: "of its area is shaded by other normals",
+            },
+        ),
+        (
+            hide_all_vertices,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "r0_c0/F: lod0: its occlusion at vertices is not the unit's",
+                BUNDLE: "of its area has other colours or occlusion at its",
+            },
+        ),
+        (
+            double_the_threshold_and_window,
+            {
+                SOURCE: "F: volumeWindow is ",
+                MANIFEST: "F: threshold_normalized is ",
+                BUNDLE: "F.ktx2: level 0: ",
+            },
+        ),
         (change_a_colour, {MANIFEST: "F: color is ", BUNDLE: "drawn in "}),
-        (leave_a_texture_stale, {BUNDLE: "F_lod1_normal.png is another image in the stage"}),
+        (
+            leave_a_texture_stale,
+            {
+                "F lod1 against source": " stated; at most ",
+                SOURCE: "r0_c0/F: lod1: its normal map is not the unit's",
+                BUNDLE: "F_lod1_normal.png is another image in the stage",
+            },
+        ),
         (
             spoil_a_voxel,
             {SOURCE: "F.exr: 1 of ", BUNDLE: "F.ktx2: level 0: 1 of "},
@@ -340,6 +379,26 @@ def test_a_fault_put_in_by_hand_is_named(
     assert found.keys() == expected.keys(), found
     for name, part in expected.items():
         assert part in found[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spoil", "part"),
+    [
+        (leave_a_texture_stale, "r0_c0/F: lod1: its normal map is not the unit's"),
+        (shade_by_other_normals, "r0_c0/F: lod0: its normals are not the unit's"),
+        (hide_all_vertices, "r0_c0/F: lod0: its occlusion at vertices is not the unit's"),
+    ],
+)
+def test_a_fault_of_the_stage_is_named_when_the_bundle_has_it_too(
+    out: Path, spoil: Callable[[Path], None], part: str
+) -> None:
+    spoil(out)
+    os.utime(out / "stage" / "tiles" / "r0_c0" / "tile.usdc")  # an edit
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    found = failures(out)
+    assert found.keys() <= {FINEST, "F lod1 against source", SOURCE}
+    assert part in found[SOURCE]
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
         store.require_units_of(plan)
         require_input(plan)
         require_added(plan)
-        odd = list(_odd_iso_values(store, plan))
+        odd = list(_odd_values(store, plan))
         findings = engine.run("source", hold_unit, list(_source_tasks(store, plan)))
     except StereoCellError as error:
         yield CheckLine("stage against source", False, _one_line(error))
@@ -77,15 +77,27 @@ def _hold_tiles(store: Store, plan: Plan) -> str:
     return f"{len(there)}, as planned"
 
 
-def _odd_iso_values(store: Store, plan: Plan) -> Iterator[str]:
-    """Yield which channel of the stage has another iso-value than was found in the source."""
+def _odd_values(store: Store, plan: Plan) -> Iterator[str]:
+    """Yield which channel of the stage has other values than were found in the source.
+
+    Its window is not among them: it may be set to taste. That of its volumes is.
+    """
     stage = open_stage(store.stage_file)
     survey = store.survey()
-    looks = {look.id: look.iso_value for look in read_looks(stage)}
+    looks = {look.id: look for look in read_looks(stage)}
     for channel in plan.channels:
-        found, built = looks.get(channel.id), survey[channel.id]["look"]["iso_value"]
-        if found != (None if built is None else shortest(built)):
-            yield f"{channel.id}: isoValue is {found}, {built} was found"
+        built, look = survey[channel.id]["look"], looks.get(channel.id)
+        if look is None:
+            yield f"{channel.id}: it is not in the stage"
+            continue
+        for name, found, wanted in (
+            ("isoValue", (look.iso_value,), (built["iso_value"],)),
+            ("threshold", (look.threshold,), (built["threshold"],)),
+            ("volumeWindow", look.volume_window, built["window"]),
+        ):
+            if found != tuple(None if value is None else shortest(value) for value in wanted):
+                told, here = (", ".join(map(str, one)) for one in (found, wanted))
+                yield f"{channel.id}: {name} is {told}; {here} was found"
 
 
 def _source_tasks(store: Store, plan: Plan) -> Iterator[tuple[str, SourceTask]]:

@@ -3,16 +3,19 @@
 Surfaces: the iso-surface of the unit's own voxels, before any level of detail is made of it, and
 from it, and to it, the distance of each level: by the same measure as a level's stated distance
 (the 99th percentile over both areas), and the largest of all, vertices too, as the unit's record
-has it. They face as it does, and have the unit's places in the maps. Volumes: every voxel in 8
-bits, and the .vdb that the stage names byte by byte.
+has it. They face as it does; normals, occlusion, maps and the places in them are the unit's.
+Volumes: every voxel in 8 bits, and the .vdb that the stage names byte by byte.
 """
 
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
 from stereocell.distance import Nearest, measure_distance, measure_spread
 from stereocell.errors import StereoCellError
@@ -37,7 +40,8 @@ from stereocell.write.vdb import write_vdb
 
 # what float32 and another order of the same triangles may do to a distance
 _SHARE, _HAIR_UM = 0.02, 1e-3
-_UV_STEP = 1e-6
+_STEP = 1e-6  # of what is 0 to 1
+_ALONG = 1 - 1e-6  # the cosine between two normals that are alike: .08 degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +87,7 @@ def hold_unit(task: SourceTask) -> UnitFinding:
         record = load_record(task.unit.directory)
         levels, faults = _hold_lods(_placed(fine, task.placement), lods, record, task.samples)
         problems += faults
-        problems += _hold_maps(lods, load_lods(task.unit.directory))
+        problems += _hold_shading(lods, load_lods(task.unit.directory), task.placement)
         if composed is None:
             problems.append("no volume in the stage")
         else:
@@ -157,16 +161,56 @@ def _facing(mesh: Mesh, fine: Nearest) -> float:
     return float(((own * other).sum(axis=1) / lengths).sum()) / area
 
 
-def _hold_maps(lods: list[ComposedLod], built: tuple[Lod, ...]) -> list[str]:
-    """Return which levels have other places in their maps than the unit's meshes have."""
+def _hold_shading(lods: list[ComposedLod], built: tuple[Lod, ...], placement: Matrix) -> list[str]:
+    """Return what of a level's normals, occlusion and maps is not as the unit has it."""
     odd = []
     for lod in lods:
-        uvs, wanted = lod.mesh.uvs, built[min(lod.level, len(built) - 1)].mesh.uvs
-        if uvs is None or wanted is None or lod.maps.normal is None:
-            continue
-        if uvs.shape != wanted.shape or np.abs(uvs - wanted).max() > _UV_STEP:
-            odd.append(f"lod{lod.level}: its UVs are not the unit's")
+        wanted = built[min(lod.level, len(built) - 1)]
+        for part in _odd_shading(lod, wanted, placement):
+            odd.append(f"lod{lod.level}: its {part} not the unit's")
     return odd
+
+
+def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[str]:
+    mesh, maps, baked = lod.mesh, lod.maps, wanted.baked
+    if mesh.normals.shape != wanted.mesh.normals.shape:
+        return  # other vertices: their places tell
+    turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
+    if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:
+        yield "normals are"
+    if wanted.normal_map is None:
+        if baked is not None and not _is_like(mesh.openness, baked.openness / 255.0):
+            yield "occlusion at vertices is"
+        return
+    if not _is_like(mesh.uvs, wanted.mesh.uvs):
+        yield "UVs are"
+    if not _is_image(maps.normal, wanted.normal_map):
+        yield "normal map is"
+    if baked is not None and not _is_image(maps.occlusion, baked.openness):
+        yield "occlusion map is"
+
+
+def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
+    wide = vectors.astype(np.float64)
+    return np.asarray(wide / np.maximum(np.linalg.norm(wide, axis=1, keepdims=True), 1e-12))
+
+
+def _is_like(found: NDArray[Any] | None, wanted: NDArray[Any] | None) -> bool:
+    if found is None or wanted is None:
+        return found is wanted
+    return found.shape == wanted.shape and bool(np.abs(found - wanted).max(initial=0) <= _STEP)
+
+
+def _is_image(file: Path | None, wanted: NDArray[np.uint8]) -> bool:
+    """Return whether a file is an image of these pixels, uint8 (y, x) or (y, x, 3)."""
+    if file is None:
+        return False
+    try:
+        with Image.open(file) as image:
+            found = np.asarray(image)
+    except OSError as error:
+        raise StereoCellError(f"{file}: can't be read as an image: {error}") from error
+    return np.array_equal(found, wanted)
 
 
 def _slack(um: float) -> float:
