@@ -24,6 +24,7 @@ import yaml
 
 import phantoms
 import stereocell
+from dicom_series import write_enhanced, write_f_nifti, write_series
 from stereocell import cli, phases
 from stereocell.errors import UsageError
 from stereocell.read import opening
@@ -43,10 +44,6 @@ PARSED = {
     "tissue": "half a minute: test_tissue_channels.py",
     "build big.ome.zarr": "a cluster: test_cluster.py",
     "build s3://": "object storage: test_mirror.py",
-    "build scans/head -o out/head --preset mri": "a second build: test_dicom_build.py",
-    "build scans/head -o out/head --series 2": "a second build: test_dicom_build.py",
-    "build frames.dcm": "a second build: test_dicom_build.py",
-    "build brain.nii.gz": "a second build: test_dicom_build.py",
 }
 # ... and run, but on less
 SMALLER = {
@@ -91,6 +88,9 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     labels = [{"label": name, "color": "00FF80"} for name in names]
     phantoms.write_ome_zarr(tmp_path / "my.ome.zarr", [voxels], "czyx", channels=labels)
     write_dicom(tmp_path / "scans" / "head", make_head((24, 20, 22), seed=4), 4)
+    write_series(tmp_path / "scans" / "head" / "other", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
+    write_enhanced(tmp_path / "frames.dcm", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
+    write_f_nifti(tmp_path / "brain.nii.gz", body, (500, 200, 200))
     for name in ("edited.usda", "edits.usda"):
         (tmp_path / name).write_text(blocks(DOCS / "blender.md", "usda")[0])
     (tmp_path / "organoid.toml").write_text(blocks(DOCS / "extending.md", "toml")[0])
@@ -104,12 +104,12 @@ def test_commands_run(
     report: Callable[[Path], None] = phases.run_report
     drawn: list[Path] = []
 
-    def draw_once(out: Path) -> None:  # seconds each time, and later ones differ by an iso-value
-        if not drawn:
+    def draw(out: Path) -> None:  # seconds each time: the first that is built, and where asked for
+        if not drawn or command.startswith("stereocell report "):
             report(out)
             drawn.append(out)
 
-    monkeypatch.setattr(phases, "run_report", draw_once)
+    monkeypatch.setattr(phases, "run_report", draw)
     ran = []
     for page in PAGES:
         for command in commands(page, "stereocell"):
@@ -130,7 +130,12 @@ def test_commands_run(
             ran.append(options.command)
     # those that are left out of this test are named in PARSED, and no others
     assert set(ran) == set(cli.COMMANDS) - {"view", "serve", "tissue"}
-    assert drawn == [Path("out/mine")]
+    assert set(drawn) == {Path("out/mine")}
+    assert len(drawn) == 1 + [c for p in PAGES for c in commands(p, "stereocell")].count(
+        "stereocell report out/mine"
+    )
+    for folder in ("head", "second", "frames", "brain"):  # of the page about DICOM
+        assert (sources / f"out/{folder}/bundle/manifest.json").is_file()
     assert (sources / "out/mine/report/index.html").is_file()
     _runs_the_workflow(sources)
 
