@@ -308,7 +308,7 @@ def test_a_lock_that_was_not_renewed_is_taken_over(
 def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[set[str]] = []
 
-    def serve(out: Path, *_: object) -> None:
+    def serve(out: Path, *_: object, **__: object) -> None:
         seen.append({path.name for path in out.iterdir()})
         assert (out / "bundle" / "manifest.json").is_file()
 

@@ -223,3 +223,19 @@ def test_a_transfer_that_takes_too_long_is_cut_off(
                 size += len(part)
     assert size < SLOW
     assert caplog.text == ""
+
+
+def test_a_file_that_is_cut_while_it_is_sent_is_named_in_a_line(out: Path) -> None:
+    file, size = out / "bundle" / "large.bin", 0
+    whole = file.stat().st_size
+    with command(out) as (process, port), begin_download(port) as stream:
+        os.truncate(file, 1 << 20)
+        with suppress(ConnectionError):
+            while part := stream.recv(1 << 20):
+                size += len(part)
+        assert size < SLOW
+        os.kill(process.pid, signal.SIGTERM)
+        _, faults = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
+    os.truncate(file, whole)
+    assert faults == f"{file}: became shorter while it was sent\n"

@@ -291,7 +291,13 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
     from stereocell.serve import serve
 
     try:
-        serve(options.out, options.port, options.lan, open_browser, for_program=options.json)
+        serve(
+            options.out,
+            options.port,
+            options.lan,
+            open_browser=open_browser,
+            for_program=options.json,
+        )
     except BrokenPipeError as error:  # of who was to read its address
         raise StdoutLost(error) from error
     return Answer()

@@ -27,7 +27,7 @@ from starlette.types import ASGIApp
 from stereocell.errors import StereoCellError
 from stereocell.serve_access import Access, Gate
 from stereocell.serve_bricks import BrickEndpoint
-from stereocell.serve_files import BundleFiles
+from stereocell.serve_files import BundleFiles, ShrunkError
 from stereocell.serve_lan import draw_qr, explain, find_addresses, find_names, make_certificate
 from stereocell.serve_library import MANIFEST, BrickLibrary
 from stereocell.serve_lifetime import Lifetime
@@ -218,6 +218,11 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 def _is_ours(record: logging.LogRecord) -> bool:
-    """Leave out tracebacks of frames that a client got wrong: it was closed with a code."""
+    """Leave out tracebacks of frames that a client got wrong: it was closed with a code.
+
+    A file that was cut meanwhile is told in a line.
+    """
     fault = record.exc_info[1] if record.exc_info else None
+    if isinstance(fault, ShrunkError):
+        record.msg, record.args, record.exc_info = str(fault), (), None
     return not isinstance(fault, UnicodeDecodeError)

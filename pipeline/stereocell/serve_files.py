@@ -11,8 +11,10 @@ from pathlib import Path
 from urllib.parse import quote
 
 import anyio.to_thread
+import h11
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.types import Receive, Scope, Send
 
 from stereocell.serve_headers import policy
 
@@ -34,6 +36,18 @@ _RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
 _DIGITS = 18  # of a number in a Range header: no file has more bytes
 
 
+class ShrunkError(Exception):
+    """A file became shorter while it was sent."""
+
+
+class _SentFile(FileResponse):
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        except h11.LocalProtocolError as error:  # less than its head had promised
+            raise ShrunkError(f"{self.path}: became shorter while it was sent") from error
+
+
 class BundleFiles:
     """The folder that is served, and whether pages learn of bricks beside it."""
 
@@ -49,7 +63,7 @@ class BundleFiles:
         path, status = found
         kind = _TYPES.get(path.suffix, "application/octet-stream")
         headers = {**self._headers, **policy(kind)}
-        response = FileResponse(path, headers=headers, media_type=kind, stat_result=status)
+        response = _SentFile(path, headers=headers, media_type=kind, stat_result=status)
         response.headers["content-type"] = kind
         tag = response.headers["etag"]
         if tag in [known.strip() for known in request.headers.get("if-none-match", "").split(",")]:
