@@ -16,7 +16,7 @@ from stereocell.plan import Plan
 from stereocell.specimen import ChannelContent, PaintColors, TileContent
 from stereocell.store import Store
 from stereocell.tiling import Tile
-from stereocell.unit_files import find_closed, load_lods, load_volume
+from stereocell.unit_files import find_closed, is_whole, load_lods, load_volume
 from stereocell.write import usd
 
 _RECORD = "units.schema.json#StageTile"
@@ -43,8 +43,9 @@ class TileTask:
         return self.stage_dir / "tiles" / self.content.id
 
     def is_done(self) -> bool:
-        """Return whether the tile stands whole and comes from the same things."""
-        return bool(find_json(self.record, _RECORD) == self.describe())
+        """Return whether the tile stands whole and comes from the same things, whole as well."""
+        are_whole = all(is_whole(folder) for _, folder, _ in self.units)
+        return are_whole and bool(find_json(self.record, _RECORD) == self.describe())
 
     def describe(self) -> dict[str, str]:
         return {"key": self.key, "results": digest_of([self.folder])}
