@@ -235,3 +235,24 @@ def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
     with pytest.raises(OutputError, match=r"the bundle has a manifest\.json of its own"):
         write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0))
     assert not (tmp_path / "bundle").exists()
+
+
+@pytest.mark.parametrize("escape", ["id", "path"])
+def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
+    parts = tmp_path / "parts"
+    write_bundle(stage, tmp_path / "first", None, Engine(0), parts)
+    (tmp_path / "secret.txt").write_text("private")
+    for record in sorted(parts.glob("*/tile.json")):
+        content = load(record)
+        if escape == "id":
+            content["id"] = f"../parts/{content['id']}"
+        else:
+            for channel in content["channels"]:
+                for file in channel["files"]:
+                    file |= {"path": "../../secret.txt", "bytes": 7}
+        record.write_text(json.dumps(content))
+    write_bundle(stage, tmp_path / "again", None, Engine(0), parts)
+    assert files(tmp_path / "again") == files(bundle)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"first", "again", "parts", "secret.txt"}
+    assert (tmp_path / "secret.txt").read_text() == "private"

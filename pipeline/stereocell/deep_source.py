@@ -174,6 +174,8 @@ def _hold_shading(lods: list[ComposedLod], built: tuple[Lod, ...], placement: Ma
 def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[str]:
     mesh, maps, baked = lod.mesh, lod.maps, wanted.baked
     if mesh.normals.shape != wanted.mesh.normals.shape:
+        if maps.normal is not None and mesh.uvs is not None and wanted.mesh.uvs is not None:
+            yield "UVs are"
         return  # other vertices: their places tell
     turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
     if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:

@@ -106,7 +106,7 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
                 from stereocell.write.atomic import clear_remains  # needs mirror, which needs this
 
                 clear_remains(out)
-            before = _held.set(Claim((out / LOCK).absolute(), os.pread(file, 4096, 0)))
+            before = _held.set(Claim((out / LOCK).absolute(), (out / LOCK).read_bytes()))
             try:
                 yield
             finally:

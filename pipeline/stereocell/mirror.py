@@ -208,11 +208,14 @@ class Mirror:
 
     # --- to there
 
-    def keep(self, path: Path) -> None:
-        """Put a file, or all of a folder in place of what was there; see `move`."""
+    def keep(self, path: Path, there: Mapping[str, str] | None = None) -> None:
+        """Put a file, or all of a folder in place of what was there.
+
+        there  what is to be moved into the folder: from where, by what it is called there
+        """
+        there = there or {}
         files = [path] if path.is_file() else [f for f in path.rglob("*") if f.is_file()]
         here = {self._key(file): file for file in files}
-        there, self.moves = self.moves, {}
         stale = [key for key in self.keys_of(path) if key not in here and key not in there]
         self._put(here, there)
         self._remove([*stale, *there.values()])
@@ -321,8 +324,7 @@ def making(folder: Path, final: Path) -> Iterator[None]:
     try:
         yield
         old, new = mirror._key(folder), mirror._key(final)
-        mirror.moves = {new + key[len(old) :]: kept for key, kept in mirror.moves.items()}
-        mirror.keep(final)
+        mirror.keep(final, {new + key[len(old) :]: kept for key, kept in mirror.moves.items()})
     finally:
         mirror.making.discard(folder)
         mirror.moves = {}

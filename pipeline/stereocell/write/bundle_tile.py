@@ -115,7 +115,9 @@ def find_part(part: Path) -> BundleTile | None:
         return None
     sizes = {file.relative_to(part).as_posix(): size for file, size in sizes_below(part).items()}
     refs = [ref for channel in tile.channels for ref in channel.files]
-    return tile if all(sizes.get(ref.path) == ref.bytes for ref in refs) else None
+    # by these names files are moved: they must be of this folder
+    is_own = tile.id == part.name and all(sizes.get(ref.path) == ref.bytes for ref in refs)
+    return tile if is_own else None
 
 
 def export_tile(
