@@ -146,6 +146,8 @@ test-viewer: setup browser
 	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/demo
 	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
 	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
+	$(RUN) check out/brain-cells --deep --workers $(WORKERS)
+	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
 	$(BIN)/python tests/assets.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
 	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit
