@@ -46,11 +46,7 @@ def close_tile(
     distance (z, y, x), um, positive inside, covers `window`; the lattice ends what is built, as far
     as the surface knows.
     """
-    inner = (
-        slice(a - w, b - w)
-        for a, b, w in zip(lattice.start, lattice.stop, window.start, strict=True)
-    )
-    own = distance[tuple(inner)]
+    own = distance[lattice.slices_in(window)]
     fine = extract_surface(own, lattice, lattice, lattice, spacing_um, origin_um)
     if not len(fine.triangles):
         return None

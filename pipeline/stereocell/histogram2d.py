@@ -106,8 +106,11 @@ def log_scaled(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
 def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
     """Return voxels as the 8-bit volumes hold them: the window's ends are 0 and 255."""
     low, high = window
-    share = (voxels.astype(np.float32) - np.float32(low)) / np.float32(high - low)
-    return np.rint(np.clip(share, 0, 1) * 255).astype(np.uint8)
+    result = np.empty(voxels.shape, np.uint8)
+    for z, plane in enumerate(voxels):  # one at a time: float32 is large
+        share = (plane.astype(np.float32) - np.float32(low)) / np.float32(high - low)
+        result[z] = np.rint(np.clip(share, 0, 1) * 255)
+    return result
 
 
 def sample_boxes(region: Box, limit: int) -> list[Box]:

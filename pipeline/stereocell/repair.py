@@ -62,21 +62,21 @@ def repair(
     distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
 ) -> Repaired:
     """Return the cleaned signed distance; the argument stays as it is."""
-    distance = distance.copy()
-    dropped = _drop_fragments(distance, spacing_um, options)
+    distance, dropped = _drop_fragments(distance, spacing_um, options)
     if options.offset_um > 0:
         limit = np.float32(2 * max(spacing_um))
-        np.clip(distance + np.float32(options.offset_um), -limit, limit, out=distance)
+        distance = distance + np.float32(options.offset_um)
+        np.clip(distance, -limit, limit, out=distance)
     if options.alpha_um > 0:
         distance = _close(distance, spacing_um, options.alpha_um)
-    filled = _fill_cavities(distance, spacing_um, options.max_cavity_um)
+    distance, filled = _fill_cavities(distance, spacing_um, options.max_cavity_um)
     return Repaired(distance, dropped, filled)
 
 
 def _drop_fragments(
     distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
-) -> int:
-    """Set small solids that lie inside the window far outside; return how many."""
+) -> tuple[Distance, int]:
+    """Return the distance with small solids inside the window set far outside, and how many."""
     # 26-connected: a fragment joined by a corner belongs to its neighbour
     solids = find_solids(distance > 0, spacing_um, 26)
     small = solids.diagonal_um < options.min_diagonal_um
@@ -85,7 +85,7 @@ def _drop_fragments(
         small |= doubtful & (solids.faces() < options.min_faces)
     small &= solids.whole
     if not small.any():
-        return 0
+        return distance, 0
     outside = np.float32(-2 * max(spacing_um))
     gone = np.concatenate([[False], small])[solids.labels]
     if options.offset_um > 0:
@@ -94,19 +94,21 @@ def _drop_fragments(
         kept = ((solids.labels > 0) & ~gone).view(np.uint8)
         near &= ~ndimage.maximum_filter(kept, 3, mode="constant") & 1
         gone |= near.view(bool)
-    distance[gone] = outside
-    return int(small.sum())
+    return np.where(gone, outside, distance), int(small.sum())
 
 
 def _fill_cavities(
     distance: Distance, spacing_um: tuple[float, float, float], max_diagonal_um: float
-) -> int:
-    """Set small holes that no path joins to the outside far inside; return how many."""
+) -> tuple[Distance, int]:
+    """Return the distance with small holes that no path joins to the outside set far inside, and
+    how many.
+    """
     holes = find_solids(distance <= 0, spacing_um, 6)
     small = holes.whole & (holes.diagonal_um < max_diagonal_um)
-    if small.any():
-        distance[np.concatenate([[False], small])[holes.labels]] = 2 * max(spacing_um)
-    return int(small.sum())
+    if not small.any():
+        return distance, 0
+    gone = np.concatenate([[False], small])[holes.labels]
+    return np.where(gone, np.float32(2 * max(spacing_um)), distance), int(small.sum())
 
 
 def _close(distance: Distance, spacing_um: tuple[float, float, float], alpha_um: float) -> Distance:
@@ -118,9 +120,11 @@ def _close(distance: Distance, spacing_um: tuple[float, float, float], alpha_um:
     """
     h = float(max(spacing_um))
     margin = [int(np.ceil(alpha_um / step)) + 1 for step in spacing_um]
-    outside = np.pad(distance <= 0, [(m, m) for m in margin], constant_values=True)
-    # centres of balls that fit outside, then how far each voxel is from the nearest of them
-    centres = edt.edt(outside, anisotropy=spacing_um, parallel=1) >= alpha_um
-    away = edt.edt(~centres, anisotropy=spacing_um, parallel=1)
+    mask = np.pad(distance <= 0, [(m, m) for m in margin], constant_values=True)
+    # no centres of balls that fit outside, then how far each voxel is from the nearest that is one
+    mask = edt.edt(mask, anisotropy=spacing_um, parallel=1) < alpha_um
+    away = edt.edt(mask, anisotropy=spacing_um, parallel=1)
     away = away[tuple(slice(m, -m) for m in margin)]
-    return np.maximum(distance, np.clip(away - np.float32(alpha_um + h), -2 * h, h))
+    away -= np.float32(alpha_um + h)
+    np.clip(away, -2 * h, h, out=away)
+    return np.maximum(distance, away)

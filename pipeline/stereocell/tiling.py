@@ -27,6 +27,12 @@ class Box:
         z, y, x = (slice(a, b) for a, b in zip(self.start, self.stop, strict=True))
         return z, y, x
 
+    def slices_in(self, window: "Box") -> tuple[slice, slice, slice]:
+        """Return the box as indices of an array that covers `window`."""
+        start, stop, first = self.start, self.stop, window.start
+        z, y, x = (slice(a - w, b - w) for a, b, w in zip(start, stop, first, strict=True))
+        return z, y, x
+
     def grown(self, halo: tuple[int, int, int], within: "Box") -> "Box":
         """Return the box larger by `halo` voxels on each side, clipped to `within`."""
         start = (max(a - h, low) for a, h, low in zip(self.start, halo, within.start, strict=True))

@@ -12,6 +12,7 @@ from stereocell.clock import Clock
 from stereocell.closed import Closed, close_tile
 from stereocell.config import Settings
 from stereocell.denoise import denoise
+from stereocell.histogram2d import to_eight_bits
 from stereocell.latticefield import LatticeField
 from stereocell.levels import make_levels
 from stereocell.mesh import Lod, Mesh
@@ -252,6 +253,4 @@ def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
             strict=True,
         )
     ]
-    low, high = given.display
-    values = voxels[np.ix_(*index)].astype(np.float32)
-    return np.round(np.clip((values - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+    return to_eight_bits(voxels[np.ix_(*index)], given.display)
