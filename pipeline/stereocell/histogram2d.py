@@ -104,7 +104,10 @@ def log_scaled(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
 
 
 def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return voxels as the 8-bit volumes hold them: the window's ends are 0 and 255."""
+    """Return voxels as the 8-bit volumes hold them: the window's ends are 0 and 255.
+
+    Any real dtype and shape (z, ...) to uint8 of that shape; `window` in voxel values.
+    """
     low, high = window
     result = np.empty(voxels.shape, np.uint8)
     for z, plane in enumerate(voxels):  # one at a time: float32 is large

@@ -61,7 +61,9 @@ class Repaired:
 def repair(
     distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
 ) -> Repaired:
-    """Return the cleaned signed distance; the argument stays as it is."""
+    """Return the cleaned signed distance; the argument stays as it is, and is what comes back where
+    nothing was to be cleaned.
+    """
     distance, dropped = _drop_fragments(distance, spacing_um, options)
     if options.offset_um > 0:
         limit = np.float32(2 * max(spacing_um))
