@@ -2,6 +2,7 @@
 
 import base64
 import os
+import re
 import select
 import socket
 import ssl
@@ -10,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from urllib.parse import urljoin, urlsplit
 
 from stereocell.serve import BundleServer
 
@@ -127,6 +129,41 @@ def raw(data: bytes, count: int = 1) -> Callable[[Target], str]:
         if said.count(b"HTTP/1.1 ") > count:
             return f"{said.count(b'HTTP/1.1 ')} answers to {count} request"
         return judge(said)
+
+    return act
+
+
+def bare(data: bytes) -> Callable[[Target], str]:
+    """Return an attack whose answer must be a head alone, as that to a HEAD."""
+
+    def act(target: Target) -> str:
+        with target.dial() as stream:
+            said = converse(stream, data, lambda said: False)
+        _, _, body = said.partition(b"\r\n\r\n")
+        return f"a body of {len(body)} bytes" if body else judge(said)
+
+    return act
+
+
+def landing(path: str) -> Callable[[Target], str]:
+    """Return an attack that follows a redirect as browsers do: "own" is where it should lead."""
+
+    def act(target: Target) -> str:
+        assert target.server.gate is not None
+        head = get(path.replace("{token}", target.server.gate.token))
+        with target.dial() as stream:
+            said = converse(stream, head, is_answer)
+        if (status := judge(said)) != "303":
+            return status
+        place = re.search(rb"^location: (.*)\r$", said, re.IGNORECASE | re.MULTILINE)
+        assert place is not None
+        shown = re.sub(r"[\t\r\n]", "", place[1].decode()).replace("\\", "/")
+        base = urlsplit(target.server.address)
+        whole = urlsplit(urljoin(target.server.address, shown))
+        is_own = (whole.scheme, whole.netloc) == (base.scheme, base.netloc)
+        # and whose parts are taken out once more before they are read again
+        again = urljoin(target.server.address, whole.path)
+        return "own" if is_own and urlsplit(again).netloc == base.netloc else shown
 
     return act
 

@@ -27,12 +27,14 @@ from attack_wire import (
     SECRET,
     Attack,
     Target,
+    bare,
     crowd,
     flood,
     frame,
     framed,
     get,
     handshake,
+    landing,
     never_reading,
     raw,
     silent_crowd,
@@ -174,6 +176,8 @@ def _requests() -> Iterator[Attack]:
         yield Attack("method", sent, raw(get("/manifest.json", method=method)), ("405",))
     tunnel = get("a.example:443", method="CONNECT")
     yield Attack("method", "`CONNECT a.example:443`", raw(tunnel), ("400",))
+    yield Attack("method", "`CONNECT /`", raw(get("/", method="CONNECT")), ("405",))
+    yield Attack("method", "`OPTIONS *`", raw(get("*", method="OPTIONS")), ("400",))
     yield Attack("HTTP/0.9", "`GET /`", raw(b"GET /\r\n\r\n"), ("400",))
     yield Attack("HTTP/9.9", "", raw(b"GET / HTTP/9.9\r\nHost: localhost\r\n\r\n"), ("505",))
     prelude = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
@@ -195,6 +199,64 @@ def _requests() -> Iterator[Attack]:
         ("a space before the colon", "Content-Length : 5", "400"),
     ):
         yield Attack(f"headers: {name}", f"`{line!r}`", raw(get("/", line)), (right,))
+
+
+def _heads() -> Iterator[Attack]:
+    """Those whose answers have no body, whoever refuses them."""
+    upgrade = ("Upgrade: websocket", "Connection: Upgrade")
+    many = [f"X-{k}: a" for k in range(MAX_HEADERS + 1)]
+    for name, sent, right in (
+        ("of everything", get("*", method="HEAD"), "400"),
+        ("of no path", get("?token=x", method="HEAD"), "400"),
+        ("in absolute form", get("http://localhost/", method="HEAD"), "400"),
+        ("of a host", get("evil.example:443", method="HEAD"), "400"),
+        ("too long a target", get("/" + "a" * TARGET_BYTES, method="HEAD"), "414"),
+        ("a huge target", b"HEAD /" + b"a" * (1 << 20), "414"),
+        ("too many headers", get("/", *many, method="HEAD"), "431"),
+        ("too long headers", get("/", "X: " + "a" * HEAD_BYTES, method="HEAD"), "431"),
+        ("a body", get("/", "Content-Length: 3", method="HEAD") + b"abc", "413"),
+        ("a websocket", get("/bricks", *upgrade, method="HEAD"), "405"),
+        ("two hosts", get("/", "Host: localhost", method="HEAD"), "400"),
+        ("HTTP/9.9", b"HEAD / HTTP/9.9\r\nHost: localhost\r\n\r\n", "505"),
+    ):
+        for server in ("plain", "lan"):
+            yield Attack(f"HEAD: {name}", server, bare(sent), (right,), server)
+    evil = get("/", method="HEAD", host="evil.example")
+    yield Attack("HEAD: another host", "plain", bare(evil), FOREIGN)
+    yield Attack("HEAD: another host", "lan", bare(evil), FOREIGN, "lan")
+    yield Attack("HEAD: no file", "plain", bare(get("/a", method="HEAD")), ABSENT)
+    yield Attack("HEAD: no session", "lan", bare(get("/a", method="HEAD")), FOREIGN, "lan")
+
+
+def _redirects() -> Iterator[Attack]:
+    """Where the answer to a token leads; and Starlette's own, of which there is none."""
+    for path in (
+        "//evil.example/",
+        "///evil.example/",
+        "////evil.example",
+        "/\\evil.example/",
+        "/\\/evil.example/",
+        "//evil.example\\@localhost/",
+        "/%2fevil.example/",
+        "/%2f%2fevil.example/",
+        "/%5cevil.example/",
+        "/%5c%5cevil.example/",
+        "/%09/evil.example/",
+        "/%0d%0aLocation:%20https://evil.example/",
+        "/.//evil.example/",
+        "/..//evil.example/",
+        "/a/..//evil.example/",
+        "/%2e/%2fevil.example/",
+        "/https://evil.example/",
+        "/javascript:alert(1)",
+        "/@evil.example/",
+    ):
+        act = landing(path + "?token={token}")
+        yield Attack("LAN, redirect", f"`GET {path}?token=...`", act, ("own",), "lan")
+    for path in ("?token={token}", "https://evil.example/?token={token}"):
+        yield Attack("LAN, redirect", f"`GET {path}`", landing(path), ("400",), "lan")
+    for path in ("/%0a/", "//evil.example/%0a/", "/%0a"):
+        yield Attack("path: a line break", f"`GET {path}`", raw(get(path)), ABSENT)
 
 
 def _smuggling() -> Iterator[Attack]:
@@ -334,6 +396,8 @@ ATTACKS: tuple[Attack, ...] = (
     *_origins(),
     *_ranges(),
     *_requests(),
+    *_heads(),
+    *_redirects(),
     *_smuggling(),
     *_slow(),
     *_sockets(),
@@ -428,7 +492,7 @@ def main(names: Sequence[str] = ()) -> int:
             found = attack(one, targets)
             is_right = found in one.right
             wrong += not is_right
-            verdict = "ignored" if found == "200" else "refused"
+            verdict = {"200": "ignored", "own": "led here"}.get(found, "refused")
             if not is_right:
                 verdict = f"**WRONG**, expected {' or '.join(one.right)}"
             sent = one.sent.replace("|", "\\|")

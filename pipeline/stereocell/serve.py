@@ -88,7 +88,9 @@ def make_app(
     routes: list[BaseRoute] = [Route("/{path:path}", files.answer, methods=["GET"])]
     if endpoint is not None:
         routes.insert(0, WebSocketRoute("/bricks", endpoint.talk))
-    return Access(Starlette(routes=routes, lifespan=lifespan), names, gate)
+    app = Starlette(routes=routes, lifespan=lifespan)
+    app.router.redirect_slashes = False  # where a path has a line break, which no route matches
+    return Access(app, names, gate)
 
 
 def _places(out: Path) -> tuple[Path, Path | None]:

@@ -116,5 +116,9 @@ def _plain_range(request: Request, size: int) -> None:
 
 
 def redirect(path: str) -> Response:
-    """Return a redirect to a path of this server, which no cache keeps."""
-    return Response(status_code=303, headers={"Location": quote(path), "Cache-Control": "no-store"})
+    """Return a redirect to a path of this server, which no cache keeps.
+
+    Its slashes are single ones: a browser takes what stands between two and a third for a host.
+    """
+    place = quote(re.sub("/+", "/", f"/{path}"))  # ":" and backslashes are encoded
+    return Response(status_code=303, headers={"Location": place, "Cache-Control": "no-store"})

@@ -140,12 +140,15 @@ class GuardedHttp(HeadDeadline):
             raise _RefusedError(405, "websockets begin with GET")
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what can't be parsed; called where h11's error is handled."""
+        """Answer what can't be parsed; called where h11's error is handled.
+
+        There is no text: it may have been a HEAD, whose answer has no body.
+        """
         status = getattr(sys.exception(), "error_status_hint", 400)
         if status == 431 and b"\n" not in self.conn.trailing_data[0]:
             status = 414
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._refuse(_RefusedError(status, "this is no HTTP request that a server may answer"))
+            self._refuse(_RefusedError(status, ""))
         else:
             self.transport.abort()
 
@@ -153,7 +156,7 @@ class GuardedHttp(HeadDeadline):
         self._is_refused = True
         self._stop()
         self._unset_keepalive_if_required()
-        text = f"{error}\n".encode()
+        text = f"{error}\n".encode() if str(error) else b""
         headers = [
             (b"content-type", b"text/plain; charset=utf-8"),
             (b"content-length", str(len(text)).encode()),
@@ -169,7 +172,9 @@ class GuardedHttp(HeadDeadline):
             headers=protect(self.server_state.default_headers + headers),
             reason=HTTPStatus(error.status).phrase.encode(),
         )
-        for event in (answer, h11.Data(data=text), h11.EndOfMessage()):
+        # a HEAD is told the length alone: h11 takes no body for its answer
+        is_head = self.scope is not None and self.scope["method"] == "HEAD"
+        for event in (answer, h11.Data(data=b"" if is_head else text), h11.EndOfMessage()):
             self.transport.write(self.conn.send(event) or b"")
         if self.transport.can_write_eof():
             self.transport.write_eof()
