@@ -1,6 +1,5 @@
-"""The wrap over triangles: where its package is installed, and what is said where it isn't."""
+"""The wrap over triangles, whose package the dev group brings, and what is said without it."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +50,6 @@ def test_unknown_wrap_lists_the_known(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "'foil', expected one of voxels, alpha-wrap" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(find_spec("pymeshlab") is None, reason="the extra alpha-wrap isn't installed")
 def test_wrap_is_closed_and_lies_the_offset_away() -> None:
     shape = (30, 40, 40)
     z, y, x = np.indices(shape) - np.float64(14.6)

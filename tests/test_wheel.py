@@ -86,6 +86,7 @@ def test_a_wheel_alone_builds_and_has_the_viewer(tmp_path: Path) -> None:
         run(python, "-c", "import stereocell; print(stereocell.__file__)", cwd=tmp_path).stdout
     ).parent
     assert package == site / "stereocell"
+    assert (package / "py.typed").is_file()  # PEP 561: who imports it gets its types
 
     command, out = home / "bin" / "stereocell", tmp_path / "out"
     sample = ["sample", "cycif", "s.ome.zarr", "--grid", "1x1", "--tile-size", "16,48,48"]
