@@ -12,9 +12,11 @@ from pathlib import Path
 
 import pytest
 
+import ctrl_c
 import phantoms
 from assets import make_assets
 from object_store import ObjectStore, serving
+from patience import PATIENCE_S
 from stereocell.cli import main
 from stereocell.cluster import ClusterError, able, join
 from stereocell.engine import Engine, TasksFailedError
@@ -162,11 +164,17 @@ def test_a_worker_that_came_later_is_held_to_the_same(
         able(str, Path("/nowhere/.lock"))(1)
 
 
+def wait_for(file: Path) -> None:
+    """Wait for a file as long as a test has patience."""
+    end = time.monotonic() + PATIENCE_S
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.05)
+
+
 def write_when(task: tuple[Path, Path, Path]) -> None:
     begun, told, file = task
     begun.touch()
-    while not told.exists():
-        time.sleep(0.05)
+    wait_for(told)
     try:
         write_bytes(file, b"late")
     finally:
@@ -180,8 +188,7 @@ def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
     out, begun, told = tmp_path / "out", tmp_path / "begun", tmp_path / "told"
 
     def interrupt() -> None:
-        while not begun.exists():
-            time.sleep(0.05)
+        wait_for(begun)
         os.kill(os.getpid(), signal.SIGINT)
 
     def build() -> None:
@@ -193,12 +200,12 @@ def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
             finally:
                 engine.close()
 
-    with pytest.raises(KeyboardInterrupt):
+    with ctrl_c.heeded(), pytest.raises(KeyboardInterrupt):
         build()
     assert not out.exists()
     told.touch()
-    while not told.with_suffix(".over").exists():
-        time.sleep(0.05)
+    wait_for(told.with_suffix(".over"))
+    assert told.with_suffix(".over").exists()
     assert not out.exists()
 
 

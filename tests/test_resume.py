@@ -4,14 +4,18 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pxr import Sdf
 
+import ctrl_c
 import phantoms
 from digests import digests_of
+from patience import PATIENCE_S
 from stereocell.cli import main
 from stereocell.store import Store
 
@@ -244,30 +248,41 @@ bundle.describe_bundle = lambda *_: time.sleep(60)
 def interrupt():
     while not list(out.glob(".bundle.*.partial/volumes/*/*")):
         time.sleep(0.001)
-    if sys.argv[2] == "SIGINT":
+    if "SIGINT" in sys.argv[2]:
         os.killpg(0, signal.SIGINT)
-    else:
+        time.sleep(0.5)
+    if "SIGTERM" in sys.argv[2]:
         os.kill(os.getpid(), signal.SIGTERM)
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # tests in the background ignore it
 threading.Thread(target=interrupt, daemon=True).start()
 sys.exit(main(["bundle", str(out), "--workers", "2"]))
 """
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.parametrize(
+    ("start", "kind", "code"),
+    [
+        (ctrl_c.heeded, "SIGINT", 130),
+        (ctrl_c.heeded, "SIGTERM", 143),
+        (ctrl_c.ignored, "SIGINT, then SIGTERM", 143),  # in the background it stays ignored
+    ],
+)
 def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(
-    out: Path, kind: str, code: int
+    out: Path, start: Callable[[], AbstractContextManager[None]], kind: str, code: int
 ) -> None:
     shutil.rmtree(out / "bundle")
-    bundle = subprocess.Popen(
-        [sys.executable, "-c", _INTERRUPTED, str(out), kind],
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-        text=True,
-    )
-    _, printed = bundle.communicate()
+    with start():
+        bundle = subprocess.Popen(
+            [sys.executable, "-c", _INTERRUPTED, str(out), kind],
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            text=True,
+        )
+    try:
+        _, printed = bundle.communicate(timeout=PATIENCE_S)
+    finally:
+        bundle.kill()
     assert bundle.returncode == code
     assert printed.endswith("stereocell: stopped; the same command goes on from here\n")
     assert "Traceback" not in printed

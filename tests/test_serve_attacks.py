@@ -7,8 +7,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Thread
@@ -17,6 +17,7 @@ from unittest.mock import patch
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+import ctrl_c
 from attack_wire import is_answer
 from patience import PATIENCE_S, connect
 from server_attacks import ATTACKS, MARK, attack, attacked, is_well, write_bundle
@@ -132,12 +133,15 @@ def test_the_documented_limits_are_the_servers() -> None:
 
 
 @contextmanager
-def command(out: Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """Run `stereocell serve OUT`; give its process and port."""
+def command(
+    out: Path, start: Callable[[], AbstractContextManager[None]] = ctrl_c.heeded
+) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """Run `stereocell serve OUT`, heeding Ctrl+C or not; give its process and port."""
     arguments = [sys.executable, "-m", "stereocell.cli", "serve", str(out), "--port", "0"]
-    with subprocess.Popen(
-        arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    pipe = subprocess.PIPE
+    with start():
+        begun = subprocess.Popen(arguments, stdout=pipe, stderr=pipe, text=True)
+    with begun as process:
         try:
             assert process.stdout is not None
             yield process, int(process.stdout.readline().split()[0].strip("/").rpartition(":")[2])
@@ -202,6 +206,17 @@ def test_a_second_ctrl_c_stops_at_once(out: Path) -> None:
         assert time.monotonic() - start < 4
     assert process.returncode == 130
     assert len(faults.splitlines()) == 1
+
+
+def test_in_the_background_ctrl_c_is_not_its_own_and_sigterm_is(out: Path) -> None:
+    with command(out, ctrl_c.ignored) as (process, port):
+        for _ in range(3):
+            os.kill(process.pid, signal.SIGINT)
+            with begin_download(port) as stream:
+                assert read_all(stream, for_s=0.1) == SLOW
+        os.kill(process.pid, signal.SIGTERM)
+        told, faults = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, told, faults) == (0, "", "")
 
 
 def test_a_transfer_that_takes_too_long_is_cut_off(

@@ -47,8 +47,8 @@ BUILT_ON: dict[type, list[str]] = {
     ],
     uvicorn.Server: [
         "__init__(self, config)", "startup(self, sockets)", "shutdown(self, sockets)",
-        "run(self, sockets)", "config", "force_exit", "lifespan", "server_state", "servers",
-        "should_exit", "started",
+        "run(self, sockets)", "capture_signals(self)", "config", "force_exit",
+        "lifespan", "server_state", "servers", "should_exit", "started",
     ],
     ServerState: ["__init__(self)", "connections", "default_headers", "tasks"],
     ServerProtocol: [

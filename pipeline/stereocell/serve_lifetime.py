@@ -8,9 +8,12 @@ take all that this process may open.
 
 import asyncio
 import errno
+import signal
 import socket
 import ssl
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -51,6 +54,15 @@ class Lifetime(uvicorn.Server):
             make = partial(_Door, self._shake)
         self.servers = [await loop.create_server(make, sock=one) for one in sockets or []]
         self.started = True
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Answer SIGTERM, and SIGINT unless it was ignored: so shells start what runs behind."""
+        is_ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        with super().capture_signals():
+            if is_ignored and threading.current_thread() is threading.main_thread():
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+            yield
 
     def _make_http(self) -> GuardedHttp:
         return GuardedHttp(self.config, self.server_state, self.lifespan.state)

@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import ctrl_c
 from malformed.cases import Case
 
 CPU_S, WALL_S = 10.0, 40.0  # the second for what waits; other processes may have the cores
@@ -172,7 +173,8 @@ def _in_child(case: Case, base: Path, folder: Path) -> None:
     before, start = _look(place), time.monotonic()
     fault = ""
     try:
-        code = run_command(arguments)
+        with ctrl_c.heeded():
+            code = run_command(arguments)
     except BaseException as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         ours = [
