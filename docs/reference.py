@@ -22,7 +22,11 @@ FORMATS: dict[str, tuple[str, str, str]] = {
         "plan",
         "`OUT/plan.json`. See [Your own data](../own-data.md).",
     ),
-    "units": ("Units", "units", "What the phases keep for each other in `OUT` and `OUT/units/`."),
+    "units": (
+        "Units",
+        "units",
+        "What the phases keep for each other in `OUT` and `OUT/units/`; `OUT/stage/files.json`.",
+    ),
     "bundle": ("Bundle", "bundle", "`OUT/bundle/manifest.json` and `files.json`."),
     "volumes": ("Bundle: volumes", "volumes", "`OUT/bundle/channels/<channel>/volumes.json`."),
     "transfer2d": (

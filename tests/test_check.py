@@ -17,6 +17,7 @@ from stereocell.store import Store
 from stereocell.write.bundle import write_bundle
 from stereocell.write.stl import write_stl
 from stereocell.write.usd import TileExtent, write_stage, write_tile
+from stereocell.write.usd_files import write_list
 
 GLB = "channels/CD31/r0_c0/lod0.glb"
 VOLUME = "volumes/r0_c0/CD31.ktx2"
@@ -29,6 +30,7 @@ def made(tmp_path_factory):
     write_tile(out / "stage", tile)
     looks = (spheres.RED, spheres.BLUE)
     write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
+    write_list(out / "stage", {}, out / "stage")
     write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0))
     return out
 
@@ -84,7 +86,7 @@ def test_a_folder_without_a_build_is_one_error(tmp_path, name):
 def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
     whole, alone = lines(out), lines(out / "bundle")
     assert alone == {name: whole[name] for name in alone}
-    assert set(whole) - set(alone) == {"plan", "stage", "stage files", "usdz"}
+    assert set(whole) - set(alone) == {"plan", "stage hashes", "stage", "stage files", "usdz"}
     change_byte(out / "bundle" / VOLUME)
     assert "hashes" in failed(out / "bundle")
 
@@ -183,6 +185,7 @@ def test_a_build_without_any_surface_passes(tmp_path):
     tile = spheres.tile(0, (spheres.BLUE,))
     write_tile(tmp_path / "stage", tile)
     write_stage(tmp_path / "stage", "empty", [spheres.BLUE], [TileExtent.of(tile)], {})
+    write_list(tmp_path / "stage", {}, tmp_path / "stage")
     write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, Engine(0))
     assert failed(tmp_path) == set()
     assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"

@@ -107,7 +107,7 @@ def test_a_unit_s_record_tells_of_its_copy(tmp_path: Path, distance: NDArray[np.
     count = len(copy.mesh.triangles)
     record = load_record(tmp_path / "with")
     assert record["closed"] == {"triangles": count, "faults": 0, "fallbacks": 0}
-    assert record["files"]["closed.stl"] == 84 + 50 * count
+    assert record["files"]["closed.stl"]["bytes"] == 84 + 50 * count
     save_unit(tmp_path / "without", Unit((), None, volume, "", 0, 0, {}))
     assert load_record(tmp_path / "without")["closed"] is None
     assert find_closed(tmp_path / "without") is None

@@ -23,6 +23,7 @@ from stereocell.engine import Engine
 from stereocell.errors import SourceError
 from stereocell.write.exr import read_atlas, write_atlas
 from stereocell.write.ktx2 import encode_2d, encode_3d
+from stereocell.write.usd_files import write_list
 
 TILE = "stage/tiles/r0_c0/tile.usdc"
 
@@ -220,6 +221,9 @@ def leave_a_texture_stale(out: Path) -> None:
     with Image.open(file) as image:
         mirrored = image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)
     mirrored.save(file)
+    # as if the build had written it so: bundles are made of nothing that is damaged
+    (out / "stage" / "files.json").unlink()
+    write_list(out / "stage", {}, out / "stage")
 
 
 def spoil_a_voxel(out: Path) -> None:

@@ -15,15 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from stereocell import unit_files
 from stereocell.as_planned import require_added
 from stereocell.assets import find_asset
 from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
+from stereocell.file_list import measure
+from stereocell.mirror import sizes_below
 from stereocell.store import Store
 from stereocell.tilesets import Content, walk
 from stereocell.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.transfer2d import find_fault, shapes_from
 from stereocell.validate_usd import validate_stage, validate_usdz
+from stereocell.write import usd_files
 from stereocell.write.bundle import FILES, MANIFEST
 from stereocell.write.exr import check_exr
 from stereocell.write.stl import check_stl
@@ -73,9 +77,12 @@ def check(out: Path) -> Iterator[CheckLine]:
 
 
 def _checks_of_build(out: Path) -> list[_Check]:
+    store = Store(out)
     return [
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
         *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
+        *([("units", lambda: _check_units(store))] if store.index_file.exists() else []),
+        ("stage hashes", lambda: _check_stage_hashes(store)),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
@@ -105,6 +112,38 @@ def _check_tissue(out: Path) -> str:
     files = read_whole(out / FOLDER)["files"]
     require_added(Store(out).plan())
     return f"{RECORD} and {len(files)} files that it lists"
+
+
+def _check_units(store: Store) -> str:
+    """Check every file of the units against the hash in its unit.json."""
+    problems, files = [], 0
+    for name, key in store.index().items():
+        tile_id, channel_id = name.split("/")
+        folder = store.unit_dir(tile_id, channel_id, key)
+        files += len(sizes_below(folder))
+        problems += [
+            f"{(folder / file).relative_to(store.out).as_posix()}: {fault}"
+            for file, fault in unit_files.find_damage(folder).items()
+        ]
+    _raise_on_all(problems, "remove what is damaged and run `stereocell units OUT`")
+    return f"{files} files of {len(store.index())} units"
+
+
+def _check_stage_hashes(store: Store) -> str:
+    """Check every file that the build wrote against the stage's list; others are an artist's."""
+    listed = read_json(store.stage_list, "units.schema.json#FileList", usd_files.REMEDY)
+    wrote = store.phases().get("stage", {"key": ""})
+    is_other = wrote["key"] and wrote["results"] != usd_files.digest_of(listed)
+    if is_other or usd_files.STAGE_NAME not in listed:
+        path = store.stage_list
+        raise CheckError(f"{path}: damaged, not the list that was written: {usd_files.REMEDY}")
+    problems = usd_files.find_damage(store.stage_dir, listed)
+    told = [f"stage/{path}: {fault}" for path, fault in problems.items()]
+    remedy = f"remove what is damaged and {usd_files.REMEDY}"
+    if {usd_files.CHANGED, usd_files.DOUBTFUL} & set(problems.values()):
+        remedy += f"; {usd_files.ADVICE}"
+    _raise_on_all(told, remedy)
+    return f"{len(listed)} files"
 
 
 def _check_stage(out: Path) -> str:
@@ -276,7 +315,7 @@ def _spoilt_content(content: Content) -> list[str]:
         if not content.is_tileset:  # of those, the walk tells
             problems.append(f"{content.tileset}: no file at {uri}")
         return problems
-    found = content_hash(_measure(content.path)["sha256"])
+    found = content_hash(measure(content.path)["sha256"])
     if found != expected:
         problems.append(f"{name}: expected {CONTENT_HASH} {expected}, found {found}")
     return problems
@@ -291,7 +330,7 @@ def _check_hashes(bundle: Path) -> str:
     for path, entry in listed.items():
         if path not in found:
             problems.append(f"{path}: missing")
-        elif _measure(found[path]) != entry:
+        elif measure(found[path]) != entry:
             problems.append(f"{path}: not the bytes that {FILES} says")
     problems += [
         f"{path}: not in {FILES}" for path in found.keys() - listed.keys() - {MANIFEST, FILES}
@@ -305,17 +344,11 @@ def _check_hashes(bundle: Path) -> str:
         entry = {"bytes": reference["bytes"], "sha256": reference["sha256"]}
         expected = listed.get(reference["path"])
         if reference["path"] == FILES:
-            expected = _measure(bundle / FILES)
+            expected = measure(bundle / FILES)
         if entry != expected:
             problems.append(f"{reference['path']}: a reference to it has another hash")
     raise_on(sorted(problems))
     return f"{len(listed)} files, {len(references)} references"
-
-
-def _measure(path: Path) -> dict[str, Any]:
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256")
-    return {"bytes": path.stat().st_size, "sha256": digest.hexdigest()}
 
 
 def _references(content: Any) -> Iterator[dict[str, Any]]:
@@ -369,6 +402,12 @@ def _run_node(script_name: str, paths: list[Path]) -> str:
     results = json.loads(answer.stdout)
     raise_on([f"{result['path']}: {p}" for result in results for p in result["problems"]])
     return f"{len(results)} files"
+
+
+def _raise_on_all(problems: list[str], remedy: str) -> None:
+    """Raise CheckError with all of the problems, if there are any."""
+    if problems:
+        raise CheckError(f"{'; '.join(problems)}: {remedy}")
 
 
 def raise_on(problems: list[str]) -> None:

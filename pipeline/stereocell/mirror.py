@@ -372,6 +372,11 @@ def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:
     return None if mirror is None else mirror.marks(folder)
 
 
+def is_mirrored(path: Path) -> bool:
+    """Return whether a path is of an OUT on object storage: here are copies, of later times."""
+    return _of(path) is not None
+
+
 def is_file(path: Path) -> bool:
     """Return whether a file is there, here or kept."""
     return path.is_file() or (_of(path) is not None and path in sizes_below(path))

@@ -3,10 +3,12 @@
 Every phase skips what is done already: results are named by what they depend on.
 """
 
+import hashlib
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +19,21 @@ from stereocell.config import Settings, to_dict, to_toml
 from stereocell.documents import write_json
 from stereocell.engine import Engine, console
 from stereocell.errors import OutputError
+from stereocell.file_list import find_faults, read_list
 from stereocell.lineage import key_of, libraries_of
-from stereocell.mirror import is_file, objects_below, remove
+from stereocell.mirror import is_file, objects_below, remove, sizes_below
 from stereocell.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.read.location import Location, require_apart
 from stereocell.rounds import run_rounds
 from stereocell.sources import SourceRef, open_source
-from stereocell.staging import digest_of, run_tile, tile_task
+from stereocell.staging import run_tile, tile_task
 from stereocell.store import Store
 from stereocell.survey import look_from
-from stereocell.write import bundle, usd, usdz
+from stereocell.write import bundle, usd, usd_files, usdz
 from stereocell.write.atomic import write_bytes
 from stereocell.write.composed import dependencies
 from stereocell.write.generator import GENERATOR
+from stereocell.write.usd_files import AsWritten
 
 
 def make(source: str, out: Path, settings: Settings) -> Plan:
@@ -119,7 +123,7 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
 
 def run_stage(out: Path, engine: Engine) -> None:
     """Write OUT/stage from the units: stage.usda, looks/, tiles/ and, where there is a surface,
-    specimen.usdz; other files are left alone.
+    specimen.usdz; last the list of all these, files.json. Other files are left alone.
     """
     store = Store(out)
     plan = store.plan()
@@ -131,11 +135,10 @@ def run_stage(out: Path, engine: Engine) -> None:
         about = provenance(plan)
         names = [plan.name, plan.modality]
         depends = [index, [asdict(look) for look in looks], about, names, list(plan.placement)]
-        folders = [store.stage_dir / "tiles" / tile.id for tile in plan.tiles]
         key = key_of(key_of(depends, staging), usdz)
-        small = store.stage_dir / usdz.USDZ_NAME
-        if phase.is_done(key, store.stage_file, small, store.stage_dir / "looks", *folders):
+        if phase.is_done(key, partial(_digest_of_stage, store)):
             return
+        remove(store.stage_list)  # of what was
         engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
         extents = [
             usd.TileExtent(t.content.id, t.content.first_um, t.content.last_um, plan.spacing_um)
@@ -151,7 +154,11 @@ def run_stage(out: Path, engine: Engine) -> None:
             placement=plan.placement,
         )
         store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
-        usdz.write_usdz(store.stage_file, small)
+        files = {path: entry for _, tile in tiles for path, entry in tile.listed().items()}
+        small = store.stage_dir / usdz.USDZ_NAME
+        usdz.write_usdz(store.stage_file, small, AsWritten({store.stage_dir.resolve(): files}))
+        looks_dir = store.stage_dir / "looks"
+        usd_files.write_list(store.stage_dir, files, looks_dir, store.stage_file, small)
 
 
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
@@ -171,14 +178,19 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         if kept is not None and store.is_begun("bundle"):
             bundle.remove_half(store.bundle_dir)
         bundle.require_bundle(store.bundle_dir)  # before it is written down that it was begun
-        if not phase.is_done(key, store.bundle_dir):
+        if not phase.is_done(key, partial(_digest_of_bundle, store)):
             store.remove_other_folders(store.parts_dir, {key})
-            bundle.write_bundle(path, store.bundle_dir, viewer, engine, store.parts_dir / key)
+            parts = store.parts_dir / key
+            bundle.write_bundle(path, store.bundle_dir, viewer, engine, parts, _tell)
     remove(store.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
+
+
+def _tell(line: str) -> None:
+    console.print(f"bundle: {line}", markup=False, soft_wrap=True)
 
 
 def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
@@ -198,9 +210,40 @@ def run_report(out: Path) -> None:
         others = {name: entry for name, entry in store.phases().items() if name != "report"}
         content = [store.index(), store.survey(), provenance(plan), others]
         key = key_of([content, report.TEMPLATE.read_text()], report)
-        if phase.is_done(key, store.report_file):
+        if phase.is_done(key, partial(_digest_of, [store.report_file])):
             return
         report.write_report(out)
+
+
+def _digest_of(results: Iterable[Path]) -> str:
+    """Return a digest of all files' names and sizes: what a damage alters."""
+    digest = hashlib.sha256()
+    for result in results:
+        for file, size in (sizes_below(result) or {result: -1}).items():
+            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
+    return digest.hexdigest()[:20]
+
+
+def _digest_of_bundle(store: Store) -> str:
+    """Return a digest of the bundle, whose files stand whole; empty: one does not."""
+    path = store.bundle_dir / bundle.FILES
+    try:
+        listed = read_list(path, "")
+    except OutputError:
+        return ""
+    faults = find_faults(store.bundle_dir, listed, since=path)
+    return "" if faults else _digest_of([store.bundle_dir])
+
+
+def _digest_of_stage(store: Store) -> str:
+    """Return a digest of the stage's list, whose files stand whole; empty: one does not."""
+    try:
+        listed = usd_files.read_stage_list(store.stage_dir)
+    except OutputError:
+        return ""
+    if not usd_files.is_kept(store.stage_dir, listed, since=store.stage_list):
+        return ""
+    return usd_files.digest_of(listed)
 
 
 class _Phase:
@@ -209,14 +252,17 @@ class _Phase:
     def __init__(self, store: Store, name: str) -> None:
         self.store, self.name = store, name
         self.key, self.about = "done", ""
-        self.results: tuple[Path, ...] = ()
+        self.results: Callable[[], str] = str
         self.is_up_to_date = False
 
-    def is_done(self, key: str, *results: Path) -> bool:
-        """Return whether `results` (files, folders) stand whole and come from the same things."""
+    def is_done(self, key: str, results: Callable[[], str]) -> bool:
+        """Return whether what the phase leaves stands whole and comes from the same things.
+
+        results  returns a digest of it
+        """
         self.key, self.results = key, results
         entry = self.store.phases().get(self.name, {})
-        self.is_up_to_date = entry.get("key") == key and entry["results"] == digest_of(results)
+        self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
         if not self.is_up_to_date:
             self.store.save_phase(self.name, "", "", 0.0, "")  # killed half-way, it is not done
         return self.is_up_to_date
@@ -232,5 +278,5 @@ def _phase(store: Store, name: str) -> Iterator[_Phase]:
     if phase.is_up_to_date:
         console.print(f"{name}: up to date")
     else:
-        store.save_phase(name, phase.key, digest_of(phase.results), seconds, phase.about)
+        store.save_phase(name, phase.key, phase.results(), seconds, phase.about)
         console.print(f"{name}: {seconds:.1f} s")

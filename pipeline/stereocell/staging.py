@@ -3,21 +3,22 @@
 The keys of the stage and of its tiles hold this module's whole lineage: see lineage.py.
 """
 
-import hashlib
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from stereocell.documents import find_json, write_json
+from stereocell.documents import find_json, read_json, write_json
+from stereocell.file_list import FileList
 from stereocell.lineage import key_of
-from stereocell.mirror import at_hand, remove, sizes_below
+from stereocell.mirror import at_hand, remove
 from stereocell.plan import Plan
 from stereocell.specimen import ChannelContent, PaintColors, TileContent
 from stereocell.store import Store
 from stereocell.tiling import Tile
 from stereocell.unit_files import find_closed, is_whole, load_lods, load_volume
-from stereocell.write import usd
+from stereocell.write import usd, usd_files
 
 _RECORD = "units.schema.json#StageTile"
 
@@ -28,7 +29,7 @@ class TileTask:
 
     content  the tile without its channels
     units    id, unit folder and paint of each channel
-    record   where is kept from what the tile was made, and what it is: units/<tile>/stage.json
+    record   where is kept from what the tile was made, and its files: units/<tile>/stage.json
     key      from what it is to be made
     """
 
@@ -44,11 +45,16 @@ class TileTask:
 
     def is_done(self) -> bool:
         """Return whether the tile stands whole and comes from the same things, whole as well."""
+        found: dict[str, Any] | None = find_json(self.record, _RECORD)
+        if found is None or found["key"] != self.key:
+            return False
         are_whole = all(is_whole(folder) for _, folder, _ in self.units)
-        return are_whole and bool(find_json(self.record, _RECORD) == self.describe())
+        return are_whole and usd_files.is_kept(self.folder, found["files"], since=self.record)
 
-    def describe(self) -> dict[str, str]:
-        return {"key": self.key, "results": digest_of([self.folder])}
+    def listed(self) -> FileList:
+        """Return the files of the tile, which is done, by their paths from the stage's folder."""
+        found = read_json(self.record, _RECORD, usd_files.REMEDY)
+        return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
 
 
 def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) -> TileTask:
@@ -87,19 +93,5 @@ def run_tile(task: TileTask) -> None:
             )
             for channel_id, folder, paint in task.units
         )
-        usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
-    write_json(task.record, task.describe())
-
-
-def digest_of(results: Iterable[Path]) -> str:
-    """Return a digest of all files' names and sizes: what a damage alters.
-
-    Of a USD layer only whether it can be opened: a size that an artist's edit changed is no damage.
-    """
-    digest = hashlib.sha256()
-    for result in results:
-        for file, size in (sizes_below(result) or {result: -1}).items():
-            if size >= 0 and file.suffix in usd.LAYER_SUFFIXES:
-                size = int(usd.is_layer(file) if file.is_file() else True)  # kept: put as a whole
-            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
-    return digest.hexdigest()[:20]
+        files = usd.write_tile(task.stage_dir, replace(task.content, channels=channels))
+    write_json(task.record, {"key": task.key, "files": files})

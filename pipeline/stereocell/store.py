@@ -37,6 +37,7 @@ class Store:
         self.phases_file = out / "phases.json"
         self.stage_dir = out / "stage"
         self.stage_file = self.stage_dir / "stage.usda"
+        self.stage_list = self.stage_dir / "files.json"
         self.bundle_dir = out / "bundle"
         self.parts_dir = out / "bundle_parts"  # its finished tiles, until it is whole
         self.report_file = out / "report" / "index.html"

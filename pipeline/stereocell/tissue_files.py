@@ -4,12 +4,12 @@ The record lists the SHA-256 of every file, as a build's voxels are sampled only
 that was lost for zeros, and zstd decodes some damage to other voxels without a word.
 """
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
 from stereocell.documents import read_json
 from stereocell.errors import OutputError
+from stereocell.file_list import measure
 from stereocell.mirror import bring
 
 FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
@@ -20,7 +20,7 @@ _AGAIN = "run `stereocell tissue OUT` again"
 def digests_of(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file of the probabilities in `folder`, by its path there."""
     return {
-        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        file.relative_to(folder).as_posix(): measure(file)["sha256"]
         for file in sorted((folder / VOXELS).rglob("*"))
         if file.is_file()
     }

@@ -1,9 +1,13 @@
 """A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail.
 
 Same input, same bytes; but for seconds.json, which lies beside them and which nothing is built of.
+unit.json lists the others with their hashes, and holds one of itself: each file is held against its
+own before it is read.
 """
 
+import hashlib
 import io
+import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -16,14 +20,16 @@ from numpy.typing import NDArray
 from stereocell.closed import Closed
 from stereocell.documents import find_json, read_json, write_json
 from stereocell.errors import OutputError
+from stereocell.file_list import DAMAGED, MISSING, find_faults, is_same, measure
 from stereocell.mesh import Baked, Lod, Mesh, Quality, Spread
-from stereocell.mirror import bring, is_file, sizes_below
+from stereocell.mirror import bring, is_file
 from stereocell.unit import Unit
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.stl import write_stl
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
+_OWN = "sha256"
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
@@ -54,25 +60,64 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "volume": list(unit.volume.shape),
             "fragments_dropped": unit.fragments_dropped,
             "cavities_filled": unit.cavities_filled,
-            "files": {file.name: file.stat().st_size for file in sorted(folder.iterdir())},
+            "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
         }
-        write_json(folder / _RECORD, record)
+        write_json(folder / _RECORD, record | {_OWN: _digest_of(record)})
         # after the files were listed: a unit is whole without
         write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
 
 
 def is_whole(directory: Path) -> bool:
-    """Return whether a unit's folder holds all that its record names, in full length."""
+    """Return whether a unit's folder holds all that its record names, as it was written.
+
+    What has not changed since by its size and time is not read: see file_list.py.
+    """
     record = find_json(directory / _RECORD, SCHEMA)
-    if record is None:
+    if record is None or not _is_own(record):
         return False
-    sizes = {file.name: size for file, size in sizes_below(directory).items()}
-    return bool(record["files"].items() <= sizes.items())
+    return not find_faults(directory, record["files"], since=directory / _RECORD)
+
+
+def find_damage(directory: Path) -> dict[str, str]:
+    """Return what is wrong with each file of a unit, by name; all are hashed."""
+    if not is_file(directory / _RECORD):
+        return {_RECORD: MISSING}
+    record = find_json(directory / _RECORD, SCHEMA)
+    if record is None or not _is_own(record):
+        return {_RECORD: DAMAGED}
+    return find_faults(directory, record["files"])
 
 
 def load_record(directory: Path) -> dict[str, Any]:
     """Return what unit.json holds: triangles, distances, reason. Raises OutputError."""
-    return dict(read_json(directory / _RECORD, SCHEMA, _remedy(directory)))
+    record = dict(read_json(directory / _RECORD, SCHEMA, _remedy(directory)))
+    if not _is_own(record):
+        raise OutputError(f"{directory / _RECORD}: damaged: {_remedy(directory)}")
+    return record
+
+
+def _digest_of(record: Mapping[str, Any]) -> str:
+    """Return what a record says of itself: a hash of all else that is in it."""
+    others = {name: value for name, value in record.items() if name != _OWN}
+    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
+
+
+def _is_own(record: Mapping[str, Any]) -> bool:
+    return bool(record[_OWN] == _digest_of(record))
+
+
+def _as_written(directory: Path, file: Path) -> Path:
+    """Return a file of a unit, which is what the record says. Raises OutputError."""
+    bring(file)
+    entry = load_record(directory)["files"].get(file.name)
+    fault = "not in unit.json" if entry is None else ""
+    if entry is not None and not file.is_file():
+        fault = MISSING
+    elif entry is not None and not is_same(file, entry):
+        fault = "damaged, not the bytes that unit.json says"
+    if fault:
+        raise OutputError(f"{file}: {fault}: {_remedy(directory)}")
+    return file
 
 
 def find_seconds(directory: Path) -> dict[str, float]:
@@ -86,9 +131,9 @@ def lod_file(directory: Path, level: int) -> Path:
 
 
 def find_closed(directory: Path) -> Path | None:
-    """Return the file of the unit's closed copy; None if it has none."""
-    file = directory / _CLOSED
-    return file if is_file(file) else None
+    """Return the file of the unit's closed copy; None if it has none. Raises OutputError."""
+    has_one = load_record(directory)["closed"] is not None
+    return _as_written(directory, directory / _CLOSED) if has_one else None
 
 
 def load_lods(directory: Path) -> tuple[Lod, ...]:
@@ -108,18 +153,20 @@ def load_quality(stored: Mapping[str, Any]) -> Quality:
 
 def load_volume(directory: Path) -> NDArray[np.uint8]:
     """Return the 8-bit voxels (z, y, x), mapped from the file. Raises OutputError."""
-    bring(directory / _VOLUME)
+    file = _as_written(directory, directory / _VOLUME)
     try:
-        volume: NDArray[np.uint8] = np.load(directory / _VOLUME, mmap_mode="r")
+        volume: NDArray[np.uint8] = np.load(file, mmap_mode="r")
     except (OSError, ValueError, EOFError) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
     return volume
 
 
 def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
-    bring(lod_file(directory, level))
     # opened here: numpy leaves a damaged file open
-    with lod_file(directory, level).open("rb") as file, np.load(file) as arrays:
+    with (
+        _as_written(directory, lod_file(directory, level)).open("rb") as file,
+        np.load(file) as arrays,
+    ):
         mesh = Mesh(
             arrays["positions"],
             arrays["triangles"],

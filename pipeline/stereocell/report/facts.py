@@ -161,7 +161,8 @@ def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str,
     lods = []
     for level, lod in enumerate(record["lods"]):
         glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
-        size = sizes_below(glb).get(glb) or record["files"][lod_file(directory, level).name]
+        stored = record["files"][lod_file(directory, level).name]["bytes"]
+        size = sizes_below(glb).get(glb) or stored
         lods.append(_lod(lod, size))
     ktx2 = [bundle / "volumes" / tile.id / f"{channel.id}{end}.ktx2" for end in ("", "_bricks")]
     z, y, x = record["volume"]

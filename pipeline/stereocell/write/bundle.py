@@ -11,9 +11,8 @@ The stage is the only source. Tiles are exported each by itself, as parts that s
 is whole; it is put together beside its place and put there as a whole.
 """
 
-import json
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -24,6 +23,7 @@ import numpy as np
 from stereocell.documents import compact_json
 from stereocell.engine import Engine
 from stereocell.errors import OutputError, StageError
+from stereocell.file_list import encode, to_json
 from stereocell.mirror import is_file, move, remove, sizes_below
 from stereocell.specimen import evaluate
 from stereocell.write.atomic import replacing_folder
@@ -48,9 +48,11 @@ from stereocell.write.generator import GENERATOR
 from stereocell.write.gltf import choose_step
 from stereocell.write.ktx2 import encode_2d
 from stereocell.write.tiles3d import make_tilesets
+from stereocell.write.usd_files import CHANGED, REMEDY, AsWritten
 
 MANIFEST = "manifest.json"
 FILES = "files.json"
+_Told = Callable[[str], None]
 
 
 def write_bundle(
@@ -59,6 +61,7 @@ def write_bundle(
     viewer_dist: Path | None,
     engine: Engine,
     parts: Path | None = None,
+    tell: _Told = lambda _: None,
 ) -> None:
     """Write the bundle of a stage, or of a layer over it, in place of an older one.
 
@@ -66,15 +69,17 @@ def write_bundle(
     engine       whose workers share the tiles; the bytes don't depend on their number
     parts        a folder for the tiles that are finished, of this very stage: those that are in it
                  are taken, and all are left there; None: none are kept if this does not end well
+    tell         is given a line on each layer that is not as it was written
 
-    Raises StageError where the stage lacks something, naming prim and file (TasksFailedError where
-    a tile does); OutputError where `bundle_dir` can't be written, or is something else.
+    Raises StageError where the stage lacks something or a file of it is damaged, naming prim and
+    file (TasksFailedError where a tile does); OutputError where `bundle_dir` can't be written, or
+    is something else.
     """
     require_bundle(bundle_dir)
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
     with replacing_folder(bundle_dir) as folder:
-        _fill(stage_path, folder, viewer_dist, engine, parts or folder / ".parts")
+        _fill(stage_path, folder, viewer_dist, engine, parts or folder / ".parts", tell)
         shutil.rmtree(folder / ".parts", ignore_errors=True)
 
 
@@ -91,9 +96,19 @@ def remove_half(place: Path) -> None:
 
 
 def _fill(
-    stage_path: Path, root: Path, viewer_dist: Path | None, engine: Engine, parts: Path
+    stage_path: Path,
+    root: Path,
+    viewer_dist: Path | None,
+    engine: Engine,
+    parts: Path,
+    tell: _Told,
 ) -> None:
+    as_written = AsWritten()
+    as_written.require_layers(stage_path.parent)
     stage = open_stage(stage_path)
+    for layer in stage.GetUsedLayers():
+        if layer.realPath:
+            as_written.require(Path(layer.realPath))
     looks = read_looks(stage)
     prims = tile_prims(stage)
     if not prims:
@@ -111,7 +126,11 @@ def _fill(
     found = {name: find_part(parts / name) for name in names}
     missing = [name for name in names if found[name] is None]
     exported = engine.run("bundle", export, [(name, name) for name in missing])
-    found |= dict(zip(missing, exported, strict=True))
+    found |= dict(zip(missing, [tile for tile, _ in exported], strict=True))
+    for layer_path in sorted(as_written.changed.union(*(changed for _, changed in exported))):
+        tell(
+            f"{layer_path}: {CHANGED}: taken as it is; if nobody edited it, remove it and {REMEDY}"
+        )
     tiles = [tile for tile in found.values() if tile is not None]
     files = []
     for tile in tiles:
@@ -127,7 +146,7 @@ def _fill(
     if viewer_dist is not None:
         files += _copy_viewer(viewer_dist, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
-    index = write_file(root, FILES, _json(dict(sorted(listed.items()))))
+    index = write_file(root, FILES, encode(listed))
     specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
     write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels, index))
 
@@ -156,7 +175,7 @@ def describe_bundle(
         "channels": channels,
         "files": asdict(index),
     }
-    return _json(manifest)
+    return to_json(manifest)
 
 
 def _write_channel(
@@ -249,10 +268,6 @@ def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
             raise OutputError(f"{source}: the bundle has a {path} of its own")
         refs.append(write_file(root, path, source.read_bytes()))
     return refs
-
-
-def _json(content: object) -> bytes:
-    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def _holds(folder: Path) -> bool:

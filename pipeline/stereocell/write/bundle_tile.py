@@ -46,6 +46,7 @@ from stereocell.write.ktx2 import (
     encode_occlusion_map,
 )
 from stereocell.write.tiles3d import TileLod
+from stereocell.write.usd_files import AsWritten
 from stereocell.write.usd_layer import move_box
 
 _COARSE_STEPS = 16  # of the lattice, to one of the coarsest LODs': some 3/4 of a large tile's voxel
@@ -122,23 +123,29 @@ def find_part(part: Path) -> BundleTile | None:
 
 def export_tile(
     stage_path: Path, parts: Path, tile_id: str, looks: tuple[ComposedLook, ...], step_m: float
-) -> BundleTile:
+) -> tuple[BundleTile, set[Path]]:
     """Write one tile's part, `parts`/<tile>/; see gltf.py for the lattice step, in metres.
+
+    Returns the tile, and the layers of it that are not as the stage's list says.
 
     Opens the stage anew and loads this tile only, so that it runs in any process and the memory
     of the others does not grow. Raises StageError and OutputError.
     """
+    as_written = AsWritten()
     stage = open_stage(stage_path)
-    with replacing_folder(parts / tile_id) as root, loaded(stage, tile_id) as (tile, choice):
+    with (
+        replacing_folder(parts / tile_id) as root,
+        loaded(stage, tile_id, as_written) as (tile, choice),
+    ):
         volumes = [read_volume(tile, look.id) for look in looks]
         channels = [
-            _export_channel(root, tile, look, volume, choice.finest_lod, step_m)
+            _export_channel(root, tile, look, volume, choice.finest_lod, step_m, as_written)
             for look, volume in zip(looks, volumes, strict=True)
         ]
         low, high = find_bounds(tile, volumes)
         made = BundleTile(tile_id, choice.representation, low, high, tuple(channels))
         write_json(root / _RECORD, _records().dump_python(made, mode="json"))
-    return made
+    return made, as_written.changed
 
 
 def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tuple[Point, Point]:
@@ -162,6 +169,7 @@ def _export_channel(
     volume: ComposedVolume | None,
     finest_lod: int,
     step_m: float,
+    as_written: AsWritten,
 ) -> TileChannel:
     channel_id = look.id
     files: list[FileRef] = []
@@ -170,6 +178,8 @@ def _export_channel(
     finer = b""
     levels = list(read_lods(tile, channel_id, finest_lod))
     for lod in levels:
+        for image in lod.maps.files:
+            as_written.require(image)
         glb = _encode(tile, channel_id, lod, step_m)
         triangles += [len(lod.mesh.triangles)] * (lod.level + 1 - len(triangles))
         if glb.data == finer:
@@ -184,6 +194,7 @@ def _export_channel(
         lods.append(TileLod(uri, file.sha256, lod.distance_um, glb.min_m, glb.max_m))
     entry = joint = None
     if volume is not None:
+        as_written.require(volume.atlas)
         entry, written, joint = _export_volume(root, tile.GetName(), look, volume)
         files += written
     return TileChannel(channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint)

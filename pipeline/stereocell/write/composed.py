@@ -32,6 +32,7 @@ from stereocell.write.composed_values import (
     sizes_of,
 )
 from stereocell.write.gltf import Material
+from stereocell.write.usd_files import AsWritten
 from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, move_box
 
 _FARTHEST_UM = 1e12  # from the origin: what float32 and browsers still draw
@@ -139,14 +140,26 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 @contextmanager
-def loaded(stage: Usd.Stage, tile_id: str) -> Iterator[tuple[Usd.Prim, TileChoice]]:
+def loaded(
+    stage: Usd.Stage, tile_id: str, as_written: AsWritten | None = None
+) -> Iterator[tuple[Usd.Prim, TileChoice]]:
     """Yield a tile's prim with its payload loaded, and what is chosen for it.
 
-    Its meshes and volumes are both active, whichever was chosen. Raises StageError.
+    Its meshes and volumes are both active, whichever was chosen. Raises StageError; for a layer
+    that is damaged, too, where the stage is held against its list.
     """
     path = TILES.AppendChild(tile_id)
     with at_hand(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
+        if as_written is not None:
+            for folder in _stage_folders(stage):
+                as_written.require_layers(folder / "tiles" / tile_id)
         yield from _loaded(stage, path)
+
+
+def _stage_folders(stage: Usd.Stage) -> list[Path]:
+    """Return where the layers lie that a stage is made of, without its payloads."""
+    paths = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
+    return sorted({Path(path).parent for path in paths})
 
 
 def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileChoice]]:

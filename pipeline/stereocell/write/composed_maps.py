@@ -19,8 +19,12 @@ class ComposedMaps:
     color: Path | None = None
 
     @property
+    def files(self) -> list[Path]:
+        return [file for file in (self.normal, self.occlusion, self.color) if file is not None]
+
+    @property
     def any(self) -> bool:
-        return (self.normal or self.occlusion or self.color) is not None
+        return bool(self.files)
 
 
 def maps_of(surface: UsdShade.Shader) -> ComposedMaps:

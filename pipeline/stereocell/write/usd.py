@@ -28,6 +28,7 @@ from stereocell.placement import IDENTITY, Matrix
 from stereocell.specimen import Look, Provenance, TileContent
 from stereocell.write.atomic import replacing_folder
 from stereocell.write.usd_cameras import define_cameras
+from stereocell.write.usd_files import STAGE_NAME
 from stereocell.write.usd_layer import (
     LAYER_SUFFIXES,
     ROOT,
@@ -45,8 +46,6 @@ from stereocell.write.usd_looks import write_looks
 from stereocell.write.usd_tile import LAYER_NAME, write_tile
 
 __all__ = ["LAYER_SUFFIXES", "TileExtent", "is_layer", "write_stage", "write_tile"]
-
-STAGE_NAME = "stage.usda"
 
 _NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
 Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pxr import Gf, Plug, Sdf, Tf, Usd, UsdGeom, Vt
+from pxr import Gf, Plug, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
 from stereocell.assets import find_asset
 from stereocell.errors import OutputError
@@ -44,10 +44,13 @@ def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
 
 def is_layer(file: Path) -> bool:
     """Return whether USD can open a file as a layer, read anew from the disk."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # of a damaged one USD prints pages
     try:
         return Sdf.Layer.OpenAsAnonymous(str(file)) is not None
     except Tf.ErrorException:
         return False
+    finally:
+        del quiet
 
 
 def export(layer: Sdf.Layer, path: Path) -> None:

@@ -23,6 +23,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
 from pxr import Kind as Kinds
 
 from stereocell.errors import StageError
+from stereocell.file_list import FileList, measure
 from stereocell.mesh import Lod
 from stereocell.names import from_identifier
 from stereocell.specimen import APRON, ChannelContent, TileContent, to_srgb8
@@ -46,10 +47,11 @@ LAYER_NAME = "tile.usdc"
 _Types = Sdf.ValueTypeNames
 
 
-def write_tile(stage_dir: Path, tile: TileContent) -> None:
-    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one. Tiles are independent.
+def write_tile(stage_dir: Path, tile: TileContent) -> FileList:
+    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one; return its files.
 
-    Raises OutputError. A volume whose shape does not fit its tile is a bug: ValueError.
+    Tiles are independent. Raises OutputError. A volume whose shape does not fit its tile is a bug:
+    ValueError.
     """
     for channel in tile.channels:
         _check_shape(tile, channel)
@@ -57,6 +59,7 @@ def write_tile(stage_dir: Path, tile: TileContent) -> None:
         for channel in tile.channels:
             _write_files(folder, tile, channel)
         export(_compose(tile), folder / LAYER_NAME)
+        return {file.name: measure(file) for file in sorted(folder.iterdir())}
 
 
 def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:

@@ -36,6 +36,7 @@ from stereocell.write.composed import (
 )
 from stereocell.write.composed_values import select_variant
 from stereocell.write.gltf import Material
+from stereocell.write.usd_files import AsWritten
 from stereocell.write.usd_layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
 from stereocell.write.usd_maps import Kind, feed_image, feed_vertices
 
@@ -58,13 +59,16 @@ class _Part:
     lod: ComposedLod
 
 
-def write_usdz(stage_path: Path, path: Path) -> int | None:
+def write_usdz(stage_path: Path, path: Path, as_written: AsWritten | None = None) -> int | None:
     """Write the meshes of a stage, or of a layer over it, as `path`; return the level of detail.
+
+    as_written  what the stage's files are held against; None: nothing
 
     None if no mesh is drawn: then no file is left at `path`. Raises StageError, OutputError.
     """
+    as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
-    level = _choose_level(stage)
+    level = _choose_level(stage, as_written)
     if level is None:
         remove(path)
         return None
@@ -74,15 +78,15 @@ def write_usdz(stage_path: Path, path: Path) -> int | None:
     high = np.max([box[1] for box in boxes], axis=0)
     flat = _new_stage(specimen_name(stage), float((high - low).max()), level)
     _define_parts(flat, parts, low, high)
-    _pack(flat.GetRootLayer(), parts, path)
+    _pack(flat.GetRootLayer(), parts, path, as_written)
     return level
 
 
-def _choose_level(stage: Usd.Stage) -> int | None:
+def _choose_level(stage: Usd.Stage, as_written: AsWritten) -> int | None:
     """Return the finest level within MAX_TRIANGLES, else the coarsest; None: there is no mesh."""
     counts: list[list[int]] = []
     for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
-        with loaded(stage, name) as (tile, _):
+        with loaded(stage, name, as_written) as (tile, _):
             counts.append([])
             variants = tile.GetVariantSet("lod").GetVariantNames()
             for variant in sorted(variants, key=lambda v: int(v.removeprefix("lod"))) or [""]:
@@ -215,14 +219,20 @@ def _texture_name(part: _Part, kind: Kind) -> str:
     return f"textures/{part.channel}_{part.tile}_{kind}.png"
 
 
-def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path) -> None:
-    """Put the layer and its textures into an archive, the layer first. Raises OutputError."""
+def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path, as_written: AsWritten) -> None:
+    """Put the layer and its textures into an archive, the layer first.
+
+    Raises OutputError; StageError for a texture that is damaged.
+    """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
         files = [(_LAYER, Path(folder) / _LAYER)]
         for part in parts:
             bring(*_images(part).values())
-            files += [(_texture_name(part, kind), file) for kind, file in _images(part).items()]
+            files += [
+                (_texture_name(part, kind), as_written.require(file))
+                for kind, file in _images(part).items()
+            ]
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
             for name, file in files:
                 archive.writestr(_entry(name, archive.start_dir), file.read_bytes())
