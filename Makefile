@@ -176,7 +176,7 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
 	GOBIN=$(abspath $(BIN)) go install github.com/versity/versitygw/cmd/versitygw@latest
 
-torture: setup ## 50 builds killed at random moments; all malformed inputs
+torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs
 	$(BIN)/python tests/torture.py 50
 	$(BIN)/python tests/malformed
 

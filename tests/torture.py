@@ -1,16 +1,19 @@
-"""Builds that are killed at random moments, and what they leave once they have gone on.
+"""Builds that are killed in each of their phases, and what they leave once they have gone on.
 
     python tests/torture.py [KILLS [SEED]]
 
-A build of two tiles and two channels is killed and started again, over and over: the command
-alone, with all its workers, one of its workers, the scheduler or a worker of a cluster; one whose
-OUT is a folder, and one whose OUT is on object storage. When it has come to its end, every byte
-must be as in an undisturbed build, no unit or tile that was finished before a kill may have been
-written again, and nothing half written may be left.
+A build of two tiles and two channels is killed and started again, over and over, as often in each
+phase as in any other: a kill waits until its phase has begun, and then a random part of the time
+that the phase takes undisturbed. Killed are the command alone, with all its workers, one of its
+workers, the scheduler or a worker of a cluster; of a build whose OUT is a folder, and of one whose
+OUT is on object storage. When it has come to its end, every byte must be as in an undisturbed
+build, no unit or tile that was finished before a kill may have been written again, and nothing half
+written may be left.
 """
 
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -18,7 +21,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,10 +35,13 @@ from digests import digests_of
 from object_store import ObjectStore, serving
 from stereocell.lock import LOCK
 
+PHASES = ("plan", "survey", "units", "stage", "bundle", "report")
+SURVEY = "units/survey.json"
 KINDS = ("command", "session", "worker", "scheduler", "cluster worker")
 STEREOCELL = (sys.executable, "-m", "stereocell.cli")
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 PATIENCE_S = 300.0
+ATTEMPTS = 10
 
 
 class TortureError(AssertionError):
@@ -118,30 +124,37 @@ class Bucket:
 
 @dataclass
 class Torture:
-    """A build in one place, which is killed and goes on. `outcomes` counts kills and ends."""
+    """A build in one place, which is killed and goes on.
+
+    `outcomes` counts kills by their kind, and ends; `phases` kills by the phase that they fell in.
+    """
 
     folder: Path
     place: Place
     seed: int
     outcomes: Counter[str] = field(default_factory=Counter)
+    phases: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
         self._source = _write_source(self.folder)
         self._said = self.folder / "stderr"
         self._finished: dict[str, object] = {}  # files of what is finished: when they were written
+        self._was: object = None  # survey.json when the build started
         self._undisturbed, self._seconds = self._build_undisturbed()
 
-    def kill(self, kind: str) -> bool:
-        """Start or go on with the build and kill it at a random moment; return whether it came to
-        that before its end."""
-        moment = self._random.uniform(0, self._seconds)
+    def kill(self, kind: str, phase: str) -> bool:
+        """Start or go on with the build and kill it in a phase; return whether it came to that.
+
+        A build in which that phase is done comes to its end instead.
+        """
         is_cluster = kind in ("scheduler", "cluster worker")
         environment = {**os.environ, **self.place.environment}
         with _cluster(self.folder, environment) if is_cluster else nullcontext() as cluster:
             told = ["--scheduler", cluster.file] if cluster else ["--workers", "2"]
             build = self._start(told)
-            if not self._await_moment(build, moment):
+            if not self._await_moment(build, phase):
+                build.wait(PATIENCE_S)
                 self._require_ended(build)
                 return False
             if cluster:
@@ -152,6 +165,11 @@ class Torture:
                     self._require_ended(build)
                     return False
                 self._random.choice(workers).kill()
+            struck = self._phase_of(build)
+            if not struck:  # between two looks it came to its end
+                build.wait(PATIENCE_S)
+                self._require_ended(build)
+                return False
             family = psutil.Process(build.pid).children(recursive=True)
             if kind == "session":
                 kill_session(build)
@@ -162,11 +180,19 @@ class Torture:
             if alive:
                 raise TortureError(f"{kind}: 30 s after the command's end there are still {alive}")
         self.outcomes[kind] += 1
+        self.phases[struck] += 1
         if code == 0:  # another worker has done what the killed one was to do
             self._require_whole()
         else:
             self._remember_finished()
-        return True
+        return struck == phase
+
+    def kill_in(self, kind: str, phase: str) -> None:
+        """Kill the build in a phase, however often it has to be begun for that."""
+        for _ in range(ATTEMPTS):  # on a busy machine a phase may end before its moment
+            if self.kill(kind, phase):
+                return
+        raise TortureError(f"{kind}: none of {ATTEMPTS} builds could be killed in {phase}")
 
     def end(self) -> None:
         """Let the build come to its end."""
@@ -174,19 +200,26 @@ class Torture:
         build.wait(PATIENCE_S)
         self._require_ended(build)
 
-    def _build_undisturbed(self) -> tuple[dict[str, str], float]:
+    def _build_undisturbed(self) -> tuple[dict[str, str], dict[str, float]]:
+        """Return what it leaves, and the seconds of each phase."""
         build = self._start(["--workers", "2"])
-        self._await_moment(build, 0)
-        start = time.monotonic()
-        if build.wait(PATIENCE_S):
-            raise TortureError("the undisturbed build failed")
-        seconds = time.monotonic() - start
+        seconds = dict.fromkeys(PHASES, 0.0)
+        last = time.monotonic()
+        while build.poll() is None:
+            phase, now = self._phase_of(build), time.monotonic()
+            if phase:
+                seconds[phase] += now - last
+            last = now
+            time.sleep(0.01)
+        if build.returncode:
+            raise TortureError(f"the undisturbed build failed: {self._said.read_text()}")
         digests = of_assets(self.place.digests())
         self.place.clear()
         return digests, seconds
 
     def _start(self, told: list[str]) -> subprocess.Popen[bytes]:
         out = ["-o", self.place.address]
+        self._was = self.place.find().get(SURVEY)
         with self._said.open("wb") as said:
             return subprocess.Popen(
                 [*STEREOCELL, "build", str(self._source), *out, "--grid", "2x1", *told],
@@ -196,13 +229,26 @@ class Torture:
                 stderr=said,
             )
 
-    def _await_moment(self, build: subprocess.Popen[bytes], moment_s: float) -> bool:
-        """Wait until the build is at work for so long; return whether it hasn't ended before."""
-        while build.poll() is None and LOCK not in self.place.find():
-            time.sleep(0.01)
+    def _phase_of(self, build: subprocess.Popen[bytes]) -> str:
+        """Return the phase that the build is in, by what it has said and written; empty: none."""
+        said = self._said.read_text(errors="replace")
+        for done, phase in (("bundle", "report"), ("stage", "bundle"), ("units", "stage")):
+            if re.search(rf"^{done}: (\d+\.\d s|up to date)$", said, re.MULTILINE):
+                return phase if build.poll() is None else ""
+        now = self.place.find()
+        if build.poll() is not None or LOCK not in now:
+            return ""
+        if not re.search(r"^plan: (\d+\.\d s|up to date)$", said, re.MULTILINE):
+            return "plan"
+        return "survey" if now.get(SURVEY) == self._was else "units"
+
+    def _await_moment(self, build: subprocess.Popen[bytes], phase: str) -> bool:
+        """Wait for a random moment of a phase; return whether the build came to it."""
+        while build.poll() is None and self._phase_of(build) != phase:
+            time.sleep(0.005)
         with suppress(subprocess.TimeoutExpired):
-            build.wait(moment_s)
-        return build.poll() is None
+            build.wait(self._random.uniform(0, self._seconds[phase]))
+        return self._phase_of(build) == phase
 
     def _require_ended(self, build: subprocess.Popen[bytes]) -> None:
         if build.returncode:
@@ -243,6 +289,17 @@ class Torture:
             if last in ("unit.json", "stage.json", "tile.json"):
                 files = (file for file in now if file.startswith(f"{folder}/"))
                 self._finished = {file: now[file] for file in files} | self._finished
+
+
+def kills_of(count: int, places: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+    """Yield place, kind and phase of each kill: every phase in its order, place by place, so that
+    one build is killed in all; every kind in every phase."""
+    for number in range(count):
+        turn, phase = divmod(number, len(PHASES))
+        kind = KINDS[(turn // len(places) + phase) % len(KINDS)]
+        if kind == "worker" and PHASES[phase] == "plan":  # it has none
+            kind = "command"
+        yield places[turn % len(places)], kind, PHASES[phase]
 
 
 def kill_session(process: subprocess.Popen[bytes]) -> None:
@@ -332,15 +389,10 @@ def main(kills: int, seed: int) -> None:
             "folder": Torture(folder, Folder(folder / "out"), seed),
             store.kind: Torture(folder, Bucket(store, "bucket/out"), seed),
         }
-        turns = [(place, kind) for kind in KINDS for place in tortures]
-        done = 0
-        while done < kills:
-            place, kind = turns[done % len(turns)]
-            if tortures[place].kill(kind):
-                done += 1
-                print(
-                    f"{done:3} {place:<9} {kind:<14} {time.monotonic() - start:6.0f} s", flush=True
-                )
+        for done, (place, kind, phase) in enumerate(kills_of(kills, list(tortures)), 1):
+            tortures[place].kill_in(kind, phase)
+            seconds = time.monotonic() - start
+            print(f"{done:3} {place:<9} {kind:<14} {phase:<6} {seconds:6.0f} s", flush=True)
         for place, torture in tortures.items():
             torture.end()
             ends = torture.outcomes.pop("ended")
@@ -349,6 +401,11 @@ def main(kills: int, seed: int) -> None:
                 f"{place}: {torture.outcomes.total()} kills ({kinds}); {ends} builds came to their "
                 "end, each with the bytes of an undisturbed one"
             )
+        struck = sum((torture.phases for torture in tortures.values()), Counter[str]())
+        print("kills by phase: " + ", ".join(f"{phase} {struck[phase]}" for phase in PHASES))
+        missed = [phase for phase in PHASES[:kills] if not struck[phase]]
+        if missed:
+            raise TortureError(f"no kill fell into {', '.join(missed)}")
 
 
 if __name__ == "__main__":
