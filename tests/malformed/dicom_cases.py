@@ -227,6 +227,13 @@ def _rle(ds: Any, stream: bytes) -> None:
     ds["PixelData"].VR = "OB"
 
 
+def _linked(series: Path, there: Path) -> None:
+    """Move the last slice elsewhere and leave a link to it."""
+    path = max(series.iterdir())
+    there.mkdir(exist_ok=True)
+    os.symlink(path.rename(there / "slice"), path)
+
+
 def _folders() -> Iterator[Case]:
     def folder_of(name: str, fill: Callable[[Path], Any], expect: str = "refused") -> Case:
         def make(base: Path, folder: Path) -> list[str]:
@@ -244,6 +251,8 @@ def _folders() -> Iterator[Case]:
     yield folder_of("folder of itself", lambda s: os.symlink(".", s / "again"), "done")
     yield folder_of("link to itself", lambda s: os.symlink("x", s / "x"), "done")
     yield folder_of("pipe among them", lambda s: os.mkfifo(s / "pipe"), "done")
+    yield folder_of("slice is a link within", lambda s: _linked(s, s / "own"), "done")
+    yield folder_of("slice is a link out", lambda s: _linked(s, s.parent / "bait"))
     yield folder_of("endless among them", lambda s: os.symlink("/dev/zero", s / "zero"), "done")
     yield folder_of(
         "10 MB of noise among them",

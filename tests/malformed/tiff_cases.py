@@ -1,6 +1,7 @@
 # ruff: noqa: E501  (tables of cases)
 """OME-TIFF: cut and flipped files, tags that lie, directories in a ring, OME-XML of every ill."""
 
+import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
@@ -33,6 +34,7 @@ def cases() -> Iterator[Case]:
     yield from _tags()
     yield from _directories()
     yield from _texts()
+    yield from _others()
     yield from _names()
 
 
@@ -215,6 +217,7 @@ def _texts() -> Iterator[Case]:
         ("entity from a file", xml(channel='Name="&x;"', head=outside), "refused"),
         ("entity from a network", xml(channel='Name="&x;"', head=outside.replace("bait", "http://127.0.0.1:9")), "refused"),
         ("XML nested", f'<OME xmlns="{_NS}">' + "<a>" * 100_000 + "</a>" * 100_000 + "</OME>", "refused"),
+        ("entity bomb before a comment", xml(channel='Name="&a11;"', head=bombs) + "<!-- an end that is none of OME's -->", "refused"),
         ("XML of 10^6 channels", xml('SizeC="1000000"'), "refused"),
         ("XML of 10^9 planes", xml(depth=10**9), "refused"),
         ("XML of 10^9 times", xml('SizeT="1000000000"'), "refused"),
@@ -239,21 +242,55 @@ def _texts() -> Iterator[Case]:
         ("10000 images", xml().replace("</Image>", "</Image>" + '<Image ID="Image:1"/>' * 10000), "any"),
     ):  # fmt: skip
         yield _made(name, expect, text=text)
-    for name, target in {
-        "parent": "../bait/x.ome.tif", "absolute": "/etc/hostname", "backslash": "..\\bait\\x.ome.tif",
-        "address": "http://127.0.0.1:9/x.tif", "itself": "x.ome.tif", "endless": "/dev/zero",
-    }.items():  # fmt: skip
-        uuid = f'<TiffData IFD="0" PlaneCount="4"><UUID FileName="{target}">urn:uuid:00000000-0000-0000-0000-000000000001</UUID></TiffData>'
-        text = xml(inside=uuid).replace(
-            "<OME ", '<OME UUID="urn:uuid:00000000-0000-0000-0000-000000000002" '
-        )
 
-        def make(base: Path, folder: Path, text: str = text) -> list[str]:
-            write_tiff(folder / "x.ome.tif", text)
+
+def _others() -> Iterator[Case]:
+    """Planes that lie in another file: sound ones, so that whoever opens them is done."""
+    links = {
+        "link out": "../bait/x.ome.tif",
+        "link within": "own/x.ome.tif",
+        "link to a device": "/dev/zero",
+    }
+    for name, target, expect in (
+        ("own", "own/x.ome.tif", "done"), ("within by a detour", "own/../own/x.ome.tif", "done"),
+        ("parent", "../bait/x.ome.tif", "refused"), ("absolute", "{}/bait/x.ome.tif", "refused"),
+        ("link out", "x2.ome.tif", "refused"), ("link within", "x2.ome.tif", "done"),
+        ("link to a device", "x2.ome.tif", "refused"), ("folder that is a link out", "away/x.ome.tif", "refused"),
+        ("pipe", "x2.ome.tif", "refused"), ("endless", "/dev/zero", "refused"), ("folder", "own", "refused"),
+        ("backslash", "..\\bait\\x.ome.tif", "refused"), ("address", "http://127.0.0.1:9/x.tif", "refused"),
+        ("itself", "x.ome.tif", "any"), ("nowhere", "own/y.ome.tif", "refused"), ("empty", "", "refused"),
+    ):  # fmt: skip
+
+        def make(base: Path, folder: Path, name: str = name, target: str = target) -> list[str]:
+            home = folder / "home"
+            (home / "own").mkdir(parents=True)
+            target = target.format(folder)
+            uuid = f'<TiffData IFD="0" PlaneCount="4"><UUID FileName="{target}">urn:uuid:00000000-0000-0000-0000-000000000001</UUID></TiffData>'
+            text = xml(inside=uuid).replace(
+                "<OME ", '<OME UUID="urn:uuid:00000000-0000-0000-0000-000000000002" '
+            )
+            write_tiff(home / "x.ome.tif", text)
+            write_tiff(home / "own" / "x.ome.tif")
             write_tiff(folder / "bait" / "x.ome.tif")
+            os.symlink("../bait", home / "away")
+            if name in links:
+                os.symlink(links[name], home / "x2.ome.tif")
+            elif name == "pipe":
+                os.mkfifo(home / "x2.ome.tif")
+            there = (home / target).exists()
+            if there == (name in ("backslash", "address", "nowhere")):
+                raise RuntimeError(f"{name}: the bait is not where the case says")
+            return plan("home/x.ome.tif")
+
+        yield Case(f"planes in another file: {name}", KIND, make, expect)
+    for name in ("pipe", "endless"):
+
+        def made(base: Path, folder: Path, name: str = name) -> list[str]:
+            path = folder / "x.ome.tif"
+            os.mkfifo(path) if name == "pipe" else os.symlink("/dev/zero", path)
             return plan("x.ome.tif")
 
-        yield Case(f"planes in another file: {name}", KIND, make)
+        yield Case(f"is {name}", KIND, made, "refused")
 
 
 def _names() -> Iterator[Case]:

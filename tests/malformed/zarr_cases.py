@@ -281,6 +281,19 @@ def _links() -> Iterator[Case]:
     yield _case(
         "array's zarr.json is a link to the group's", link("0/zarr.json", "../zarr.json"), "refused"
     )
+
+    def out(file: str) -> Spoil:
+        """Move a file or folder out of the group and leave a link to it."""
+
+        def spoil(path: Path) -> None:
+            bait = (path / file).rename(path.parent / "bait" / "moved")
+            os.symlink(bait, path / file)
+
+        return spoil
+
+    for file in ("zarr.json", "0", "0/zarr.json", "0/c", "0/c/0/0/0/0"):
+        yield _case(f"{file} is a link out", out(file), "refused")
+    yield _case("level is a link within", link("0", "moved"), "done")
     yield _case("chunk is a link to itself", link("0/c/0/0/0/0", "0"), "refused")
     yield _case("chunk is a link without end", link("0/c/0/0/0/0", "/dev/zero"), "refused")
     yield _case("zarr.json is a link without end", link("zarr.json", "/dev/zero"), "refused")

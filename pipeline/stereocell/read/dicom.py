@@ -23,7 +23,7 @@ from stereocell.read.dicom_header import NoPlaneError, is_dicom, read_frames
 from stereocell.read.dicom_pixels import decode, dtype_of
 from stereocell.read.dicom_series import Stack, find_stacks
 from stereocell.read.image import Image
-from stereocell.read.location import Location
+from stereocell.read.location import Location, is_own
 from stereocell.read.resampling import resample_stack
 from stereocell.read.spacing import Grid
 from stereocell.read.whole import WholeArray
@@ -87,6 +87,7 @@ def list_series(location: Location) -> tuple[str, ...]:
 def _find(location: Location) -> Found:
     root = Path(location.source)
     files = _files(root) if root.is_dir() else [root]
+    _require_own(location, files)
     paths = [path for path in files if is_dicom(path)]
     left_out: Counter[str] = Counter()
     if len(paths) < len(files):
@@ -122,6 +123,21 @@ def _files(folder: Path) -> list[Path]:
     """Return all files below a folder, sorted, so that another disk gives the same order."""
     found = [Path(at) / name for at, _, names in os.walk(folder) for name in names]
     return sorted(found, key=lambda path: path.relative_to(folder).parts)
+
+
+def _require_own(location: Location, files: Sequence[Path]) -> None:
+    """Raise SourceError for a link that leads out of the folder, by its number: names are private.
+
+    Pipes, devices and links that lead nowhere are left out: they are not opened.
+    """
+    own = [location.folder]
+    for number, path in enumerate(files, start=1):
+        if path.is_file() and not is_own(path, own):
+            raise SourceError(
+                f"{location.shown}: file {number} of {len(files)} in the order of names: is a link "
+                "that leads out of the folder, expected files in it or below "
+                "(`cp -rL` copies what links lead to)"
+            )
 
 
 def _are_equal(paths: Sequence[Path], shown: str, a: Frame, b: Frame) -> bool:

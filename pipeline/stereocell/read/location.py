@@ -2,6 +2,8 @@
 
 import os
 import re
+import stat
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ from fsspec import AbstractFileSystem
 from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
-from stereocell.errors import UsageError
+from stereocell.errors import SourceError, StereoCellError, UsageError
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
 _TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
@@ -57,6 +59,12 @@ class Location:
         if parts.scheme == "file":
             return cls(os.path.abspath(unquote(parts.path)), True)
         return cls(text, False)
+
+    @property
+    def folder(self) -> Path:
+        """The source's own folder, links followed: what it names has to lie there or below."""
+        path = Path(os.path.realpath(self.source))
+        return path if path.is_dir() else path.parent
 
     @property
     def shown(self) -> str:
@@ -155,6 +163,50 @@ def does_answer(files: AbstractFileSystem, path: str) -> bool:
         except Exception:  # told by who reads, better
             pass
     return True
+
+
+def is_own(path: str | Path, folders: Sequence[Path]) -> bool:
+    """Return whether a path, its links followed, lies in one of some folders or below."""
+    real = Path(os.path.realpath(path))
+    return any(real.is_relative_to(folder) for folder in folders)
+
+
+def require_own(
+    path: str | Path,
+    folders: Sequence[Path],
+    named: str,
+    raised: type[StereoCellError] = SourceError,
+) -> os.stat_result | None:
+    """Return the state of a file that a source names, or None where there is none.
+
+    Sources come from strangers, and results are published: so whatever they name, by a path in
+    their metadata or by a link, has to be a regular file in one of `folders` (links followed) or
+    below. Else it is not opened, which would hang on a pipe, and `raised` says `named` and why.
+    """
+    real = os.path.realpath(path)
+    if not is_own(real, folders):
+        raise raised(
+            f"{named}: leads to {real}, expected a file in {folders[0]} or below (links followed)"
+        )
+    try:
+        status = os.stat(real)
+    except OSError:  # told by who reads
+        return None
+    if not stat.S_ISREG(status.st_mode):
+        raise raised(f"{named}: is no regular file, expected one")
+    return status
+
+
+def require_own_key(key: str, named: str) -> None:
+    """Raise SourceError where a key leaves the address that it is joined to.
+
+    Stores of http take `%2e%2e` for `..`, as often as it is escaped.
+    """
+    found, steps = "", key
+    while found != steps:
+        found, steps = steps, unquote(steps)
+    if ".." in re.split(r"[/\\?#]", steps):
+        raise SourceError(f"{named}: leads out of the address, expected a key below it")
 
 
 def require_apart(source: str | Path, out: Path) -> None:

@@ -8,11 +8,13 @@ strips or tiles.
 
 import logging
 import math
+import os
 import re
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any
+from xml.etree import ElementTree
 
 import fsspec
 import zarr
@@ -23,7 +25,7 @@ from stereocell.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.faults import collected_log, one_line
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
-from stereocell.read.location import Location
+from stereocell.read.location import Location, require_own
 from stereocell.read.spacing import Grid, Triple, um_per
 
 # What the OME-XML and the tags may claim: the libraries make lists of that length at once.
@@ -47,6 +49,7 @@ def read_image(location: Location) -> Image:
         ):
             tiff = _open(location, stack)
             _check_claims(where, tiff)
+            _check_files(location, tiff)
             with warnings.catch_warnings():  # of values that are none: they become errors below
                 warnings.simplefilter("ignore")
                 reader = Reader(location.source, fs_kwargs=location.storage_options)
@@ -69,7 +72,7 @@ def read_image(location: Location) -> Image:
 
 def _check_claims(where: str, tiff: TiffFile) -> None:
     """Raise SourceError where the OME-XML or the tags ask for more than any file holds."""
-    text = tiff.ome_metadata or ""
+    text = tiff.pages.first.description  # what bioio parses, even where tifffile sees no OME-XML
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise SourceError(f"{where}: OME-XML: found a DOCTYPE, expected none")
     sizes: dict[str, int] = {}
@@ -89,6 +92,22 @@ def _check_claims(where: str, tiff: TiffFile) -> None:
     tag = tiff.pages.first.tags.get(_SUB_IFDS)
     if tag is not None and tag.count > _MAX_LEVELS:
         raise SourceError(f"{where}: SubIFDs: found {tag.count}, expected at most {_MAX_LEVELS}")
+
+
+def _check_files(location: Location, tiff: TiffFile) -> None:
+    """Raise SourceError where planes are said to lie in a file that is not the source's own.
+
+    Before tifffile opens them all; of an address it opens none.
+    """
+    if not location.is_local or not tiff.ome_metadata:
+        return
+    root = ElementTree.fromstring(tiff.ome_metadata)
+    for element in root.iter():
+        name = element.get("FileName")
+        is_other = element.tag.endswith("UUID") and element.text != root.get("UUID", "")
+        if name is not None and is_other:
+            named = f"{location.shown}: OME-XML: UUID FileName {name!r:.200}"
+            require_own(os.path.join(tiff.filehandle.dirname, name), [location.folder], named)
 
 
 def _image(
@@ -116,12 +135,15 @@ def _image(
 
 
 def _open(location: Location, stack: ExitStack) -> TiffFile:
+    """Open a file, but not by the formats whose index of other files tifffile would follow."""
     if location.is_local:  # by path, so that the files of a set find each other
-        return stack.enter_context(TiffFile(location.source, is_mmstack=False))
+        return stack.enter_context(
+            TiffFile(os.path.realpath(location.source), is_mmstack=False, is_ndtiff=False)
+        )
     files, path = fsspec.url_to_fs(location.source, **location.storage_options)
     file = files.open(path, "rb", block_size=_REMOTE_BLOCK, cache_type="blockcache")
     stack.callback(file.close)
-    return stack.enter_context(TiffFile(file, is_mmstack=False))
+    return stack.enter_context(TiffFile(file, is_mmstack=False, is_ndtiff=False))
 
 
 def _array(series: TiffPageSeries, level: int) -> VoxelArray:

@@ -12,7 +12,6 @@ in use, and its import took 1.5 s of each process, four times as long as zarr's:
 import math
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import zarr
@@ -42,7 +41,7 @@ def read_image(location: Location) -> Image:
     where = location.shown
     with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
         store = _store(location)
-        metadata = zarr.open_group(GuardedStore(store, _root(location)), mode="r").metadata
+        metadata = zarr.open_group(GuardedStore(store, location), mode="r").metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
     if not isinstance(ome, Mapping):
@@ -179,23 +178,18 @@ def _store(location: Location) -> Store:
         )
 
 
-def _root(location: Location) -> Path | None:
-    return Path(location.source) if location.is_local else None
-
-
 def _open_array(
     location: Location, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
 ) -> VoxelArray:
     field = f"{location.shown}: level {path!r:.80}"
-    root = _root(location)
     with one_line(field, "a Zarr array"):
-        guard = GuardedStore(store, root)
+        guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
         codecs = tuple(codec_name(codec) for codec in array.compressors)
         size = math.prod(array.shards or array.chunks) * array.dtype.itemsize
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
         # not `path`, which may end in a slash
-        guard = GuardedStore(store, root, codecs, size, f"{array.path}/{named}".lstrip("/"))
+        guard = GuardedStore(store, location, codecs, size, f"{array.path}/{named}".lstrip("/"))
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
     if array.ndim != len(axes):
         raise SourceError(f"{field}: found {array.ndim} dimensions, expected {len(axes)} as `axes`")

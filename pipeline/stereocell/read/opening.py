@@ -12,7 +12,7 @@ from stereocell.errors import SourceError, UsageError
 from stereocell.read.dataset import ChannelInfo, Dataset
 from stereocell.read.faults import one_line
 from stereocell.read.image import Image
-from stereocell.read.location import ANSWER_S, Location, does_answer
+from stereocell.read.location import ANSWER_S, Location, does_answer, require_own
 from stereocell.read.spacing import Triple, levels_of
 
 DTYPES = ("uint8", "uint16", "int16", "float32")
@@ -66,6 +66,8 @@ def open(
         raise SourceError(
             f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
         )
+    if location.is_local and not Path(location.source).is_dir():
+        require_own(location.source, [location.folder], location.shown)
     if location.format is None:
         raise SourceError(
             f"{location.shown}: unknown format, "

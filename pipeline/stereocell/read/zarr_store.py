@@ -1,4 +1,4 @@
-"""What Zarr reads through: whole, regular files, and chunks that unpack to what their array says.
+"""What Zarr reads through: whole files of the group's own, chunks that unpack to what is said.
 
 A chunk's size is known from the array's metadata, but the decoders don't ask: gzip and zstd unpack
 until the stream ends, whatever the memory, and Blosc trusts the length in the chunk's header and
@@ -8,11 +8,9 @@ is read as a whole only the file's size is known here, not what its inner chunks
 
 import bz2
 import lzma
-import stat
 import struct
 import zlib
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 import zstandard
@@ -21,6 +19,8 @@ from zarr.abc.store import ByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import WrapperStore
 
+from stereocell.read.location import Location, require_own, require_own_key
+
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
 _METADATA_BYTES = 64 << 20
 _ROOM = 1 << 20  # bytes over a chunk's own: what poor compression, checksums and an index add
@@ -28,35 +28,35 @@ _BLOSC_HEADER = struct.Struct("<4B3I")  # the last three: bytes unpacked, of a b
 
 
 class GuardedStore(WrapperStore[Store]):
-    """Refuses what is no regular file, is cut short, or unpacks to more than a chunk holds.
+    """Refuses what is no file of the group's own, is cut short, or unpacks to more than a chunk.
 
-    root     the local folder, or None
-    codecs   the names of the bytes-to-bytes codecs, in the order of encoding
-    chunk    bytes of a chunk as it is in memory; None: metadata alone are read
-    array    the array's metadata file: where that is gone, a missing chunk is no empty one
+    location  of the group
+    codecs    the names of the bytes-to-bytes codecs, in the order of encoding
+    chunk     bytes of a chunk as it is in memory; None: metadata alone are read
+    array     the array's metadata file: where that is gone, a missing chunk is no empty one
     """
 
     def __init__(
         self,
         store: Store,
-        root: Path | None = None,
+        location: Location,
         codecs: tuple[str, ...] = (),
         chunk: int | None = None,
         array: str = "",
     ) -> None:
         super().__init__(store)
-        self._root, self._codecs, self._chunk, self._array = root, codecs, chunk, array
+        self._location, self._folder = location, location.folder
+        self._codecs, self._chunk, self._array = codecs, chunk, array
 
     def _with_store(self, store: Store) -> "GuardedStore":
-        return type(self)(store, self._root, self._codecs, self._chunk, self._array)
+        return type(self)(store, self._location, self._codecs, self._chunk, self._array)
 
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
         is_metadata = key.rsplit("/", 1)[-1] in _METADATA
         most = _METADATA_BYTES if is_metadata or self._chunk is None else self._most(2)
-        if self._root is not None:
-            require_regular(self._root / key, most)
+        self._require_own(key, most)
         value = await self._store.get(key, prototype, byte_range)
         if value is None and self._array and not await self._store.exists(self._array):
             raise OSError(f"{self._array} is gone since it was opened")
@@ -70,6 +70,15 @@ class GuardedStore(WrapperStore[Store]):
         key_ranges: Iterable[tuple[str, ByteRequest | None]],
     ) -> list[Buffer | None]:
         return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]
+
+    def _require_own(self, key: str, most: int) -> None:
+        named = f"{self._location.shown}: {key!r:.200}"
+        if not self._location.is_local:
+            require_own_key(key, named)
+            return
+        found = require_own(f"{self._location.source}/{key}", [self._folder], named)
+        if found is not None and found.st_size > most:
+            raise OSError(f"{key}: {found.st_size} bytes, over the {most} that it may have")
 
     def _most(self, times: int) -> int:
         return times * (self._chunk or 0) + _ROOM
@@ -87,18 +96,6 @@ class GuardedStore(WrapperStore[Store]):
         size = measure(value.to_bytes()[: max(end, 0)], most)
         if size > most:
             raise OSError(f"chunk {key} unpacks to over {most} bytes, more than its array says")
-
-
-def require_regular(path: Path, most: int) -> None:
-    """Raise OSError for what is there and no regular file (a pipe, a device), or larger."""
-    try:
-        status = path.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return
-    if not stat.S_ISREG(status.st_mode):
-        raise OSError(f"{path.name}: no regular file")
-    if status.st_size > most:
-        raise OSError(f"{path.name}: {status.st_size} bytes, over the {most} that it may have")
 
 
 def _of_zstd(data: bytes, most: int) -> int:
