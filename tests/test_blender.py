@@ -6,6 +6,7 @@ STEREOCELL_BLENDER. See blender/session.py for what happens there.
 
 import json
 import os
+import re
 import subprocess
 from itertools import count
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from pxr import Sdf, Usd
+from pxr import Sdf, Usd, UsdGeom
 
 from bundles import load
 from stages import BALL_ID, COLORS, F_ID, FUNCTIONS, leaf, write_whole
@@ -44,7 +45,10 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
     command = [PYTHON, str(SESSION), step, str(file)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-3000:]
-    return json.loads(result.read_text())
+    found = json.loads(result.read_text())
+    # how an operator's report reaches a terminal
+    told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", done.stdout, re.MULTILINE)
+    return {**found, "told": told} if step == "edit" else found
 
 
 def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Path) -> None:
@@ -139,9 +143,10 @@ def test_what_can_not_be_imported_is_one_clear_line(stage_path: Path, tmp_path: 
 
 def test_nothing_changed_is_an_empty_layer(stage_path: Path, tmp_path: Path) -> None:
     overlay = tmp_path / "edit.usda"
-    run(
+    found = run(
         "edit", tmp_path, stage=stage_path, overlay=overlay, representation="AS_STAGED", size="TRUE"
     )
+    assert found["told"] == [("Info", "0 edits: ")]
     layer = Sdf.Layer.FindOrOpen(str(overlay))
     assert not layer.GetPrimAtPath("/Specimen").nameChildren
     assert not Path(layer.subLayerPaths[0]).is_absolute()
@@ -181,6 +186,148 @@ def test_edits_reach_the_bundle(stage_path: Path, tmp_path: Path, size: str) -> 
     tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
     assert tile.GetVariantSet("lod").GetVariantSelection() == "lod2"
     assert tile.GetVariantSet("representation").GetVariantSelection() == "both"
+
+
+LETTER = leaf("r0_c0", F_ID)
+
+
+def mesh_at(layer: Path, path: str, lod: str) -> UsdGeom.Mesh:
+    """Return a mesh of a composed stage in one level of detail; it lives as long as the stage."""
+    stage = Usd.Stage.Open(str(layer))
+    tile = stage.GetPrimAtPath(Sdf.Path(path).GetParentPath().GetParentPath())
+    tile.GetVariantSet("lod").SetVariantSelection(lod)
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(path))
+    mesh.stage = stage
+    return mesh
+
+
+def array(attribute: Usd.Attribute) -> Any:
+    return np.array(attribute.Get())
+
+
+@pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
+@pytest.mark.parametrize("lod", ["lod0", "lod2"])
+def test_moved_points_are_carried_with_all_that_follows_from_them(
+    stage_path: Path, tmp_path: Path, size: str, lod: str
+) -> None:
+    overlay = tmp_path / "an artist's edit.usda"
+    top = -4.0  # um, of y: the upper strokes of the F
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, lod=lod,
+        pull={LETTER: [1, top, 1.5]},
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Info"
+    assert f"CD3_x3b5__r0_c0: points at {lod}" in told
+    assert ("finer levels keep their shape" in told) == (lod != "lod0")
+    assert validate_stage(overlay) == []
+    built, edited = (mesh_at(path, LETTER, lod) for path in (stage_path, overlay))
+    before, after = (array(mesh.GetPointsAttr()) for mesh in (built, edited))
+    expected = before + np.where(before[:, 1] > top, 1.5, 0)[:, None] * [0, 1, 0]
+    assert np.allclose(after, expected, atol=1e-5)  # the tile's own um
+    assert np.allclose(edited.GetExtentAttr().Get(), [after.min(axis=0), after.max(axis=0)])
+    normals, kept = (array(mesh.GetNormalsAttr()) for mesh in (edited, built))
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-3)
+    triangles = array(built.GetFaceVertexIndicesAttr()).reshape(-1, 3)
+    far = ~np.isin(
+        np.arange(len(before)), triangles[(before != after).any(axis=1)[triangles].any(axis=1)]
+    )
+    # along a seam of UVs the twin of a touched vertex is touched as well
+    far &= (before[:, 1] < top - 1) | (before[:, 1] > top + 1)
+    assert far.any()
+    assert np.array_equal(normals[far], kept[far])
+    # a wall that was stretched lies flatter: its normals follow the triangles
+    stretched = (before[triangles, 1].max(axis=1) > top) & (before[triangles, 1].min(axis=1) <= top)
+    corners = after[triangles[stretched]]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    def agreement(vectors: Any) -> float:
+        return float((vectors[triangles[stretched]].mean(axis=1) * facing).sum())
+
+    assert agreement(normals) > agreement(kept)
+    if lod == "lod2":  # the level that has them
+        tangents = array(UsdGeom.PrimvarsAPI(edited).GetPrimvar("tangents"))
+        across = (tangents[:, :3] * normals).sum(axis=1)
+        before_it = array(UsdGeom.PrimvarsAPI(built).GetPrimvar("tangents"))[:, :3]
+        assert np.allclose(across, (before_it * kept).sum(axis=1), atol=1e-4)
+    other = "lod2" if lod == "lod0" else "lod0"
+    assert np.array_equal(
+        array(mesh_at(overlay, LETTER, other).GetPointsAttr()),
+        array(mesh_at(stage_path, LETTER, other).GetPointsAttr()),
+    )
+
+
+def test_points_that_are_still_in_edit_mode_are_carried(stage_path: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "edit.usda"
+    run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, lod="lod0", tiles="r0_c0",
+        odd=["work_in_edit_mode"],
+    )  # fmt: skip
+    built, edited = (mesh_at(path, LETTER, "lod0") for path in (stage_path, overlay))
+    away = array(edited.GetPointsAttr()) - array(built.GetPointsAttr())
+    assert np.allclose(away, [0, 0, 0.5], atol=1e-5)
+
+
+@pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
+def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, size: str) -> None:
+    overlay = tmp_path / "edit.usda"
+    volume = leaf("r0_c1", BALL_ID, "_volume")
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, representation="both",
+        move={LETTER: [1.0, 2.0, 3.0], volume: [0.0, -4.0, 0.0]},
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Info"
+    assert "CD3_x3b5__r0_c0: moved" in told
+    assert validate_stage(overlay) == []
+    stage = Usd.Stage.Open(str(overlay))
+    for path, expected in ((LETTER, (1, 2, 3)), (volume, (0, -4, 0)), (leaf("r0_c1", F_ID), None)):
+        prim = UsdGeom.Xformable(stage.GetPrimAtPath(path))
+        found_at = prim.GetLocalTransformation().ExtractTranslation()
+        assert np.allclose(found_at, expected or (0, 0, 0), atol=1e-5)
+        assert prim.GetXformOpOrderAttr().HasAuthoredValue() == (expected is not None)
+    write_bundle(overlay, tmp_path / "bundle", None, Engine(0))
+    ball = load(tmp_path / "bundle" / "manifest.json")["channels"][1]
+    entries = load(tmp_path / "bundle" / ball["volumes"]["path"])["volumes"]
+    assert entries[1]["matrix"][12:] == pytest.approx([0, -4, 0, 1])
+
+
+NAME = "CD3_x3b5__r0_c0"
+
+
+@pytest.mark.parametrize(
+    ("odd", "words"),
+    [
+        ("drop_a_face", f"{NAME}: topology changed"),
+        ("add_a_vertex", f"{NAME}: topology changed"),
+        ("rename", f"{NAME}: renamed to it's mine"),
+        ("copy", f"{NAME}.001: a copy, or new"),
+        ("add_new", "arrow: a copy, or new"),
+        ("smooth_by_modifier", f"{NAME}: modifier Smooth, not applied"),
+        ("rewire_a_material", f"material {NAME}_look: its nodes changed"),
+        ("replace_a_material", f"{NAME}: another material"),
+        ("color_a_ramp", "volume: its nodes changed"),
+        ("move_a_camera", "mono: moved"),
+        ("move_a_light", "key: moved"),
+        ("take_out", f"{NAME}: taken out of the specimen"),
+        ("add_shape_keys", f"{NAME}: shape keys"),
+        ("animate", f"{NAME}: animation"),
+        ("paint_other_uvs", f"{NAME}: UVs changed"),
+    ],
+)
+def test_an_edit_that_no_layer_carries_is_named(
+    stage_path: Path, tmp_path: Path, odd: str, words: str
+) -> None:
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=tmp_path / "edit.usda", lod="lod2",
+        representation="both", tiles="r0_c0", odd=[odd],
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Warning"
+    carried, lost = told.split(". Not carried: ")
+    assert words in lost
+    assert lost.count("; ") == 0, lost
+    assert "points" not in carried
 
 
 def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_path: Path) -> None:

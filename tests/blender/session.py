@@ -15,6 +15,7 @@ LOCAL = Path(bpy.utils.resource_path("LOCAL"))
 sys.path += [str(path) for path in LOCAL.glob("python/lib/python3*/site-packages")]
 sys.path.append(str(Path(__file__).parents[2] / "usd_assets" / "blender"))
 
+import bmesh  # noqa: E402  (bpy brings it)
 import stereocell_import  # noqa: E402
 from stereocell_import.importing import COLOR, PRIM, VOLUME  # noqa: E402
 from stereocell_import.looks import color_of, points_of  # noqa: E402
@@ -130,8 +131,107 @@ def step_edit(arguments):
         bpy.data.objects.remove(by_prim(path))
     for path, offset in arguments.get("move", {}).items():
         by_prim(path).location += type(root.location)(offset)
+    for path, (axis, above, offset) in arguments.get("pull", {}).items():
+        for vertex in by_prim(path).data.vertices:
+            if vertex.co[axis] > above:
+                vertex.co[axis] += offset
+    for name in arguments.get("odd", []):
+        _ODD[name](root)
     assert bpy.ops.export_scene.stereocell_edits(filepath=arguments["overlay"]) == {"FINISHED"}
-    return Path(arguments["overlay"]).read_text()
+    return {}
+
+
+def a_mesh(_root):
+    return next(block for block in bpy.data.objects if block.type == "MESH")
+
+
+def drop_a_face(root):
+    mesh = a_mesh(root).data
+    faces = [list(face.vertices) for face in mesh.polygons][1:]
+    points = [vertex.co.copy() for vertex in mesh.vertices]
+    mesh.clear_geometry()
+    mesh.from_pydata(points, [], faces)
+
+
+def add_a_vertex(root):
+    a_mesh(root).data.vertices.add(1)
+
+
+def rename(root):
+    a_mesh(root).name = "it's mine"
+
+
+def copy(root):
+    block = a_mesh(root)
+    bpy.context.scene.collection.objects.link(block.copy())
+
+
+def add_new(_root):
+    block = bpy.data.objects.new("arrow", bpy.data.meshes.new("arrow"))
+    bpy.context.scene.collection.objects.link(block)
+
+
+def smooth_by_modifier(root):
+    a_mesh(root).modifiers.new("Smooth", "SMOOTH")
+
+
+def rewire_a_material(root):
+    material = a_mesh(root).material_slots[0].material
+    (shader,) = [n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled"]
+    shader.inputs["Roughness"].default_value = 0.9
+
+
+def replace_a_material(root):
+    a_mesh(root).material_slots[0].material = bpy.data.materials.new("gold")
+
+
+def color_a_ramp(root):
+    material = next(root[key] for key in root.keys() if key.startswith(VOLUME))  # noqa: SIM118
+    (ramp,) = [n for n in material.node_tree.nodes if n.type == "VALTORGB"]
+    ramp.color_ramp.elements[0].color = (1, 0, 0, ramp.color_ramp.elements[0].color[3])
+
+
+def move_a_camera(_root):
+    by_prim("/Specimen/Cameras/mono").location.x += 5
+
+
+def move_a_light(_root):
+    by_prim("/Specimen/Lights/key").location.x += 5
+
+
+def take_out(root):
+    a_mesh(root).parent = None
+
+
+def add_shape_keys(root):
+    a_mesh(root).shape_key_add(name="Basis")
+
+
+def animate(root):
+    a_mesh(root).keyframe_insert("location")
+
+
+def paint_other_uvs(root):
+    a_mesh(root).data.uv_layers[0].uv[0].vector = (0.5, 0.25)
+
+
+def work_in_edit_mode(root):
+    """Move the points as an artist does, and export without leaving the mode."""
+    block = a_mesh(root)
+    bpy.context.view_layer.objects.active = block
+    bpy.ops.object.mode_set(mode="EDIT")
+    form = bmesh.from_edit_mesh(block.data)
+    for vertex in form.verts:
+        vertex.co.z += 0.5
+    bmesh.update_edit_mesh(block.data)
+
+
+_ODD = {
+    one.__name__: one
+    for one in (drop_a_face, add_a_vertex, rename, copy, add_new, smooth_by_modifier,
+                rewire_a_material, replace_a_material, color_a_ramp, move_a_camera, move_a_light,
+                take_out, add_shape_keys, animate, paint_other_uvs, work_in_edit_mode)
+}  # fmt: skip
 
 
 def step_render(arguments):

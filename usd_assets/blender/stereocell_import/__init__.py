@@ -90,7 +90,7 @@ class ExportStereoCellEdits(bpy.types.Operator, ExportHelper):
         except StageProblem as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(edits)} edits: " + "; ".join(edits))
+        self.report({"WARNING" if edits.lost else "INFO"}, edits.summary())
         return {"FINISHED"}
 
 

@@ -15,6 +15,7 @@ from .cameras import pair_cameras
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
 from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
 from .problem import StageProblem
+from .snapshot import take_materials, take_snapshot
 
 STATE = "stereocell"
 PRIM = "stereocell_prim"
@@ -68,6 +69,7 @@ def import_stage(context, path, choice, is_true_size):
     if "state" not in made:
         raise StageProblem(f"{path}: Blender imported nothing of it")
     root, state = made["state"]
+    state["lods"] = {tile: found.get("lod", "") for tile, found in state["selected"].items()}
     state["chosen"] = {
         tile: {
             name: variant for name, variant in found.items() if staged[tile].get(name) != variant
@@ -107,25 +109,35 @@ def _finish(context, stage, prim_map, scale):
     context.view_layer.update()
     pair_cameras(context.scene, stage, objects, scale)
     leaves = [p for p, o in objects.items() if o.type in ("MESH", "VOLUME")]
-    selected = {}
-    matrices = {}
-    for prim in stage.GetPrimAtPath(TILES).GetChildren():
-        sets = prim.GetVariantSets()
-        selected[prim.GetName()] = dict(sets.GetAllVariantSelections())
-        if str(prim.GetPath()) in objects:
-            frame = objects.get(TILES, root)
-            matrices[prim.GetName()] = matrix_in(frame, objects[str(prim.GetPath())])
+    selected = {
+        prim.GetName(): dict(prim.GetVariantSets().GetAllVariantSelections())
+        for prim in stage.GetPrimAtPath(TILES).GetChildren()
+    }
+    own = set(objects.values())
     return root, {
         "channels": channels,
         "leaves": leaves,
         "selected": selected,
-        "matrices": matrices,
+        "matrices": {p: matrix_of(p, objects) for p in objects if p != ROOT},
+        "snapshots": {p: take_snapshot(block) for p, block in objects.items()},
+        "materials": take_materials(objects[path] for path in leaves),
+        "others": [block.name for block in context.scene.objects if block not in own],
     }
 
 
-def matrix_in(frame, tile):
-    """Return a tile's matrix below another object, in the stage's units: rows, column vectors."""
-    return [list(row) for row in frame.matrix_world.inverted() @ tile.matrix_world]
+def matrix_of(path, objects):
+    """Return the matrix of a prim's object below that of the prim above it, in the stage's units.
+
+    Rows, for column vectors. `objects`: Blender's by the paths of their prims, /Specimen's too.
+    """
+    block, above = objects[path], path.rpartition("/")[0]
+    while above not in objects:
+        above = above.rpartition("/")[0]
+    frame = objects[above]
+    if block.parent == frame and block.parent_type == "OBJECT" and not block.constraints:
+        # not through the world, whose floats have 32 bits
+        return [list(row) for row in block.matrix_parent_inverse @ block.matrix_basis]
+    return [list(row) for row in frame.matrix_world.inverted() @ block.matrix_world]
 
 
 def _read_look(prim):

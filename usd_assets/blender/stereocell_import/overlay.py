@@ -1,27 +1,44 @@
 """Write what an artist changed as a layer over the stage: `stereocell bundle OUT --stage LAYER`.
 
 Colours (in a channel's colour group), opacities (in a volume material's ramp), objects hidden or
-deleted, tiles moved, and variants chosen at the import. Where the whole specimen stands in the
-scene is the scene's own affair.
+deleted, tiles, meshes and volumes moved, points of meshes moved, and variants chosen at the import.
+Whatever else was done to the specimen is lost, and named. Where the whole of it stands in the scene
+is the scene's own affair.
 """
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from pxr import Gf, Sdf, Vt
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage
-from .importing import COLOR, PRIM, STATE, VOLUME, matrix_in
+from .importing import COLOR, PRIM, STATE, VOLUME, matrix_of
 from .looks import color_of, points_of
 from .problem import StageProblem
+from .shapes import cut_fans, group_seams, turn_with
+from .snapshot import digest_nodes, find_losses, points_of_mesh, take_snapshot
 
 _MOVED = 1e-4  # of the longest translation and of 1: floats of 32 bits, through a scale of 1e-6
 
 
+@dataclass(frozen=True)
+class Edits:
+    """A line for each edit that the layer carries, and for each that it does not."""
+
+    carried: list[str]
+    lost: list[str]
+
+    def summary(self):
+        told = f"{len(self.carried)} edits: " + "; ".join(self.carried)
+        return f"{told}. Not carried: " + "; ".join(self.lost) if self.lost else told
+
+
 def export_edits(context, path):
-    """Write the layer; return a line for each edit in it. Raises StageProblem."""
+    """Write the layer; return its Edits. Raises StageProblem."""
     root = _find_root(context)
     state = json.loads(root[STATE])
     stage_path, path = Path(state["stage"]), Path(bpy.path.abspath(str(path)))
@@ -36,16 +53,17 @@ def export_edits(context, path):
     layer.pseudoRoot.SetInfo("upAxis", "Y")
     layer.subLayerPaths = [_name_of(stage_path, path)]
     Sdf.CreatePrimInLayer(layer, ROOT)  # the default prim, also where nothing was edited
-    objects = {}
-    for block in context.scene.objects:
-        if PRIM in block and _is_below(root, block):
-            objects.setdefault(block[PRIM], []).append(block)
+    objects, strangers = _find_objects(context, root, state)
+    lost = [f"{block.name}: a copy, or new" for block in strangers]
     edits = [
         *_write_looks(layer, stage, root, state),
         *_write_variants(layer, state),
         *_write_hidden(layer, state, objects),
-        *_write_moved(layer, state, root, objects),
+        *_write_moved(layer, state, root, objects, lost),
+        *_write_points(layer, stage, state, objects, lost),
     ]
+    _write_hints(layer, stage, state, root, objects)
+    lost += _find_losses(context, state, objects)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         if not layer.Export(str(temporary)):
@@ -55,7 +73,7 @@ def export_edits(context, path):
         raise StageProblem(f"{path}: can't be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
-    return edits
+    return Edits(edits, lost)
 
 
 def _find_root(context):
@@ -69,6 +87,44 @@ def _find_root(context):
     if len(found) != 1:
         raise StageProblem(f"{len(found)} imported stages in the scene, expected one selected")
     return found[0]
+
+
+def _find_objects(context, root, state):
+    """Return the specimen's objects by the paths of their prims, and those that it did not have."""
+    objects, strangers = {}, []
+    known = {one["name"] for one in state["snapshots"].values()} | set(state["others"])
+    for block in sorted(context.scene.objects, key=lambda block: block.name not in known):
+        path = block.get(PRIM)
+        if _is_below(root, block) and path in state["snapshots"] and path not in objects:
+            objects[path] = block
+        elif _is_below(root, block) or (path is None and block.name not in state["others"]):
+            strangers.append(block)
+    for block in objects.values():
+        if block.type == "MESH" and block.mode == "EDIT":
+            block.update_from_editmode()
+    return objects, sorted(strangers, key=lambda block: block.name)
+
+
+def _find_losses(context, state, objects):
+    """Return what was done to the specimen that the layer does not carry."""
+    lost = []
+    for path, before in state["snapshots"].items():
+        block = objects.get(path)
+        if block is not None:
+            lost += find_losses(block, before)
+        elif path in state["leaves"] and any(
+            one.get(PRIM) == path for one in context.scene.objects
+        ):
+            lost.append(f"{before['name']}: taken out of the specimen, which leaves it out")
+        elif path.rpartition("/")[0] != TILES and path not in state["leaves"]:
+            lost.append(f"{before['name']}: deleted")
+    for name, before in state["materials"].items():
+        material = bpy.data.materials.get(name)
+        if material is None:
+            lost.append(f"material {name}: renamed or deleted")
+        elif digest_nodes(material.node_tree) != before:
+            lost.append(f"material {name}: its nodes changed")
+    return lost
 
 
 def _is_below(root, block):
@@ -124,11 +180,11 @@ def _write_variants(layer, state):
 
 
 def _write_hidden(layer, state, objects):
-    hidden = [path for path in state["leaves"] if all(map(_is_hidden, objects.get(path, [])))]
+    hidden = [path for path in state["leaves"] if _is_hidden(objects.get(path))]
     for tile in state["chosen"]:
         path = f"{TILES}/{tile}"
         inside = [leaf for leaf in state["leaves"] if leaf.startswith(f"{path}/")]
-        if all(map(_is_hidden, objects.get(path, []))) or (inside and set(inside) <= set(hidden)):
+        if _is_hidden(objects.get(path)) or (inside and set(inside) <= set(hidden)):
             _hide(layer, path)
             yield f"{tile}: hidden"
             continue
@@ -139,27 +195,150 @@ def _write_hidden(layer, state, objects):
 
 
 def _is_hidden(block):
-    return block.hide_render or not block.visible_get()
+    return block is None or block.hide_render or not block.visible_get()
 
 
 def _hide(layer, path):
     _set(layer, path, "visibility", Sdf.ValueTypeNames.Token, "invisible")
 
 
-def _write_moved(layer, state, root, objects):
-    frame = objects.get(TILES, [root])[0]
-    for tile, before in state["matrices"].items():
+def _write_moved(layer, state, root, objects, lost):
+    """Yield what is moved of the tiles and what they hold; of the rest, `lost` gets the names."""
+    for path, before in state["matrices"].items():
+        block = objects.get(path)
+        matrix = before if block is None else matrix_of(path, {ROOT: root, **objects})
+        if not _differ(matrix, before, _MOVED):
+            continue
+        name = path.rpartition("/")[2]
+        is_field = path.rpartition("/")[0] in state["leaves"]  # of a volume: drawn as that is
+        if is_field or not f"{path}/".startswith(f"{TILES}/"):
+            lost.append(f"{name}: moved")
+            continue
+        rows = [[round(float(v), 6) for v in row] for row in zip(*matrix, strict=True)]
+        kind = Sdf.ValueTypeNames
+        _set(layer, path, "xformOp:transform", kind.Matrix4d, Gf.Matrix4d(rows))
+        order = Vt.TokenArray(["xformOp:transform"])
+        _set(layer, path, "xformOpOrder", kind.TokenArray, order, is_uniform=True)
+        yield f"{name}: moved"
+
+
+def _write_points(layer, stage, state, objects, lost):
+    """Yield which meshes have moved points: in the level of detail that was imported."""
+    for path in state["leaves"]:
+        block, before = objects.get(path), state["snapshots"][path]
+        if block is None or block.type != "MESH":
+            continue
+        now = take_snapshot(block)
+        if now["points"] == before["points"] or now["faces"] != before["faces"]:
+            continue  # other faces are told as a loss
+        tile = path.removeprefix(f"{TILES}/").partition("/")[0]
+        lod = state["lods"].get(tile, "")
+        mesh = UsdGeom.Mesh(_as_staged(stage, f"{TILES}/{tile}", lod, path) or Usd.Prim())
+        points = points_of_mesh(block.data)
+        if not mesh or len(mesh.GetPointsAttr().Get() or []) != len(points):
+            lost.append(f"{before['name']}: points moved, and the stage has others by now")
+            continue
+        if lod:
+            Sdf.CreateVariantInLayer(layer, f"{TILES}/{tile}", "lod", lod)
+        _write_shape(layer, _place_of(f"{TILES}/{tile}", lod, path), mesh, points)
+        at = f" at {lod}" if lod else ""
+        finer = "; finer levels keep their shape (import lod0 to edit them)"
+        yield f"{before['name']}: points{at}" + (finer if lod not in ("", "lod0") else "")
+
+
+def _write_hints(layer, stage, state, root, objects):
+    """Let the box that an unloaded tile is known by hold what was moved inside it."""
+    for tile, lod in state["lods"].items():
         path = f"{TILES}/{tile}"
-        for block in objects.get(path, [])[:1]:
-            matrix = matrix_in(frame, block)
-            if not _differ(matrix, before, _MOVED):
+        hint = UsdGeom.ModelAPI(stage.GetPrimAtPath(path)).GetExtentsHintAttr().Get()
+        if not hint:
+            continue
+        boxes = [np.array(hint[:2], np.float64)]
+        for leaf in state["leaves"]:
+            if not leaf.startswith(f"{path}/") or leaf not in objects:
                 continue
-            rows = [[round(float(v), 6) for v in row] for row in zip(*matrix, strict=True)]
-            kind = Sdf.ValueTypeNames
-            _set(layer, path, "xformOp:transform", kind.Matrix4d, Gf.Matrix4d(rows))
-            order = Vt.TokenArray(["xformOp:transform"])
-            _set(layer, path, "xformOpOrder", kind.TokenArray, order, is_uniform=True)
-            yield f"{tile}: moved"
+            chain = [leaf]
+            while chain[-1].rpartition("/")[0] != path:
+                chain.append(chain[-1].rpartition("/")[0])
+            shape = layer.GetAttributeAtPath(f"{_place_of(path, lod, leaf)}.extent")
+            places = [layer.GetAttributeAtPath(f"{one}.xformOp:transform") for one in chain]
+            if shape is None and not any(places):
+                continue
+            matrix = np.eye(4)
+            for one in chain:
+                if one in objects:
+                    matrix = np.array(matrix_of(one, {ROOT: root, **objects})) @ matrix
+            extents = _extents(stage, path, leaf) if any(places) else []
+            for extent in [*extents, *([shape.default] if shape else [])]:
+                corners = np.stack(np.meshgrid(*np.array(extent, np.float64).T), axis=-1)
+                corners = corners.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+                boxes.append(np.array([corners.min(axis=0), corners.max(axis=0)]))
+        low, high = np.array(boxes)[:, 0].min(axis=0), np.array(boxes)[:, 1].max(axis=0)
+        if len(boxes) > 1 and not np.allclose([low, high], boxes[0], atol=0):
+            box = Vt.Vec3fArray.FromNumpy(np.array([low, high], np.float32))
+            _set(layer, path, "extentsHint", Sdf.ValueTypeNames.Float3Array, box)
+
+
+def _extents(stage, tile, path):
+    """Return a prim's extents in all levels of detail that the stage has."""
+    prim = stage.GetPrimAtPath(tile)
+    prim.Load()
+    levels = prim.GetVariantSet("lod").GetVariantNames() or [""]
+    prims = (_as_staged(stage, tile, level, path) for level in levels)
+    extents = (prim.GetAttribute("extent").Get() for prim in prims if prim)
+    return [extent for extent in extents if extent]
+
+
+def _as_staged(stage, tile, lod, path):
+    """Return a prim of the stage in a level of detail; None if it isn't there any more."""
+    prim = stage.GetPrimAtPath(tile)
+    if not prim:
+        return None
+    prim.Load()
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for name, variant in (("lod", lod), ("representation", "both")):
+            if variant in prim.GetVariantSet(name).GetVariantNames():
+                prim.GetVariantSet(name).SetVariantSelection(variant)
+    return stage.GetPrimAtPath(path) or None
+
+
+def _place_of(tile, lod, path):
+    """Return where opinions on a mesh belong: the other levels of detail have other points.
+
+    A flattened stage has one level, and no variants.
+    """
+    return f"{tile}{{lod={lod}}}{path.removeprefix(f'{tile}/')}" if lod else path
+
+
+def _write_shape(layer, place, mesh, points):
+    """Write points and what follows from them: extent, normals, tangents."""
+    kind = Sdf.ValueTypeNames
+    before = np.array(mesh.GetPointsAttr().Get(), np.float32)
+    array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points))
+    _set(layer, place, "points", kind.Point3fArray, array)
+    extent = UsdGeom.PointBased.ComputeExtent(array)
+    _set(layer, place, "extent", kind.Float3Array, extent)
+    counts, indices = (
+        np.array(attribute.Get() or [], np.int64)
+        for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
+    )
+    triangles = cut_fans(counts, indices)
+    prim = mesh.GetPrim()
+    primvar = prim.GetAttribute("primvars:normals").Get()
+    normals = mesh.GetNormalsAttr().Get() if primvar is None else primvar
+    normals = np.array([] if normals is None else normals, np.float32)
+    is_known = normals.shape == points.shape  # at vertices, as the pipeline has them
+    groups = group_seams(before, points, normals if is_known else points)
+    if is_known:
+        turned = turn_with(normals, before, points, triangles, groups)
+        name = "normals" if primvar is None else "primvars:normals"
+        _set(layer, place, name, kind.Normal3fArray, Vt.Vec3fArray.FromNumpy(turned))
+    tangents = np.array(prim.GetAttribute("primvars:tangents").Get() or [], np.float32)
+    if tangents.shape == (len(points), 4):
+        turned = turn_with(tangents[:, :3], before, points, triangles, groups)
+        turned = np.ascontiguousarray(np.concatenate([turned, tangents[:, 3:]], axis=1))
+        array = Vt.Vec4fArray.FromNumpy(turned)
+        _set(layer, place, "primvars:tangents", kind.Float4Array, array)
 
 
 def _set(layer, path, name, kind, value, is_uniform=False):

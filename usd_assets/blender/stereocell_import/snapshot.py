@@ -1,0 +1,147 @@
+"""What an imported object was like, so that the export knows what was done to it since.
+
+A layer carries some of that (overlay.py). `find_losses` names the rest.
+"""
+
+import hashlib
+import json
+
+import bpy
+import numpy as np
+
+_LAYOUT = {
+    *("name", "label", "width", "height", "hide", "select", "mute", "parent", "show_options"),
+    *("show_preview", "show_texture", "use_custom_color", "warning_propagation"),
+}
+
+
+def take_snapshot(block):
+    """Return what is to be compared of an object: JSON."""
+    found = {"name": block.name, "modifiers": [one.name for one in block.modifiers]}
+    if block.type == "MESH":
+        mesh = block.data
+        found |= {
+            "points": _digest(points_of_mesh(mesh)),
+            "faces": [
+                len(mesh.vertices),
+                _digest(_read(mesh.loops, "vertex_index", np.int32)),
+                _digest(_read(mesh.polygons, "loop_total", np.int32)),
+            ],
+            "uvs": [_digest(_read(one.uv, "vector", np.float32, 2)) for one in mesh.uv_layers],
+        }
+    if block.type in ("MESH", "VOLUME"):
+        found["materials"] = [slot.material and slot.material.name for slot in block.material_slots]
+    return found
+
+
+def take_materials(blocks):
+    """Return a digest of each material's nodes, by its name."""
+    used = {slot.material for block in blocks for slot in block.material_slots if slot.material}
+    return {material.name: digest_nodes(material.node_tree) for material in used}
+
+
+def points_of_mesh(mesh):
+    """Return the places of a mesh's vertices in its own space, float32 (n, 3)."""
+    return _read(mesh.vertices, "co", np.float32, 3)
+
+
+def find_losses(block, before):
+    """Yield what was done to an object that no layer carries; `before`: its snapshot."""
+    now, name = take_snapshot(block), before["name"]
+    if now["name"] != name:
+        yield f"{name}: renamed to {now['name']}"
+    for modifier in now["modifiers"]:
+        if modifier not in before["modifiers"]:
+            yield f"{name}: modifier {modifier}, not applied"
+    if now.get("materials") != before.get("materials"):
+        yield f"{name}: another material"
+    if block.type == "MESH":
+        if now["faces"] != before["faces"]:
+            yield f"{name}: topology changed (other vertices, edges or faces)"
+        elif now["uvs"] != before["uvs"]:
+            yield f"{name}: UVs changed"
+        if block.data.shape_keys is not None:
+            yield f"{name}: shape keys"
+    moving = [one.animation_data for one in (block, block.data) if one is not None]
+    if any(one is not None and (one.action or one.drivers) for one in moving):
+        yield f"{name}: animation, of which this frame's place is taken"
+
+
+def digest_nodes(tree):
+    """Return a digest of a shader's nodes but for what a layer carries: a channel's colour, and
+    the positions and opacities of its ramp."""
+    return _hash(_describe_nodes(tree))
+
+
+def _describe_nodes(tree):
+    if tree is None:
+        return None
+    nodes = [
+        [
+            node.name,
+            node.bl_idname,
+            {key: _plain(getattr(node, key)) for key in _properties(node)},
+            [_plain(getattr(one, "default_value", None)) for one in node.inputs],
+            [] if _is_channel_color(tree, node) else
+            [_plain(getattr(one, "default_value", None)) for one in node.outputs],
+            _describe_nodes(getattr(node, "node_tree", None)),
+            _describe_ramp(getattr(node, "color_ramp", None)),
+            getattr(getattr(node, "image", None), "filepath", ""),
+        ]
+        for node in tree.nodes
+    ]  # fmt: skip
+    links = [
+        [link.from_node.name, link.from_socket.identifier, link.to_node.name,
+         link.to_socket.identifier]
+        for link in tree.links
+    ]  # fmt: skip
+    return [sorted(nodes, key=lambda node: node[0]), sorted(links)]
+
+
+def _is_channel_color(tree, node):
+    return node.bl_idname == "ShaderNodeRGB" and not isinstance(tree.id_data, bpy.types.Material)
+
+
+def _describe_ramp(ramp):
+    if ramp is None:
+        return None
+    colors = {tuple(round(part, 5) for part in element.color[:3]) for element in ramp.elements}
+    return [ramp.interpolation, ramp.color_mode, sorted(colors)]
+
+
+def _properties(node):
+    """Return the names of a node's settings: how it calculates, not where it is drawn."""
+    kinds = ("BOOLEAN", "INT", "FLOAT", "STRING", "ENUM")
+    return sorted(
+        one.identifier
+        for one in node.bl_rna.properties
+        if one.type in kinds
+        and not one.is_readonly
+        and one.identifier not in _LAYOUT
+        and not one.identifier.startswith(("location", "color", "bl_"))
+    )
+
+
+def _plain(value):
+    if isinstance(value, float):
+        return round(value, 5)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    try:
+        return [_plain(part) for part in value]
+    except TypeError:
+        return getattr(value, "name", "")
+
+
+def _hash(content):
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _digest(array):
+    return hashlib.sha256(array.tobytes()).hexdigest()[:16]
+
+
+def _read(items, name, kind, width=1):
+    values = np.empty(len(items) * width, kind)
+    items.foreach_get(name, values)
+    return values.reshape(-1, width) if width > 1 else values
