@@ -430,6 +430,47 @@ def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
     assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
 
 
+def push_the_finest(stage: Usd.Stage) -> None:
+    tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+    variants = tile.GetVariantSet("lod")
+    variants.SetVariantSelection("lod0")
+    with variants.GetVariantEditContext():
+        points = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/F/F_r0_c0.points")
+        moved = np.array(points.Get(), np.float64)
+        moved[:, 2] += 3 * np.exp(-(((moved[:, 1] - moved[:, 1].mean()) / 3) ** 2))
+        points.Set(Vt.Vec3fArray.FromNumpy(moved.astype(np.float32)))
+    variants.ClearVariantSelection()
+
+
+@pytest.mark.slow
+def test_a_bundle_of_an_edited_mesh_is_held_against_the_edited_one(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    layer = tmp_path / "an artist's edit.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths.append(str(out / "stage" / "stage.usda"))
+    push_the_finest(stage)
+    stage.GetRootLayer().Save()
+    told = ["--stage", str(layer)]
+    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    edit = "r0_c0/F: edited by hand: lod0 (sound); made anew from lod0: lod1 within "
+    assert f"bundle: {edit}" in capsys.readouterr().err
+    assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+    assert edit in capsys.readouterr().out
+    assert "lod1: " in failures(out)[BUNDLE]  # against the stage as it was built
+    # the bundle of the edit with the coarser levels and errors as they were is a fault
+    file = out / "bundle" / "channels" / "F" / "r0_c0" / "lod1.glb"
+    edited = file.read_bytes()
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    as_built = file.read_bytes()
+    assert as_built != edited
+    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    file.write_bytes(as_built)
+    line = {line.name: line for line in check_deep(out, Engine(0), layer)}[BUNDLE]
+    assert not line.ok
+    assert "r0_c0/F: lod1: " in line.detail
+
+
 @pytest.mark.slow
 def test_without_its_source_the_bundle_is_held_against_the_stage_all_the_same(
     built: Path, out: Path, monkeypatch: pytest.MonkeyPatch

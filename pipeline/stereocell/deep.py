@@ -161,8 +161,10 @@ def _hold_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
     raise_on([problem for tile in tiles for problem in tile.problems])
     raise_on(list(hold_histograms(bundle, tiles)))
     surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
+    edits = "; ".join(line for tile in tiles for line in tile.edits)
     worst = max((tile.worst for tile in tiles), default=0.0)
     return (
         f"{surfaces} surfaces within {worst:.2f} lattice steps, their colours and maps; "
         f"{volumes} volumes, every voxel of every level, their bricks and histograms"
+        + (f"; {edits}" if edits else "")
     )

@@ -31,7 +31,7 @@ from stereocell.mesh import Mesh
 from stereocell.specimen import evaluate
 from stereocell.tilesets import Content, walk
 from stereocell.write.bundle import MANIFEST
-from stereocell.write.bundle_tile import find_bounds, read_image
+from stereocell.write.bundle_tile import find_bounds
 from stereocell.write.bundle_transfer2d import count_tile, sum_tiles
 from stereocell.write.composed import (
     ComposedLod,
@@ -39,12 +39,13 @@ from stereocell.write.composed import (
     loaded,
     modality_of,
     open_stage,
-    read_lods,
     read_volume,
     specimen_name,
     tile_prims,
 )
+from stereocell.write.composed_edits import shown_lods
 from stereocell.write.composed_look import ComposedLook, read_looks
+from stereocell.write.composed_maps import read_image
 from stereocell.write.exr import read_atlas
 from stereocell.write.gltf import AMBIENT_SHARE
 from stereocell.write.gltf_read import Drawn, read_glb
@@ -80,6 +81,7 @@ class TileFinding:
     """What was seen of one tile.
 
     worst   a vertex's way from its place, in lattice steps
+    edits   what was edited by hand, a line for each surface
     joints  each volume's histogram of value and gradient, packed, by channel
     """
 
@@ -89,6 +91,7 @@ class TileFinding:
     worst: float
     joints: dict[str, bytes]
     problems: tuple[str, ...]
+    edits: tuple[str, ...] = ()
 
 
 def hold_manifest(stage_file: Path, bundle: Path) -> list[str]:
@@ -181,6 +184,7 @@ def hold_tile(task: BundleTask) -> TileFinding:
     manifest = read_json(task.bundle / MANIFEST, "bundle.schema.json", _REMEDY)
     channels = {channel["id"]: channel for channel in manifest["channels"]}
     problems: list[str] = []
+    edits: list[str] = []
     joints: dict[str, bytes] = {}
     surfaces = 0
     worst = 0.0
@@ -197,7 +201,9 @@ def hold_tile(task: BundleTask) -> TileFinding:
             problems += _unlike(task.tile_id, listed, told)
         for look, composed in zip(looks, volumes, strict=True):
             channel, name = channels[look.id], f"{task.tile_id}/{look.id}"
-            lods = {lod.level: lod for lod in read_lods(tile, look.id, choice.finest_lod)}
+            shown = shown_lods(tile, look.id, choice.finest_lod)
+            lods = dict(_without_repeats(shown.lods))
+            edits += [f"{name}: {shown.edit}"] if shown.edit else []
             contents = dict(_contents(task.bundle, channel, task.tile_id))
             surfaces += len(contents)
             apart, faults = _hold_surfaces(contents, lods)
@@ -212,7 +218,31 @@ def hold_tile(task: BundleTask) -> TileFinding:
                 voxels = look.window_voxels(read_atlas(composed.atlas))
                 problems += [f"{name}: {fault}" for fault in _hold_volume(task, entry, voxels)]
                 joints[look.id] = count_tile(voxels, composed, look.gradient_max)
-    return TileFinding(task.tile_id, surfaces, len(joints), worst, joints, tuple(problems))
+    return TileFinding(
+        task.tile_id, surfaces, len(joints), worst, joints, tuple(problems), tuple(edits)
+    )
+
+
+def _without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
+    """Yield the levels that a bundle has: of those that are alike, the finest."""
+    last: ComposedLod | None = None
+    for lod in lods:
+        if last is None or not _are_alike(last, lod):
+            yield lod.level, lod
+        last = lod
+
+
+def _are_alike(one: ComposedLod, other: ComposedLod) -> bool:
+    def arrays(lod: ComposedLod) -> list[NDArray[Any] | None]:
+        mesh, maps = lod.mesh, lod.images or lod.maps
+        images = [None if m is None else read_image(m) for m in (maps.normal, maps.occlusion,
+                                                                 maps.color)]  # fmt: skip
+        return [mesh.positions, mesh.triangles, mesh.normals, mesh.colors, mesh.openness, *images]
+
+    if one.material != other.material or len(one.mesh.triangles) != len(other.mesh.triangles):
+        return False
+    pairs = zip(arrays(one), arrays(other), strict=True)
+    return all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs)
 
 
 def _placed(volume: ComposedVolume) -> dict[str, Any]:
@@ -400,20 +430,21 @@ def _hold_vertex_colors(
 
 def _hold_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str]:
     for name, (kind, encode) in _ENCODERS.items():
-        path: Path | None = getattr(lod.maps, kind)
+        path: Path | NDArray[np.uint8] | None = getattr(lod.images or lod.maps, kind)
+        named = path.name if isinstance(path, Path) else f"lod{lod.level}_{kind}"
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
                 yield f"a map ({kind}) that the stage has not"
             continue  # the coarsest level goes without
         if name not in drawn.maps:
-            yield f"the map {path.name} is missing"
+            yield f"the map {named} is missing"
             continue
         anew = encode(read_image(path))
         if anew == drawn.maps[name]:
             continue
         found, wanted = _pixels(drawn.maps[name]), _pixels(anew)
         if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
-            yield f"the map {path.name} is another image in the stage"
+            yield f"the map {named} is another image in the stage"
 
 
 def _pixels(ktx2: bytes) -> NDArray[np.float64]:

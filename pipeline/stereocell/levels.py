@@ -23,11 +23,13 @@ def make_levels(
     settings: Settings,
     clock: Clock,
     source: FineSurface | None = None,
+    first: int = 0,
 ) -> tuple[Lod, ...]:
     """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
 
     `source`: what maps are baked from, the fine surface and what lies past the planes; without one
     the fine surface alone, which nothing hides.
+    `first`: the finest level to be made, of a surface that is itself the level before it.
     Meshes are certified before seams of charts split their vertices: places stay the same.
     """
     options = settings.lod
@@ -38,7 +40,7 @@ def make_levels(
         baker = Baker(source or FineSurface.bare(fine))
     with clock("measure"):
         to_fine = Nearest(fine, options.samples)
-    for level, error in enumerate(options.errors):
+    for level, error in list(enumerate(options.errors))[first:]:
         with clock("simplify"):
             length = error * min(spacing)
             mended = simplify_soundly(mesh, planes, length, STRAY * length)

@@ -69,7 +69,8 @@ def write_bundle(
     engine       whose workers share the tiles; the bytes don't depend on their number
     parts        a folder for the tiles that are finished, of this very stage: those that are in it
                  are taken, and all are left there; None: none are kept if this does not end well
-    tell         is given a line on each layer that is not as it was written
+    tell         is given a line on each layer that is not as it was written, and on each surface
+                 that was edited by hand
 
     Raises StageError where the stage lacks something or a file of it is damaged, naming prim and
     file (TasksFailedError where a tile does); OutputError where `bundle_dir` can't be written, or
@@ -149,6 +150,10 @@ def _fill(
     index = write_file(root, FILES, encode(listed))
     specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
     write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels, index))
+    for tile in tiles:
+        for channel in tile.channels:
+            if channel.edit:
+                tell(f"{tile.id}/{channel.channel_id}: {channel.edit}")
 
 
 def describe_bundle(

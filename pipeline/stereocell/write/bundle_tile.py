@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 from pxr import Usd
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -31,11 +29,12 @@ from stereocell.write.composed import (
     hinted_box,
     loaded,
     open_stage,
-    read_lods,
     read_volume,
 )
 from stereocell.write.composed_choice import Representation
+from stereocell.write.composed_edits import shown_lods
 from stereocell.write.composed_look import ComposedLook
+from stereocell.write.composed_maps import read_image
 from stereocell.write.composed_values import Point
 from stereocell.write.exr import read_atlas
 from stereocell.write.gltf import Glb, Textures, encode_glb
@@ -72,6 +71,7 @@ class TileChannel:
     volume     its entry in volumes.json, or None
     files      all that was written
     joint      the volume's histogram of value and gradient, packed; see bundle_transfer2d.py
+    edit       what was edited by hand of its surface, and what follows from that; or empty
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -82,6 +82,7 @@ class TileChannel:
     volume: dict[str, Any] | None
     files: tuple[FileRef, ...]
     joint: bytes | None
+    edit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +177,8 @@ def _export_channel(
     lods: list[TileLod] = []
     triangles: list[int] = []
     finer = b""
-    levels = list(read_lods(tile, channel_id, finest_lod))
+    shown = shown_lods(tile, channel_id, finest_lod)
+    levels = shown.lods
     for lod in levels:
         for image in lod.maps.files:
             as_written.require(image)
@@ -197,7 +199,9 @@ def _export_channel(
         as_written.require(volume.atlas)
         entry, written, joint = _export_volume(root, tile.GetName(), look, volume)
         files += written
-    return TileChannel(channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint)
+    return TileChannel(
+        channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint, shown.edit
+    )
 
 
 def _bare(lod: ComposedLod, step_m: float) -> ComposedLod:
@@ -209,11 +213,12 @@ def _bare(lod: ComposedLod, step_m: float) -> ComposedLod:
     """
     moved_um = math.sqrt(3) / 2 * _COARSE_STEPS * step_m * _UM_PER_METRE
     maps = replace(lod.maps, normal=None, occlusion=None)
-    lod = replace(lod, distance_um=lod.distance_um + moved_um)
-    if maps.color is not None:
-        return replace(lod, maps=maps)
+    images = lod.images and replace(lod.images, normal=None, occlusion=None)
+    lod = replace(lod, distance_um=lod.distance_um + moved_um, maps=maps, images=images)
+    if maps.color is not None or (images is not None and images.color is not None):
+        return lod
     mesh = replace(lod.mesh, uvs=None, tangents=None)
-    return replace(lod, maps=maps, mesh=_welded(mesh))
+    return replace(lod, mesh=_welded(mesh))
 
 
 def _welded(mesh: Mesh) -> Mesh:
@@ -237,7 +242,7 @@ def _welded(mesh: Mesh) -> Mesh:
 
 def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) -> Glb:
     prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
-    maps = lod.maps
+    maps = lod.images or lod.maps
     textures = Textures(
         None if maps.normal is None else encode_normal_map(read_image(maps.normal)),
         None if maps.occlusion is None else encode_occlusion_map(read_image(maps.occlusion)),
@@ -254,22 +259,6 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
         )
     except ValueError as error:  # what an artist may have done to the mesh
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error
-
-
-def read_image(path: Path) -> NDArray[np.uint8]:
-    """Return an image uint8 (y, x, 3), both edges multiples of 4, as Basis Universal asks.
-
-    Raises StageError.
-    """
-    try:
-        with Image.open(path) as file:
-            image = file.convert("RGB")
-    except OSError as error:
-        raise StageError(f"{path}: can't be read as an image: {error}") from error
-    width, height = (max(4, 4 * round(n / 4)) for n in image.size)
-    if (width, height) != image.size:
-        image = image.resize((width, height), Image.Resampling.LANCZOS)
-    return np.asarray(image)
 
 
 def _export_volume(

@@ -7,7 +7,7 @@ layer.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,20 +33,50 @@ from stereocell.write.composed_values import (
 )
 from stereocell.write.gltf import Material
 from stereocell.write.usd_files import AsWritten
-from stereocell.write.usd_layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, move_box
+from stereocell.write.usd_layer import (
+    CHANNELS,
+    METERS_PER_UNIT,
+    ROOT,
+    SHAPE_HASH,
+    TILES,
+    hash_shape,
+    move_box,
+)
 
 _FARTHEST_UM = 1e12  # from the origin: what float32 and browsers still draw
 
 
 @dataclass(frozen=True, slots=True)
+class MadeMaps:
+    """Maps of a level that was made anew, uint8: normals (h, w, 3), openness (h, w), sRGB."""
+
+    normal: NDArray[np.uint8] | None
+    occlusion: NDArray[np.uint8] | None
+    color: NDArray[np.uint8] | None
+
+
+@dataclass(frozen=True, slots=True)
 class ComposedLod:
-    """One level of detail, in world um. `level` counts from the finest, 0."""
+    """One level of detail, in world um. `level` counts from the finest, 0.
+
+    matrix  (4, 4) for row vectors, from the mesh's own space to world um
+    shape   hash of the points and faces as composed; `built`: as the pipeline made them, or empty
+    own     the mesh prim's own transform
+    lost    what an edit left without sense: values for other vertices
+    images  maps in memory, where the level was made anew: see composed_edits.py
+    """
 
     level: int
     mesh: Mesh
     distance_um: float
     material: Material
     maps: ComposedMaps
+    matrix: NDArray[np.float64]
+    shape: str
+    built: str
+    own: tuple[float, ...]
+    lost: tuple[str, ...] = ()
+    images: MadeMaps | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,25 +212,88 @@ def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[Comp
 
     Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
     """
-    path = tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}")
     levels = [level for level in lod_levels(tile) if level >= finest]
     for level in levels or [0]:  # a flattened stage has one level, and no variants
-        if levels:
-            select_variant(tile, "lod", f"lod{level}")
-        prim = _drawn(tile, path)
-        if prim is None or not prim.IsA(UsdGeom.Mesh):
+        prim = mesh_at(tile, channel_id, level)
+        if prim is None:
             continue
         matrix = _to_world(prim)
+        built = str(prim.GetAttribute(SHAPE_HASH).Get() or "")
+        shape = hash_shape(UsdGeom.Mesh(prim)) if built else ""
         try:
             surface = surface_of(prim)
-            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, vertex_values_of(surface))
+            fed = vertex_values_of(surface)
+            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, fed, is_edited=shape != built)
         except StageError as error:
             raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
         if mesh is None:
             continue
         stretch = float(np.linalg.norm(matrix[:3, :3], 2))
         distance = shortest(*numbers_of(prim, "stereocell:distance", 1)) * stretch
-        yield ComposedLod(level, mesh, distance, material_of(surface), maps_of(surface))
+        own = UsdGeom.Xformable(prim).GetLocalTransformation()
+        lod = ComposedLod(
+            level,
+            mesh,
+            distance,
+            material_of(surface),
+            maps_of(surface),
+            matrix,
+            shape,
+            built,
+            tuple(np.array(own).ravel().tolist()),
+        )
+        yield lod if shape == built else _without_misfits(lod, prim, fed)
+
+
+def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> ComposedLod:
+    """Return an edited level without the maps and values at vertices that fit other faces."""
+    mesh, lost, has_color = lod.mesh, [], True
+    if lod.maps.any and mesh.uvs is None:
+        has_color = lod.maps.color is None
+        lod = replace(lod, maps=ComposedMaps())
+        lost.append("maps")
+    if "occlusion" in fed and mesh.openness is None:
+        lost.append("occlusion")
+    if "displayColor" in fed and mesh.colors is None:
+        lost.append("colours")
+        has_color = False
+    colors = np.array(UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() or [], np.float64)
+    if not has_color and colors.size:  # one instead of them
+        r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
+        lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
+    return replace(lod, lost=tuple(lost))
+
+
+def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
+    """Return an edited level's mesh in its own space. Raises StageError."""
+    prim = mesh_at(tile, channel_id, level)
+    found = None
+    if prim is not None:
+        fed = vertex_values_of(surface_of(prim))
+        found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), fed, is_edited=True)
+    if found is None:
+        raise StageError(f"{tile.GetPath()}/{channel_id}: lod{level} has no mesh any more")
+    return found
+
+
+def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
+    """Return the levels whose faces somebody took away, all of them."""
+    found = []
+    for level in lod_levels(tile) or [0]:
+        prim = mesh_at(tile, channel_id, level)
+        if prim is None or not prim.GetAttribute(SHAPE_HASH).Get():
+            continue
+        if not UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get():
+            found.append(level)
+    return found
+
+
+def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
+    """Return the mesh that is drawn at a level, which is selected; None: none is."""
+    if lod_levels(tile):
+        select_variant(tile, "lod", f"lod{level}")
+    prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))
+    return prim if prim is not None and prim.IsA(UsdGeom.Mesh) else None
 
 
 def _edit_advice(level: int) -> str:

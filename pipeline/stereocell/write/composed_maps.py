@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 from pxr import Usd, UsdShade
 
 from stereocell.errors import StageError
@@ -30,6 +33,24 @@ class ComposedMaps:
 def maps_of(surface: UsdShade.Shader) -> ComposedMaps:
     """Return the images that feed a surface. Raises StageError if one is missing."""
     return ComposedMaps(*(_image(surface, kind) for kind in ("normal", "occlusion", "color")))
+
+
+def read_image(path: Path | NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return an image uint8 (y, x, 3), both edges multiples of 4, as Basis Universal asks.
+
+    One that was made in memory has such edges, and may be (y, x). Raises StageError.
+    """
+    if not isinstance(path, Path):
+        return path if path.ndim == 3 else np.repeat(path[..., None], 3, axis=2)
+    try:
+        with Image.open(path) as file:
+            image = file.convert("RGB")
+    except OSError as error:
+        raise StageError(f"{path}: can't be read as an image: {error}") from error
+    width, height = (max(4, 4 * round(n / 4)) for n in image.size)
+    if (width, height) != image.size:
+        image = image.resize((width, height), Image.Resampling.LANCZOS)
+    return np.asarray(image)
 
 
 def vertex_values_of(surface: UsdShade.Shader) -> set[str]:

@@ -19,12 +19,16 @@ _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolati
 
 
 def read_mesh(
-    mesh: UsdGeom.Mesh, to_world: NDArray[np.float64], shown: Collection[str] = ()
+    mesh: UsdGeom.Mesh,
+    to_world: NDArray[np.float64],
+    shown: Collection[str] = (),
+    *,
+    is_edited: bool = False,
 ) -> Mesh | None:
     """Return the mesh in world um, at the default time; None if it has no faces.
 
     `to_world`: matrix for row vectors, (4, 4). `shown`: which of the primvars `displayColor` and
-    `occlusion` its look takes up.
+    `occlusion` its look takes up. `is_edited`: primvars that fit other faces are left out.
 
     Raises StageError where its arrays contradict each other.
     """
@@ -50,6 +54,14 @@ def read_mesh(
         **{name: _primvar(primvars.GetPrimvar(name)) for name in sorted(shown)},
     }
     values = {name: given for name, given in found.items() if given is not None}
+    if is_edited:
+        sizes = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
+        for name in sorted(values.keys() - {"normals"}):
+            array, kind = values[name]
+            if len(array) != sizes.get(kind, len(points)):
+                del values[name]
+        if "st" not in values:
+            values.pop("tangents", None)
     if all(kind in ("vertex", "varying") for _, kind in values.values()):
         triangles = indices[corners]
         arrays = {name: array for name, (array, _) in values.items()}
@@ -60,7 +72,7 @@ def read_mesh(
         triangles, points, arrays = _split(path, points, indices, counts, corners, values)
     if "normals" not in arrays:
         arrays["normals"] = _smooth_normals(points, triangles)
-    return _transform(
+    return move_mesh(
         Mesh(
             points,
             np.ascontiguousarray(triangles, dtype=np.uint32),
@@ -161,7 +173,7 @@ def _smooth_normals(
     return (total / np.where(lengths == 0, 1, lengths)).astype(np.float32)
 
 
-def _transform(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+def move_mesh(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
     """Return the mesh moved by a matrix for row vectors (4, 4). The identity keeps all bits."""
     if np.array_equal(matrix, np.eye(4)):
         return mesh

@@ -5,6 +5,7 @@ Importing this module registers the codeless API schema of schemas/usd with USD,
 schemas once, when the first stage of a process opens.
 """
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ CAMERAS = ROOT.AppendChild("Cameras")
 CHANNEL_API = "StereoCellChannelAPI"
 SPECIMEN_API = "StereoCellSpecimenAPI"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
+
+SHAPE_HASH = "stereocell:shapeHash"  # of a mesh: the shape that the pipeline gave it
 
 Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
 
@@ -70,6 +73,20 @@ def set_attribute(
     prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object, *, custom: bool = False
 ) -> None:
     prim.CreateAttribute(name, kind, custom).Set(value)
+
+
+def hash_shape(mesh: UsdGeom.Mesh) -> str:
+    """Return a hash of a mesh's points and faces as composed; empty: they are no numbers."""
+    digest = hashlib.sha256()
+    faces = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
+    for attribute, kind in ((mesh.GetPointsAttr(), "<f4"), *((one, "<i4") for one in faces)):
+        value = attribute.Get()
+        try:
+            array = np.ascontiguousarray([] if value is None else value, kind)
+        except (TypeError, ValueError):
+            return ""
+        digest.update(f"{array.size} ".encode() + array.tobytes())
+    return digest.hexdigest()[:32]
 
 
 def vec3f(points: ArrayLike) -> Vt.Vec3fArray:

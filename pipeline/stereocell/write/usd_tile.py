@@ -31,7 +31,9 @@ from stereocell.write.atomic import replacing_folder
 from stereocell.write.exr import write_atlas
 from stereocell.write.usd_layer import (
     CHANNELS,
+    SHAPE_HASH,
     export,
+    hash_shape,
     new_stage,
     set_attribute,
     vec3d,
@@ -219,6 +221,7 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
     if len(points):
         mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     set_attribute(mesh.GetPrim(), "stereocell:distance", _Types.Float, lod.distance_um, custom=True)
+    set_attribute(mesh.GetPrim(), SHAPE_HASH, _Types.String, hash_shape(mesh), custom=True)
     primvars = UsdGeom.PrimvarsAPI(mesh)
     vertex = UsdGeom.Tokens.vertex
     if lod.mesh.uvs is not None:
