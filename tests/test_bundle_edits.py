@@ -572,7 +572,9 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
         swell(1.25)(UsdGeom.Mesh(own.GetPrimAtPath("/r0_c0/CD31/CD31_r0_c0")))
     variants.SetVariantSelection("lod1")
     own.GetRootLayer().Save()
-    (line,) = write_bundle(tmp_path / "own/stage.usda", tmp_path / "a", None, Engine(0))
+    told: list[str] = []
+    write_bundle(tmp_path / "own/stage.usda", tmp_path / "a", None, Engine(0), tell=told.append)
+    (line,) = told
     assert "lod0 (sound); made anew from lod0: lod1" in line
     assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < 0.1
 
@@ -581,7 +583,9 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     tile = whole.GetPrimAtPath("/Specimen/Tiles/r0_c0")
     tile.GetVariantSet("lod").SetVariantSelection("lod0")
     whole.Export(str(tmp_path / "flat.usda"))
-    (line,) = write_bundle(tmp_path / "flat.usda", tmp_path / "flat", None, Engine(0))
+    told: list[str] = []
+    write_bundle(tmp_path / "flat.usda", tmp_path / "flat", None, Engine(0), tell=told.append)
+    (line,) = told
     assert line == "r0_c0/CD31: edited by hand: lod0 (sound)"
 
 
@@ -595,7 +599,9 @@ def test_points_in_other_units_are_told(stage, tmp_path):
     root = Sdf.Layer.CreateNew(str(tmp_path / "root.usda"))
     root.subLayerPaths = ["./an artist's.usda"]
     root.Save()
-    (line,) = write_bundle(tmp_path / "root.usda", tmp_path / "bundle", None, Engine(0))
+    told: list[str] = []
+    write_bundle(tmp_path / "root.usda", tmp_path / "bundle", None, Engine(0), tell=told.append)
+    (line,) = told
     assert "points of an artist's.usda, whose metersPerUnit is 0.01, are taken as um" in line
 
 
