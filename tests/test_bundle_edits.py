@@ -1,6 +1,7 @@
 """What is edited in a layer over the stage reaches the bundle, or is named."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,12 @@ from bundles import CD31, channel, factor, files, load, volumes, write_tiles
 from glbs import decoded_positions_m, read
 from stereocell.engine import Engine
 from stereocell.errors import StereoCellError
+from stereocell.mesh import Baked, Lod
+from stereocell.specimen import PaintColors
 from stereocell.write.bundle import write_bundle
+from stereocell.write.composed import loaded, open_stage
+from stereocell.write.composed_edits import shown_lods
+from stereocell.write.usd import TileExtent, write_stage, write_tile
 
 
 @pytest.fixture(scope="module")
@@ -611,3 +617,42 @@ def test_points_that_are_no_numbers_are_refused(edit):
 
     with pytest.raises(StereoCellError, match=r"CD31_r0_c0.points: a number that is not finite"):
         edit(lambda s: in_level(s, "lod0", spoil))
+
+
+@pytest.mark.parametrize("first_lod", [1, 2])
+def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, first_lod):
+    """By the stage's own settings: lod1 has maps, or values at its vertices."""
+    tile = spheres.tile(0)
+    (painted, *others) = tile.channels
+    lods = []
+    for lod in painted.lods:
+        bare = replace(lod.mesh, uvs=None, tangents=None)
+        high, front = (bare.positions[:, k] > spheres.CENTER[k] for k in (1, 2))
+        baked = Baked(np.where(high, 128, 255).astype(np.uint8), front.astype(np.uint8) * 255)
+        lods.append(Lod(bare, lod.distance_um, None, None, baked))
+    colors = PaintColors((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    painted = replace(painted, lods=tuple(lods), paint=colors)
+    tile = replace(tile, channels=(painted, *others))
+    write_tile(tmp_path, tile)
+    settings = {"lod": {"errors": [0.1, 0.5, 0.8]}, "unwrap": {"first_lod": first_lod}}
+    looks = (replace(spheres.RED, painted_by="Hoechst_x20_33342"), spheres.BLUE)
+    write_stage(tmp_path, "one", looks, [TileExtent.of(tile)], {"settings": settings})
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "edit.usda"))
+    layer.subLayerPaths = ["./stage.usda"]
+    over = Usd.Stage.Open(layer)
+    in_level(over, "lod0", swell(1.25))
+    layer.Save()
+    (line,) = write_bundle(tmp_path / "edit.usda", tmp_path / "bundle", None, Engine(0))
+    assert "made anew from lod0: lod1" in line
+    with loaded(open_stage(tmp_path / "edit.usda"), "r0_c0") as (prim, _):
+        _, lod, _ = shown_lods(prim, "CD31").lods
+    assert lod.material.color == (1, 1, 1)
+    if first_lod == 1:
+        color, openness = lod.images.color / 255, lod.images.occlusion / 255
+    else:
+        assert lod.images is None
+        color, openness = lod.mesh.colors, lod.mesh.openness
+    for share in (color[..., 0], color[..., 1]):  # half is red, half green, sharply
+        assert 0.3 < (share > 0.9).mean() < 0.7
+    assert 0.3 < (np.abs(openness - 128 / 255) < 0.02).mean() < 0.7
+    assert 0.3 < (openness > 0.98).mean() < 0.7

@@ -55,7 +55,7 @@ def _forget() -> None:
     ("file", "reached"),
     [
         ("pipeline/stereocell/cli.py", set()),
-        ("pipeline/stereocell/lod.py", {"units", "stage", "report"}),
+        ("pipeline/stereocell/lod.py", {"units", "stage", "bundle", "report"}),
         ("pipeline/stereocell/read/ome_zarr.py", {"units", "report"}),
         ("pipeline/stereocell/write/exr.py", {"stage", "bundle"}),
         ("pipeline/stereocell/write/gltf.py", {"bundle"}),
