@@ -2,44 +2,51 @@
 .DEFAULT_GOAL := help
 SHELL := /bin/bash
 
-PYTHON ?= python3
-SAMPLE ?= cycif
-WORKERS ?= $(shell nproc)
-ARGS ?=
+# What a person sets is data: taken as it stands, no dollar expanded, and given to commands by the
+# environment, where no shell reads it: "$$OUT" in a recipe, never $(OUT)
+SET := INPUT OUT SAMPLE WORKERS ARGS PYTHON CHROMIUM BLENDER_BASE STEREOCELL_DATA CI
+$(foreach name,$(SET),$(if $(filter-out undefined,$(origin $(name))),$(eval override export $(name) := $$(value $(name)))))
+
+export PYTHON ?= python3
+export SAMPLE ?= cycif
+export ARGS ?=
+ifndef WORKERS
+export WORKERS := $(shell nproc)
+endif
 ifeq ($(SAMPLE),brain-cells)
-OUT ?= out/brain-cells
+export OUT ?= out/brain-cells
 DEMO_INPUT := out/samples/brain-cells.ome.tif
 DEMO_ARGS := --preset lightsheet --grid 2x2
 else ifeq ($(SAMPLE),mri)
-OUT ?= out/mri-demo
+export OUT ?= out/mri-demo
 DEMO_INPUT := out/samples/head
 DEMO_ARGS := --preset mri
-else
-OUT ?= out/demo
+else ifeq ($(SAMPLE),cycif)
+export OUT ?= out/demo
 DEMO_INPUT := out/samples/cycif.ome.zarr
 DEMO_ARGS := --preset cycif --grid 5x2
-endif
-
-ifeq ($(filter $(SAMPLE),cycif brain-cells mri),)
+else
 $(error SAMPLE is $(SAMPLE), expected cycif, brain-cells or mri)
 endif
 
 VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(BIN)/stereocell
+WITH_ARGS := $(BIN)/python pipeline/with_args.py
 READY := $(VENV)/.ready
 VIEWER := viewer_gltf
 VIEWER_READY := $(VIEWER)/node_modules/.ready
 VIEWER_DIST := $(VIEWER)/dist/index.html
 VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/index.html $(VIEWER)/*.ts $(VIEWER)/*.json schemas -type f 2>/dev/null)
-CHROMIUM ?= $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
-export CHROMIUM
+ifndef CHROMIUM
+export CHROMIUM := $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
+endif
 # real volumes, where they are at hand; tests that want them skip without
 ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser need-input FORCE
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -48,9 +55,9 @@ help: ## Show this help
 setup: $(READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
 
 $(READY): requirements.lock pyproject.toml
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "setup: $(PYTHON) is $$($(PYTHON) --version), expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "setup: $$PYTHON is $$("$$PYTHON" --version), expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
+	test -x $(BIN)/python || "$$PYTHON" -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@# once, also where Python is told to keep no bytecode; by all cores, of which pip takes one
@@ -68,7 +75,7 @@ $(VIEWER_DIST): $(VIEWER_READY) $(VIEWER_SOURCES)
 	@touch $@
 
 browser: ## Install Debian's chromium for the browser tests, if it is missing and we may
-	@if [ -n "$(CHROMIUM)" ]; then :; \
+	@if [ -n "$$CHROMIUM" ]; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
 	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
@@ -76,49 +83,64 @@ browser: ## Install Debian's chromium for the browser tests, if it is missing an
 
 demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells or mri)
 	@mkdir -p out/samples
-	test -e $(DEMO_INPUT) || $(RUN) sample $(SAMPLE) $(DEMO_INPUT)
-	$(RUN) build $(DEMO_INPUT) -o $(OUT) --workers $(WORKERS) $(DEMO_ARGS) $(ARGS)
+	test -e $(DEMO_INPUT) || $(RUN) sample "$$SAMPLE" $(DEMO_INPUT)
+	$(WITH_ARGS) $(RUN) build $(DEMO_INPUT) --out="$$OUT" --workers="$$WORKERS" $(DEMO_ARGS) ARGS
 	@echo
-	@du -sh $(OUT)/stage $(OUT)/bundle $(OUT)/report
-	$(RUN) check $(OUT) --deep --workers $(WORKERS)
-	@echo "look at it:  make view OUT=$(OUT)"
+	@du -sh -- "$$OUT"/{stage,bundle,report}
+	$(RUN) check --deep --workers="$$WORKERS" -- "$$OUT"
+	@printf 'look at it:  make view OUT=%q\n' "$$OUT"
 
-need-input:
-	@test -n "$(INPUT)" || { echo "make: INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder" >&2; exit 2; }
+# Make can't have a space, `%` or `:` in the name of a file. So it finds a phase's file through a link
+# to OUT, in a folder by a checksum of OUT's name; there are a link to INPUT and what was asked for, too
+define newline
 
-plan: need-input $(OUT)/plan.json ## Settle what is built:  INPUT=... OUT=... [ARGS="--grid 5x2"]
-units: need-input $(OUT)/units/done.json ## ... then meshes and volumes of every tile and channel
-stage: need-input $(OUT)/stage/stage.usda ## ... then the USD stage
-bundle: need-input $(OUT)/bundle/manifest.json ## ... then the web bundle
-report: need-input $(OUT)/report/index.html ## ... then the page with pictures
 
-# what was asked for: another INPUT or other ARGS make the plan anew
-$(OUT)/.request: FORCE
-	@mkdir -p $(OUT)
-	@echo '$(INPUT) $(ARGS)' | cmp -s - $@ || echo '$(INPUT) $(ARGS)' > $@
-$(OUT)/plan.json: $(OUT)/.request $(wildcard $(INPUT)) | setup
-	$(RUN) plan $(INPUT) -o $(OUT) $(ARGS)
-	@touch $@
-$(OUT)/units/done.json: $(OUT)/plan.json
-	$(RUN) units $(OUT) --workers $(WORKERS)
-	@touch $@
-$(OUT)/stage/stage.usda: $(OUT)/units/done.json
-	$(RUN) stage $(OUT) --workers $(WORKERS)
-	@touch $@
-$(OUT)/bundle/manifest.json: $(OUT)/stage/stage.usda $(VIEWER_DIST)
-	$(RUN) bundle $(OUT) --workers $(WORKERS)
-	@touch $@
-$(OUT)/report/index.html: $(OUT)/bundle/manifest.json
-	$(RUN) report $(OUT)
+endef
+quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
+PLACE := out/.make/$(firstword $(shell printf %s $(call quoted,$(OUT)) | sha256sum))
+ifneq ($(filter plan units stage bundle report,$(MAKECMDGOALS)),)
+ifeq ($(INPUT),)
+$(error INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder)
+endif
+ifeq ($(OUT),)
+$(error OUT is empty, expected OUT=folder)
+endif
+$(shell mkdir -p $(PLACE); out=$(call quoted,$(OUT)) input=$(call quoted,$(INPUT)) args=$(call quoted,$(ARGS)); \
+  ln -sfnr -- "$$out" $(PLACE)/out; rm -f $(PLACE)/input; [ ! -e "$$input" ] || ln -sr -- "$$input" $(PLACE)/input; \
+  printf '%q ' "$$input" "$$args" | cmp -s - $(PLACE)/asked || printf '%q ' "$$input" "$$args" > $(PLACE)/asked)
+endif
+
+plan: $(PLACE)/out/plan.json ## Settle what is built:  INPUT=... OUT=... [ARGS="--grid 5x2"]
+units: $(PLACE)/out/units/done.json ## ... then meshes and volumes of every tile and channel
+stage: $(PLACE)/out/stage/stage.usda ## ... then the USD stage
+bundle: $(PLACE)/out/bundle/manifest.json ## ... then the web bundle
+report: $(PLACE)/out/report/index.html ## ... then the page with pictures
+
+# another INPUT or other ARGS make the plan anew
+$(PLACE)/out/plan.json: $(PLACE)/asked $(wildcard $(PLACE)/input) | setup
+	$(WITH_ARGS) $(RUN) plan --out="$$OUT" ARGS -- "$$INPUT"
+	@touch -c $@
+$(PLACE)/out/units/done.json: $(PLACE)/out/plan.json
+	$(RUN) units --workers="$$WORKERS" -- "$$OUT"
+	@touch -c $@
+$(PLACE)/out/stage/stage.usda: $(PLACE)/out/units/done.json
+	$(RUN) stage --workers="$$WORKERS" -- "$$OUT"
+	@touch -c $@
+$(PLACE)/out/bundle/manifest.json: $(PLACE)/out/stage/stage.usda $(VIEWER_DIST)
+	$(RUN) bundle --workers="$$WORKERS" -- "$$OUT"
+	@touch -c $@
+$(PLACE)/out/report/index.html: $(PLACE)/out/bundle/manifest.json
+	$(RUN) report -- "$$OUT"
+	@touch -c $@
 
 check: setup ## Hold OUT against schemas, USD, glTF and KTX2 rules
-	$(RUN) check $(OUT)
+	$(RUN) check -- "$$OUT"
 
 view: setup ## Serve OUT's bundle on localhost and open a browser
-	$(RUN) view $(OUT)
+	$(RUN) view -- "$$OUT"
 
 serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
-	$(RUN) serve $(OUT) $(ARGS)
+	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
 lint: setup ## ruff, mypy, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
@@ -139,14 +161,14 @@ test: setup browser ## All tests, in headless Chromium too
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
 # a process for each core, and of each one thread: others would wait for one another, busily
 test-python: setup
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $(WORKERS) --durations 25
+	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n "$$WORKERS" --durations 25
 
 test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test
 	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/demo
 	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
 	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
-	$(RUN) check out/brain-cells --deep --workers $(WORKERS)
+	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
 	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
 	$(BIN)/python tests/assets.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
@@ -155,26 +177,26 @@ test-viewer: setup browser
 	cp -r out/edit/built/bundle out/edit/before
 	$(BIN)/python tests/edits.py layer out/edit
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
-	cd $(VIEWER) && STEREOCELL_TEST_BUNDLE=$(abspath out/demo/bundle) \
-	  STEREOCELL_REAL_BUNDLE=$(abspath out/brain-cells/bundle) \
-	  STEREOCELL_F_BUNDLES=$(abspath out/f)/of-f.ome.tif/bundle:$(abspath out/f)/of-f.ome.zarr/bundle:$(abspath out/f)/of-f.nii.gz/bundle:$(abspath out/f)/of-dicom/bundle \
-	  STEREOCELL_EDIT_BUNDLES=$(abspath out/edit/before):$(abspath out/edit/built/bundle) \
+	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/demo/bundle" \
+	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
+	  STEREOCELL_F_BUNDLES="$$out/f/of-f.ome.tif/bundle:$$out/f/of-f.ome.zarr/bundle:$$out/f/of-f.nii.gz/bundle:$$out/f/of-dicom/bundle" \
+	  STEREOCELL_EDIT_BUNDLES="$$out/edit/before:$$out/edit/built/bundle" \
 	  npm exec --silent -- vitest run --project browser
 
 # Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
 BLENDER := $(VENV)/blender
-BLENDER_BASE ?= python3.11
+export BLENDER_BASE ?= python3.11
 test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .venv/blender)
 	@$(BLENDER)/bin/python -c 'import bpy' >/dev/null 2>&1 \
-	  || { $(BLENDER_BASE) -m venv --clear $(BLENDER) \
+	  || { "$$BLENDER_BASE" -m venv --clear $(BLENDER) \
 	       && $(BLENDER)/bin/pip install --quiet --disable-pip-version-check bpy==5.0.1 'numpy<2'; } \
-	  || echo "test-blender: bpy 5.0.1 can't be installed here (it wants $(BLENDER_BASE) and 350 MB)" >&2
+	  || echo "test-blender: bpy 5.0.1 can't be installed here (it wants $$BLENDER_BASE and 350 MB)" >&2
 	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
 	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/test_blender.py; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
 
 object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
-	GOBIN=$(abspath $(BIN)) go install github.com/versity/versitygw/cmd/versitygw@latest
+	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest
 
 torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs
 	$(BIN)/python tests/torture.py 50
@@ -205,11 +227,11 @@ bench-serve: setup ## The tree of bricks, its picture by bytes, and 50 clients f
 BENCH_VIEWER := tests/bench/viewer
 bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, and against float64
 	@if ! command -v npm >/dev/null; then echo "bench-viewer: skipped: no node and npm"; \
-	elif [ -z "$(CHROMIUM)" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
+	elif [ -z "$$CHROMIUM" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else \
 	  cd $(BENCH_VIEWER) && { test node_modules/.ready -nt package-lock.json \
 	    || { npm ci --ignore-scripts --no-audit --no-fund --loglevel=error && touch node_modules/.ready; }; } \
-	  && $(abspath $(BIN))/python bench.py $(abspath out/bench-viewer); \
+	  && "$$OLDPWD/$(BIN)/python" bench.py "$$OLDPWD/out/bench-viewer"; \
 	fi
 
 wheel: setup ## A wheel with the built viewer in it: out/wheel
