@@ -130,6 +130,31 @@ def test_what_is_lost_or_half_made_there_is_made_again(
 
 
 @pytest.mark.slow
+def test_flipped_bits_there_are_named_and_get_no_further(
+    store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs = store.files()
+    before = of_parts(kept(store, "bucket/there"))
+    (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
+    (atlas,) = [key for key in before if key.startswith("stage/tiles/r0_c0/") and ".exr" in key]
+    for key, phase in ((unit, "stage"), (atlas, "bundle")):
+        whole = fs.cat_file(f"bucket/there/{key}")
+        middle = len(whole) // 2
+        flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
+        fs.pipe_file(f"bucket/there/{key}", flipped)
+        capsys.readouterr()
+        assert main(["check", there]) == 1
+        assert f": {key}: damaged: remove what is damaged and run" in capsys.readouterr().out
+        if phase == "stage":
+            fs.rm("bucket/there/stage/tiles/r0_c0", recursive=True)
+        assert main([phase, there, "--workers", "0"]) == 1
+        assert f"{there}/{key}: damaged" in capsys.readouterr().err
+        fs.rm(f"bucket/there/{key}")
+        assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+        assert of_parts(kept(store, "bucket/there")) == before
+
+
+@pytest.mark.slow
 def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_alone(
     store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
