@@ -22,6 +22,7 @@ from stereocell.documents import read_json
 from stereocell.errors import CheckError, OutputError, StereoCellError
 from stereocell.file_list import measure
 from stereocell.mirror import sizes_below
+from stereocell.read.location import Location, require_own
 from stereocell.store import Store
 from stereocell.tilesets import Content, walk
 from stereocell.tissue_files import FOLDER, RECORD, read_whole
@@ -29,6 +30,7 @@ from stereocell.transfer2d import find_fault, shapes_from
 from stereocell.validate_usd import validate_stage, validate_usdz
 from stereocell.write import usd_files
 from stereocell.write.bundle import FILES, MANIFEST
+from stereocell.write.composed import dependencies
 from stereocell.write.exr import check_exr
 from stereocell.write.stl import check_stl
 from stereocell.write.tiles3d import CONTENT_HASH, content_hash
@@ -150,6 +152,7 @@ def _check_stage(out: Path) -> str:
     store = Store(out)
     store.require_finished("stage")
     path = store.stage_file
+    dependencies(path, path.parent)  # refuses what is not the stage's own
     findings = validate_stage(path)
     raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"
@@ -160,6 +163,7 @@ def _check_usdz(path: Path) -> str:
         raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
     if not path.is_file():
         return f"no {path.name}: a specimen without surfaces has none"
+    dependencies(path, path.parent)
     raise_on([str(finding) for finding in validate_usdz(path)])
     return f"{path.name}: nothing found by the validators of usdz and by our own rules"
 
@@ -174,6 +178,7 @@ def _check_stage_files(out: Path) -> str:
     problems = _lost_copies(out)
     for path in paths:
         try:
+            require_own(path, [Location.of(folder).folder], str(path), CheckError)
             _WHOLE[path.suffix](path)
         except StereoCellError as error:
             problems.append(str(error))

@@ -9,12 +9,12 @@ from stereocell.check import CheckLine, raise_on
 from stereocell.deep_bundle import BundleTask, hold_histograms, hold_manifest, hold_tile
 from stereocell.deep_source import SourceTask, UnitFinding, hold_unit
 from stereocell.engine import Engine
-from stereocell.errors import OutputError, StereoCellError
+from stereocell.errors import OutputError, StageError, StereoCellError
 from stereocell.plan import Channel, Plan
 from stereocell.rounds import unit_tasks
 from stereocell.store import Store
 from stereocell.write.bundle import MANIFEST
-from stereocell.write.composed import open_stage, tile_prims
+from stereocell.write.composed import dependencies, open_stage, tile_prims
 from stereocell.write.composed_look import read_looks
 from stereocell.write.composed_values import shortest
 
@@ -34,6 +34,13 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
             "the bundle is held against"
         )
     plan = store.plan()
+    exported, bundle = stage or store.stage_file, store.bundle_dir
+    try:
+        for path in (store.stage_file, exported):
+            dependencies(path, store.stage_dir)
+    except StageError as error:
+        yield CheckLine("files of the stage", False, _one_line(error))
+        return
     yield _line("tiles of the stage", lambda: _hold_tiles(store, plan))
     try:
         store.require_units_of(plan)
@@ -46,7 +53,6 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
     else:
         for channel in plan.channels if findings else ():
             yield from _channel_lines(channel, findings, odd)
-    exported, bundle = stage or store.stage_file, store.bundle_dir
     yield _line("manifest against stage", lambda: _hold_manifest(exported, bundle))
     yield _line("bundle against stage", lambda: _hold_bundle(exported, bundle, engine))
 

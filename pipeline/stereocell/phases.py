@@ -172,7 +172,8 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
             raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
         kept = objects_below(path.parent)
-        made_of = [str(path.absolute()), _states(dependencies(path))] if kept is None else kept
+        files = dependencies(path, store.stage_dir)  # first: it refuses those of others
+        made_of = [str(path.absolute()), _states(files)] if kept is None else kept
         page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
         key = key_of([made_of, page], bundle)
         if kept is not None and store.is_begun("bundle"):

@@ -8,15 +8,17 @@ layer.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol
 
 from stereocell.errors import StageError
 from stereocell.mesh import Mesh
 from stereocell.mirror import at_hand
+from stereocell.read.location import Location, require_own
 from stereocell.write.composed_choice import TileChoice, lod_levels, read_choice
 from stereocell.write.composed_look import material_of, surface_of
 from stereocell.write.composed_maps import ComposedMaps, maps_of, vertex_values_of
@@ -121,20 +123,44 @@ def open_stage(path: Path) -> Usd.Stage:
     return stage
 
 
-def dependencies(path: Path) -> list[Path]:
-    """Return every file that the stage is made of: layers, also unselected ones, and assets.
+def dependencies(path: Path, stage_dir: Path) -> list[Path]:
+    """Return every file that a stage is made of: layers, also unselected ones, and assets.
 
-    A stage that can't be opened depends on itself; `open_stage` says what is wrong with it.
+    None is opened that isn't the stage's own: in the folder of the layer `path`, in `stage_dir` or
+    below. Raises StageError for one that is not; what can't be opened, `open_stage` tells.
     """
+    folders = [Location.of(path).folder, Location.of(stage_dir).folder]
+    files, names, waiting = {path}, {str(path)}, [str(path)]
     quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        layers, assets, _ = UsdUtils.ComputeAllDependencies(str(path))
-    except Tf.ErrorException:
-        return [path]
+        while waiting:
+            for asset, name in _named_in(waiting.pop()):
+                file = Path(Ar.SplitPackageRelativePathOuter(name)[0])  # what is in a .usdz: that
+                if name in names or not require_own(file, folders, asset, StageError):
+                    continue
+                files.add(file)
+                names.add(name)
+                if Sdf.FileFormat.FindByExtension(name) is not None:
+                    waiting.append(name)
     finally:
         del quiet
-    files = {path, *(Path(layer.realPath) for layer in layers), *(Path(str(a)) for a in assets)}
     return sorted(file for file in files if file.is_file())
+
+
+def _named_in(name: str) -> Iterator[tuple[str, str]]:
+    """Yield what one layer names, as an error would say it, and the path that USD would open."""
+    try:
+        layer = Sdf.Layer.FindOrOpen(name)
+        named = chain(*UsdUtils.ExtractExternalReferences(name)) if layer else ()
+    except Tf.ErrorException:
+        return
+    if layer and layer.expressionVariables:  # layers above it could make other paths of them
+        raise StageError(f"{name}: expressionVariables: found some, expected paths without them")
+    for asset in named:
+        path = Sdf.ComputeAssetPathRelativeToLayer(layer, Sdf.Layer.SplitIdentifier(asset)[0])
+        found = str(Ar.GetResolver().Resolve(path))
+        if found:
+            yield f"{name}: {asset!r}", found
 
 
 def specimen_name(stage: Usd.Stage) -> str:
