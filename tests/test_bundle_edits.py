@@ -642,7 +642,9 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
     over = Usd.Stage.Open(layer)
     in_level(over, "lod0", swell(1.25))
     layer.Save()
-    (line,) = write_bundle(tmp_path / "edit.usda", tmp_path / "bundle", None, Engine(0))
+    told: list[str] = []
+    write_bundle(tmp_path / "edit.usda", tmp_path / "bundle", None, Engine(0), tell=told.append)
+    (line,) = told
     assert "made anew from lod0: lod1" in line
     with loaded(open_stage(tmp_path / "edit.usda"), "r0_c0") as (prim, _):
         _, lod, _ = shown_lods(prim, "CD31").lods
