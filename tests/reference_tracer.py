@@ -2,7 +2,7 @@
 
 What the viewer's shader does in another way: one majorant for the whole volume (Woodcock et al.
 1965), no environment sampling, lamps by binary shadow rays; the same medium, the same scattering.
-Reads the run as JSON (viewer_gltf/test/trace/harness.ts) on standard input, with "paths"; prints
+Reads the run as JSON (viewer_gltf/test/support/pathtrace/harness.ts) on standard input, with "paths"; prints
 mean and standard error of premultiplied colour and coverage over the picture.
 """
 

@@ -146,7 +146,7 @@ VIEWER = find_asset("viewer_gltf")
 def test_the_viewer_makes_the_same_bytes(tmp_path: Path) -> None:
     cases = [SHAPES, (RECTANGLE, TRIANGLE), *(random_shapes(seed) for seed in range(40))]
     assert sum(map(len, cases)) > 60
-    twin = (VIEWER / "src/volume/shapes2d.ts").as_posix()
+    twin = (VIEWER / "src/state/transfer_shapes.ts").as_posix()
     (tmp_path / "twin.ts").write_text(
         f'import {{ rasterise }} from "{twin}";\n'
         'import { readFileSync, writeFileSync } from "node:fs";\n'

@@ -75,7 +75,7 @@ export default defineConfig({
           name: "browser",
           include: ["test/**/*.test.ts"],
           environment: "node",
-          globalSetup: "test/driver/shared_fixture.ts",
+          globalSetup: "test/support/browser/shared_fixture.ts",
           testTimeout: 180_000,
           hookTimeout: 180_000,
           expect: { poll: { timeout: 20_000 } }, // its usual second is short for a busy machine

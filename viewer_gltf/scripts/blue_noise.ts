@@ -1,13 +1,13 @@
 /**
  * A tile of blue noise by void and cluster (Ulichney, The void-and-cluster method for dither array
  * generation, SPIE 1913, 1993): texels are ranked so that those below any threshold lie as evenly
- * as they can, across the tile's edges too. Writes src/shaders/blue_noise.ts, the same every time:
+ * as they can, across the tile's edges too. Writes src/gpu/blue_noise.ts, the same every time:
  *
  *   npx tsx scripts/blue_noise.ts
  */
 import { writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
-import { seeded } from "../test/seeded";
+import { seeded } from "../test/support/seeded";
 
 const SIZE = 64;
 const SEED = 1993;
@@ -128,6 +128,6 @@ export function blueNoise(): Uint8Array<ArrayBuffer> {
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-  const out = new URL("../src/shaders/blue_noise.ts", import.meta.url);
+  const out = new URL("../src/gpu/blue_noise.ts", import.meta.url);
   await writeFile(out, moduleText(blueNoiseTexels()));
 }

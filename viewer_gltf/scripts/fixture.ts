@@ -1,5 +1,5 @@
 /** Write the tests' synthetic bundle, to look at it: `npm run fixture -- FOLDER`. */
-import { writeFixture } from "../test/fixture/bundle";
+import { writeFixture } from "../test/support/fixture/bundle";
 
 const [folder] = process.argv.slice(2);
 if (folder === undefined) {

@@ -15,9 +15,9 @@
  *     --page                 the bundle's own index.html instead of dist/
  */
 import { parseArgs } from "node:util";
-import { addHeadset, launch } from "../test/driver/chromium";
-import { Host } from "../test/driver/host";
-import { ViewerPage } from "../test/driver/page";
+import { addHeadset, launch } from "../test/support/browser/chromium";
+import { Host } from "../test/support/browser/host";
+import { ViewerPage } from "../test/support/browser/page";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,

@@ -2,7 +2,7 @@
 import { BundleError, TemporaryError } from "./errors";
 import type { FileRef } from "./generated/bundle";
 import { checkHash } from "./hash";
-import { noteAsked } from "./log";
+import { noteAsked } from "./request_log";
 import { withRetries } from "./retry";
 
 /** The address of a path that a manifest names; the bundle's query, if any, goes with it. */

@@ -6,8 +6,8 @@
  */
 import { checkFile, fileAddress } from "../bundle/fetch";
 import type { FileRef } from "../bundle/generated/bundle";
-import type { Asked } from "../bundle/log";
-import { type Keys, ownBundle, type Plan, planFor } from "./plan";
+import type { Asked } from "../bundle/request_log";
+import { type Keys, ownBundle, type Plan, planFor } from "./request_plan";
 import type { Store } from "./store";
 
 /** A network that takes longer than this to answer counts as none where a copy is kept. */

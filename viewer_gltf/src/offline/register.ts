@@ -1,6 +1,6 @@
 /** Make the viewer and what it has shown usable without a network, where the browser can. */
-import { takeAsked } from "../bundle/log";
-import { ownBundle } from "./plan";
+import { takeAsked } from "../bundle/request_log";
+import { ownBundle } from "./request_plan";
 import type { Opened } from "./sw";
 import workerAddress from "./sw?worker&url";
 

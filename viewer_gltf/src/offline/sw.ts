@@ -2,9 +2,9 @@
  * The service worker: hands the page's requests to the keeper. It serves the viewer's folder, and
  * is built as sw.js beside index.html, with the list of the viewer's files filled in.
  */
-import type { Asked } from "../bundle/log";
+import type { Asked } from "../bundle/request_log";
 import { Keeper } from "./keeper";
-import { Keys } from "./plan";
+import { Keys } from "./request_plan";
 import { Store } from "./store";
 
 /**

@@ -11,9 +11,9 @@ import {
   Quaternion,
   Vector3,
 } from "three";
-import type { RoomRay } from "../gaze/pointer";
-import { leaveUncut } from "../panel3d/uncut";
-import type { HandPose } from "../view/grab";
+import { leaveUncut } from "../gpu/unclipped_material";
+import type { RoomRay } from "../interaction/ray_pointer";
+import type { HandPose } from "../math/grab";
 
 /** `press` and `release` are of the trigger held, `select` is the trigger used. */
 export type HandEvent = Readonly<{

@@ -1,14 +1,14 @@
 /** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
 import { type Camera, Matrix4, type WebGLRenderer } from "three";
 import { BundleError } from "../bundle/errors";
-import type { ViewerState } from "../state";
-import type { Command } from "../ui/commands";
-import type { Eyes } from "../view/eyes";
-import type { Profile } from "./cardboard/profile";
+import type { Eyes } from "../gpu/eyes";
+import type { Command } from "../state/commands";
+import type { ViewerState } from "../state/viewer_state";
 import type { SplitSession } from "./cardboard/split_session";
-import { askInTap } from "./cardboard/tap";
-import { Hands, type HandsOptions } from "./hands";
-import { betweenEyes } from "./head";
+import { askInTap } from "./cardboard/user_gesture";
+import type { Profile } from "./cardboard/viewer_profile";
+import { betweenEyes } from "./head_pose";
+import { Hands, type HandsOptions } from "./interaction";
 import { XrSession } from "./session";
 
 export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &

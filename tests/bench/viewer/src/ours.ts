@@ -10,14 +10,14 @@ import {
   WebGLRenderTarget,
 } from "three";
 import type { TileVolume } from "viewer/bundle/generated/volumes";
-import { Cuts } from "viewer/view/cuts";
-import { DepthPass } from "viewer/view/depth_pass";
-import { Eyes } from "viewer/view/eyes";
-import { MarchPass } from "viewer/view/march_pass";
-import { brickCounts } from "viewer/volume/brick_counts";
-import { opacities } from "viewer/volume/luts";
-import { occupancyDistances } from "viewer/volume/occupancy";
-import { makeFrame, TileMarch } from "viewer/volume/tile_march";
+import { Cuts } from "viewer/gpu/clip_planes";
+import { DepthPass } from "viewer/render/depth_pass";
+import { Eyes } from "viewer/gpu/eyes";
+import { MarchPass } from "viewer/render/raymarch_pass";
+import { brickCounts } from "viewer/volumes/bricks8";
+import { opacities } from "viewer/volumes/transfer_luts";
+import { occupancyDistances } from "viewer/volumes/empty_space";
+import { makeFrame, TileMarch } from "viewer/volumes/tile_raymarch";
 import { serve } from "./page";
 import type { About, Camera, Renderer, Scene } from "./scene";
 

@@ -11,13 +11,13 @@ import {
   Vector4,
   WebGLRenderer,
 } from "three";
-import { environmentTables } from "viewer/trace/environment";
-import { START_TRACE } from "viewer/trace/settings";
-import { Tracer } from "viewer/trace/tracer";
-import { Cuts } from "viewer/view/cuts";
-import { DepthPass } from "viewer/view/depth_pass";
-import { Eyes } from "viewer/view/eyes";
-import { LAST, Overlay } from "viewer/view/overlay";
+import { environmentTables } from "viewer/pathtrace/environment_sampling";
+import { START_TRACE } from "viewer/state/path_trace_settings";
+import { Tracer } from "viewer/pathtrace/path_tracer";
+import { Cuts } from "viewer/gpu/clip_planes";
+import { DepthPass } from "viewer/render/depth_pass";
+import { Eyes } from "viewer/gpu/eyes";
+import { LAST, Overlay } from "viewer/gpu/composite_pass";
 import { serve } from "./page";
 import type { Camera, Renderer, Scene } from "./scene";
 

@@ -19,7 +19,7 @@ import {
 import fragment from "./distortion.frag.glsl?raw";
 import vertex from "./distortion.vert.glsl?raw";
 import { eyeTangents, type Screen, type Side, toScreen } from "./lens";
-import type { Profile } from "./profile";
+import type { Profile } from "./viewer_profile";
 
 const CELLS = 40;
 const SIDES: readonly Side[] = ["left", "right"];

@@ -10,7 +10,7 @@ import {
   toScreen,
   undistort,
 } from "./lens";
-import { CARDBOARD_V1, CARDBOARD_V2, type Profile } from "./profile";
+import { CARDBOARD_V1, CARDBOARD_V2, type Profile } from "./viewer_profile";
 
 const PHONE: Screen = { width_m: 0.14, height_m: 0.065, border_m: 0.003 };
 const tan = (deg: number) => Math.tan((deg * Math.PI) / 180);

@@ -5,7 +5,7 @@
  * r (1 + k1 r^2 + k2 r^4 + ...). Each eye's picture is drawn undistorted, by these tangents, and
  * put on the screen through the inverse, so that the lens makes it straight again.
  */
-import type { Profile } from "./profile";
+import type { Profile } from "./viewer_profile";
 
 export type Side = "left" | "right";
 

@@ -28,12 +28,12 @@ import {
 } from "three";
 import { BundleError } from "../../bundle/errors";
 import { DistortionPass } from "./distortion_pass";
-import { type Eye, EyeCameras } from "./eyes";
+import { type Eye, EyeCameras } from "./eye_cameras";
 import { cssPixelsPerInch, screenOf } from "./lens";
 import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
-import { CARDBOARD_V2, type Profile } from "./profile";
 import type { ScreenHold } from "./screen";
-import type { Asked } from "./tap";
+import type { Asked } from "./user_gesture";
+import { CARDBOARD_V2, type Profile } from "./viewer_profile";
 
 const SAMPLES = 4;
 

@@ -1,0 +1,264 @@
+/**
+ * All that is drawn on the specimen and is no part of it: handles of the clip and of the lamps,
+ * measured points, scale bar, orientation, names. And what a ray means among them.
+ */
+import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
+import type { Box } from "../math/clip";
+import { type Ray, shownBox } from "../math/pick";
+import type { Action, ViewerState } from "../state/viewer_state";
+import { ClipMark } from "./clip_gizmo";
+import {
+  dragHandle,
+  type HandleId,
+  handlesOf,
+  type Pointing,
+  pickHandle,
+  TOLERANCE_RAD,
+} from "./clip_handles";
+import { HandleTarget } from "./handle_target";
+import { type Named, NameMark } from "./hover_name";
+import { LampMark } from "./lamp_gizmo";
+import { dragLamp, isLampHandle, lampHandles } from "./lamp_handles";
+import { MeasureMark } from "./measurement";
+import { Axes, OrientationMark } from "./orientation_axes";
+import type { Cone } from "./probe";
+import { Reading, type ReadingOptions } from "./probe_reader";
+import { Ruler } from "./ruler";
+import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
+import { type Sight, screenZoom } from "./style";
+
+/** A head that is held still moves by less. */
+const TREMBLE_M = 0.03;
+
+export type MarksOptions = ReadingOptions &
+  Readonly<{
+    dispatch: (action: Action) => void;
+    /** The picture differs now. */
+    onChange: () => void;
+  }>;
+
+/** A flat picture. */
+export type MarksScreen = Readonly<{
+  camera: PerspectiveCamera;
+  /** CSS pixels. */
+  height_px: number;
+  /** What is looked at, room: the scale bar is true there. */
+  focus: Vector3;
+}>;
+
+/** From where the marks are seen in a frame. */
+export type MarksView = Readonly<{
+  /** Pose of the head or of the mono camera, room. */
+  head: Matrix4;
+  /** From um to the room. */
+  specimen: Matrix4;
+  /** null in stereo. */
+  screen: MarksScreen | null;
+  /** Straight ahead, um. */
+  gaze: Ray;
+  /** Where volumes show in disc mode. */
+  disc: Cone | null;
+  /** The panel lies beside the specimen, and ruler and axes would lie across it. */
+  isPanelOpen: boolean;
+  dt_s: number;
+}>;
+
+export class Marks {
+  /** Child of the specimen's group: um, world. */
+  readonly group = new Object3D();
+  readonly handles = new ClipMark();
+  readonly lamps = new LampMark();
+  /** The handles, for gaze and hands in stereo. */
+  readonly target: HandleTarget;
+  readonly measured: MeasureMark;
+  readonly scaleBar = new ScaleBarMark();
+  readonly orientation = new OrientationMark();
+  readonly name = new NameMark();
+  readonly ruler = new Ruler();
+  readonly axes = new Axes();
+  private readonly reading: Reading;
+  private readonly toSpecimen = new Matrix4();
+  private sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
+  /** The lamp that the ray which drags it has lost over its rim. */
+  private beside: HandleId | null = null;
+  /** How many surfaces are on screen. */
+  private surfaces = 0;
+  private isDisposed = false;
+
+  constructor(
+    private readonly options: MarksOptions,
+    private state: ViewerState,
+  ) {
+    this.reading = new Reading(options, state);
+    this.target = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
+    this.measured = new MeasureMark((point) => this.reading.valuesAt(point), options.onChange);
+    const { handles, lamps, measured, ruler, axes, name } = this;
+    this.group.name = "marks";
+    this.group.add(handles.group, lamps.group, measured.group);
+    this.group.add(ruler.group, axes.group, name.group);
+    this.follow(state);
+  }
+
+  /** For the stage, over the canvas. */
+  get overlayElements(): readonly (HTMLElement | SVGElement)[] {
+    return [this.scaleBar.root, this.orientation.root, this.name.root];
+  }
+
+  /** What the pass for the depth has to leave out. */
+  get overlays(): readonly Object3D[] {
+    return [this.group];
+  }
+
+  follow(state: ViewerState): void {
+    this.state = state;
+    this.reading.state = state;
+    this.handles.show(state.clip, this.shown);
+    this.lamps.show(state, this.specimen);
+    const cuts = handlesOf(state.clip, this.shown);
+    this.target.handles = [...cuts, ...lampHandles(state, this.specimen)];
+    this.showMeasured();
+    this.name.forget();
+  }
+
+  /** Before every frame, drawn or not. */
+  update(view: MarksView): void {
+    const { eye_um, up } = this.sight;
+    this.toSpecimen.copy(view.specimen).invert();
+    eye_um.setFromMatrixPosition(view.head).applyMatrix4(this.toSpecimen);
+    up.setFromMatrixColumn(view.head, 1).transformDirection(this.toSpecimen);
+    const zoom = view.screen === null ? 1 : screenZoom(pxPerRad(view.screen));
+    this.sight = { eye_um, up, zoom };
+    this.target.specimen = view.specimen;
+    this.reading.specimen = view.specimen;
+    this.reading.disc = view.disc;
+    const m_per_um = view.specimen.getMaxScaleOnAxis();
+    const surfaces = this.options.surfaces().length;
+    if (surfaces !== this.surfaces) this.name.ask(); // they come and refine, too
+    this.surfaces = surfaces;
+    this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
+    if (this.state.measured.length > 0) this.showMeasured(); // volumes come and refine
+    if (view.screen === null) this.updateInRoom(view.isPanelOpen);
+    else this.updateOnScreen(view, view.screen, m_per_um);
+    this.handles.update(this.sight);
+    this.lamps.update(this.sight);
+    this.measured.update(this.sight);
+  }
+
+  /** Of each measured point: each shown channel's value, as `DAPI 1210`; those that have come. */
+  get values(): readonly (readonly string[])[] {
+    return this.state.measured.map((_, i) =>
+      this.measured
+        .valuesAt(i === 0 ? 0 : 1)
+        .split("\n")
+        .filter((line) => line !== ""),
+    );
+  }
+
+  /** Read the values of the measured points once more. */
+  readAnew(): void {
+    this.measured.readAnew();
+  }
+
+  /** The handle that a ray (um) means. */
+  pick(ray: Ray, pointing: Pointing): HandleId | null {
+    return pickHandle(ray, this.target.handles, this.sight.zoom * TOLERANCE_RAD[pointing]);
+  }
+
+  /** Bring a handle to a ray (um). */
+  drag(id: HandleId, ray: Ray): void {
+    const { state } = this;
+    if (!isLampHandle(id)) {
+      const action = dragHandle(id, ray, state.clip, this.shown);
+      if (action !== null) this.options.dispatch(action);
+      return;
+    }
+    const drag = dragLamp(id, ray, state, this.specimen, this.beside === id);
+    if (drag === null) return;
+    this.beside = drag.isBeside ? id : null;
+    if (drag.action !== null) this.options.dispatch(drag.action);
+  }
+
+  /** Light up what is pointed at, or held. */
+  mean(id: HandleId | null): void {
+    if (!this.handles.mean(id)) return;
+    this.lamps.mean(id);
+    this.lamps.show(this.state, this.specimen);
+    this.options.onChange();
+  }
+
+  /** Measure from or to what a ray (um) means: the first point, the second, a first one again. */
+  async measure(ray: Ray): Promise<void> {
+    const found = await this.reading.probe(ray);
+    if (found === null || this.isDisposed) return;
+    const { measured } = this.state;
+    const points = measured.length === 1 ? [...measured, found.point] : [found.point];
+    this.options.dispatch({ type: "measure", points });
+  }
+
+  /** Box of what is shown: the specimen, or the isolated tile. */
+  private get shown(): Box {
+    return shownBox(this.options.manifest, this.state.isolated);
+  }
+
+  private get specimen(): Box {
+    return this.options.manifest.specimen.bounds_um;
+  }
+
+  private updateInRoom(isPanelOpen: boolean): void {
+    const { sight, shown } = this;
+    this.mean(this.target.takeSeen());
+    this.scaleBar.update(null);
+    this.orientation.root.style.display = "none";
+    this.ruler.update(shown, sight);
+    if (isPanelOpen) this.ruler.group.visible = false;
+    this.axes.group.visible = !isPanelOpen;
+    this.axes.update(shown, sight);
+    this.name.placeInRoom(sight);
+  }
+
+  private updateOnScreen(
+    { head, specimen }: MarksView,
+    screen: MarksScreen,
+    m_per_um: number,
+  ): void {
+    const { camera, height_px, focus } = screen;
+    this.ruler.group.visible = false;
+    this.axes.group.visible = false;
+    this.scaleBar.update(umPerPixelAt(focus, camera, height_px, m_per_um));
+    this.orientation.root.style.display = "";
+    this.orientation.update(head, specimen);
+    this.name.showOnScreen();
+  }
+
+  private showMeasured(): void {
+    const { measured } = this.state;
+    this.measured.show(measured, this.reading.sourcesKey(measured));
+  }
+
+  private nameOf(gaze: Ray): Named | null {
+    const probed = this.reading.glance(gaze);
+    if (probed === null) return null;
+    const channel = this.state.channels.find(({ id }) => id === probed.channel);
+    const text = channel === undefined ? probed.tile : `${probed.tile} · ${channel.name}`;
+    return { probed, text };
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    this.reading.dispose();
+    this.handles.dispose();
+    this.lamps.dispose();
+    this.measured.dispose();
+    this.scaleBar.dispose();
+    this.orientation.dispose();
+    this.name.dispose();
+    this.ruler.dispose();
+    this.axes.dispose();
+    this.group.removeFromParent();
+  }
+}
+
+/** In the middle of a flat picture. */
+function pxPerRad({ camera, height_px }: MarksScreen): number {
+  return (camera.projectionMatrix.elements[5] * height_px) / 2;
+}

@@ -1,0 +1,147 @@
+/** Clip box and plane in the scene: their outlines and the handles that drag them. um, world. */
+import {
+  BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  ConeGeometry,
+  DoubleSide,
+  EdgesGeometry,
+  Object3D,
+  OctahedronGeometry,
+  SphereGeometry,
+  Vector3,
+} from "three";
+import type { Box, Clip, ClipPlane } from "../math/clip";
+import type { Vec3 } from "../math/pick";
+import { MOST_CORNERS, planeSection } from "../math/plane_box_section";
+import {
+  BOX_HANDLES,
+  boxWithin,
+  type ClipHandleId,
+  type HandleId,
+  handlesOf,
+  PLANE_HANDLES,
+} from "./clip_handles";
+import {
+  ACCENT,
+  BRIGHT,
+  DIM,
+  disposeMarks,
+  HANDLE_RADIUS,
+  lengthAt,
+  MARKS_ORDER,
+  type MarkMesh,
+  MEANT,
+  markLine,
+  markMesh,
+  PLANE,
+  rimmed,
+  type Sight,
+} from "./style";
+
+const UP = new Vector3(0, 1, 0);
+
+export class ClipMark {
+  readonly group = new Object3D();
+  private readonly handles = new Map<ClipHandleId, MarkMesh>();
+  private readonly edges = markLine(new EdgesGeometry(new BoxGeometry()), DIM, { opacity: 0.8 });
+  private readonly rim = markLine(points(MOST_CORNERS), PLANE, { isLoop: true, opacity: 0.9 });
+  private readonly sheet = markMesh(fan(this.rim.geometry), PLANE, 0.08);
+  private readonly arm = markLine(points(2), PLANE);
+  private meant: HandleId | null = null;
+
+  constructor() {
+    const ball = new SphereGeometry(0.5, 20, 12);
+    const shapes = {
+      "plane-middle": new OctahedronGeometry(0.6),
+      "plane-tip": new ConeGeometry(0.5, 1.2, 20),
+    };
+    for (const id of BOX_HANDLES) this.handles.set(id, rimmed(markMesh(ball, ACCENT)));
+    for (const id of PLANE_HANDLES) {
+      this.handles.set(id, rimmed(markMesh(shapes[id], PLANE)));
+    }
+    this.sheet.material.side = DoubleSide;
+    this.sheet.renderOrder = MARKS_ORDER - 1; // never over a handle
+    this.sheet.clear(); // seen through the specimen it would only dull it
+    this.group.add(this.edges, this.rim, this.sheet, this.arm, ...this.handles.values());
+    this.show({ box: null, plane: null }, { min: [0, 0, 0], max: [1, 1, 1] });
+  }
+
+  /** `shown`: box of what is shown. */
+  show(clip: Clip, shown: Box): void {
+    const { box, plane } = clip;
+    this.edges.visible = box !== null;
+    if (box !== null) {
+      const { min, max } = boxWithin(box, shown);
+      const low = new Vector3(...min);
+      this.edges.scale.set(...max).sub(low);
+      this.edges.position.copy(low).addScaledVector(this.edges.scale, 0.5);
+    }
+    for (const mesh of this.handles.values()) mesh.visible = false;
+    for (const { id, position } of handlesOf(clip, shown)) {
+      const mesh = this.handles.get(id);
+      mesh?.position.set(...position);
+      if (mesh !== undefined) mesh.visible = true;
+    }
+    this.arm.visible = plane !== null;
+    this.rim.visible = this.sheet.visible = plane !== null;
+    if (plane !== null) this.showPlane(plane, shown);
+  }
+
+  /** Which handle is pointed at, or held; whether it is another than before. */
+  mean(id: HandleId | null): boolean {
+    if (id === this.meant) return false;
+    this.meant = id;
+    for (const [each, { material }] of this.handles) {
+      material.color.setHex(each === id ? BRIGHT : each.startsWith("plane") ? PLANE : ACCENT);
+    }
+    return true;
+  }
+
+  update(sight: Sight): void {
+    for (const [id, mesh] of this.handles) {
+      if (!mesh.visible) continue;
+      const size = lengthAt(mesh.position, sight, 2 * HANDLE_RADIUS);
+      mesh.scale.setScalar(id === this.meant ? MEANT * size : size);
+    }
+  }
+
+  private showPlane(plane: ClipPlane, shown: Box): void {
+    const corners = planeSection(plane, shown);
+    write(this.rim.geometry, corners);
+    this.sheet.geometry.setDrawRange(0, 3 * Math.max(0, corners.length - 2));
+    this.rim.visible = this.sheet.visible = corners.length > 0;
+    const middle = this.handles.get("plane-middle");
+    const tip = this.handles.get("plane-tip");
+    if (middle === undefined || tip === undefined) return;
+    tip.quaternion.setFromUnitVectors(UP, new Vector3(...plane.normal));
+    write(this.arm.geometry, [middle.position.toArray(), tip.position.toArray()]);
+  }
+
+  dispose(): void {
+    this.group.removeFromParent();
+    disposeMarks(this.group);
+  }
+}
+
+function points(count: number): BufferGeometry {
+  const positions = new BufferAttribute(new Float32Array(3 * count), 3);
+  return new BufferGeometry().setAttribute("position", positions);
+}
+
+/** The area inside a convex rim, whose points it shares. */
+function fan(rim: BufferGeometry): BufferGeometry {
+  const corners = Array.from({ length: MOST_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
+  return new BufferGeometry()
+    .setAttribute("position", rim.attributes.position)
+    .setIndex(corners.flat());
+}
+
+function write(geometry: BufferGeometry, places: readonly Vec3[]): void {
+  const { position } = geometry.attributes;
+  places.forEach((place, i) => {
+    position.setXYZ(i, ...place);
+  });
+  position.needsUpdate = true;
+  geometry.setDrawRange(0, places.length);
+}

@@ -1,0 +1,110 @@
+/** Text in the scene that faces the eye and keeps its angular size; drawn anew only when it differs. */
+import {
+  CanvasTexture,
+  LinearFilter,
+  Sprite,
+  SpriteMaterial,
+  SRGBColorSpace,
+  type Vector3,
+} from "three";
+import { LABEL_HEIGHT, lengthAt, MARKS_ORDER, type Sight } from "./style";
+
+/** Pixels of the canvas to a line: enough for a headset and for a phone's dense screen. */
+const LINE_PX = 56;
+const TEXT_PX = 40;
+const PAD_PX = 14;
+
+/** Where the label lies to its point: `above`, `below`, or `aside` (to the right and above). */
+export type Side = "above" | "below" | "aside";
+/** Where the point lies: share of the width from the left, lines above the lower or upper edge. */
+const POINTS = {
+  above: { share: 0.5, edge: 0, lines: -0.45 },
+  below: { share: 0.5, edge: 1, lines: 0.45 },
+  aside: { share: -0.08, edge: 0, lines: -0.6 },
+} as const;
+
+export class Label {
+  readonly sprite: Sprite;
+  /** How often it was drawn. */
+  draws = 0;
+  private readonly canvas = document.createElement("canvas");
+  private readonly texture = new CanvasTexture(this.canvas);
+  /** What was written last. */
+  text = "";
+  private lines = 0;
+
+  constructor(
+    private side: Side,
+    private readonly color = "#e6e9f0",
+    private readonly height_rad = LABEL_HEIGHT,
+  ) {
+    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.minFilter = LinearFilter;
+    this.texture.generateMipmaps = false;
+    const material = new SpriteMaterial({
+      map: this.texture,
+      transparent: true,
+      depthTest: false,
+      depthWrite: false,
+      toneMapped: false,
+      fog: false,
+    });
+    this.sprite = new Sprite(material);
+    this.sprite.renderOrder = MARKS_ORDER + 1;
+    this.sprite.visible = false;
+  }
+
+  /** One line, or several with \n between them; empty: no label. */
+  write(text: string): void {
+    this.sprite.visible = text !== "";
+    if (text === this.text || text === "") return;
+    this.text = text;
+    this.draw(text.split("\n"));
+  }
+
+  /** At a point, um. */
+  place(point: Vector3, sight: Sight): void {
+    if (!this.sprite.visible) return;
+    const line = lengthAt(point, sight, this.height_rad);
+    const height = line * this.lines;
+    this.sprite.position.copy(point);
+    this.sprite.scale.set((height * this.canvas.width) / this.canvas.height, height, 1);
+  }
+
+  turnTo(side: Side): void {
+    this.side = side;
+    const { share, edge, lines } = POINTS[side];
+    this.sprite.center.set(share, edge + lines / Math.max(1, this.lines));
+  }
+
+  private draw(lines: readonly string[]): void {
+    const context = this.canvas.getContext("2d");
+    if (context === null) throw new Error("no 2D canvas");
+    const font = `600 ${TEXT_PX}px system-ui, "Noto Sans", sans-serif`;
+    context.font = font;
+    const widest = Math.max(...lines.map((line) => context.measureText(line).width));
+    this.canvas.width = Math.ceil(widest + 2 * PAD_PX);
+    this.canvas.height = LINE_PX * lines.length;
+    context.font = font; // a canvas of another size has forgotten it
+    context.fillStyle = "rgb(11 13 18 / 0.78)";
+    context.beginPath();
+    context.roundRect(0, 0, this.canvas.width, this.canvas.height, PAD_PX);
+    context.fill();
+    context.fillStyle = this.color;
+    context.textBaseline = "middle";
+    lines.forEach((line, i) => {
+      context.fillText(line, PAD_PX, (i + 0.54) * LINE_PX);
+    });
+    this.texture.dispose(); // its size on the GPU is fixed
+    this.texture.needsUpdate = true;
+    this.lines = lines.length;
+    this.draws++;
+    this.turnTo(this.side);
+  }
+
+  dispose(): void {
+    this.sprite.removeFromParent();
+    this.sprite.material.dispose();
+    this.texture.dispose();
+  }
+}

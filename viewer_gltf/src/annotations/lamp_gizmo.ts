@@ -1,0 +1,81 @@
+/** The lamps of the path-traced picture in the scene, to be taken hold of. um, world. */
+import { Object3D, SphereGeometry, Vector3 } from "three";
+import { type Box, boxSpan } from "../math/clip";
+import type { HandleId } from "./clip_handles";
+import { Label } from "./label";
+import { LAMP_HANDLES, type LampHandleId, type LitState, lampHandles } from "./lamp_handles";
+import {
+  BRIGHT,
+  disposeMarks,
+  HANDLE_RADIUS,
+  lengthAt,
+  type MarkMesh,
+  MEANT,
+  markMesh,
+  rimmed,
+  type Sight,
+} from "./style";
+
+/** Opacity of a lamp behind the specimen: paths of light leave no depth to be hidden by. */
+const BEHIND = 0.4;
+
+type Ball = Readonly<{ mesh: MarkMesh; label: Label }>;
+
+export class LampMark {
+  readonly group = new Object3D();
+  private readonly balls = new Map<LampHandleId, Ball>();
+  private meant: HandleId | null = null;
+  private specimen: Box = { min: [0, 0, 0], max: [0, 0, 0] };
+  private readonly way = new Vector3();
+
+  constructor() {
+    const shape = new SphereGeometry(0.5, 20, 12);
+    LAMP_HANDLES.forEach((id, i) => {
+      const ball = { mesh: rimmed(markMesh(shape, BRIGHT)), label: new Label("aside") };
+      ball.label.write(`${i + 1}`);
+      this.balls.set(id, ball);
+      this.group.add(ball.mesh, ball.label.sprite);
+    });
+  }
+
+  /** @param specimen all of it, whatever is isolated: lamps are placed by it */
+  show(state: LitState, specimen: Box): void {
+    this.specimen = specimen;
+    const handles = new Map(lampHandles(state, specimen).map((each) => [each.id, each.position]));
+    this.group.visible = handles.size > 0;
+    LAMP_HANDLES.forEach((id, i) => {
+      const ball = this.balls.get(id);
+      const position = handles.get(id);
+      if (ball === undefined) return;
+      ball.mesh.visible = ball.label.sprite.visible = position !== undefined;
+      if (position === undefined) return;
+      ball.mesh.position.set(...position);
+      if (id === this.meant) ball.mesh.material.color.setHex(BRIGHT);
+      else ball.mesh.material.color.setRGB(...state.trace.lamps[i].color);
+    });
+  }
+
+  /** Which handle is pointed at, or held: seen as that from the next `show` on. */
+  mean(id: HandleId | null): void {
+    this.meant = id;
+  }
+
+  update(sight: Sight): void {
+    const { eye_um } = sight;
+    for (const [id, { mesh, label }] of this.balls) {
+      if (!mesh.visible) continue;
+      const size = lengthAt(mesh.position, sight, 2 * HANDLE_RADIUS);
+      mesh.scale.setScalar(id === this.meant ? MEANT * size : size);
+      const direction = this.way.subVectors(mesh.position, eye_um).toArray();
+      const ray = { origin: eye_um.toArray(), direction };
+      mesh.material.opacity = boxSpan([0, 1], ray, this.specimen) === null ? 1 : BEHIND;
+      label.place(mesh.position, sight);
+    }
+  }
+
+  dispose(): void {
+    this.group.removeFromParent();
+    for (const { label } of this.balls.values()) label.dispose();
+    disposeMarks(this.group);
+  }
+}

@@ -1,0 +1,147 @@
+/**
+ * The lamps of the path-traced picture as handles: where they are, and where a drag brings one. A
+ * lamp slides on the sphere round the specimen's middle on which it is. Pure.
+ */
+import { Vector3 } from "three";
+import { AXES, type Box } from "../math/clip";
+import type { Ray, Vec3 } from "../math/pick";
+import { LAMP_REACH } from "../state/path_trace_settings";
+import { type Action, isTraced, type ViewerState } from "../state/viewer_state";
+
+export const LAMP_HANDLES = ["lamp-0", "lamp-1", "lamp-2"] as const;
+export type LampHandleId = (typeof LAMP_HANDLES)[number];
+/** um, world. */
+export type LampHandle = Readonly<{ id: LampHandleId; position: Vec3 }>;
+/** What of the state says where lamps are. */
+export type LitState = Pick<ViewerState, "mode" | "areLampsShown" | "trace">;
+
+/**
+ * A ray that goes beside the sphere tips a lamp over the rim that its origin sees, by so much: when
+ * it comes back it has the lamp on the other side.
+ */
+export const TIP_RAD = (4 * Math.PI) / 180;
+
+/** `isBeside`: the ray went beside the sphere. */
+export type Slid = Readonly<{ place: Vec3; isBeside: boolean }>;
+/** `action` null: the lamp is there already. */
+export type LampDrag = Readonly<{ action: Action | null; isBeside: boolean }>;
+
+/** Lengths of the specimen: a hand that rests does not begin the picture anew. */
+const SAME = 1e-9;
+
+export function isLampHandle(id: string): id is LampHandleId {
+  return (LAMP_HANDLES as readonly string[]).includes(id);
+}
+
+/** All that can be taken hold of: of the lamps that are on, where they really are. */
+export function lampHandles(state: LitState, specimen: Box): readonly LampHandle[] {
+  if (!isTraced(state) || !state.areLampsShown) return [];
+  const { middle, edge_um } = roundOf(specimen);
+  return LAMP_HANDLES.flatMap((id, i) => {
+    const lamp = state.trace.lamps[i];
+    if (!lamp?.isOn) return [];
+    const position = new Vector3(lamp.x, lamp.y, lamp.z).multiplyScalar(edge_um).add(middle);
+    return [{ id, position: position.toArray() }];
+  });
+}
+
+/**
+ * What dragging a lamp to a ray (um) makes of it; null: it is not there, or the ray says nothing.
+ *
+ * @param wasBeside whether the ray before, of the same drag, went beside the sphere
+ */
+export function dragLamp(
+  id: LampHandleId,
+  ray: Ray,
+  state: LitState,
+  specimen: Box,
+  wasBeside: boolean,
+): LampDrag | null {
+  const { middle, edge_um } = roundOf(specimen);
+  const isThere = lampHandles(state, specimen).some((each) => each.id === id);
+  if (!isThere || !(edge_um > 0)) return null;
+  const lamp = LAMP_HANDLES.indexOf(id);
+  const { x, y, z } = state.trace.lamps[lamp];
+  const origin = new Vector3(...ray.origin).sub(middle).divideScalar(edge_um).toArray();
+  const slid = slideOnSphere([x, y, z], { origin, direction: ray.direction }, wasBeside);
+  if (slid === null) return null;
+  const [toX, toY, toZ] = withinReach(slid.place);
+  const isSame = Math.hypot(toX - x, toY - y, toZ - z) < SAME;
+  const change = { x: toX, y: toY, z: toZ };
+  const action: Action | null = isSame ? null : { type: "move-lamp", lamp, change };
+  return { action, isBeside: slid.isBeside };
+}
+
+/**
+ * Where a point comes to lie on its sphere about 0 when it follows a ray. Of the two places at which
+ * the ray meets the sphere the one nearer to the point counts. Beside the sphere it is the rim that is
+ * seen from the ray's origin: the point goes over it to the other side, once, and then along it.
+ * null: the ray says nothing about it.
+ */
+export function slideOnSphere(
+  from: Vec3,
+  { origin, direction }: Ray,
+  wasBeside: boolean,
+): Slid | null {
+  const point = new Vector3(...from);
+  const eye = new Vector3(...origin);
+  const ahead = new Vector3(...direction).normalize();
+  const radius = point.length();
+  if (!(radius > 0)) return null;
+  const nearest = -eye.dot(ahead);
+  const half = Math.sqrt(radius ** 2 - (eye.lengthSq() - nearest ** 2)); // NaN: beside it
+  const ends = [nearest - half, nearest + half]
+    .filter((t) => t > 0)
+    .map((t) => eye.clone().addScaledVector(ahead, t));
+  ends.sort((a, b) => a.distanceToSquared(point) - b.distanceToSquared(point));
+  const place = ends[0] ?? atTheRim(point, eye, ahead, wasBeside);
+  return place && { place: place.toArray(), isBeside: ends.length === 0 };
+}
+
+/** @param eye outside of the sphere */
+function atTheRim(
+  point: Vector3,
+  eye: Vector3,
+  ahead: Vector3,
+  wasBeside: boolean,
+): Vector3 | null {
+  const radius = point.length();
+  const towards = eye.clone().normalize();
+  const aside = ahead.clone().addScaledVector(towards, -ahead.dot(towards));
+  if (!(aside.length() > 1e-6)) return null; // straight away from the sphere
+  aside.normalize();
+  const rim = Math.acos(Math.min(1, radius / eye.length())); // where a ray touches the sphere
+  const wasBehind = towards.angleTo(point) > rim;
+  const isBehind = wasBehind === wasBeside;
+  const angle = Math.max(0, rim + (isBehind ? TIP_RAD : -TIP_RAD));
+  return towards
+    .multiplyScalar(radius * Math.cos(angle))
+    .addScaledVector(aside, radius * Math.sin(angle));
+}
+
+/**
+ * As far from the middle, and within the lamps' reach along each axis: what lies beyond it is cut off,
+ * and goes to the other axes.
+ */
+export function withinReach(place: Vec3): Vec3 {
+  const far2 = place[0] ** 2 + place[1] ** 2 + place[2] ** 2;
+  let parts = place;
+  for (const _ of AXES) {
+    const isFull = parts.map((v) => Math.abs(v) >= LAMP_REACH);
+    if (parts.every((v) => Math.abs(v) <= LAMP_REACH)) break;
+    const full = isFull.filter(Boolean).length;
+    const left = Math.sqrt(Math.max(0, far2 - full * LAMP_REACH ** 2));
+    const free = Math.hypot(...parts.map((v, i) => (isFull[i] ? 0 : v)));
+    const part = (i: 0 | 1 | 2) => {
+      if (isFull[i]) return Math.sign(parts[i]) * LAMP_REACH;
+      return free > 0 ? (parts[i] * left) / free : left / Math.sqrt(3 - full);
+    };
+    parts = [part(0), part(1), part(2)];
+  }
+  return parts;
+}
+
+function roundOf({ min, max }: Box): Readonly<{ middle: Vector3; edge_um: number }> {
+  const middle = new Vector3(...min).add(new Vector3(...max)).multiplyScalar(0.5);
+  return { middle, edge_um: Math.max(...AXES.map((i) => max[i] - min[i])) };
+}

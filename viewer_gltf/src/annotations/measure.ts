@@ -1,0 +1,87 @@
+/** What a measurement says: the distance of two points, the channel's value at one. Pure. */
+import { Matrix4, Vector3 } from "three";
+import type { TileVolume } from "../bundle/generated/volumes";
+import type { Size3 } from "../bundle/ktx2";
+import type { Vec3 } from "../math/pick";
+import { textureCorners } from "../volumes/tile_raymarch";
+
+/** One mip level: texels along x, y, z and their bytes, x fastest. */
+export type VolumeLevel = Readonly<{
+  size: Size3;
+  texels: Uint8Array;
+  /** Bytes a texel, where channels lie side by side, and which of them is meant; else 1 and 0. */
+  stride?: number;
+  channel?: number;
+}>;
+/** The voxel values of the source that are 0 and 255 in the volumes. */
+export type Window = readonly [number, number];
+
+/** Points of the rim are inside, whatever the matrices round. */
+const RIM = 1e-6;
+const DIGITS = 3;
+
+export function distanceBetween(a: Vec3, b: Vec3): number {
+  return Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+}
+
+/** Three digits are more than a hand can point: mm from 1000 um on, nm below 1 um. */
+export function distanceText(distance_um: number): string {
+  const rounded = Number(distance_um.toPrecision(DIGITS)); // so that 999.9 um is 1.00 mm
+  if (rounded === 0) return "0 µm";
+  const [unit, factor] = rounded >= 1000 ? ["mm", 1e-3] : rounded < 1 ? ["nm", 1e3] : ["µm", 1];
+  const value = distance_um * factor;
+  const whole = Math.floor(Math.log10(rounded * factor) + 1e-9) + 1;
+  return `${value.toFixed(Math.max(0, DIGITS - Math.max(1, whole)))} ${unit}`;
+}
+
+/**
+ * The channel's value at a point (um, world), on the source's scale: trilinear between texels, as
+ * the march samples it. null outside the tile.
+ *
+ * @param level any mip level of the tile's texture: all cover the same box
+ */
+export function valueAt(
+  volume: TileVolume,
+  level: VolumeLevel,
+  window: Window,
+  point_um: Vec3,
+): number | null {
+  const { min, max } = volume.bounds_um;
+  const toTile = new Matrix4().fromArray(volume.matrix).invert();
+  const p = new Vector3(...point_um).applyMatrix4(toTile).toArray();
+  const { low, high } = textureCorners(volume);
+  const [from, to] = [low.toArray(), high.toArray()];
+  const at: number[] = [];
+  for (let axis = 0; axis < 3; axis++) {
+    const edge = max[axis] - min[axis];
+    const share = edge > 0 ? (p[axis] - min[axis]) / edge : p[axis] === min[axis] ? 0 : -1;
+    if (!(share >= -RIM && share <= 1 + RIM)) return null;
+    at.push((from[axis] + (to[axis] - from[axis]) * share) * level.size[axis] - 0.5);
+  }
+  const [start, end] = window;
+  return start + ((end - start) * trilinear(level, at[0], at[1], at[2])) / 255;
+}
+
+/** As many digits as 8 bits of the window hold. */
+export function valueText(value: number, [start, end]: Window): string {
+  const step = Math.abs(end - start) / 255;
+  const decimals = step > 0 ? Math.max(0, -Math.floor(Math.log10(step))) : 0;
+  return value.toFixed(Math.min(decimals, 100));
+}
+
+/** At a place in texels, 0 the centre of the first; clamped to the edge, as the GPU does. */
+function trilinear(level: VolumeLevel, x: number, y: number, z: number): number {
+  const { texels, stride = 1, channel = 0 } = level;
+  const [nx, ny, nz] = level.size;
+  const clamp = (v: number, n: number) => Math.min(Math.max(v, 0), n - 1);
+  const [cx, cy, cz] = [clamp(x, nx), clamp(y, ny), clamp(z, nz)];
+  const [i, j, k] = [Math.floor(cx), Math.floor(cy), Math.floor(cz)];
+  const [fx, fy, fz] = [cx - i, cy - j, cz - k];
+  const texel = (di: number, dj: number, dk: number) => {
+    const row = Math.min(k + dk, nz - 1) * ny + Math.min(j + dj, ny - 1);
+    return texels[(row * nx + Math.min(i + di, nx - 1)) * stride + channel];
+  };
+  const row = (dj: number, dk: number) => texel(0, dj, dk) * (1 - fx) + texel(1, dj, dk) * fx;
+  const plane = (dk: number) => row(0, dk) * (1 - fy) + row(1, dk) * fy;
+  return plane(0) * (1 - fz) + plane(1) * fz;
+}

@@ -1,0 +1,65 @@
+import { Matrix4, PerspectiveCamera, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import { axesSeen } from "./orientation_axes";
+import { rulerLength } from "./ruler";
+import { umPerPixelAt } from "./scale_bar";
+
+const scaled = new Matrix4().makeScale(1e-3, 1e-3, 1e-3);
+
+function expectNear(found: Vector3, expected: readonly number[]): void {
+  found.toArray().forEach((v, i) => {
+    expect(v).toBeCloseTo(expected[i]);
+  });
+}
+
+describe("the axes that are seen", () => {
+  it("are x to the right, y up and z to the eye from the front", () => {
+    const head = new Matrix4().makeTranslation(0, 0, 3);
+    const seen = axesSeen(head, scaled);
+    expectNear(seen[0], [1, 0, 0]);
+    expectNear(seen[1], [0, 1, 0]);
+    expectNear(seen[2], [0, 0, 1]);
+  });
+
+  it("follow the eye and the specimen's own turn", () => {
+    // from the right side: what leads right comes to the eye, what leads to the front goes left
+    const side = new Matrix4().makeRotationY(Math.PI / 2);
+    const [x, y, z] = axesSeen(side, scaled);
+    expectNear(x, [0, 0, 1]);
+    expectNear(y, [0, 1, 0]);
+    expectNear(z, [-1, 0, 0]);
+    const turned = axesSeen(side, side.clone().multiply(scaled));
+    expectNear(turned[0], [1, 0, 0]);
+  });
+});
+
+describe("um to a pixel", () => {
+  it("is what projecting two points says, at the depth of the focus", () => {
+    const camera = new PerspectiveCamera(40, 1.5, 0.01, 20);
+    camera.position.set(0.3, -0.2, 2);
+    camera.lookAt(0.1, 0.4, -0.5);
+    camera.updateMatrixWorld();
+    const focus = new Vector3(0.1, 0.4, -0.5);
+    const m_per_um = 1.2e-3;
+    const um_per_px = umPerPixelAt(focus, camera, 500, m_per_um);
+    const aside = new Vector3(1, 0, 0)
+      .transformDirection(camera.matrixWorld)
+      .multiplyScalar(100 * m_per_um)
+      .add(focus);
+    const apart = (aside.project(camera).x - focus.clone().project(camera).x) * (750 / 2);
+    expect(100 / apart).toBeCloseTo(um_per_px, 9);
+  });
+});
+
+describe("the ruler", () => {
+  it("has a round length that is seen under a moderate angle, from any distance", () => {
+    for (const distance_um of [50, 1234, 9e5]) {
+      const length = rulerLength(distance_um)?.length_um ?? 0;
+      expect([1, 2, 5]).toContain(Number(length.toExponential(6).split("e")[0]));
+      const angle_deg = (2 * Math.atan(length / 2 / distance_um) * 180) / Math.PI;
+      expect(angle_deg).toBeLessThanOrEqual(16.001);
+      expect(angle_deg).toBeGreaterThan(6);
+    }
+    expect(rulerLength(0)).toBeNull();
+  });
+});

@@ -1,0 +1,157 @@
+/** What the specimen is where a ray meets it: surface, volume or tile, and the channels' values. */
+import { Box3, type Matrix4, Vector3 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
+import { pickTile, type Ray, shownTiles, type Vec3 } from "../math/pick";
+import type { ViewerState } from "../state/viewer_state";
+import { VolumeSource } from "../volumes/volume_source";
+import { valueAt, valueText } from "./measure";
+import {
+  type Cone,
+  nearestIn,
+  type Probed,
+  type ProbedVolume,
+  probeBoxes,
+  probeSurfaces,
+  probeVolumes,
+  type ShownSurface,
+  unitRay,
+} from "./probe";
+import { type LevelSource, levelAtHand, TexelCache } from "./texel_cache";
+
+/** Where a ray meets a volume is looked for in a level of at most so many texels. */
+const PROBED_TEXELS = 2 * 1024 * 1024;
+
+/** A channel of a tile on screen as a volume. */
+export type ShownVolume = Pick<ProbedVolume, "tile" | "channel" | "table" | "isInDisc"> &
+  Readonly<{ source: LevelSource }>;
+
+export type ReadingOptions = Readonly<{
+  manifest: Manifest;
+  /** Address of the bundle's manifest. */
+  base: string;
+  /** On screen now. */
+  surfaces: () => readonly ShownSurface[];
+  volumes: () => readonly ShownVolume[];
+  /** null: not known yet, or there is none. */
+  source: (tile: string, channel: string) => LevelSource | null;
+  /** The same, once it is known. */
+  sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
+  onError: (error: unknown) => void;
+}>;
+
+export class Reading {
+  state: ViewerState;
+  /** From um to the room, in which the surfaces are; null before the first frame. */
+  specimen: Matrix4 | null = null;
+  /** Where volumes show in disc mode. */
+  disc: Cone | null = null;
+  private readonly cache: TexelCache;
+  private isDisposed = false;
+
+  constructor(
+    private readonly options: ReadingOptions,
+    state: ViewerState,
+  ) {
+    this.state = state;
+    this.cache = new TexelCache((volume) => new VolumeSource(options.base, volume));
+  }
+
+  /** What a ray (um) means; null: it meets nothing. */
+  async probe(ray: Ray): Promise<Probed | null> {
+    const along = unitRay(ray);
+    const surface = this.probeSurfaces(along);
+    const { clip, mode } = this.state;
+    const disc = mode === "disc" ? this.disc : null;
+    const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
+    if (surface !== null && volume !== null) {
+      return surface.distance_um <= volume.distance_um ? surface : volume;
+    }
+    return surface ?? volume ?? probeBoxes(along, this.tiles, clip);
+  }
+
+  /** The same, but at once and without volumes. */
+  glance(ray: Ray): Probed | null {
+    const along = unitRay(ray);
+    if (pickTile(along, this.tiles, this.state.clip) === null) return null;
+    return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, this.state.clip);
+  }
+
+  /** A line for each shown channel: its name and its value at a point, on the source's scale. */
+  async valuesAt(point: Vec3): Promise<readonly string[]> {
+    const tile = this.tileAt(point);
+    const lines = await Promise.all(
+      this.shownChannels.map(async (channel) => {
+        const source = await this.options.sourceOf(tile, channel.id);
+        const place = source && nearestIn(source.volume, point);
+        if (source === null || place === null) return [];
+        const level = await this.orReport(this.cache.best(source));
+        const value = level && valueAt(source.volume, level, channel.window, place);
+        return value === null ? [] : [`${channel.name} ${valueText(value, channel.window)}`];
+      }),
+    );
+    return lines.flat();
+  }
+
+  /** What these values depend on: they may differ only if this does. */
+  sourcesKey(points: readonly Vec3[]): string {
+    const known = points.flatMap((point) => {
+      const tile = this.tileAt(point);
+      return this.shownChannels.map(({ id }) => {
+        const source = this.options.source(tile, id);
+        return `${id} ${source && levelAtHand(source)}`;
+      });
+    });
+    return known.join();
+  }
+
+  private get tiles() {
+    return shownTiles(this.options.manifest.tiles, this.state.isolated);
+  }
+
+  private probeSurfaces(along: Ray): Probed | null {
+    if (this.specimen === null) return null;
+    const { clip } = this.state;
+    return probeSurfaces(along, this.options.surfaces(), this.specimen, clip, this.tiles);
+  }
+
+  private async volumesAlong(along: Ray): Promise<readonly ProbedVolume[]> {
+    const { clip } = this.state;
+    const met = this.tiles.filter((tile) => pickTile(along, [tile], clip) !== null);
+    const found: ProbedVolume[] = [];
+    for (const { source, ...shown } of this.options.volumes()) {
+      if (!met.some(({ id }) => id === shown.tile)) continue;
+      const level = await this.orReport(this.cache.atHand(source, PROBED_TEXELS));
+      if (level !== null) found.push({ ...shown, volume: source.volume, level });
+    }
+    return found;
+  }
+
+  /** The nearest tile: a point of a surface can lie a little outside all of them. */
+  private tileAt(point: Vec3): string {
+    const place = new Vector3(...point);
+    const distances = this.options.manifest.tiles.map(({ bounds_um: { min, max } }) =>
+      new Box3(new Vector3(...min), new Vector3(...max)).distanceToPoint(place),
+    );
+    return this.options.manifest.tiles[distances.indexOf(Math.min(...distances))].id;
+  }
+
+  private get shownChannels() {
+    const shown = new Set(this.state.channels.flatMap((c) => (c.shown ? [c.id] : [])));
+    return this.options.manifest.channels.filter(({ id }) => shown.has(id));
+  }
+
+  /** null after a fault, which was told. */
+  private async orReport<T>(promise: Promise<T>): Promise<T | null> {
+    try {
+      return await promise;
+    } catch (error) {
+      if (!this.isDisposed) this.options.onError(error);
+      return null;
+    }
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    this.cache.dispose();
+  }
+}

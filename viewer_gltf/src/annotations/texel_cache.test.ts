@@ -1,0 +1,87 @@
+import { beforeEach, expect, it, vi } from "vitest";
+import { decodeTexels } from "../bundle/decode";
+import type { TileVolume } from "../bundle/generated/volumes";
+import { type LevelSource, levelAtHand, TexelCache } from "./texel_cache";
+
+vi.mock("../bundle/decode", () => ({
+  decodeTexels: vi.fn(async (frames: readonly { bytes: Uint8Array }[], bytes: number) =>
+    new Uint8Array(bytes).fill(frames[0].bytes[0]),
+  ),
+}));
+
+const MIB = 1024 * 1024;
+
+function volumeOf(name: string, sides: readonly number[]): TileVolume {
+  const file = { path: name, bytes: 0, sha256: "" };
+  const levels = sides.map((n) => ({
+    size: [n, n, n] as [number, number, number],
+    offset: 0,
+    length: 1,
+    sha256: "",
+  }));
+  return {
+    tile: "r0_c0",
+    file,
+    bricks: file,
+    size: levels[0].size,
+    apron: 1,
+    bounds_um: { min: [0, 0, 0], max: [1, 1, 1] },
+    matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    levels: [levels[0], ...levels.slice(1)],
+  };
+}
+
+function sourceOf(volume: TileVolume, atHand: readonly number[]): LevelSource {
+  return {
+    volume,
+    has: (index) => atHand.includes(index),
+    level: async (index) => Uint8Array.of(index),
+  };
+}
+
+const reopen = (volume: TileVolume) => sourceOf(volume, []);
+
+beforeEach(() => {
+  vi.mocked(decodeTexels).mockClear();
+});
+
+it("takes the finest level at hand that is small enough", async () => {
+  const source = sourceOf(volumeOf("a", [64, 32, 16]), [2, 1]);
+  expect(levelAtHand(source)).toBe(1);
+  expect(levelAtHand(source, 5000)).toBe(2);
+  expect(levelAtHand(source, 5)).toBeNull();
+  const cache = new TexelCache(reopen);
+  expect((await cache.atHand(source))?.size).toEqual([32, 32, 32]);
+  expect(await cache.atHand(source, 5)).toBeNull();
+  expect(decodeTexels).toHaveBeenCalledTimes(1);
+});
+
+it("fetches a moderate level where none is at hand", async () => {
+  const cache = new TexelCache(reopen);
+  const level = await cache.best(sourceOf(volumeOf("a", [256, 128, 64]), []));
+  expect(level.size).toEqual([128, 128, 128]);
+  expect(level.texels[0]).toBe(1);
+});
+
+it("decodes what is asked for again only once, and forgets what was long not used", async () => {
+  const cache = new TexelCache(reopen);
+  const side = Math.cbrt(27 * MIB);
+  const [a, b, c] = ["a", "b", "c"].map((name) => sourceOf(volumeOf(name, [side]), [0]));
+  await Promise.all([cache.best(a), cache.best(a)]);
+  await cache.best(b);
+  await cache.best(a);
+  expect(decodeTexels).toHaveBeenCalledTimes(2);
+  await cache.best(c); // 81 MiB: b goes
+  await cache.best(a);
+  expect(decodeTexels).toHaveBeenCalledTimes(3);
+  await cache.best(b);
+  expect(decodeTexels).toHaveBeenCalledTimes(4);
+});
+
+it("tries again after a fault", async () => {
+  const cache = new TexelCache(reopen);
+  const source = sourceOf(volumeOf("a", [4]), [0]);
+  vi.mocked(decodeTexels).mockRejectedValueOnce(new Error("broken"));
+  await expect(cache.best(source)).rejects.toThrow("broken");
+  expect((await cache.best(source)).size).toEqual([4, 4, 4]);
+});

@@ -1,0 +1,58 @@
+/**
+ * `window.stereocell`: what automation may read. Nothing in it changes the viewer; a script drives
+ * the page as a person does, through its controls (`[data-channel="<id>"] [data-part="shown"]`,
+ * `color`, `volume`, `transfer-function`; `[data-mode]`, `[data-tile-choice]`, `[data-action]`).
+ */
+
+import type { QualitySettings } from "../state/quality_controller";
+import type { ViewerState } from "../state/viewer_state";
+import type { Progress } from "../surfaces/overview_progress";
+import type { VolumeStatus } from "../volumes/volume_set";
+
+export type Snapshot = Readonly<{
+  state: ViewerState;
+  /** Whether all tiles show, in the first channel. */
+  hasFirstPicture: boolean;
+  /** Of all shown channels. */
+  overview: Progress;
+  isLoading: boolean;
+  /** Triangles of the surfaces on screen. */
+  triangles: number;
+  volumes: readonly VolumeStatus[];
+  /** Of the GPU's memory. */
+  volumeBytes: number;
+  /** Of the path-traced picture: samples a pixel, and the mip level; null: there is none. */
+  traced: Readonly<{ samples: number; level: number | null }>;
+  /** The tile in the middle of the view, if it is near. */
+  gazed: string | null;
+  /** Of the disc as it is now; 0: closed. */
+  discRadius_deg: number;
+  /** Between two frames of a moving picture. */
+  frame_ms: number;
+  /** What the last frame was drawn with. */
+  settings: QualitySettings;
+  /** Of each measured point: each shown channel's value there. */
+  measuredValues: readonly (readonly string[])[];
+  /** Of three's own count. */
+  gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
+  isStereo: boolean;
+  /** What is said before the eyes now, in stereo. */
+  told: readonly string[];
+}>;
+
+export interface StereoCellApi {
+  readonly apiVersion: 1;
+  /** Resolves when the overview is on screen; rejects with the words of a fatal error. */
+  readonly ready: Promise<void>;
+  /** Frames drawn so far. A still picture draws none. */
+  readonly frames: number;
+  /** Resolves when nothing is loading any more and the picture shows all of it. */
+  settled(): Promise<void>;
+  snapshot(): Snapshot;
+}
+
+declare global {
+  interface Window {
+    stereocell?: StereoCellApi;
+  }
+}

@@ -1,0 +1,289 @@
+/**
+ * What the user works the viewer by: panel, keys, list of keys, share link. Holds the panel's own
+ * view and turns wishes into actions and commands; whoever draws the panel elsewhere takes
+ * `layOut` and hands its wishes to `perform`.
+ */
+
+import { chooseFile } from "../dom/choose_file";
+import { copyText } from "../dom/clipboard";
+import type { Box } from "../math/clip";
+import { shownBox } from "../math/pick";
+import { handleOf } from "../panel/clip_by_key";
+import { changePanel, type Layout, type PanelView, START_VIEW, type Wish } from "../panel/controls";
+import { Help } from "../panel/html/key_list";
+import type { Said } from "../panel/html/overlays";
+import { Panel } from "../panel/html/panel";
+import { scanByCamera } from "../panel/html/qr_scanner";
+import { type KeyContext, listenForKeys, wishOf } from "../panel/keys";
+import { type Facts, layOut } from "../panel/layout";
+import type { Ranges } from "../panel/sections/channels";
+import { told } from "../panel/spoken_feedback";
+import { SETTINGS, settingsOf } from "../share/page_parameters";
+import { readLink, writeLink } from "../share/permalink";
+import { remarkOn } from "../state/announce_change";
+import { CANT, type Command } from "../state/commands";
+import { initialState } from "../state/viewer_state";
+import { canScan } from "../xr/cardboard/scan_qr";
+import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/viewer_profile";
+import type { XrSupport } from "../xr/support";
+import type { Viewer } from "./viewer";
+
+/** What a phone lacks for it, the phone says when it is asked. */
+const SPLIT: XrSupport = { isAvailable: true, reason: "" };
+/** Figures that change with each frame can be read at this rate. */
+const REFRESH_MS = 250;
+
+const LENS_KEY = "stereocell-lens";
+
+/** What the user's phone viewer is, from the visit before. */
+function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
+  try {
+    const { lenses, code } = JSON.parse(localStorage.getItem(LENS_KEY) ?? "{}");
+    const isKnown = lenses === "own" || lenses in BUILT_IN;
+    return isKnown && typeof code === "string" ? { lenses, code } : {};
+  } catch {
+    return {}; // no storage here, or another's words in it: then as at first
+  }
+}
+
+function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
+  try {
+    localStorage.setItem(LENS_KEY, JSON.stringify(lens));
+  } catch {
+    // no storage here: it has to be chosen anew next time
+  }
+}
+
+export type DeskOptions = Readonly<{
+  subtitle: string;
+  /** Enter stereo; called from within a click or a key, as is the other. */
+  onStereo: () => void;
+  /** Split the screen for a phone viewer of such lenses. */
+  onSplit: (lenses: Profile) => void;
+}>;
+
+export class Desk {
+  readonly panel: Panel;
+  private view: PanelView = { ...START_VIEW, ...rememberedLens() };
+  private stereo: XrSupport = { isAvailable: false, reason: "" };
+  private readonly help: Help;
+  private readonly ranges: Ranges;
+  private readonly disposed = new AbortController();
+  private timer = 0;
+  private canScan = false;
+
+  constructor(
+    private readonly viewer: Viewer,
+    parent: HTMLElement,
+    private readonly said: Said,
+    private readonly options: DeskOptions,
+  ) {
+    const { channels } = viewer.bundle.manifest;
+    this.ranges = new Map(channels.map(({ id, window }) => [id, window]));
+    this.panel = new Panel((wish) => this.perform(wish));
+    parent.append(this.panel.root);
+    this.help = new Help(parent, () => {
+      if (this.view.isHelpOpen) this.perform({ panel: "help" });
+    });
+    viewer.onRemark = (text) => this.say(text);
+    listenForKeys((name) => this.press(name), this.disposed.signal);
+    // A link to another view of the same bundle: what it leaves out is as the bundle opens.
+    addEventListener("hashchange", () => location.reload(), { signal: this.disposed.signal });
+    this.refresh();
+    void canScan().then((isAble) => {
+      this.canScan = isAble;
+      this.refresh();
+    });
+  }
+
+  /** What a panel shows now; one that is drawn elsewhere has its own sections open. */
+  layOut(view: PanelView = this.view): Layout {
+    return layOut(this.viewer.state, this.factsFor(view), view);
+  }
+
+  setStereo(support: XrSupport): void {
+    this.stereo = support;
+    this.refresh();
+  }
+
+  /** Bring the panel to the state; to be called after each change. */
+  refresh(): void {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    this.panel.update(this.layOut());
+    this.help.update(this.view.isHelpOpen);
+  }
+
+  /** Bring the figures to the frame that was just drawn, now and then. */
+  refreshSoon(): void {
+    if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
+  }
+
+  perform(wish: Wish): void {
+    if (typeof wish === "string") this.run(wish);
+    else if ("panel" in wish) {
+      if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
+      this.view = changePanel(this.view, wish);
+      this.refresh();
+    } else this.viewer.dispatch(wish);
+  }
+
+  /** Go to what the page's address asks for. */
+  followAddress(search: string, hash: string): void {
+    const { viewer } = this;
+    const { bounds_um } = viewer.bundle.manifest.specimen;
+    const { actions, look } = readLink(hash, viewer.state, bounds_um);
+    for (const action of [...settingsOf(search), ...actions]) viewer.dispatch(action);
+    if (look !== null) viewer.lookFrom(look);
+  }
+
+  private run(command: Command): void {
+    if (command === "share") void this.share();
+    else if (command === "stereo") {
+      if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
+      else if (this.stereo.isAvailable) this.options.onStereo();
+      else this.say(this.stereo.reason);
+    } else if (command === "split") {
+      this.splitScreen();
+    } else if (command === "scan") {
+      void this.scan();
+    } else if (command === "own-light") {
+      void this.lightByFile();
+    } else if (command === "find") {
+      const isLong = this.goTo("channels", "find-channel");
+      if (!isLong) this.say("The panel lists all channels.");
+    } else if (!this.viewer.run(command)) this.say(CANT);
+  }
+
+  /** On the page, and in stereo before the eyes, which don't see the page. */
+  private say(text: string): void {
+    this.said.say(text);
+    this.viewer.stereo.tell(text);
+  }
+
+  private unfold(section: string): void {
+    const open = this.view.open.filter((id) => id !== section);
+    this.view = { ...this.view, open: [...open, section] };
+    this.refresh();
+  }
+
+  /** Bring the keyboard to a control, also of a panel that is hidden; whether there is one. */
+  private goTo(section: string, control: string): boolean {
+    this.view = { ...this.view, isHidden: false };
+    this.unfold(section);
+    return this.panel.focus(control);
+  }
+
+  private splitScreen(): void {
+    const { lenses, code } = this.view;
+    try {
+      this.options.onSplit(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
+      rememberLens({ lenses, code });
+    } catch (error) {
+      if (!(error instanceof ProfileError)) throw error;
+      this.say(error.message);
+    }
+  }
+
+  private async scan(): Promise<void> {
+    try {
+      const text = await scanByCamera(document.body);
+      if (text !== null) this.perform({ panel: "code", text });
+    } catch (error) {
+      if (!(error instanceof ProfileError || error instanceof DOMException)) throw error;
+      this.say(error.message);
+    }
+  }
+
+  /** Light the traced picture by a file of the user's. */
+  private async lightByFile(): Promise<void> {
+    const file = await chooseFile(".hdr,.exr");
+    if (file === null) return;
+    try {
+      await this.viewer.lightBy(file);
+      this.say(`Lit by ${file.name}`);
+    } catch (error) {
+      this.viewer.report(error);
+    }
+  }
+
+  private press(name: string): boolean {
+    const { viewer, view } = this;
+    const context: KeyContext = {
+      state: viewer.state,
+      view,
+      shown: this.shown,
+      gazed: viewer.snapshot().gazed,
+    };
+    const wish = wishOf(name, context);
+    if (wish === null) return false;
+    this.perform(wish);
+    if (typeof wish !== "string" && "panel" in wish && wish.panel === "grip") {
+      viewer.mean(handleOf(wish.grip));
+    }
+    const { tiles } = viewer.bundle.manifest;
+    const text =
+      remarkOn(context.state, viewer.state, tiles) ??
+      told(wish, context.state, viewer.state, this.ranges);
+    if (text !== "") this.say(text);
+    return true;
+  }
+
+  /** The address of this view, in the clipboard, in the address bar and in the panel. */
+  private async share(): Promise<void> {
+    const { viewer } = this;
+    const address = new URL(location.href);
+    for (const name of SETTINGS) address.searchParams.delete(name);
+    const start = initialState(viewer.bundle.manifest);
+    address.hash = writeLink(viewer.state, start, viewer.look);
+    history.replaceState(history.state, "", address);
+    this.view = { ...this.view, link: address.href };
+    this.unfold("share");
+    if (await copyText(address.href)) this.say("The link is in the clipboard.");
+    else {
+      this.goTo("share", "link"); // which selects it
+      this.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
+    }
+  }
+
+  private get shown(): Box {
+    return shownBox(this.viewer.bundle.manifest, this.viewer.state.isolated);
+  }
+
+  /** A panel in the room has another view. */
+  private factsFor({ isPlaneOpen, picked }: PanelView): Facts {
+    const { viewer, stereo } = this;
+    const hasPlane = isPlaneOpen && picked !== null && this.ranges.has(picked);
+    const { specimen } = viewer.bundle.manifest;
+    const { triangles, volumes, traced, isLoading, gazed, frame_ms, isStereo, settings } =
+      viewer.snapshot();
+    const drawn = [...volumes, traced];
+    const levels = drawn.flatMap(({ level }) => (level === null ? [] : [level]));
+    return {
+      title: specimen.name,
+      subtitle: this.options.subtitle,
+      shown: this.shown,
+      ranges: this.ranges,
+      histogram: hasPlane ? viewer.histogram(picked) : null,
+      gazed,
+      isStereo,
+      stereo,
+      split: SPLIT,
+      canScan: this.canScan,
+      frame_ms: frame_ms > 0 ? frame_ms : null,
+      settings,
+      triangles,
+      volumeLevel: levels.length > 0 ? Math.min(...levels) : null,
+      samples: traced.level === null ? null : traced.samples,
+      isLoading,
+      values: viewer.snapshot().measuredValues,
+    };
+  }
+
+  dispose(): void {
+    clearTimeout(this.timer);
+    this.disposed.abort();
+    this.panel.root.remove();
+    this.help.dispose();
+  }
+}

@@ -1,0 +1,143 @@
+/** Start: find the bundle, show it, or say on the page why not. */
+import "../panel/html/page.css";
+import "../panel/html/panel.css";
+import "../panel/html/widgets.css";
+import "../panel/html/controls.css";
+import "../panel/html/overlays.css";
+import "../annotations/annotations.css";
+import { bundleAddress } from "../bundle/address";
+import { BundleError } from "../bundle/errors";
+import type { Manifest } from "../bundle/generated/bundle";
+import { loadBundle } from "../bundle/load";
+import { watchWaiting } from "../bundle/retry";
+import { element } from "../dom/element";
+import { keepOffline } from "../offline/register";
+import { Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
+import { findXrSupport } from "../xr/support";
+import type { StereoCellApi } from "./automation_api";
+import { Desk } from "./controller";
+import { Viewer } from "./viewer";
+
+function checkWebGl2(): void {
+  if (document.createElement("canvas").getContext("webgl2") !== null) return;
+  throw new BundleError(
+    "This browser offers no WebGL 2, which the viewer draws with. Try a current Chrome, Edge, " +
+      "Firefox or Safari, and check that hardware acceleration is on in its settings.",
+  );
+}
+
+/** For example `512 x 205 x 54 um`. */
+function describeSize({ specimen, tiles }: Manifest): string {
+  const { min, max } = specimen.bounds_um;
+  const edges = max.map((v, i) => (v - min[i]).toPrecision(3)).map(Number);
+  return `${edges.join(" × ")} µm · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
+}
+
+async function open(parent: HTMLElement): Promise<Viewer> {
+  checkWebGl2();
+  const bundle = await loadBundle(bundleAddress(location.href));
+  const { manifest } = bundle;
+  document.title = `${manifest.specimen.name} · StereoCell`;
+
+  const stage = element("div", { className: "stage" });
+  stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
+  stage.role = "img";
+  const progress = new ProgressBar();
+  const notices = new Notices(
+    (text) => viewer.dispatch({ type: "dismiss", text }),
+    () => viewer.run("retry"),
+  );
+  const said = new Said();
+  const over = [progress.root, said.root, notices.root];
+  parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
+  let desk: Desk | null = null;
+  const viewer: Viewer = new Viewer(
+    bundle,
+    stage,
+    (state) => {
+      desk?.refresh();
+      notices.update(state);
+    },
+    () => {
+      progress.update(viewer.snapshot().overview);
+      desk?.refreshSoon();
+    },
+  );
+  desk = new Desk(viewer, parent, said, {
+    subtitle: describeSize(manifest),
+    onStereo: () => void enterStereo(viewer),
+    onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
+  });
+  const { layOut } = desk;
+  viewer.layOut = layOut.bind(desk);
+  notices.update(viewer.state);
+  desk.followAddress(location.search, location.hash);
+  desk.setStereo(await findXrSupport(navigator.xr, isSecureContext));
+  return viewer;
+}
+
+async function enterStereo(viewer: Viewer): Promise<void> {
+  if (navigator.xr === undefined) return;
+  try {
+    await viewer.stereo.headset.start(navigator.xr);
+  } catch (error) {
+    if (!(error instanceof DOMException)) throw error;
+    viewer.dispatch({ type: "notify", text: `Stereo could not start: ${error.message}` });
+  }
+}
+
+/** Resolves once every shown channel's overview is on screen. */
+async function overviewShown(viewer: Viewer): Promise<void> {
+  for (;;) {
+    const before = viewer.frames;
+    if (viewer.snapshot().overview.isComplete && before > 0) return;
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+  }
+}
+
+const app = document.getElementById("app");
+if (app === null) throw new Error("the page has no #app");
+const opened = open(app);
+const ready = opened.then(overviewShown);
+opened.catch((error: unknown) => {
+  if (!(error instanceof BundleError)) {
+    showFatal(app, "The viewer failed", String(error));
+    throw error;
+  }
+  showFatal(app, "This bundle can't be shown", error.message);
+});
+let viewer: Viewer | null = null;
+void opened.then(
+  (made) => {
+    viewer = made;
+  },
+  () => undefined, // told above
+);
+void ready.then(keepOffline, () => undefined);
+const WAITING = "The host does not answer: trying again. What has come stays on screen.";
+watchWaiting((isWaiting) =>
+  viewer?.dispatch({ type: isWaiting ? "notify" : "dismiss", text: WAITING }),
+);
+ready.catch(() => undefined); // told above; whoever awaits `ready` still sees it
+
+/** Bugs: the console has the details, the page says that something is amiss. */
+function tellBug(error: unknown): void {
+  if (!(error instanceof Error)) return; // such as a ResizeObserver's harmless message
+  viewer?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });
+}
+addEventListener("error", (event) => tellBug(event.error));
+addEventListener("unhandledrejection", (event) => tellBug(event.reason));
+
+const api: StereoCellApi = {
+  apiVersion: 1,
+  ready,
+  get frames() {
+    return viewer?.frames ?? 0;
+  },
+  settled: async () => (await opened).settled(),
+  snapshot() {
+    if (viewer === null) throw new Error("nothing is open yet: await ready");
+    return viewer.snapshot();
+  },
+};
+window.stereocell = api;

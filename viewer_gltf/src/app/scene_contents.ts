@@ -1,0 +1,166 @@
+/** What is shown of a bundle: its surfaces, its volumes, and the marks on them. */
+import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
+import { Marks, type MarksView } from "../annotations/annotations";
+import type { Bundle } from "../bundle/load";
+import { memoryBudget } from "../gpu/memory_budget";
+import { TracedVolume } from "../pathtrace/traced_volume";
+import type { Picture } from "../render/frame_renderer";
+import type { Hybrid } from "../render/gaze_focus";
+import { wantedTiles } from "../state/representation";
+import { isTwoD } from "../state/transfer_functions_2d";
+import { type Action, type ViewerState, volumeChannels } from "../state/viewer_state";
+import { SurfaceLoader } from "../surfaces/gltf_loader";
+import { SurfaceSet } from "../surfaces/surface_set";
+import { BrickService } from "../volumes/bricks/brick_service";
+import type { BrickView } from "../volumes/bricks/protocol";
+import { TransferPlanes } from "../volumes/transfer_functions_loader";
+import { VolumeSet } from "../volumes/volume_set";
+
+export type ContentsOptions = Readonly<{
+  bundle: Bundle;
+  renderer: WebGLRenderer;
+  picture: Picture;
+  state: ViewerState;
+  dispatch: (action: Action) => void;
+  /** The picture is no longer true. */
+  onChange: () => void;
+  onError: (error: unknown) => void;
+}>;
+
+export class Contents {
+  readonly surfaces: SurfaceSet;
+  readonly volumes: VolumeSet;
+  /** The same volumes by paths of light, in the mode `traced`. */
+  readonly traced: TracedVolume;
+  /** Two-dimensional transfer functions. */
+  readonly planes: TransferPlanes;
+  readonly marks: Marks;
+  private readonly bricks: BrickService | null;
+  private readonly clip = new Matrix4();
+  private readonly point = new Vector3();
+  private readonly ahead = new Vector3();
+  private readonly loader: SurfaceLoader;
+  /** Volumes come after the first picture of all tiles. */
+  private hasOverview = false;
+
+  constructor(options: ContentsOptions) {
+    const { bundle, renderer, picture, onChange, onError } = options;
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    this.loader = new SurfaceLoader(renderer);
+    const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
+    const budget = memoryBudget(navigator);
+    const limits = { bytes: budget.volumes, side };
+    this.bricks =
+      bundle.bricks === undefined
+        ? null
+        : new BrickService(renderer, bundle.bricks, onChange, onError);
+    const { marchFrame } = picture;
+    this.volumes = new VolumeSet(bundle, marchFrame, limits, onChange, onError, this.bricks);
+    const { uSceneDepth } = marchFrame;
+    const { bricks } = this;
+    this.traced = new TracedVolume(this.volumes, bricks, limits, uSceneDepth, onChange, onError);
+    picture.add(this.traced.group);
+    this.planes = new TransferPlanes(
+      bundle,
+      (channel, plane) => options.dispatch({ type: "learn-plane", channel, plane }),
+      onChange,
+      onError,
+    );
+    this.surfaces = new SurfaceSet(
+      bundle,
+      this.loader,
+      picture.surfaceFrame,
+      budget.surfaces,
+      (tile, channel) => this.volumes.presence(tile, channel),
+      onChange,
+      onError,
+    );
+    const reading = {
+      manifest: bundle.manifest,
+      base: bundle.base,
+      surfaces: () => this.surfaces.meshes,
+      volumes: () => [...this.volumes.shown(), ...this.traced.shown()],
+      source: (tile: string, channel: string) => this.volumes.source(tile, channel),
+      sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
+      dispatch: options.dispatch,
+      onChange,
+      onError,
+    };
+    this.marks = new Marks(reading, options.state);
+  }
+
+  get isLoading(): boolean {
+    return (
+      this.surfaces.isLoading ||
+      this.volumes.isLoading ||
+      this.traced.isLoading ||
+      this.planes.isLoading ||
+      !this.surfaces.overview.isComplete
+    );
+  }
+
+  follow(state: ViewerState, { nearby, mayRefine }: Hybrid): void {
+    const wanted = this.hasOverview ? wantedTiles(state, nearby) : [];
+    for (const channel of volumeChannels(state)) if (isTwoD(channel)) this.planes.want(channel.id);
+    this.volumes.follow(state, wanted, mayRefine);
+    this.traced.follow(state);
+    this.surfaces.follow(state, nearby);
+    this.marks.follow(state);
+  }
+
+  /** What has failed is asked for again; then `follow`. */
+  retryFailed(): void {
+    this.surfaces.retryFailed();
+    this.volumes.retryFailed();
+    this.traced.retryFailed();
+    this.planes.retryFailed();
+    this.marks.readAnew();
+  }
+
+  /** True once, when the overview has come: then `follow` again. */
+  hasJustBegun(): boolean {
+    if (this.hasOverview || !this.surfaces.overview.isComplete) return false;
+    this.hasOverview = true;
+    return true;
+  }
+
+  /** Go on with what fades; whether it does. */
+  advance(view: MarksView): boolean {
+    const isFading = this.volumes.advance(view.dt_s);
+    this.traced.advance(view.dt_s);
+    this.marks.update(view);
+    return isFading;
+  }
+
+  /** Stream the surfaces that the eye needs, down to an error on screen. */
+  stream(camera: Camera, width_px: number, height_px: number, target_px: number): void {
+    this.surfaces.setErrorTarget(target_px);
+    this.surfaces.update(camera, width_px, height_px);
+    this.bricks?.look(this.viewOf(camera, height_px));
+  }
+
+  /** What a camera sees, in the specimen's um. */
+  private viewOf(camera: Camera, height_px: number): BrickView {
+    const { surfaces, clip, point, ahead } = this;
+    const specimen = surfaces.group.matrixWorld;
+    clip.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(specimen);
+    const toSpecimen = specimen.clone().invert();
+    point.setFromMatrixPosition(camera.matrixWorld).applyMatrix4(toSpecimen);
+    ahead.set(0, 0, -1).transformDirection(camera.matrixWorld).transformDirection(toSpecimen);
+    return {
+      clip: clip.toArray(),
+      eye: point.toArray(),
+      gaze: ahead.toArray(),
+      pixels_per_radian: (camera.projectionMatrix.elements[5] * height_px) / 2,
+    };
+  }
+
+  dispose(): void {
+    this.marks.dispose();
+    this.surfaces.dispose();
+    this.volumes.dispose();
+    this.traced.dispose();
+    this.bricks?.dispose();
+    this.loader.dispose();
+  }
+}

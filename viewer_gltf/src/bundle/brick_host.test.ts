@@ -1,0 +1,17 @@
+import { describe, expect, it } from "vitest";
+import { bricksAddress } from "./brick_host";
+
+describe("the address of the bricks", () => {
+  const of = (value: string | null, base: string) =>
+    bricksAddress(new Headers(value === null ? {} : { "Stereocell-Bricks": value }), base);
+
+  it("is the host's that has them, as safe as the page", () => {
+    expect(of("version=1", "http://localhost:8000/")).toBe("ws://localhost:8000/bricks");
+    expect(of("version=1", "https://10.0.0.7:8000/x/")).toBe("wss://10.0.0.7:8000/bricks");
+  });
+
+  it("is none where the host has none, or newer ones", () => {
+    expect(of(null, "http://localhost/")).toBeNull();
+    expect(of("version=2", "http://localhost/")).toBeNull();
+  });
+});

@@ -1,0 +1,99 @@
+/** Whole KTX2 textures: their format and size are checked, their levels decompressed. */
+import {
+  KHR_SUPERCOMPRESSION_NONE,
+  KHR_SUPERCOMPRESSION_ZSTD,
+  type KTX2Container,
+  read,
+  VK_FORMAT_R8_UNORM,
+  VK_FORMAT_R8G8_UNORM,
+  VK_FORMAT_R8G8B8A8_UNORM,
+} from "ktx-parse";
+import { decodeTexels } from "./decode";
+import { BundleError } from "./errors";
+
+export type Size3 = readonly [number, number, number];
+
+/** Bytes a texel of each format that a bundle uses; the key names it in messages. */
+export const FORMATS = {
+  R8: { vk: VK_FORMAT_R8_UNORM, bytes: 1 },
+  R8G8: { vk: VK_FORMAT_R8G8_UNORM, bytes: 2 },
+  R8G8B8A8: { vk: VK_FORMAT_R8G8B8A8_UNORM, bytes: 4 },
+} as const;
+
+/** The parsed container. Throws BundleError unless format and level-0 size are as expected. */
+export function readTexture(
+  file: Uint8Array<ArrayBuffer>,
+  path: string,
+  format: keyof typeof FORMATS,
+  size: Size3,
+): KTX2Container {
+  let texture: KTX2Container;
+  try {
+    texture = read(file);
+  } catch (error) {
+    throw new BundleError(`${path}: expected a KTX2 texture (${String(error)})`, { cause: error });
+  }
+  if (texture.vkFormat !== FORMATS[format].vk) {
+    throw new BundleError(
+      `${path}: vkFormat: expected ${FORMATS[format].vk} (${format}), found ${texture.vkFormat}`,
+    );
+  }
+  const found = [texture.pixelWidth, texture.pixelHeight, texture.pixelDepth || 1];
+  if (found.some((n, i) => n !== size[i])) {
+    throw new BundleError(
+      `${path}: size: expected ${size.join(" x ")}, found ${found.join(" x ")}`,
+    );
+  }
+  return texture;
+}
+
+/** The texels of one level, x fastest. Throws BundleError. */
+export async function readLevel(
+  texture: KTX2Container,
+  path: string,
+  format: keyof typeof FORMATS,
+  index: number,
+): Promise<Uint8Array<ArrayBuffer>> {
+  const level = texture.levels[index];
+  if (level === undefined) {
+    throw new BundleError(
+      `${path}: expected mip level ${index}, found ${texture.levels.length} levels`,
+    );
+  }
+  const side = (n: number) => Math.max(1, n >> index);
+  const size =
+    side(texture.pixelWidth) *
+    side(texture.pixelHeight) *
+    side(texture.pixelDepth || 1) *
+    FORMATS[format].bytes;
+  switch (texture.supercompressionScheme) {
+    case KHR_SUPERCOMPRESSION_ZSTD:
+      return decodeTexels([{ bytes: level.levelData, name: path }], size);
+    case KHR_SUPERCOMPRESSION_NONE:
+      if (level.levelData.length !== size) {
+        throw new BundleError(
+          `${path}: level ${index}: expected ${size} bytes, found ${level.levelData.length}`,
+        );
+      }
+      return new Uint8Array(level.levelData);
+    default:
+      throw new BundleError(
+        `${path}: supercompression: expected zstd or none, found scheme ${texture.supercompressionScheme}`,
+      );
+  }
+}
+
+/** The zstd frame of one level; of an uncompressed texture, null. Throws BundleError. */
+export function compressedLevel(
+  texture: KTX2Container,
+  path: string,
+  index: number,
+): Uint8Array | null {
+  const level = texture.levels[index];
+  if (level === undefined) {
+    throw new BundleError(
+      `${path}: expected mip level ${index}, found ${texture.levels.length} levels`,
+    );
+  }
+  return texture.supercompressionScheme === KHR_SUPERCOMPRESSION_ZSTD ? level.levelData : null;
+}

@@ -1,0 +1,91 @@
+import { describe, expect, it } from "vitest";
+import { parseJson } from "./fetch";
+import { checkManifest, checkVolumes } from "./schema_check";
+
+const FILE = { path: "a/b.json", bytes: 1, sha256: "0".repeat(64) };
+const BOUNDS = { min: [0, -1, 0], max: [1, 0, 1] };
+const MANIFEST = {
+  format: "stereocell-bundle",
+  version: 1,
+  generator: "stereocell 0.1.0",
+  specimen: { name: "s", modality: "MR", bounds_um: BOUNDS },
+  tiles: [{ id: "r0_c0", representation: "mesh", bounds_um: BOUNDS }],
+  channels: [
+    {
+      id: "A",
+      name: "A",
+      color: [1, 0.5, 0],
+      window: [0, 10],
+      iso_value: null,
+      iso_normalized: null,
+      threshold_normalized: null,
+      surface: "none",
+      transfer_function: "default",
+      transfer_functions: ["default"],
+      transfer_functions_2d: { names: [], file: FILE },
+      lut: FILE,
+      tileset: null,
+      triangles: [],
+      volumes: FILE,
+    },
+  ],
+  files: FILE,
+};
+
+describe("the manifest's check", () => {
+  it("accepts a manifest of the schema", () => {
+    expect(checkManifest(MANIFEST)).toBe(MANIFEST);
+  });
+
+  it("tells another format and another version, found against expected", () => {
+    expect(() => checkManifest({ ...MANIFEST, format: "tileset" })).toThrow(
+      'manifest.json: format: expected "stereocell-bundle", found "tileset"',
+    );
+    expect(() => checkManifest([])).toThrow("found none");
+    expect(() => checkManifest({ ...MANIFEST, version: 7 })).toThrow(
+      "manifest.json: version: this viewer reads version 1, found 7",
+    );
+  });
+
+  it("names the field that is wrong", () => {
+    const channel = { ...MANIFEST.channels[0], color: [1, "green", 0] };
+    expect(() => checkManifest({ ...MANIFEST, channels: [channel] })).toThrow(
+      /^manifest\.json: channels\.0\.color\.1: .*"string".*"number"/,
+    );
+    const { tiles, ...rest } = MANIFEST;
+    expect(tiles).toHaveLength(1);
+    expect(() => checkManifest(rest)).toThrow(/^manifest\.json: .*"tiles"/);
+  });
+
+  it("refuses a bundle without channels, in one line", () => {
+    expect(() => checkManifest({ ...MANIFEST, channels: [] })).toThrow(
+      /^manifest\.json: channels: the bundle holds none, so nothing can be shown$/,
+    );
+  });
+
+  it("refuses paths that leave the bundle", () => {
+    const files = { ...FILE, path: "../secret" };
+    expect(() => checkManifest({ ...MANIFEST, files })).toThrow("manifest.json: files.path");
+  });
+});
+
+describe("other JSON", () => {
+  it("of volumes is checked by its own schema", () => {
+    expect(() => checkVolumes({ volumes: [{ tile: "r0_c0" }] }, "channels/A/volumes.json")).toThrow(
+      /^channels\/A\/volumes\.json: volumes\.0: /,
+    );
+  });
+
+  it("that is a host's error page is told as such", () => {
+    expect(() => parseJson("<!doctype html><title>Oops</title>", "manifest.json")).toThrow(
+      'manifest.json: expected JSON, found "<!doctype html>',
+    );
+  });
+
+  it("that is cut short is told as such", () => {
+    const text = JSON.stringify(MANIFEST).slice(0, 200);
+    expect(() => parseJson(text, "manifest.json")).toThrow(
+      /^manifest\.json: the JSON is broken or cut short \(/,
+    );
+  });
+});

@@ -1,0 +1,79 @@
+/** Check a bundle's JSON files against the schemas that the pipeline wrote them by. */
+import { type OutputUnit, type Schema, Validator } from "@cfworker/json-schema";
+import bundleSchema from "../../../schemas/bundle.schema.json";
+import transfer2dSchema from "../../../schemas/transfer2d.schema.json";
+import volumesSchema from "../../../schemas/volumes.schema.json";
+import { faultOf, MAX_SHAPES } from "../state/transfer_shapes";
+import { BundleError } from "./errors";
+import type { Manifest } from "./generated/bundle";
+import type { ChannelTransfer2D } from "./generated/transfer2d";
+import type { ChannelVolumes } from "./generated/volumes";
+
+export const FORMAT = "stereocell-bundle";
+export const VERSION = 1;
+
+function checkSchema(schema: object, value: unknown, path: string): void {
+  const result = new Validator(schema as Schema, "2020-12", true).validate(value);
+  if (result.valid) return;
+  // The innermost error says most; after a wrong tuple the validator adds a bare "false".
+  const depth = (unit: OutputUnit) => unit.instanceLocation.split("/").length;
+  const told = result.errors.filter((unit) => unit.keyword !== "false");
+  const { instanceLocation, error } = (told.length > 0 ? told : result.errors).reduce((a, b) =>
+    depth(b) >= depth(a) ? b : a,
+  );
+  const field = instanceLocation.replace(/^#\/?/, "").replaceAll("/", ".");
+  throw new BundleError(`${path}: ${field === "" ? "" : `${field}: `}${error}`);
+}
+
+function fieldOf(value: unknown, key: string): unknown {
+  if (value === null || typeof value !== "object") return undefined;
+  return (value as Record<string, unknown>)[key];
+}
+
+/** The manifest, once format, version and shape are right. Throws BundleError. */
+export function checkManifest(value: unknown): Manifest {
+  const format = fieldOf(value, "format");
+  if (format !== FORMAT) {
+    const found = format === undefined ? "none" : JSON.stringify(format);
+    throw new BundleError(`manifest.json: format: expected "${FORMAT}", found ${found}`);
+  }
+  const version = fieldOf(value, "version");
+  if (version !== VERSION) {
+    const found = version === undefined ? "none" : JSON.stringify(version);
+    throw new BundleError(
+      `manifest.json: version: this viewer reads version ${VERSION}, found ${found}; ` +
+        "open the bundle with the viewer it was built with",
+    );
+  }
+  checkSchema(bundleSchema, value, "manifest.json");
+  const manifest = value as Manifest;
+  if (manifest.channels.length === 0) {
+    throw new BundleError(
+      "manifest.json: channels: the bundle holds none, so nothing can be shown",
+    );
+  }
+  return manifest;
+}
+
+/** A channel's volumes.json, once its shape is right. Throws BundleError. */
+export function checkVolumes(value: unknown, path: string): ChannelVolumes {
+  checkSchema(volumesSchema, value, path);
+  return value as ChannelVolumes;
+}
+
+/** A channel's transfer2d.json, once its shape is right and its shapes are. Throws BundleError. */
+export function checkTransfer2d(value: unknown, path: string): ChannelTransfer2D {
+  checkSchema(transfer2dSchema, value, path);
+  const checked = value as ChannelTransfer2D;
+  for (const [name, shapes] of Object.entries(checked.functions)) {
+    if (shapes.length > MAX_SHAPES) {
+      const found = `expected at most ${MAX_SHAPES} shapes, found ${shapes.length}`;
+      throw new BundleError(`${path}: functions.${name}: ${found}`);
+    }
+    shapes.forEach((shape, i) => {
+      const fault = faultOf(shape);
+      if (fault !== null) throw new BundleError(`${path}: functions.${name}.${i}: ${fault}`);
+    });
+  }
+  return checked;
+}

@@ -1,0 +1,48 @@
+/** What clip box and plane cut off, for the surfaces' shaders: planes in the room, by reference. */
+import { type Matrix4, Vector3, Vector4 } from "three";
+import type { Clip } from "../math/clip";
+import type { MarchClip } from "./clip_uniforms";
+
+const MOST = 7; // six faces of the box, and the plane
+/** um; beyond any specimen, within the precision of floats. */
+const FAR = 1e9;
+
+export class Cuts {
+  /** xyz unit normal, w offset, metres of the room: gone is where dot(xyz, p) > w. */
+  readonly uCuts = { value: Array.from({ length: MOST }, () => new Vector4()) };
+  readonly uCutCount = { value: 0 };
+  /** The same for the march, um. */
+  readonly march: MarchClip = {
+    min: new Vector3(),
+    max: new Vector3(),
+    plane: new Vector4(),
+  };
+
+  follow({ box, plane }: Clip, specimen: Matrix4): void {
+    let count = 0;
+    const add = (x: number, y: number, z: number, offset_um: number) => {
+      const normal = new Vector3(x, y, z).transformDirection(specimen);
+      const on = new Vector3(x, y, z).multiplyScalar(offset_um).applyMatrix4(specimen);
+      this.uCuts.value[count++].set(normal.x, normal.y, normal.z, normal.dot(on));
+    };
+    this.march.min.setScalar(-FAR);
+    this.march.max.setScalar(FAR);
+    this.march.plane.set(0, 0, 0, 1);
+    if (box !== null) {
+      const [a, b] = [box.min, box.max];
+      add(-1, 0, 0, -a[0]);
+      add(0, -1, 0, -a[1]);
+      add(0, 0, -1, -a[2]);
+      add(1, 0, 0, b[0]);
+      add(0, 1, 0, b[1]);
+      add(0, 0, 1, b[2]);
+      this.march.min.set(...a);
+      this.march.max.set(...b);
+    }
+    if (plane !== null) {
+      add(...plane.normal, plane.offset_um);
+      this.march.plane.set(...plane.normal, plane.offset_um);
+    }
+    this.uCutCount.value = count;
+  }
+}

@@ -1,0 +1,22 @@
+/** For how long a ray has stayed where it is, apart from a hand's or a head's tremble. Pure. */
+import { Vector3 } from "three";
+import type { Ray } from "../math/pick";
+
+/** A ray that turns by more has moved. */
+const TREMBLE_RAD = (1.2 * Math.PI) / 180;
+
+export type Rest = Readonly<{ ray: Ray; elapsed_s: number }>;
+
+/**
+ * The next state. Measured against where the rest began, so that a slow drift is a move as well.
+ *
+ * @param tremble_um the ray's origin may move by so much
+ */
+export function advanceRest(rest: Rest | null, ray: Ray, tremble_um: number, dt_s: number): Rest {
+  if (rest === null) return { ray, elapsed_s: 0 };
+  const { origin, direction } = rest.ray;
+  const moved = new Vector3(...origin).distanceTo(new Vector3(...ray.origin));
+  const turned = new Vector3(...direction).angleTo(new Vector3(...ray.direction));
+  if (moved > tremble_um || turned > TREMBLE_RAD) return { ray, elapsed_s: 0 };
+  return { ray: rest.ray, elapsed_s: rest.elapsed_s + dt_s };
+}

@@ -1,0 +1,75 @@
+import { Matrix4, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import { gazeOf, type Hit, meetFirst, Pointer, type RoomRay, type Target } from "./ray_pointer";
+
+const AHEAD: RoomRay = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
+const FRAME_S = 1 / 60;
+
+function target(key: string | null, distance_m: number | null, isOnTop = false): Target {
+  const meet = (): Hit | null => (distance_m === null ? null : { key, distance_m });
+  return { isOnTop, meet, choose: () => undefined };
+}
+
+describe("what a ray meets", () => {
+  it("is the nearest target, whatever their order", () => {
+    const [near, far] = [target("near", 1), target("far", 2)];
+    expect(meetFirst(AHEAD, [far, near])?.key).toBe("near");
+    expect(meetFirst(AHEAD, [near, far])?.key).toBe("near");
+  });
+
+  it("is what is drawn on top, though something is nearer", () => {
+    const handle = target("handle", 3, true);
+    expect(meetFirst(AHEAD, [target("panel", 1), handle, target("tile", 2)])?.key).toBe("handle");
+  });
+
+  it("is nothing if every target is missed", () => {
+    expect(meetFirst(AHEAD, [target("a", null), target("b", null, true)])).toBeNull();
+  });
+
+  it("starts at the eye and leads ahead of the head", () => {
+    const head = new Matrix4().makeRotationY(Math.PI / 2).setPosition(1, 2, 3);
+    const { origin, direction } = gazeOf(head);
+    expect(origin.toArray()).toEqual([1, 2, 3]);
+    expect(direction.distanceTo(new Vector3(-1, 0, 0))).toBeLessThan(1e-12);
+  });
+});
+
+describe("the gaze", () => {
+  const tile = target("tile", 1.5);
+  /** Seconds of looking until the first choice; null: none within 4 s. */
+  const untilChosen = (
+    hands: readonly (RoomRay | null)[],
+    targets: readonly Target[],
+    isDwellOn = true,
+  ) => {
+    const pointer = new Pointer();
+    for (let frame = 0; frame * FRAME_S < 4; frame++) {
+      if (pointer.advance(AHEAD, hands, targets, FRAME_S, isDwellOn)) return frame * FRAME_S;
+    }
+    return null;
+  };
+
+  it("chooses after 1.5 s", () => {
+    expect(untilChosen([], [tile])).toBeCloseTo(1.5, 1);
+  });
+
+  it("chooses nothing with dwell off, nor what can't be chosen", () => {
+    expect(untilChosen([], [tile], false)).toBeNull();
+    expect(untilChosen([], [target(null, 1)])).toBeNull();
+  });
+
+  it("chooses nothing while a hand points at something, but does beside an idle hand", () => {
+    expect(untilChosen([AHEAD], [tile])).toBeNull();
+    expect(untilChosen([null], [tile])).not.toBeNull();
+  });
+
+  it("does not choose again what the button has chosen", () => {
+    const pointer = new Pointer();
+    pointer.advance(AHEAD, [], [tile], FRAME_S, true);
+    pointer.press("tile");
+    for (let i = 0; i < 240; i++) {
+      expect(pointer.advance(AHEAD, [], [tile], FRAME_S, true)).toBeNull();
+    }
+    expect(pointer.progress).toBe(0);
+  });
+});

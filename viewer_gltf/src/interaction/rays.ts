@@ -1,0 +1,62 @@
+/** Rays into the specimen: from a click on the picture, or from the head. */
+import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from "three";
+import type { Ray } from "../math/pick";
+import type { RoomRay } from "./ray_pointer";
+
+/** A pointer that moves less than this between down and up is a click, not an orbit. */
+const CLICK_PX = 5;
+
+/** The ray from `eye` through `towards` (room) in the specimen's own space (um, world). */
+function rayInto(specimen: Object3D, eye: Vector3, towards: Vector3): Ray {
+  const toSpecimen = new Matrix4().copy(specimen.matrixWorld).invert();
+  const origin = eye.applyMatrix4(toSpecimen);
+  const direction = towards.applyMatrix4(toSpecimen).sub(origin);
+  return { origin: origin.toArray(), direction: direction.toArray() };
+}
+
+/** The ray under a point of the picture, given in -1..1 with y up. */
+export function rayUnder(point: Vector2, camera: PerspectiveCamera, specimen: Object3D): Ray {
+  camera.updateMatrixWorld();
+  const towards = new Vector3(point.x, point.y, 0.5).unproject(camera);
+  return rayInto(specimen, camera.position.clone(), towards);
+}
+
+/** The ray straight ahead of the head, whose pose in the room is `head`. */
+export function rayAhead(head: Matrix4, specimen: Object3D): Ray {
+  const eye = new Vector3().setFromMatrixPosition(head);
+  return rayInto(specimen, eye, new Vector3(0, 0, -1).applyMatrix4(head));
+}
+
+/** A ray of the room in the specimen's own space; its direction stays one metre long. */
+export function rayAlong({ origin, direction }: RoomRay, toSpecimen: Matrix4): Ray {
+  const from = origin.clone().applyMatrix4(toSpecimen);
+  const to = origin.clone().add(direction).applyMatrix4(toSpecimen);
+  return { origin: from.toArray(), direction: to.sub(from).toArray() };
+}
+
+/**
+ * Calls `onClick` with the place in -1..1, y up, of every click or tap that does not drag. Two
+ * fingers zoom and move: neither taps.
+ */
+export function listenForClicks(
+  canvas: HTMLCanvasElement,
+  onClick: (point: Vector2) => void,
+): void {
+  const down = new Map<number, Vector2>();
+  let isTap = false;
+  canvas.addEventListener("pointerdown", (event) => {
+    down.set(event.pointerId, new Vector2(event.clientX, event.clientY));
+    isTap = down.size === 1;
+  });
+  canvas.addEventListener("pointercancel", (event) => down.delete(event.pointerId));
+  canvas.addEventListener("pointerup", (event) => {
+    const start = down.get(event.pointerId);
+    down.delete(event.pointerId);
+    if (start === undefined || !isTap || event.button !== 0) return;
+    if (start.distanceTo(new Vector2(event.clientX, event.clientY)) > CLICK_PX) return;
+    const box = canvas.getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * 2 - 1;
+    const y = 1 - ((event.clientY - box.top) / box.height) * 2;
+    onClick(new Vector2(x, y));
+  });
+}

@@ -1,0 +1,31 @@
+import { Group, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import type { BoxedTile } from "../math/pick";
+import { TileTarget } from "./tile_target";
+
+const TILES: readonly BoxedTile[] = [
+  { id: "near", bounds_um: { min: [0, 0, 10], max: [10, 10, 20] } },
+  { id: "far", bounds_um: { min: [0, 0, 0], max: [10, 10, 10] } },
+];
+
+describe("the tile along a ray", () => {
+  it("is chosen with a ray in um, and its distance is in metres", () => {
+    const specimen = new Group();
+    specimen.matrixAutoUpdate = false;
+    specimen.matrixWorld.makeScale(0.01, 0.01, 0.01).setPosition(-0.05, -0.05, -2);
+    const chosen: unknown[] = [];
+    const target = new TileTarget(specimen, (ray, tile) => chosen.push([ray, tile]));
+    target.tiles = TILES;
+    const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
+    const hit = target.meet(ray);
+    expect(hit?.key).toBe("tile:near");
+    expect(hit?.distance_m).toBeCloseTo(1.8, 12);
+    if (hit !== null) target.choose(hit, ray);
+    const [[{ origin, direction }, tile]] = chosen as [
+      [{ origin: number[]; direction: number[] }, string],
+    ];
+    expect(tile).toBe("near");
+    expect(origin.map((v) => Math.round(v * 1e6) / 1e6)).toEqual([5, 5, 200]);
+    expect(direction[2]).toBeCloseTo(-100, 9);
+  });
+});

@@ -1,0 +1,240 @@
+/**
+ * Cutting the specimen open: a box and a free plane, and the handles that drag them. um, world.
+ * Pure.
+ */
+import { Vector3 } from "three";
+import type { Ray, Vec3 } from "./pick";
+
+export type Box = Readonly<{ min: Vec3; max: Vec3 }>;
+/** Kept is where normal · p <= offset_um; the normal, of unit length, leads to what is cut away. */
+export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
+/** What is kept. null: not cut. */
+export type Clip = Readonly<{ box: Box | null; plane: ClipPlane | null }>;
+/** Part of a ray, in lengths of its direction; entry before exit. */
+export type Span = readonly [number, number];
+/** All of a ray. */
+export const AHEAD: Span = [0, Number.POSITIVE_INFINITY];
+/** Nothing is cut. */
+export const WHOLE: Clip = { box: null, plane: null };
+
+export const AXES = [0, 1, 2] as const;
+export type Side = "min" | "max";
+/** One face of the box; `direction` leads out of it. */
+export type BoxHandle = Readonly<{
+  axis: (typeof AXES)[number];
+  side: Side;
+  position: Vec3;
+  direction: Vec3;
+}>;
+/** `middle` moves the plane along its normal, `tip` turns it about the middle. */
+export type PlaneHandles = Readonly<{ middle: Vec3; tip: Vec3 }>;
+
+/** The box stays so thick, as a share of the specimen's edge. */
+const THINNEST = 0.01;
+/** Rays so parallel to a handle's axis (sine squared of the angle) say nothing about it. */
+const PARALLEL = 1e-6;
+
+/**
+ * What is left of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
+ * are the same. Every frame asks for thousands: nothing is made but the answer.
+ */
+export function boxSpan(span: Span, { origin, direction }: Ray, { min, max }: Box): Span | null {
+  let from = span[0];
+  let to = span[1];
+  for (let axis = 0; axis < 3; axis++) {
+    const o = origin[axis];
+    const d = direction[axis];
+    if (d === 0) {
+      if (o < min[axis] || o > max[axis]) return null;
+      continue;
+    }
+    const a = (min[axis] - o) / d;
+    const b = (max[axis] - o) / d;
+    from = Math.max(from, Math.min(a, b));
+    to = Math.min(to, Math.max(a, b));
+    if (from > to) return null;
+  }
+  return [from, to];
+}
+
+/** What is left of a ray's span inside box and plane; null: nothing. */
+export function clipSpan(span: Span, ray: Ray, { box, plane }: Clip): Span | null {
+  const inBox = box === null ? span : boxSpan(span, ray, box);
+  if (inBox === null) return null;
+  let [from, to] = inBox;
+  if (plane !== null) {
+    const depth = plane.offset_um - dot(plane.normal, ray.origin); // that of what is kept
+    const rate = dot(plane.normal, ray.direction);
+    if (rate > 0) to = Math.min(to, depth / rate);
+    else if (rate < 0) from = Math.max(from, depth / rate);
+    else if (depth < 0) return null;
+  }
+  return from < to ? [from, to] : null;
+}
+
+/** Whether a point is kept. */
+export function isKept(point: Vec3, { box, plane }: Clip): boolean {
+  const isInBox =
+    box === null || AXES.every((i) => point[i] >= box.min[i] && point[i] <= box.max[i]);
+  return isInBox && (plane === null || dot(plane.normal, point) <= plane.offset_um);
+}
+
+/** Whether nothing is left of a box. */
+export function isCutAway(of: Box, { box, plane }: Clip): boolean {
+  const min = AXES.map((i) => (box === null ? of.min[i] : Math.max(of.min[i], box.min[i])));
+  const max = AXES.map((i) => (box === null ? of.max[i] : Math.min(of.max[i], box.max[i])));
+  const isGone = AXES.some((i) => (of.min[i] < of.max[i] ? min[i] >= max[i] : min[i] > max[i]));
+  if (isGone || plane === null) return isGone;
+  const { normal, offset_um } = plane;
+  const deepest = AXES.reduce<number>(
+    (sum, i) => sum + normal[i] * (normal[i] > 0 ? min[i] : max[i]),
+    0,
+  );
+  return deepest >= offset_um;
+}
+
+/** A handle in the middle of each face. */
+export function boxHandles(box: Box): readonly BoxHandle[] {
+  const middle = centerOf(box);
+  return AXES.flatMap((axis) =>
+    (["min", "max"] as const).map((side) => ({
+      axis,
+      side,
+      position: withPart(middle, axis, box[side][axis]),
+      direction: withPart([0, 0, 0], axis, side === "max" ? 1 : -1),
+    })),
+  );
+}
+
+/** The box after its face was dragged to where the ray comes closest to the handle's axis. */
+export function dragBox(
+  box: Box,
+  handle: Pick<BoxHandle, "axis" | "side">,
+  ray: Ray,
+  specimen: Box,
+): Box {
+  const { axis, side } = handle;
+  const face = withPart(centerOf(box), axis, box[side][axis]);
+  const along = closestOnLine(face, withPart([0, 0, 0], axis, 1), ray);
+  return along === null ? box : moveFace(box, handle, along, specimen);
+}
+
+/** The box after its face has gone along the axis; it stays in the specimen, and a box. */
+export function moveFace(
+  box: Box,
+  { axis, side }: Pick<BoxHandle, "axis" | "side">,
+  by_um: number,
+  specimen: Box,
+): Box {
+  const gap = THINNEST * (specimen.max[axis] - specimen.min[axis]);
+  const lowest = side === "min" ? specimen.min[axis] : box.min[axis] + gap;
+  const highest = side === "max" ? specimen.max[axis] : box.max[axis] - gap;
+  const wanted = Math.min(Math.max(box[side][axis] + by_um, lowest), highest);
+  return { ...box, [side]: withPart(box[side], axis, wanted) };
+}
+
+/**
+ * The handles of the plane: `middle` on it, nearest to the specimen's centre, `tip` so far along
+ * its normal.
+ */
+export function planeHandles(plane: ClipPlane, specimen: Box, arm_um: number): PlaneHandles {
+  const center = centerOf(specimen);
+  const middle = along(center, plane.normal, plane.offset_um - dot(plane.normal, center));
+  return { middle, tip: along(middle, plane.normal, arm_um) };
+}
+
+/** The plane after its middle was dragged along its normal. */
+export function slidePlane(plane: ClipPlane, ray: Ray, specimen: Box): ClipPlane {
+  const { middle } = planeHandles(plane, specimen, 0);
+  const by = closestOnLine(middle, plane.normal, ray);
+  return by === null ? plane : movePlane(plane, by, specimen);
+}
+
+/** The plane after it has gone along its normal; it never leaves the specimen. */
+export function movePlane(plane: ClipPlane, by_um: number, specimen: Box): ClipPlane {
+  const moved = withinSpecimen(plane.normal, plane.offset_um + by_um, specimen);
+  return moved.offset_um === plane.offset_um ? plane : moved;
+}
+
+/**
+ * The plane after its tip was dragged: it turns about its middle. Of the two places at which a ray
+ * meets the sphere around the middle the one nearer to the tip counts; beside the sphere, the
+ * place nearest to the ray.
+ */
+export function turnPlane(plane: ClipPlane, ray: Ray, specimen: Box, arm_um: number): ClipPlane {
+  const { middle, tip } = planeHandles(plane, specimen, arm_um);
+  const center = new Vector3(...middle);
+  const origin = new Vector3(...ray.origin);
+  const direction = new Vector3(...ray.direction).normalize();
+  const nearest = Math.max(0, center.clone().sub(origin).dot(direction));
+  const foot = origin.clone().addScaledVector(direction, nearest);
+  const half = Math.sqrt(Math.max(0, arm_um ** 2 - foot.distanceToSquared(center)));
+  const ends = [-half, half]
+    .map((by) => nearest + by)
+    .filter((t) => t >= 0)
+    .map((t) => origin.clone().addScaledVector(direction, t));
+  const handle = new Vector3(...tip);
+  ends.sort((a, b) => a.distanceToSquared(handle) - b.distanceToSquared(handle));
+  const normal = (ends[0] ?? foot).sub(center);
+  if (!(normal.length() > 0)) return plane; // through the middle itself: no direction
+  return aboutMiddle(plane, normal.normalize().toArray(), specimen);
+}
+
+/** The plane after it was turned about an axis through its middle, counter-clockwise. */
+export function spinPlane(
+  plane: ClipPlane,
+  axis: (typeof AXES)[number],
+  angle_rad: number,
+  specimen: Box,
+): ClipPlane {
+  const normal = new Vector3(...plane.normal);
+  normal.applyAxisAngle(new Vector3(...withPart([0, 0, 0], axis, 1)), angle_rad);
+  return aboutMiddle(plane, normal.normalize().toArray(), specimen);
+}
+
+/** The plane through the same middle that faces another way. */
+function aboutMiddle(plane: ClipPlane, normal: Vec3, specimen: Box): ClipPlane {
+  const { middle } = planeHandles(plane, specimen, 0);
+  return withinSpecimen(normal, dot(normal, middle), specimen);
+}
+
+/** The plane, its offset no less and no more than the specimen's corners have. */
+export function withinSpecimen(normal: Vec3, offset_um: number, specimen: Box): ClipPlane {
+  const center = dot(normal, centerOf(specimen));
+  const reach = AXES.reduce<number>(
+    (sum, i) => sum + (Math.abs(normal[i]) * (specimen.max[i] - specimen.min[i])) / 2,
+    0,
+  );
+  return { normal, offset_um: Math.min(Math.max(offset_um, center - reach), center + reach) };
+}
+
+/**
+ * How far along a line (unit direction, from `point`) the ray comes closest to it; null if they
+ * are parallel. What lies behind the ray's origin does not count.
+ */
+export function closestOnLine(point: Vec3, direction: Vec3, ray: Ray): number | null {
+  const line = new Vector3(...direction);
+  const toward = new Vector3(...ray.direction).normalize();
+  const gap = new Vector3(...ray.origin).sub(new Vector3(...point));
+  const cosine = line.dot(toward);
+  const sine2 = 1 - cosine ** 2;
+  if (!(sine2 > PARALLEL)) return null;
+  const onRay = (cosine * line.dot(gap) - toward.dot(gap)) / sine2;
+  return line.dot(gap) + Math.max(0, onRay) * cosine;
+}
+
+function dot(a: Vec3, b: Vec3): number {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+function along(p: Vec3, direction: Vec3, by: number): Vec3 {
+  return [p[0] + by * direction[0], p[1] + by * direction[1], p[2] + by * direction[2]];
+}
+
+function centerOf({ min, max }: Box): Vec3 {
+  return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
+}
+
+function withPart(p: Vec3, axis: 0 | 1 | 2, value: number): Vec3 {
+  return [axis === 0 ? value : p[0], axis === 1 ? value : p[1], axis === 2 ? value : p[2]];
+}

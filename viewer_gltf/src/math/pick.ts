@@ -1,0 +1,45 @@
+/** Which tile a ray meets first. Pure. */
+import { AHEAD, type Box, boxSpan, type Clip, clipSpan } from "./clip";
+
+export type Vec3 = readonly [number, number, number];
+export type Ray = Readonly<{ origin: Vec3; direction: Vec3 }>;
+
+export type BoxedTile = Readonly<{ id: string; bounds_um: Box }>;
+type Boxed<B extends Box> = Readonly<{ bounds_um: B }>;
+/** How far the tile is, in lengths of the ray's direction. */
+export type MetTile = Readonly<{ id: string; distance: number }>;
+
+/** The tiles that can be seen: all, or the isolated one. */
+export function shownTiles<T extends Readonly<{ id: string }>>(
+  tiles: readonly T[],
+  isolated: string | null,
+): readonly T[] {
+  return isolated === null ? tiles : tiles.filter(({ id }) => id === isolated);
+}
+
+/** The box of what can be seen: the specimen's, or the isolated tile's. */
+export function shownBox<B extends Box>(
+  { specimen, tiles }: Readonly<{ specimen: Boxed<B>; tiles: readonly (BoxedTile & Boxed<B>)[] }>,
+  isolated: string | null,
+): B {
+  return (tiles.find(({ id }) => id === isolated) ?? specimen).bounds_um;
+}
+
+/** The first tile along the ray (um, world) of which something is left there; null: none. */
+export function pickTile(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): MetTile | null {
+  const kept = clipSpan(AHEAD, ray, clip);
+  if (kept === null) return null;
+  let nearest = Number.POSITIVE_INFINITY;
+  let picked: string | null = null;
+  for (const { id, bounds_um } of tiles) {
+    const span = boxSpan(AHEAD, ray, bounds_um);
+    if (span === null) continue;
+    const from = Math.max(span[0], kept[0]);
+    const to = Math.min(span[1], kept[1]);
+    const isFlat = span[0] === span[1]; // otherwise a cut along its face has taken all of it
+    if (from >= nearest || !(from < to || (isFlat && from === to))) continue;
+    nearest = from;
+    picked = id;
+  }
+  return picked === null ? null : { id: picked, distance: nearest };
+}

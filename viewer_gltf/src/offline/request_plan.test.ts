@@ -1,0 +1,79 @@
+import { describe, expect, it } from "vitest";
+import { Keys, ownBundle, planFor } from "./request_plan";
+
+const FOLDER = "https://host/cells/";
+const FIXED = ["app.webmanifest", "icon.svg"];
+const plan = (address: string, page: string | null = FOLDER) =>
+  planFor(address, FOLDER, page, FIXED);
+
+describe("the answer to a request", () => {
+  it("is the page for its folder and its file, whatever the query", () => {
+    for (const address of [FOLDER, `${FOLDER}?mode=tile`, `${FOLDER}index.html?x=1`]) {
+      expect(plan(address, null)).toEqual({ kind: "page" });
+    }
+    expect(plan("https://host/cells/other.html", null)).toEqual({ kind: "none" });
+    expect(plan("https://host/cells/report/", null)).toEqual({ kind: "none" });
+  });
+
+  it("tells the viewer's own files from the bundle's", () => {
+    expect(plan(`${FOLDER}assets/index-a1.js`)).toEqual({
+      kind: "asset",
+      name: "assets/index-a1.js",
+    });
+    expect(plan(`${FOLDER}icon.svg`)).toEqual({ kind: "fixed", name: "icon.svg" });
+    expect(plan(`${FOLDER}manifest.json`)).toEqual({ kind: "manifest", base: FOLDER });
+    expect(plan(`${FOLDER}luts/a%20b.ktx2`)).toEqual({
+      kind: "file",
+      base: FOLDER,
+      path: "luts/a b.ktx2",
+    });
+  });
+
+  it("knows a bundle in another folder of the host, with its query", () => {
+    const page = `${FOLDER}?bundle=${encodeURIComponent("../other/?token=1")}`;
+    const base = "https://host/other/?token=1";
+    expect(plan("https://host/other/manifest.json?token=1", page)).toEqual({
+      kind: "manifest",
+      base,
+    });
+    expect(plan("https://host/other/a/lod3.glb?token=1", page)).toEqual({
+      kind: "file",
+      base,
+      path: "a/lod3.glb",
+    });
+    expect(plan("https://host/elsewhere/a.glb", page)).toEqual({ kind: "none" });
+  });
+
+  it("leaves bundles of other hosts alone", () => {
+    const page = `${FOLDER}?bundle=https://far/x/`;
+    expect(ownBundle(page)).toBeNull();
+    expect(ownBundle(`${FOLDER}?bundle=http://`)).toBeNull();
+    expect(ownBundle("blob:https://host/5f0e")).toBeNull();
+    expect(plan("https://far/x/manifest.json", page)).toEqual({ kind: "none" });
+    expect(plan(`${FOLDER}manifest.json`, page)).toEqual({ kind: "none" });
+  });
+});
+
+describe("the store's keys", () => {
+  const keys = new Keys(FOLDER);
+
+  it("differ by bundle, content and range", () => {
+    const all = [
+      keys.file("https://host/a/", "00ff"),
+      keys.file("https://host/b/", "00ff"),
+      keys.file("https://host/a/", "00ee"),
+      keys.file("https://host/a/", "00ff", "bytes=0-9"),
+      keys.manifest("https://host/a/"),
+      keys.page,
+      keys.ledger,
+    ];
+    expect(new Set(all).size).toBe(all.length);
+    for (const key of all) expect(new URL(key).href).toBe(key);
+  });
+
+  it("tell the hash", () => {
+    const key = keys.file("https://host/a/?t=/1", "00ff", "bytes=0-9");
+    expect(key.startsWith(keys.files("https://host/a/?t=/1"))).toBe(true);
+    expect(keys.hashOf(key)).toBe("00ff");
+  });
+});

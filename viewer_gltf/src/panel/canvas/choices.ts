@@ -1,0 +1,139 @@
+/** What the panel on a plane lets choose from: options, colours, tiles. Pure. */
+import type { Choice, Colour, TileMap } from "../controls";
+import { nextColour } from "../palettes";
+import {
+  type Block,
+  box,
+  GAP,
+  type Mark,
+  type Rect,
+  type Region,
+  ROW,
+  SMALL,
+  split,
+  text,
+} from "./draw_list";
+import { captioned, LABEL, one, region, toneOf, unlessRefused } from "./parts";
+
+/** A map of few tiles need not fill the panel. */
+const LARGEST_CELL = 96;
+const MAP_HEIGHT = 7 * ROW;
+/** 1.25 degrees at 1.2 m: of smaller ones no gaze could choose one. */
+const SMALLEST_CELL = 42;
+
+/** Options side by side. */
+export function chips(choice: Choice, width: number): Block {
+  const rects = split({ x: 0, y: 0, width, height: ROW }, choice.options.length);
+  const marks: Mark[] = [];
+  const regions: Region[] = [];
+  choice.options.forEach(({ value, label }, i) => {
+    const isChosen = value === choice.value;
+    marks.push(
+      box(rects[i], isChosen ? "accent" : "raised"),
+      text(rects[i], label, { align: "center", tone: toneOf(choice, isChosen) }),
+    );
+    regions.push(region(`${choice.id}=${value}`, label, rects[i], () => choice.to(value)));
+  });
+  return captioned(choice.label, width, one(marks, unlessRefused(choice, regions)));
+}
+
+/** Many options, or long ones: the one before and the one after. */
+export function stepper(choice: Choice, row: Rect): Block {
+  const { options, value, id } = choice;
+  const at = options.findIndex((each) => each.value === value);
+  const step = (by: number) => {
+    const { length } = options;
+    return () => choice.to(options[(Math.max(at, 0) + by + length) % length].value);
+  };
+  const left = row.width * LABEL;
+  const label: Rect = { ...row, width: left };
+  const before: Rect = { ...row, x: row.x + left, width: ROW };
+  const after: Rect = { ...row, x: row.x + row.width - ROW, width: ROW };
+  const middle: Rect = { ...row, x: before.x + ROW, width: after.x - before.x - ROW };
+  const tone = toneOf(choice);
+  const marks = [
+    text(label, choice.label, { tone, size: SMALL }),
+    box(before, "raised"),
+    text(before, "‹", { align: "center", tone }),
+    text(middle, options[at]?.label ?? value, { align: "center", tone, size: SMALL + 2 }),
+    box(after, "raised"),
+    text(after, "›", { align: "center", tone }),
+  ];
+  const isAlone = options.length < 2;
+  return one(
+    marks,
+    isAlone
+      ? []
+      : unlessRefused(choice, [
+          region(`${id}=before`, `${choice.label}: before`, before, step(-1)),
+          region(`${id}=after`, `${choice.label}: after`, after, step(1)),
+        ]),
+  );
+}
+
+/** Any colour: the palettes' next one. */
+export function nextSwatch(colour: Colour, rect: Rect): Block {
+  return one(
+    [box(rect, toneOfHex(colour.value), "line")],
+    unlessRefused(colour, [
+      region(colour.id, colour.name ?? colour.label, rect, () =>
+        colour.to(nextColour(colour.value)),
+      ),
+    ]),
+  );
+}
+
+export function palettes(colour: Colour, width: number): readonly Block[] {
+  return colour.palettes.map(({ name, colors }) => {
+    const rects = split({ x: 0, y: 0, width, height: ROW }, colors.length);
+    const marks = colors.map(({ hex }, i) =>
+      box(rects[i], toneOfHex(hex), hex === colour.value ? "text" : null),
+    );
+    const regions = colors.map(({ name: label, hex }, i) =>
+      region(`${colour.id}=${name}=${hex}`, label, rects[i], () => colour.to(hex)),
+    );
+    return captioned(name, width, one(marks, unlessRefused(colour, regions)));
+  });
+}
+
+function toneOfHex(hex: string): `#${string}` {
+  return `#${hex.slice(1)}`;
+}
+
+export function mapBlock(map: TileMap, width: number): Block {
+  const cell = Math.min(LARGEST_CELL, width / map.columns, MAP_HEIGHT / map.rows);
+  if (cell < SMALLEST_CELL) return stepper(asChoice(map), { x: 0, y: 0, width, height: ROW });
+  const left = (width - cell * map.columns) / 2;
+  const rectOf = (row: number, column: number): Rect => ({
+    x: left + column * cell,
+    y: row * cell,
+    width: cell,
+    height: cell,
+  });
+  const marks: Mark[] = [];
+  const regions: Region[] = [];
+  for (const tile of map.tiles) {
+    const rect = rectOf(tile.row, tile.column);
+    const isChosen = tile.isSelected || tile.isIsolated;
+    marks.push(box(rect, isChosen ? "accent" : "raised", tile.isGazed ? "text" : "line"));
+    if (cell >= ROW) {
+      const label = tile.isIsolated ? "only" : `${tile.row} ${tile.column}`;
+      const tone = isChosen ? "ink" : "dim";
+      marks.push(text(rect, label, { align: "center", size: SMALL, tone }));
+    }
+    regions.push(region(`${map.id}=${tile.id}`, tile.id, rect, () => map.to(tile.id)));
+  }
+  const block = one(marks, unlessRefused(map, regions), Math.ceil(cell * map.rows) + GAP);
+  return captioned(map.label, width, block);
+}
+
+/** One tile after the other, from the one that is chosen or gazed at. */
+function asChoice({ id, tiles, refusal, to }: TileMap): Choice {
+  const now =
+    tiles.find(({ isIsolated }) => isIsolated) ??
+    tiles.find(({ isSelected }) => isSelected) ??
+    tiles.find(({ isGazed }) => isGazed);
+  const options = tiles.map((tile) => ({ value: tile.id, label: tile.id }));
+  const value = now?.id ?? "";
+  return { kind: "choice", id, label: "Tile", value, options, isInline: false, refusal, to };
+}

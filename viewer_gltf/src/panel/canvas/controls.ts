@@ -1,0 +1,138 @@
+/**
+ * The controls of a layout as rows of the panel on a plane, each tall enough to be gazed at. Pure.
+ */
+import type { Control, Group, Toggle } from "../controls";
+import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
+import { type Block, box, type Mark, type Rect, type Region, ROW, SMALL, text } from "./draw_list";
+import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
+import { sliderRow, windowRow } from "./sliders";
+import { planeBlock } from "./transfer_function_2d";
+
+/** What has no use in a headset: there is no keyboard, no clipboard, and stereo has begun. */
+const ELSEWHERE: ReadonlySet<string> = new Set([
+  "stereo",
+  "split",
+  "scan",
+  "lenses",
+  "share",
+  "help",
+]);
+/** Widths in a channel's row. */
+const CHIP = 150;
+const SWATCH = 80;
+
+export function blocksOf(item: Control | Group, width: number): readonly Block[] {
+  if (item.kind === "group") return groupBlocks(item, width);
+  if (ELSEWHERE.has(item.id)) return [];
+  const row: Rect = { x: 0, y: 0, width, height: ROW };
+  switch (item.kind) {
+    case "toggle":
+      return [toggleRow(item, row)];
+    case "button":
+      return [
+        one(
+          [
+            box(row, item.isPrimary && !item.refusal ? "accent" : "raised"),
+            text(row, item.label, { align: "center", tone: toneOf(item, item.isPrimary) }),
+          ],
+          unlessRefused(item, [region(item.id, item.label, row, item.to)]),
+        ),
+      ];
+    case "slider":
+      return [sliderRow(item, row)];
+    case "window":
+      return [windowRow(item, 0, row), windowRow(item, 1, row)];
+    case "choice":
+      return [item.isInline ? chips(item, width) : stepper(item, row)];
+    case "colour":
+      return item.palettes.length === 0 ? [nextSwatch(item, row)] : palettes(item, width);
+    case "map":
+      return [mapBlock(item, width)];
+    case "plane":
+      return [planeBlock(item, width)];
+    case "text":
+      return item.value === "" ? [] : [textBlock(item.label, item.value, width)];
+    case "search":
+    case "link":
+      return [];
+  }
+}
+
+function toggleRow(toggle: Toggle, row: Rect): Block {
+  const mark: Rect = { ...row, width: ROW };
+  const label: Rect = { ...row, x: row.x + ROW, width: row.width - ROW };
+  const marks = [
+    box(inner(mark), toggle.value ? "accent" : "raised", toggle.value ? null : "line"),
+    text(label, toggle.label, { tone: toneOf(toggle) }),
+  ];
+  if (toggle.value) marks.push({ kind: "tick", rect: inner(mark), tone: "ink" });
+  const label_ = toggle.name ?? toggle.label;
+  return one(
+    marks,
+    unlessRefused(toggle, [region(toggle.id, label_, row, () => toggle.to(!toggle.value))]),
+  );
+}
+
+function inner({ x, y, width, height }: Rect): Rect {
+  return { x: x + 8, y: y + 8, width: width - 16, height: height - 16 };
+}
+
+/** A toggle among others in a row: lit while it is on. */
+function chip(toggle: Toggle, rect: Rect): Block {
+  const isOn = toggle.value && !toggle.refusal;
+  return one(
+    [
+      box(rect, isOn ? "accent" : "raised", isOn ? null : "line"),
+      text(rect, toggle.label, { align: "center", tone: toneOf(toggle, isOn) }),
+    ],
+    unlessRefused(toggle, [
+      region(toggle.id, toggle.name ?? toggle.label, rect, () => toggle.to(!toggle.value)),
+    ]),
+  );
+}
+
+function textBlock(label: string, value: string, width: number): Block {
+  const height = ROW;
+  const left: Rect = { x: 0, y: 0, width: width * LABEL, height };
+  const right: Rect = { ...left, x: left.width, width: width - left.width };
+  return one(
+    [
+      text(left, label, { tone: "dim", size: SMALL }),
+      text(right, value, { size: SMALL, lines: 2 }),
+    ],
+    [],
+    height,
+  );
+}
+
+/** A channel: colour, name and what is switched in one row; the rest while it is open. */
+function groupBlocks(group: Group, width: number): readonly Block[] {
+  const inRow = group.controls.filter(({ kind }) => kind === "colour" || kind === "toggle");
+  const below = [...group.controls.filter((each) => !inRow.includes(each)), ...group.more];
+  const marks: Mark[] = [];
+  const regions: Region[] = [];
+  const add = ({ marks: more, regions: places }: Block) => {
+    marks.push(...more);
+    regions.push(...places);
+  };
+  let [left, right] = [0, width];
+  for (const control of inRow) {
+    if (control.kind !== "colour") continue;
+    add(nextSwatch(control, { x: left, y: 0, width: SWATCH, height: ROW }));
+    left += SWATCH;
+  }
+  for (const control of [...inRow].reverse()) {
+    if (control.kind !== "toggle") continue;
+    right -= CHIP;
+    add(chip(control, { x: right, y: 0, width: CHIP, height: ROW }));
+  }
+  const name: Rect = { x: left, y: 0, width: right - left, height: ROW };
+  const canOpen = group.controls.length > 1 || group.more.length > 0;
+  const sign = canOpen ? (group.isOpen ? "▾ " : "▸ ") : "";
+  const tags = group.tags.length === 0 ? "" : ` (${group.tags.join(", ")})`;
+  marks.push(text(name, `${sign}${group.label}${tags}`));
+  if (canOpen) regions.push(region(`${group.id}/open`, group.label, name, () => group.opener));
+  const head = one(marks, regions);
+  if (!group.isOpen) return [head];
+  return [head, ...below.flatMap((control) => blocksOf(control, width))];
+}

@@ -1,0 +1,115 @@
+/** What the panel on a plane is made of: marks to paint and regions to point at. Pixels. Pure. */
+
+import type { Histogram } from "../../volumes/transfer_functions_loader";
+import type { Wish } from "../controls";
+
+/** From the upper left corner. */
+export type Rect = Readonly<{ x: number; y: number; width: number; height: number }>;
+
+/** Colours by their part in the panel, or `#rrggbb`. */
+export type Tone = "back" | "raised" | "line" | "text" | "dim" | "accent" | "ink" | `#${string}`;
+
+export type Mark =
+  | Readonly<{ kind: "box"; rect: Rect; fill: Tone | null; stroke: Tone | null; radius: number }>
+  | Readonly<{
+      kind: "text";
+      rect: Rect;
+      text: string;
+      tone: Tone;
+      align: "left" | "center" | "right";
+      size: number;
+      /** As many lines as may be broken into; the last one ends with an ellipsis. */
+      lines: number;
+    }>
+  | Readonly<{ kind: "tick"; rect: Rect; tone: Tone }>
+  /** `corners` in the rect, 0..1 from its upper left corner. */
+  | Readonly<{
+      kind: "outline";
+      rect: Rect;
+      corners: readonly (readonly [number, number])[];
+      fill: Tone;
+      opacity: number;
+      stroke: Tone;
+    }>
+  /** `window`: the part of its values that the rect is as wide as. */
+  | Readonly<{
+      kind: "histogram";
+      rect: Rect;
+      histogram: Histogram;
+      window: readonly [number, number];
+    }>;
+
+/** What the plane keeps for itself, since it shows one section at a time, and a page of it. */
+export type PlaneChange =
+  | Readonly<{ plane: "tab"; section: string }>
+  | Readonly<{ plane: "page"; page: number }>
+  /** Say why what was asked for can't be done. */
+  | Readonly<{ plane: "tell"; text: string }>
+  | Readonly<{ plane: "close" }>
+  | Readonly<{ plane: "leave" }>;
+
+export type PlaneWish = Wish | PlaneChange;
+
+/**
+ * Where a ray does something. `to` gets where in the region it is, 0..1 from its left edge and from
+ * its upper one; null: nothing changes by it.
+ */
+export type Region = Readonly<{
+  id: string;
+  /** For tests and for whoever reads the panel aloud. */
+  label: string;
+  rect: Rect;
+  isSlide: boolean;
+  to: (across: number, down?: number) => PlaneWish | null;
+  /** What taking hold of it does, where that is something else than to drag it. */
+  press?: (across: number, down: number) => PlaneWish;
+}>;
+
+/** A row, or what must not be broken; its upper left corner is 0, 0. */
+export type Block = Readonly<{
+  height: number;
+  marks: readonly Mark[];
+  regions: readonly Region[];
+}>;
+
+export const ROW = 60;
+export const GAP = 8;
+export const TEXT = 28;
+export const SMALL = 22;
+
+/** The part of a row that is painted. */
+export function inset({ x, y, width, height }: Rect, by = GAP / 2): Rect {
+  return { x: x + by, y: y + by, width: width - 2 * by, height: height - 2 * by };
+}
+
+export function box(rect: Rect, fill: Tone | null, stroke: Tone | null = null): Mark {
+  return { kind: "box", rect: inset(rect), fill, stroke, radius: 10 };
+}
+
+export function text(
+  rect: Rect,
+  words: string,
+  { tone = "text", align = "left", size = TEXT, lines = 1 }: Partial<TextLook> = {},
+): Mark {
+  return { kind: "text", rect: inset(rect, GAP), text: words, tone, align, size, lines };
+}
+type TextLook = Omit<Extract<Mark, { kind: "text" }>, "kind" | "rect" | "text">;
+
+/** Parts of a row, side by side. */
+export function split(rect: Rect, count: number): readonly Rect[] {
+  const width = rect.width / count;
+  return Array.from({ length: count }, (_, i) => ({ ...rect, x: rect.x + i * width, width }));
+}
+
+export function moved(block: Block, dx: number, dy: number): Block {
+  const by = (rect: Rect): Rect => ({ ...rect, x: rect.x + dx, y: rect.y + dy });
+  return {
+    height: block.height,
+    marks: block.marks.map((mark) => ({ ...mark, rect: by(mark.rect) })),
+    regions: block.regions.map((region) => ({ ...region, rect: by(region.rect) })),
+  };
+}
+
+export function holds({ x, y, width, height }: Rect, at: Readonly<{ x: number; y: number }>) {
+  return at.x >= x && at.x < x + width && at.y >= y && at.y < y + height;
+}

@@ -1,0 +1,28 @@
+/** Histograms as pictures, each made once. */
+import { COLUMNS, ROWS } from "../../state/transfer_shapes";
+import type { Histogram } from "../../volumes/transfer_functions_loader";
+
+/** Of the page's accent, where there are most voxels. */
+const COLOR = [150, 190, 240] as const;
+
+const made = new WeakMap<Histogram, HTMLCanvasElement>();
+
+/** COLUMNS x ROWS pixels, the steepest gradient on top. */
+export function histogramPicture(histogram: Histogram): HTMLCanvasElement {
+  const before = made.get(histogram);
+  if (before !== undefined) return before;
+  const canvas = document.createElement("canvas");
+  canvas.width = COLUMNS;
+  canvas.height = ROWS;
+  const picture = new ImageData(COLUMNS, ROWS);
+  for (let row = 0; row < ROWS; row++) {
+    for (let k = 0; k < COLUMNS; k++) {
+      const at = 4 * ((ROWS - 1 - row) * COLUMNS + k);
+      picture.data.set(COLOR, at);
+      picture.data[at + 3] = histogram.cells[row * COLUMNS + k];
+    }
+  }
+  canvas.getContext("2d")?.putImageData(picture, 0, 0);
+  made.set(histogram, canvas);
+  return canvas;
+}

@@ -1,0 +1,208 @@
+import { describe, expect, it } from "vitest";
+import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
+import { initialState, reduce, type ViewerState } from "../../state/viewer_state";
+import { type PanelView, START_VIEW } from "../controls";
+import { type Facts, layOut } from "../layout";
+import { blocksOf } from "./controls";
+import { type Rect, type Region, ROW } from "./draw_list";
+import { HEIGHT, type Page, PX_PER_M, pageOf, paginate, WIDTH } from "./page";
+
+const FACTS: Facts = {
+  title: "sample",
+  subtitle: "",
+  shown: SPECIMEN_BOX,
+  ranges: new Map(),
+  gazed: "r1_c2",
+  isStereo: true,
+  stereo: { isAvailable: true, reason: "" },
+  split: null,
+  canScan: false,
+  frame_ms: 12.3,
+  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
+  triangles: 12_345,
+  volumeLevel: 1,
+  samples: null,
+  isLoading: false,
+  values: [],
+};
+const start = (channels = 12) => initialState(sampleManifest(channels));
+const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
+  layOut(state, FACTS, { ...START_VIEW, ...view });
+
+const TABS = [
+  ...["channels", "volumes", "light", "tiles", "view", "stereo", "measure", "cut", "quality"],
+];
+
+/** Every page of every section. */
+function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly Page[] {
+  return TABS.flatMap((tab) => {
+    const pages: Page[] = [];
+    for (let page = 0; ; page++) {
+      const made = pageOf(laidOut(state, view), { tab, page });
+      pages.push(made);
+      const more = made.regions.find(({ id }) => id === "more")?.to(0);
+      if (typeof more !== "object" || more === null || !("plane" in more) || more.plane !== "page")
+        break;
+      if (more.page === 0) break;
+    }
+    return pages;
+  });
+}
+
+function find(page: Page, id: string): Region {
+  const found = page.regions.find((region) => region.id === id);
+  if (found === undefined) throw new Error(`no ${id} in ${page.regions.map((r) => r.id)}`);
+  return found;
+}
+
+const overlap = (a: Rect, b: Rect) =>
+  Math.min(a.x + a.width, b.x + b.width) - Math.max(a.x, b.x) > 1e-6 &&
+  Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y) > 1e-6;
+
+describe("the panel on a plane", () => {
+  const pages = allPages(start(), { picked: "c2", isPlaneOpen: true });
+
+  it("gives every control at least 1.2 degrees either way at 1.2 m", () => {
+    const degrees = (px: number) => (2 * Math.atan(px / PX_PER_M / 2 / 1.2) * 180) / Math.PI;
+    for (const { rect, id } of pages.flatMap(({ regions }) => regions)) {
+      expect(degrees(Math.min(rect.width, rect.height)), id).toBeGreaterThan(1.2);
+    }
+  });
+
+  it("keeps all controls apart and in the picture", () => {
+    for (const { regions } of pages) {
+      for (const [i, { rect, id }] of regions.entries()) {
+        expect(Math.min(rect.x, rect.y), id).toBeGreaterThanOrEqual(0);
+        expect(rect.x + rect.width, id).toBeLessThanOrEqual(WIDTH);
+        expect(rect.y + rect.height, id).toBeLessThanOrEqual(HEIGHT);
+        const others = regions.slice(i + 1).filter((other) => overlap(rect, other.rect));
+        expect(others.map((other) => `${id} ${other.id}`)).toEqual([]);
+      }
+    }
+  });
+
+  it("names every control once", () => {
+    for (const { regions } of pages) {
+      const ids = regions.map(({ id }) => id);
+      expect(new Set(ids).size).toBe(ids.length);
+    }
+  });
+
+  it("leaves out no control that can be used in a headset", () => {
+    const ids = new Set(pages.flatMap(({ regions }) => regions.map(({ id }) => id.split("=")[0])));
+    for (const { items } of laidOut(start(), { picked: "c2", isPlaneOpen: true }).sections) {
+      for (const item of items) {
+        const inRow = item.kind === "group" ? item.controls : [item];
+        const isOpen = item.kind === "group" && item.isOpen;
+        const controls = isOpen ? [...inRow, ...item.more] : inRow;
+        for (const { id, kind, refusal } of controls) {
+          const isElsewhere =
+            ["stereo", "lenses", "share", "help"].includes(id) || kind === "search";
+          const isClosed = item.kind === "group" && !isOpen && kind === "choice";
+          if (isElsewhere || isClosed || refusal || kind === "text") continue;
+          expect(ids, id).toContain(id);
+        }
+      }
+    }
+  });
+
+  it("says why where something is refused", () => {
+    const off = reduce(start(), { type: "choose-mode", mode: "off" });
+    const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
+    const radius = find(page, "disc-radius");
+    expect(radius.isSlide).toBe(false);
+    expect(radius.to(0.3)).toEqual({ plane: "tell", text: "Only the mode Disc has one." });
+    expect(find(page, "mode=disc").to(0)).toEqual({ type: "choose-mode", mode: "disc" });
+  });
+});
+
+describe("its controls", () => {
+  it("do what the layout's do", () => {
+    const channels = pageOf(laidOut(start()), { tab: "channels", page: 0 });
+    expect(find(channels, "c0/shown").to(0)).toEqual({ type: "show", channel: "c0", shown: false });
+    expect(find(channels, "c3/open").to(0)).toEqual({ panel: "pick", channel: "c3" });
+    const tiles = pageOf(laidOut(start()), { tab: "tiles", page: 0 });
+    expect(find(tiles, "tile-map=r1_c4").to(0)).toEqual({ type: "select", tile: "r1_c4" });
+    const view = pageOf(laidOut(start()), { tab: "view", page: 0 });
+    expect(find(view, "reset").to(0)).toBe("reset");
+  });
+
+  it("slide from end to end, in the control's steps, a little before the region's ends", () => {
+    const page = pageOf(laidOut(start(), { picked: "c0" }), { tab: "channels", page: 0 });
+    const opacity = find(page, "c0/opacity");
+    const at = (across: number) => {
+      const wish = opacity.to(across);
+      return typeof wish === "object" && wish !== null && "opacity" in wish ? wish.opacity : null;
+    };
+    expect([at(0), at(0.5), at(1)]).toEqual([0, 0.5, 1]);
+    expect(at(0.04)).toBe(0);
+    expect(100 * (at(0.337) ?? 0)).toBeCloseTo(Math.round(100 * (at(0.337) ?? 0)), 9);
+  });
+
+  it("bring a window's ends together but not past each other", () => {
+    const shown = reduce(start(), { type: "window", channel: "c0", window: [0.25, 0.5] });
+    const all = allPages(shown, { picked: "c0" }).flatMap(({ regions }) => regions);
+    const [low] = all.filter(({ id }) => id === "c0/window=low");
+    const [high] = all.filter(({ id }) => id === "c0/window=high");
+    expect(low.to(1)).toEqual({ type: "window", channel: "c0", window: [0.5, 0.5] });
+    expect(high.to(0)).toEqual({ type: "window", channel: "c0", window: [0.25, 0.25] });
+  });
+});
+
+describe("its pages", () => {
+  const block = { height: ROW, marks: [], regions: [] };
+
+  it("hold all blocks in order, and leave room for the way on", () => {
+    const blocks = Array.from({ length: 20 }, (_, i) => ({ ...block, height: ROW + i }));
+    const pages = paginate(blocks, 9 * ROW);
+    expect(pages.flat()).toEqual(blocks);
+    for (const page of pages) {
+      expect(page.reduce((sum, { height }) => sum + height, 0)).toBeLessThanOrEqual(8 * ROW);
+    }
+  });
+
+  it("are one if all fits", () => {
+    expect(
+      paginate(
+        Array.from({ length: 9 }, () => block),
+        9 * ROW,
+      ),
+    ).toHaveLength(1);
+  });
+
+  it("never grow with the bundle: of 70 channels, each is reached by name", () => {
+    const many = allPages(start(70));
+    expect(many.flatMap(({ regions }) => regions).some(({ id }) => id === "next-channels")).toBe(
+      true,
+    );
+    expect(many.length).toBeLessThan(TABS.length + 6);
+  });
+
+  it("step from tile to tile where a map would be too fine for the gaze", () => {
+    const tiles = Array.from({ length: 400 }, (_, i) => ({
+      id: `r${Math.floor(i / 20)}_c${i % 20}`,
+      row: Math.floor(i / 20),
+      column: i % 20,
+      isGazed: i === 45,
+      isSelected: false,
+      isIsolated: false,
+    }));
+    const to = (tile: string) => ({ type: "select", tile }) as const;
+    const map = { kind: "map", id: "map", label: "", rows: 20, columns: 20, tiles, to } as const;
+    const [{ regions }] = blocksOf(map, 760);
+    expect(regions.map((region) => [region.id, region.to(0)])).toEqual([
+      ["map=before", { type: "select", tile: "r2_c4" }],
+      ["map=after", { type: "select", tile: "r2_c6" }],
+    ]);
+  });
+
+  it("draw a colour as a swatch", () => {
+    const hex = "#12ab34";
+    const palettes = [{ name: "p", colors: [{ name: "n", hex }] }];
+    const [made] = blocksOf(
+      { kind: "colour", id: "x", label: "X", value: hex, palettes, to: () => "reset" },
+      500,
+    );
+    expect(made.marks.some((mark) => mark.kind === "box" && mark.fill === hex)).toBe(true);
+  });
+});

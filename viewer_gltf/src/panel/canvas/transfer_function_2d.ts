@@ -1,0 +1,90 @@
+/** The plane of value and gradient with its shapes, on a page's canvas and on the panel's plane. Pure. */
+import { type Rgb, toHex } from "../../math/color";
+import { outline, type PlanePoint, type Shape } from "../../state/transfer_shapes";
+import type { PlaneEditor } from "../controls";
+import { type Block, type Mark, type Rect, SMALL, text } from "./draw_list";
+import { captioned, one, region, unlessRefused } from "./parts";
+
+/** Of the plane on the panel. */
+const HEIGHT = 300;
+/** Texts of the axes. */
+const AXIS = 30;
+/** A corner is as near as this, px: a ray trembles. */
+const REACH = 26;
+const HANDLE = 22;
+
+/** The corners that are drawn to be taken hold of. */
+function handlesOf(shape: Shape): readonly PlanePoint[] {
+  const corners = outline(shape);
+  if (shape.kind === "rectangle") return corners;
+  const [bottom, top] = shape.gradients;
+  const upper = corners.filter(({ gradient }) => gradient === top);
+  const tip = { value: shape.tip, gradient: 0 };
+  return [...upper, tip, ...(bottom > 0 ? [{ value: middleAt(shape), gradient: bottom }] : [])];
+}
+
+/** Where a triangle is cut off. */
+function middleAt({ values: [low, high], gradients: [bottom, top], tip }: Shape): number {
+  return tip + (((low + high) / 2 - tip) * bottom) / top;
+}
+
+/** A shape's colour as it shows: the channel's times its own. */
+function toneOf(shape: Shape, color: Rgb): `#${string}` {
+  const [r, g, b] = color;
+  return `#${toHex([r * shape.color[0], g * shape.color[1], b * shape.color[2]]).slice(1)}`;
+}
+
+/** @param handle the edge of a handle */
+export function planeMarks(editor: PlaneEditor, rect: Rect, handle: number): readonly Mark[] {
+  const { histogram, shapes, selected, color, window } = editor;
+  const marks: Mark[] = [{ kind: "box", rect, fill: "ink", stroke: "line", radius: 0 }];
+  if (histogram !== null) marks.push({ kind: "histogram", rect, histogram, window });
+  const place = ({ value, gradient }: PlanePoint) => ({
+    x: rect.x + value * rect.width,
+    y: rect.y + (1 - gradient) * rect.height,
+  });
+  shapes.forEach((shape, i) => {
+    marks.push({
+      kind: "outline",
+      rect,
+      corners: outline(shape).map(({ value, gradient }) => [value, 1 - gradient]),
+      fill: toneOf(shape, color),
+      opacity: 0.15 + 0.35 * shape.opacity,
+      stroke: i === selected ? "text" : "dim",
+    });
+  });
+  if (selected === null) return marks;
+  for (const corner of handlesOf(shapes[selected])) {
+    const { x, y } = place(corner);
+    const at = { x: x - handle / 2, y: y - handle / 2, width: handle, height: handle };
+    marks.push({ kind: "box", rect: at, fill: "text", stroke: "ink", radius: handle / 2 });
+  }
+  return marks;
+}
+
+export function planeBlock(editor: PlaneEditor, width: number): Block {
+  const rect: Rect = { x: REACH, y: 0, width: width - 2 * REACH, height: HEIGHT };
+  const below: Rect = { ...rect, y: HEIGHT, height: AXIS };
+  const [low, high, steepest] = editor.texts;
+  const look = { size: SMALL - 2, tone: "dim" } as const;
+  const marks = [
+    ...planeMarks(editor, rect, HANDLE),
+    text(below, low, look),
+    text(below, high, { ...look, align: "right" }),
+    text({ ...rect, height: AXIS + 8 }, steepest, look),
+  ];
+  const pointAt = (across: number, down = 0): PlanePoint => ({ value: across, gradient: 1 - down });
+  const reach = { value: REACH / rect.width, gradient: REACH / rect.height };
+  const held = {
+    ...region(
+      editor.id,
+      editor.label,
+      rect,
+      (across, down) => editor.drag(pointAt(across, down)),
+      true,
+    ),
+    press: (across: number, down: number) => editor.press(pointAt(across, down), reach),
+  };
+  const block = one(marks, unlessRefused(editor, [held]), HEIGHT + AXIS);
+  return captioned("Value to the right, gradient up", width, block);
+}

@@ -1,0 +1,80 @@
+import { describe, expect, it } from "vitest";
+import type { Box, Clip } from "../math/clip";
+import {
+  cutText,
+  type Grip,
+  gripName,
+  gripsOf,
+  handleOf,
+  meantGrip,
+  moveGrip,
+} from "./clip_by_key";
+
+const SHOWN: Box = { min: [0, -20, 0], max: [100, 0, 50] };
+const CLIP: Clip = {
+  box: { min: [10, -20, 10], max: [90, -5, 40] },
+  plane: { normal: [0, 0, 1], offset_um: 25 },
+};
+
+function moved(grip: Grip, steps: number, clip = CLIP, shown = SHOWN): Clip {
+  const action = moveGrip(grip, steps, clip, shown);
+  return action?.type === "set-clip" ? action.clip : clip;
+}
+
+describe("the grips of the cuts", () => {
+  it("are those of the cuts that there are, each with a name of its own", () => {
+    expect(gripsOf({ box: null, plane: null })).toEqual([]);
+    expect(gripsOf({ ...CLIP, box: null })).toEqual(["plane-middle", "turn-x", "turn-y", "turn-z"]);
+    const all = gripsOf(CLIP);
+    expect(new Set(all.map(gripName)).size).toBe(10);
+    expect(handleOf("turn-y")).toBe("plane-tip");
+  });
+
+  it("are meant as picked, while they are there", () => {
+    expect(meantGrip(CLIP, "y-max")).toBe("y-max");
+    expect(meantGrip(CLIP, null)).toBe("x-min");
+    expect(meantGrip({ ...CLIP, box: null }, "y-max")).toBe("plane-middle");
+    expect(meantGrip({ box: null, plane: null }, "y-max")).toBeUndefined();
+  });
+
+  it("move a face by a fiftieth of the edge, and no other", () => {
+    expect(moved("x-min", 1)).toEqual({ ...CLIP, box: { min: [12, -20, 10], max: [90, -5, 40] } });
+    expect(moved("z-max", -2).box?.max[2]).toBeCloseTo(38);
+  });
+
+  it("move the plane along its normal", () => {
+    expect(moved("plane-middle", -1).plane).toEqual({ normal: [0, 0, 1], offset_um: 23 });
+  });
+
+  it("turn the plane about its middle by five degrees, counter-clockwise", () => {
+    const { plane } = moved("turn-y", 1);
+    [Math.sin(Math.PI / 36), 0, Math.cos(Math.PI / 36)].forEach((v, i) => {
+      expect(plane?.normal[i]).toBeCloseTo(v);
+    });
+    // (50, -10, 25) stays on it
+    expect(plane?.offset_um).toBeCloseTo(50 * Math.sin(Math.PI / 36) + 25 * Math.cos(Math.PI / 36));
+    expect(moved("turn-z", 1).plane?.normal).toEqual([0, 0, 1]);
+  });
+
+  it("go no further than the handles do", () => {
+    const far = moved("x-min", 1000);
+    expect(far.box?.min[0]).toBeCloseTo(89);
+    expect(moveGrip("x-min", 1, far, SHOWN)).toBeNull();
+    expect(moved("plane-middle", 1000).plane?.offset_um).toBe(50);
+    expect(moveGrip("plane-middle", 1, moved("plane-middle", 1000), SHOWN)).toBeNull();
+    expect(moveGrip("x-min", 1, { ...CLIP, box: null }, SHOWN)).toBeNull();
+  });
+
+  it("heed the isolated tile", () => {
+    const tile: Box = { min: [50, -20, 0], max: [100, 0, 50] };
+    expect(moved("x-max", -1, CLIP, tile).box).toEqual({ min: [10, -20, 10], max: [89, -5, 40] });
+    expect(moved("x-min", 1, CLIP, tile).box?.min[0]).toBe(51);
+  });
+
+  it("are told with the place that they have now", () => {
+    expect(cutText(CLIP, moved("y-min", 1))).toBe("Box: y from -19.6 µm");
+    expect(cutText(CLIP, moved("plane-middle", 1))).toBe("Plane at 27.0 µm");
+    expect(cutText(CLIP, moved("turn-x", 6))).toBe("Plane faces 0, -0.5, 0.87");
+    expect(cutText(CLIP, { ...CLIP, box: null })).toBe("Cut by a plane");
+  });
+});

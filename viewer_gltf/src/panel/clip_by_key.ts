@@ -1,0 +1,94 @@
+/**
+ * The cuts by key: one part of them, the grip, is meant, and two keys move or turn it, within the
+ * limits that its handle has. Pure.
+ */
+import {
+  BOX_HANDLES,
+  type BoxHandleId,
+  changeFace,
+  changePlane,
+  faceOf,
+  type HandleId,
+} from "../annotations/clip_handles";
+import { distanceText } from "../annotations/measure";
+import { AXES, type Box, type Clip, moveFace, movePlane, spinPlane } from "../math/clip";
+import type { Action } from "../state/viewer_state";
+
+const TURNS = ["turn-x", "turn-y", "turn-z"] as const;
+type Turn = (typeof TURNS)[number];
+/** A face of the box, the plane along its normal, or the plane about an axis of the specimen. */
+export type Grip = BoxHandleId | "plane-middle" | Turn;
+
+/** Of the edge of what is shown. */
+const STEP = 0.02;
+const STEP_RAD = Math.PI / 36;
+const AXIS_NAMES = ["x", "y", "z"] as const;
+
+export function gripsOf({ box, plane }: Clip): readonly Grip[] {
+  return [
+    ...(box === null ? [] : BOX_HANDLES),
+    ...(plane === null ? [] : (["plane-middle", ...TURNS] as const)),
+  ];
+}
+
+/** The one that is meant: that which was picked, if it is there still, or the first. */
+export function meantGrip(clip: Clip, picked: Grip | null): Grip | undefined {
+  const grips = gripsOf(clip);
+  return grips.find((grip) => grip === picked) ?? grips[0];
+}
+
+/** The handle that stands for it in the picture. */
+export function handleOf(grip: Grip): HandleId {
+  return isTurn(grip) ? "plane-tip" : grip;
+}
+
+/** @param steps below zero: the other way. @returns null where it can go no further */
+export function moveGrip(grip: Grip, steps: number, clip: Clip, shown: Box): Action | null {
+  const edge = (axis: 0 | 1 | 2) => shown.max[axis] - shown.min[axis];
+  if (isTurn(grip)) {
+    const axis = AXES[TURNS.indexOf(grip)];
+    return changePlane(clip, (plane) => spinPlane(plane, axis, steps * STEP_RAD, shown));
+  }
+  if (grip === "plane-middle") {
+    const by_um = steps * STEP * Math.max(...AXES.map(edge));
+    return changePlane(clip, (plane) => movePlane(plane, by_um, shown));
+  }
+  return changeFace(clip, grip, shown, (seen, face) =>
+    moveFace(seen, face, steps * STEP * edge(face.axis), shown),
+  );
+}
+
+export function gripName(grip: Grip): string {
+  if (grip === "plane-middle") return "The plane, along its normal";
+  if (isTurn(grip)) return `The plane, turned about ${grip.at(-1)}`;
+  const { axis, side } = faceOf(grip);
+  return `The box, ${side === "min" ? "lower" : "upper"} end of ${AXIS_NAMES[axis]}`;
+}
+
+/** What a change has made of the cuts, in words; that of one part is told alone. */
+export function cutText(before: Clip, after: Clip): string {
+  const { box, plane } = after;
+  if ((before.box === null) !== (box === null) || (before.plane === null) !== (plane === null)) {
+    const cuts = [box && "a box", plane && "a plane"].filter(Boolean).join(" and ");
+    return cuts === "" ? "Not cut" : `Cut by ${cuts}`;
+  }
+  for (const grip of BOX_HANDLES) {
+    const { axis, side } = faceOf(grip);
+    const place = box?.[side][axis];
+    if (place === undefined || place === before.box?.[side][axis]) continue;
+    return `Box: ${AXIS_NAMES[axis]} ${side === "min" ? "from" : "to"} ${placeText(place)}`;
+  }
+  if (plane === null) return "";
+  const { normal, offset_um } = plane;
+  const isTurned = normal.some((v, i) => v !== before.plane?.normal[i]);
+  if (!isTurned) return `Plane at ${placeText(offset_um)}`;
+  return `Plane faces ${normal.map((v) => Number(v.toFixed(2)) + 0).join(", ")}`; // no -0
+}
+
+function placeText(place_um: number): string {
+  return `${place_um < 0 ? "-" : ""}${distanceText(Math.abs(place_um))}`;
+}
+
+function isTurn(grip: Grip): grip is Turn {
+  return grip.startsWith("turn-");
+}

@@ -1,0 +1,258 @@
+/**
+ * The panel as plain data: sections of a few kinds of controls. Whoever draws it, in HTML or on a
+ * plane in the room, shows the values and hands back the wish that a control's `to` makes of what
+ * the user did. Pure.
+ */
+import type { Rgb } from "../math/color";
+import type { Command } from "../state/commands";
+import type { PlanePoint, Shapes } from "../state/transfer_shapes";
+import type { Action } from "../state/viewer_state";
+import type { Histogram } from "../volumes/transfer_functions_loader";
+import type { Grip } from "./clip_by_key";
+import type { Grasp, Meant } from "./edit_shapes";
+
+/** Of the viewer that a phone is put into: Google's of 2014, of 2015, another. */
+export type Lenses = "v1" | "v2" | "own";
+
+/** What the panel keeps for itself: it changes what is listed or meant, never the picture. */
+export type PanelChange =
+  | Readonly<{ panel: "find"; text: string }>
+  | Readonly<{ panel: "page"; page: number }>
+  /** The channel whose card is open, and whom the channel keys mean; null: none. */
+  | Readonly<{ panel: "pick"; channel: string | null }>
+  /** The part of the cuts that the keys move. */
+  | Readonly<{ panel: "grip"; grip: Grip }>
+  /** The number of the light that the keys turn: see path_trace_parameters.ts. */
+  | Readonly<{ panel: "dial"; dial: string }>
+  /** Open or close the plane of value and gradient in a channel's card, which it opens. */
+  | Readonly<{ panel: "plane"; channel: string }>
+  /** The shape that is meant, and what a pointer has hold of. */
+  | Readonly<{ panel: "shape"; shape: Meant | null; grasp: Grasp | null }>
+  /** The number of a shape that the keys change: see edit_shapes.ts. */
+  | Readonly<{ panel: "shape-number"; id: string }>
+  | Readonly<{ panel: "unfold"; section: string }>
+  | Readonly<{ panel: "lenses"; lenses: Lenses }>
+  /** Of the phone viewer's lenses, as its QR code has it. */
+  | Readonly<{ panel: "code"; text: string }>
+  | Readonly<{ panel: "hide" }>
+  | Readonly<{ panel: "help" }>;
+
+/** What a control or a key asks for. */
+export type Wish = Action | PanelChange | Command;
+
+export type PanelView = Readonly<{
+  search: string;
+  /** Of the channels that are not shown. */
+  page: number;
+  picked: string | null;
+  grip: Grip | null;
+  dial: string | null;
+  isPlaneOpen: boolean;
+  shape: Meant | null;
+  grasp: Grasp | null;
+  shapeNumber: string | null;
+  /** Sections that are open. */
+  open: readonly string[];
+  lenses: Lenses;
+  code: string;
+  isHidden: boolean;
+  isHelpOpen: boolean;
+  /** The last link that was shared; "": none. */
+  link: string;
+}>;
+
+export const START_VIEW: PanelView = {
+  search: "",
+  page: 0,
+  picked: null,
+  grip: null,
+  dial: null,
+  isPlaneOpen: false,
+  shape: null,
+  grasp: null,
+  shapeNumber: null,
+  open: ["channels", "volumes", "light", "tiles", "view", "stereo"],
+  lenses: "v2",
+  code: "",
+  isHidden: false,
+  isHelpOpen: false,
+  link: "",
+};
+
+type Base = Readonly<{
+  /** Unique in the panel; of a channel's control: channel/part. */
+  id: string;
+  label: string;
+  /** The label where there is no group around it: for screen readers, and for gaze. */
+  name?: string;
+  /** Why it can't be used; "" or absent: it can. */
+  refusal?: string;
+  /** Whether the refusal is always in view. */
+  tellsWhy?: boolean;
+}>;
+
+export type Toggle = Base &
+  Readonly<{ kind: "toggle"; value: boolean; to: (value: boolean) => Wish }>;
+/** `value` 0..1, in so many steps; what it stands for is the text's. */
+export type Slider = Base &
+  Readonly<{
+    kind: "slider";
+    value: number;
+    steps: number;
+    text: string;
+    to: (value: number) => Wish;
+  }>;
+/** Two ends of a range, each as a slider's value. */
+export type Window = Base &
+  Readonly<{
+    kind: "window";
+    value: readonly [number, number];
+    steps: number;
+    texts: readonly [string, string];
+    to: (value: readonly [number, number]) => Wish;
+  }>;
+export type Option = Readonly<{ value: string; label: string }>;
+export type Choice = Base &
+  Readonly<{
+    kind: "choice";
+    value: string;
+    options: readonly Option[];
+    /** Few and short: side by side. */
+    isInline: boolean;
+    to: (value: string) => Wish;
+  }>;
+export type Palette = Readonly<{
+  name: string;
+  colors: readonly Readonly<{ name: string; hex: string }>[];
+}>;
+/** `value` is #rrggbb. Without palettes any colour may be chosen. */
+export type Colour = Base &
+  Readonly<{
+    kind: "colour";
+    value: string;
+    palettes: readonly Palette[];
+    to: (hex: string) => Wish;
+  }>;
+export type Button = Base & Readonly<{ kind: "button"; isPrimary?: boolean; to: () => Wish }>;
+export type MapTile = Readonly<{
+  id: string;
+  row: number;
+  column: number;
+  isGazed: boolean;
+  isSelected: boolean;
+  isIsolated: boolean;
+}>;
+export type TileMap = Base &
+  Readonly<{
+    kind: "map";
+    rows: number;
+    columns: number;
+    tiles: readonly MapTile[];
+    to: (tile: string) => Wish;
+  }>;
+/** Value to the right, gradient up: a histogram, and shapes that can be taken hold of. */
+export type PlaneEditor = Base &
+  Readonly<{
+    kind: "plane";
+    /** null: it has not come. */
+    histogram: Histogram | null;
+    /** The part of the histogram's values that the plane is as wide as. */
+    window: readonly [number, number];
+    shapes: Shapes;
+    selected: number | null;
+    /** The channel's, linear. */
+    color: Rgb;
+    /** The lower and the upper end of the values, and the steepest gradient. */
+    texts: readonly [string, string, string];
+    /** @param reach how far off a corner or an edge may be */
+    press: (at: PlanePoint, reach: PlanePoint) => Wish;
+    /** null: nothing has changed by it. */
+    drag: (at: PlanePoint) => Wish | null;
+  }>;
+/** What can only be read. */
+export type Text = Base & Readonly<{ kind: "text"; value: string }>;
+export type Search = Base & Readonly<{ kind: "search"; value: string; to: (text: string) => Wish }>;
+/** An address to copy. */
+export type Link = Base & Readonly<{ kind: "link"; value: string }>;
+
+export type Control =
+  | Toggle
+  | Slider
+  | Window
+  | Choice
+  | Colour
+  | Button
+  | TileMap
+  | PlaneEditor
+  | Text
+  | Search
+  | Link;
+
+/** A channel: its name and what is always at hand; `more` only while it is open. */
+export type Group = Readonly<{
+  kind: "group";
+  id: string;
+  label: string;
+  tags: readonly string[];
+  controls: readonly Control[];
+  more: readonly Control[];
+  isOpen: boolean;
+  /** Opens and closes it. */
+  opener: PanelChange;
+}>;
+
+export type Section = Readonly<{
+  id: string;
+  label: string;
+  isOpen: boolean;
+  opener: PanelChange;
+  items: readonly (Control | Group)[];
+}>;
+
+export type Layout = Readonly<{
+  title: string;
+  subtitle: string;
+  sections: readonly Section[];
+  /** Triangles, level, frame time: one line that is always in view. */
+  status: string;
+  isHidden: boolean;
+}>;
+
+/** The next view of the panel. Returns the same object if nothing changes. */
+export function changePanel(view: PanelView, change: PanelChange): PanelView {
+  switch (change.panel) {
+    case "find":
+      return change.text === view.search ? view : { ...view, search: change.text, page: 0 };
+    case "page":
+      return change.page === view.page ? view : { ...view, page: change.page };
+    case "pick":
+      return change.channel === view.picked ? view : { ...view, picked: change.channel };
+    case "grip":
+      return change.grip === view.grip ? view : { ...view, grip: change.grip };
+    case "dial":
+      return change.dial === view.dial ? view : { ...view, dial: change.dial };
+    case "plane": {
+      const { channel } = change;
+      const isOpen = view.isPlaneOpen && view.picked === channel;
+      return { ...view, picked: channel, isPlaneOpen: !isOpen, shape: null, grasp: null };
+    }
+    case "shape":
+      return { ...view, shape: change.shape, grasp: change.grasp };
+    case "shape-number":
+      return change.id === view.shapeNumber ? view : { ...view, shapeNumber: change.id };
+    case "unfold": {
+      const { section } = change;
+      const isOpen = view.open.includes(section);
+      const open = isOpen ? view.open.filter((id) => id !== section) : [...view.open, section];
+      return { ...view, open };
+    }
+    case "lenses":
+      return change.lenses === view.lenses ? view : { ...view, lenses: change.lenses };
+    case "code":
+      return change.text === view.code ? view : { ...view, code: change.text };
+    case "hide":
+      return { ...view, isHidden: !view.isHidden };
+    case "help":
+      return { ...view, isHelpOpen: !view.isHelpOpen };
+  }
+}

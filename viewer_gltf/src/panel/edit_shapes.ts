@@ -1,0 +1,155 @@
+/**
+ * What is done to the shapes of a two-dimensional transfer function: which is meant, what has hold of
+ * it, and by which numbers it is told. Plain data and pure functions.
+ */
+import { toHex } from "../math/color";
+import { editedName, type Functions, isTwoD, shapesOf } from "../state/transfer_functions_2d";
+import {
+  addShape,
+  hitTest,
+  makeShape,
+  move,
+  type Part,
+  type PlanePoint,
+  replaceShape,
+  resize,
+  type Shape,
+  type ShapeKind,
+  type Shapes,
+} from "../state/transfer_shapes";
+
+/** Which shape is meant, of how many: of another number of shapes it means the one on top. */
+export type Meant = Readonly<{ index: number; count: number }>;
+
+/** What a pointer has taken hold of, and what it was then. */
+export type Grasp = Readonly<{ index: number; part: Part; from: PlanePoint; shape: Shape }>;
+
+/** Less than a finger trembles: a press alone moves nothing. */
+const STILL: PlanePoint = { value: 1 / 255, gradient: 1 / 63 };
+/** New shapes stand beside each other. */
+const PLACES = [0.3, 0.5, 0.7, 0.4, 0.6];
+
+/** null: there is none. */
+export function meantShape(meant: Meant | null, shapes: Shapes): number | null {
+  if (shapes.length === 0) return null;
+  return meant?.count === shapes.length ? meant.index : shapes.length - 1;
+}
+
+/** The shapes that an editor shows: none while a one-dimensional function is chosen. */
+export function editedShapes(functions: Functions): Shapes {
+  return isTwoD(functions) ? shapesOf(functions) : [];
+}
+
+/** The shapes that one more is added to: one's own may be there, though they are not chosen. */
+function growing(functions: Functions): Shapes {
+  return shapesOf(functions, editedName(functions));
+}
+
+export function withNewShape(functions: Functions, kind: ShapeKind): Shapes {
+  const shapes = growing(functions);
+  const value = PLACES[shapes.length % PLACES.length];
+  return addShape(shapes, makeShape(kind, { value, gradient: 0.4 }));
+}
+
+export function graspAt(
+  shapes: Shapes,
+  at: PlanePoint,
+  reach: PlanePoint,
+  meant: number | null,
+): Grasp | null {
+  const hit = hitTest(shapes, at, reach, meant);
+  return hit === null ? null : { ...hit, from: at, shape: shapes[hit.index] };
+}
+
+/** The shapes after what was taken hold of has been drawn along; null: nothing has changed. */
+export function draggedTo(shapes: Shapes, grasp: Grasp, at: PlanePoint): Shapes | null {
+  const { index, part, from, shape } = grasp;
+  if (!(index in shapes)) return null;
+  const by = { value: at.value - from.value, gradient: at.gradient - from.gradient };
+  const isStill = Math.abs(by.value) < STILL.value && Math.abs(by.gradient) < STILL.gradient;
+  if (isStill && shapes[index] === shape) return null;
+  if (part === "body") return replaceShape(shapes, index, move(shape, by));
+  const start = placeOf(shape, part);
+  const to = { value: start.value + by.value, gradient: start.gradient + by.gradient };
+  return replaceShape(shapes, index, resize(shape, part, to));
+}
+
+function placeOf({ values, gradients, tip }: Shape, part: Part): PlanePoint {
+  if (part === "tip") return { value: tip, gradient: 0 };
+  return {
+    value: values[part.endsWith("right") ? 1 : 0],
+    gradient: gradients[part.startsWith("top") ? 1 : 0],
+  };
+}
+
+/** One number of a shape, which keys make less or more. */
+export type ShapeNumber = Readonly<{
+  id: string;
+  name: string;
+  isOf: (shape: Shape) => boolean;
+  by: (shape: Shape, step: number) => Shape;
+}>;
+
+const all = () => true;
+
+function edge(id: Part, name: string): ShapeNumber {
+  const by = (shape: Shape, step: number) => {
+    const { value, gradient } = placeOf(shape, id);
+    return resize(shape, id, { value: value + step, gradient: gradient + step });
+  };
+  return { id, name, isOf: id === "tip" ? ({ kind }) => kind === "triangle" : all, by };
+}
+
+function share(id: "opacity" | "softness"): ShapeNumber {
+  const by = (shape: Shape, step: number) => ({
+    ...shape,
+    [id]: Math.min(1, Math.max(0, shape[id] + step)),
+  });
+  return { id, name: id, isOf: all, by };
+}
+
+export const SHAPE_NUMBERS: readonly ShapeNumber[] = [
+  {
+    id: "value",
+    name: "place by value",
+    isOf: all,
+    by: (shape, step) => move(shape, { value: step, gradient: 0 }),
+  },
+  {
+    id: "gradient",
+    name: "place by gradient",
+    isOf: all,
+    by: (shape, step) => move(shape, { value: 0, gradient: step }),
+  },
+  edge("left", "lower value"),
+  edge("right", "upper value"),
+  edge("bottom", "lower gradient"),
+  edge("top", "upper gradient"),
+  edge("tip", "tip"),
+  share("opacity"),
+  share("softness"),
+];
+
+const ends = ([low, high]: readonly [number, number]) => `${low.toFixed(2)} – ${high.toFixed(2)}`;
+
+/** For who does not see it. */
+export function shapeText({ kind, values, gradients, opacity, softness, color }: Shape): string {
+  const hex = toHex(color);
+  return [
+    `${kind}: value ${ends(values)}`,
+    `gradient ${ends(gradients)}`,
+    `opacity ${Math.round(100 * opacity)} %`,
+    `softness ${Math.round(100 * softness)} %`,
+    ...(hex === "#ffffff" ? [] : [`colour ${hex}`]),
+  ].join(", ");
+}
+
+/** What has become of shapes, in words. */
+export function changeText(before: Shapes, after: Shapes): string {
+  if (after.length > before.length) return `Added a ${shapeText(after[after.length - 1])}`;
+  if (after.length < before.length) return `Removed a shape: ${after.length} left`;
+  const changed = after.findIndex((shape, i) => shape !== before[i]);
+  const differs = after.findIndex((shape, i) => shapeText(shape) !== shapeText(before[i]));
+  const index = differs === -1 ? changed : differs;
+  return index === -1 ? "" : `Shape ${index + 1}, ${shapeText(after[index])}`;
+}

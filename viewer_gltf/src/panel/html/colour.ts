@@ -1,0 +1,75 @@
+/** A colour: any (the browser's own picker), or one of the palettes. */
+
+import { element } from "../../dom/element";
+import { Rove } from "../../dom/roving_tabindex";
+import type { Colour } from "../controls";
+import { hooks, type Send, type Widget } from "./widget";
+
+const SWATCHES_A_ROW = 4;
+
+export function makeColour(first: Colour, send: Send): Widget<Colour> {
+  return first.palettes.length === 0 ? makePicker(first, send) : makeSwatches(first, send);
+}
+
+function makePicker(first: Colour, send: Send): Widget<Colour> {
+  let now = first;
+  const input = element(
+    "input",
+    {
+      type: "color",
+      ariaLabel: first.name ?? first.label,
+      oninput: () => send(now.to(input.value)),
+    },
+    hooks(first.id),
+  );
+  return {
+    root: input,
+    update(control) {
+      now = control;
+      if (input.value !== control.value) input.value = control.value;
+    },
+  };
+}
+
+function makeSwatches(first: Colour, send: Send): Widget<Colour> {
+  let now = first;
+  const buttons: HTMLButtonElement[] = [];
+  const root = element("div", {
+    className: "palettes",
+    role: "group",
+    ariaLabel: first.name ?? first.label,
+  });
+  for (const palette of first.palettes) {
+    const row = palette.colors.map(({ name, hex }) => {
+      const button = element(
+        "button",
+        {
+          type: "button",
+          className: "swatch",
+          title: name,
+          ariaLabel: `${palette.name}: ${name}`,
+          onclick: () => send(now.to(hex)),
+        },
+        { ...hooks(first.id), color: hex },
+      );
+      button.style.setProperty("--color", hex);
+      buttons.push(button);
+      return button;
+    });
+    root.append(
+      element("p", { className: "hint", textContent: palette.name }),
+      element("div", { className: "swatches" }, {}, ...row),
+    );
+  }
+  const rove = new Rove(root);
+  rove.follow(buttons, SWATCHES_A_ROW);
+  return {
+    root,
+    update(control) {
+      now = control;
+      for (const button of buttons) {
+        button.ariaPressed = String(button.dataset.color === control.value);
+      }
+    },
+  };
+}

@@ -1,0 +1,97 @@
+/** What lies over the picture: the progress bar, notices, and the page of a fatal error. */
+
+import { element, setText } from "../../dom/element";
+import type { ViewerState } from "../../state/viewer_state";
+import type { Progress } from "../../surfaces/overview_progress";
+
+/** What is said stays for as long; a screen reader reads it at once. */
+const SAID_MS = 4000;
+
+/** A thin bar at the top with its count in words; hidden once complete. */
+export class ProgressBar {
+  private readonly fill = element("div", { className: "fill" });
+  private readonly label = element("span");
+  readonly root = element(
+    "div",
+    { className: "progress", role: "progressbar", ariaLabel: "The overview" },
+    { progress: "" },
+    element("div", { className: "track" }, {}, this.fill),
+    this.label,
+  );
+
+  update({ done, total, isComplete }: Progress): void {
+    this.root.hidden = isComplete;
+    this.fill.style.width = `${(100 * done) / Math.max(1, total)}%`;
+    setText(this.label, `Loading the overview: ${done} of ${total} surfaces`);
+    this.root.ariaValueNow = String(done);
+    this.root.ariaValueMax = String(total);
+  }
+}
+
+/** Faults that leave the rest usable. Each can be dismissed. */
+export class Notices {
+  readonly root = element("div", { className: "notices", role: "status" }, { notices: "" });
+
+  private told: readonly string[] = [];
+  private readonly retry = element(
+    "button",
+    { textContent: "Try again", onclick: () => this.onRetry() },
+    { action: "retry" },
+  );
+
+  constructor(
+    private readonly onDismiss: (text: string) => void,
+    private readonly onRetry: () => void,
+  ) {}
+
+  update({ notices, mendable }: Pick<ViewerState, "notices" | "mendable">): void {
+    if (notices === this.told) return; // what is written anew is read out anew
+    this.told = notices;
+    // A broken host fails for every file: the newest few say what is wrong.
+    const shown = notices.slice(-3);
+    const hidden = notices.length - shown.length;
+    this.root.replaceChildren(
+      ...(hidden > 0 ? [element("p", { textContent: `and ${hidden} more like these` })] : []),
+      ...shown.map((text) =>
+        element(
+          "p",
+          {},
+          {},
+          element("span", { textContent: text }),
+          element("button", {
+            textContent: "×",
+            ariaLabel: `Dismiss: ${text}`,
+            onclick: () => this.onDismiss(text),
+          }),
+        ),
+      ),
+      ...(mendable.length > 0 ? [this.retry] : []),
+    );
+  }
+}
+
+/** What a key or a button has just done, where nothing else shows it; it goes by itself. */
+export class Said {
+  readonly root = element("p", { className: "said", role: "status" }, { said: "" });
+  private timer = 0;
+
+  say(text: string): void {
+    setText(this.root, text);
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => setText(this.root, ""), SAID_MS);
+  }
+}
+
+/** Nothing can be shown: say what is wrong and what can be done, in the page. */
+export function showFatal(parent: HTMLElement, title: string, text: string): void {
+  parent.replaceChildren(
+    element(
+      "main",
+      { className: "fatal", role: "alert" },
+      { fatal: "" },
+      element("h1", { textContent: title }),
+      element("p", { textContent: text }),
+      element("button", { textContent: "Try again", onclick: () => location.reload() }),
+    ),
+  );
+}

@@ -1,0 +1,171 @@
+/** The panel in HTML: draws a layout, hands back wishes. Keeps no state of its own. */
+
+import { arrange, element, setText } from "../../dom/element";
+import type { Control, Group, Layout, Section } from "../controls";
+import type { Send, Widget } from "./widget";
+import { makeWidget } from "./widgets";
+
+type Item = Control | Group;
+
+/** An item of another shape needs another element. */
+function shapeOf(item: Item): string {
+  return item.kind === "group" ? `${item.id}, group of ${item.controls.length}` : item.id;
+}
+
+class Items {
+  private readonly made = new Map<string, Widget<Item>>();
+
+  constructor(
+    readonly root: HTMLElement,
+    private readonly send: Send,
+  ) {}
+
+  update(items: readonly Item[]): void {
+    const roots = items.map((item) => {
+      const shape = shapeOf(item);
+      let widget = this.made.get(shape);
+      if (widget === undefined) {
+        widget = (
+          item.kind === "group" ? makeGroup(item, this.send) : makeWidget(item, this.send)
+        ) as Widget<Item>;
+        widget.root.classList.add(`item-${item.id.slice(item.id.indexOf("/") + 1)}`);
+        this.made.set(shape, widget);
+      }
+      widget.update(item);
+      return widget.root;
+    });
+    arrange(this.root, roots);
+    const listed = new Set(items.map(shapeOf));
+    for (const shape of this.made.keys()) if (!listed.has(shape)) this.made.delete(shape);
+  }
+}
+
+/** A channel: those that are shown can be opened. */
+function makeGroup(first: Group, send: Send): Widget<Group> {
+  let now = first;
+  const canOpen = first.more.length > 0;
+  const name = canOpen
+    ? element(
+        "button",
+        { type: "button", className: "name opener", onclick: () => send(now.opener) },
+        { opener: first.id },
+      )
+    : element("span", { className: "name" });
+  const tags = element("span", { className: "tags" });
+  const always = new Items(element("div", { className: "always" }), send);
+  const more = new Items(element("div", { className: "more" }), send);
+  const root = element(
+    "div",
+    { className: canOpen ? "channel" : "channel off", role: "group", ariaLabel: first.label },
+    { channel: first.id },
+    name,
+    always.root,
+    tags,
+    more.root,
+  );
+  return {
+    root,
+    update(group) {
+      now = group;
+      setText(name, group.label);
+      name.title = group.label;
+      if (canOpen) name.ariaExpanded = String(group.isOpen);
+      setText(tags, group.tags.join(", "));
+      always.update(group.controls);
+      more.root.hidden = !group.isOpen;
+      more.update(group.isOpen ? group.more : []);
+    },
+  };
+}
+
+function makeSection(first: Section, send: Send): Widget<Section> {
+  let now = first;
+  const opener = element(
+    "button",
+    {
+      type: "button",
+      className: "opener",
+      textContent: first.label,
+      onclick: () => send(now.opener),
+    },
+    { opener: first.id },
+  );
+  const items = new Items(element("div", { className: "items", id: `items-${first.id}` }), send);
+  opener.setAttribute("aria-controls", items.root.id);
+  return {
+    root: element(
+      "section",
+      { ariaLabel: first.label },
+      { section: first.id },
+      element("h2", {}, {}, opener),
+      items.root,
+    ),
+    update(section) {
+      now = section;
+      opener.ariaExpanded = String(section.isOpen);
+      items.root.hidden = !section.isOpen;
+      items.update(section.isOpen ? section.items : []);
+    },
+  };
+}
+
+export class Panel {
+  readonly root: HTMLElement;
+  private readonly title = element("h1");
+  private readonly subtitle = element("p", { className: "hint" });
+  private readonly body = element("div", { className: "body", id: "panel-body" });
+  private readonly status = element("p", { className: "status" }, { status: "" });
+  private readonly fold: HTMLButtonElement;
+  private readonly sections = new Map<string, Widget<Section>>();
+
+  constructor(private readonly send: Send) {
+    this.fold = element("button", {
+      type: "button",
+      className: "fold",
+      ariaLabel: "Panel",
+      title: "Hide or show the panel (h)",
+      onclick: () => send({ panel: "hide" }),
+    });
+    this.fold.setAttribute("aria-controls", this.body.id);
+    this.root = element(
+      "aside",
+      { className: "panel", ariaLabel: "Controls" },
+      {},
+      element("header", {}, {}, element("div", {}, {}, this.title, this.subtitle), this.fold),
+      this.body,
+      this.status,
+    );
+  }
+
+  update(layout: Layout): void {
+    const { activeElement } = document;
+    const focused =
+      activeElement instanceof HTMLElement ? activeElement.dataset.control : undefined;
+    setText(this.title, layout.title);
+    this.title.title = layout.title;
+    setText(this.subtitle, layout.subtitle);
+    setText(this.status, layout.status);
+    this.root.classList.toggle("folded", layout.isHidden);
+    this.fold.ariaExpanded = String(!layout.isHidden);
+    const roots = layout.sections.map((section) => {
+      let widget = this.sections.get(section.id);
+      if (widget === undefined) {
+        widget = makeSection(section, this.send);
+        this.sections.set(section.id, widget);
+      }
+      widget.update(section);
+      return widget.root;
+    });
+    arrange(this.body, roots);
+    // A channel that comes or goes moves in the list: the focus goes with it.
+    if (focused !== undefined && document.activeElement !== activeElement) this.focus(focused);
+  }
+
+  /** Bring the keyboard to a control, by its id; whether there is one. */
+  focus(id: string): boolean {
+    const selector = `[data-control="${CSS.escape(id)}"]:not([tabindex="-1"])`;
+    const found = this.root.querySelector<HTMLElement>(selector);
+    found?.focus();
+    return found !== null;
+  }
+}

@@ -1,0 +1,48 @@
+/** The tiles by row and column; the gazed, the chosen and the isolated one are marked. */
+
+import { element } from "../../dom/element";
+import { Rove } from "../../dom/roving_tabindex";
+import type { MapTile, TileMap } from "../controls";
+import { hooks, type Send, type Widget } from "./widget";
+
+function nameOf({ id, isGazed, isSelected, isIsolated }: MapTile): string {
+  const marks = [isIsolated && "shown alone", isSelected && "chosen", isGazed && "looked at"];
+  return [`Tile ${id}`, ...marks.filter(Boolean)].join(", ");
+}
+
+export function makeMap(first: TileMap, send: Send): Widget<TileMap> {
+  let now = first;
+  const buttons = new Map<string, HTMLButtonElement>();
+  const root = element("div", { className: "map", role: "group", ariaLabel: first.label });
+  root.style.setProperty("--columns", String(first.columns));
+  for (const tile of first.tiles) {
+    const button = element(
+      "button",
+      { type: "button", textContent: tile.id, onclick: () => send(now.to(tile.id)) },
+      { ...hooks(first.id), tileChoice: tile.id },
+    );
+    button.style.gridRow = String(tile.row + 1);
+    button.style.gridColumn = String(tile.column + 1);
+    buttons.set(tile.id, button);
+    root.append(button);
+  }
+  new Rove(root).follow([...buttons.values()], first.columns);
+  let marked = "";
+  return {
+    root,
+    update(control) {
+      now = control;
+      const names = control.tiles.map(nameOf);
+      if (names.join() === marked) return;
+      marked = names.join();
+      control.tiles.forEach((tile, i) => {
+        const button = buttons.get(tile.id);
+        if (button === undefined) return;
+        button.ariaLabel = names[i];
+        button.ariaPressed = String(tile.isSelected || tile.isIsolated);
+        button.classList.toggle("gazed", tile.isGazed);
+        button.classList.toggle("isolated", tile.isIsolated);
+      });
+    },
+  };
+}

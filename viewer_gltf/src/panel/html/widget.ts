@@ -1,0 +1,12 @@
+/** What a control's element offers, and the attributes by which scripts find it. */
+import type { Wish } from "../controls";
+
+export type Send = (wish: Wish) => void;
+/** `update` is called with the control as it is now, whenever anything may have changed. */
+export type Widget<C> = Readonly<{ root: HTMLElement; update: (control: C) => void }>;
+
+/** `data-control`: its id; of a channel's control also `data-part`, what it is of the channel. */
+export function hooks(id: string): Readonly<Record<string, string>> {
+  const at = id.indexOf("/");
+  return at === -1 ? { control: id } : { control: id, part: id.slice(at + 1) };
+}

@@ -1,0 +1,239 @@
+import { describe, expect, it } from "vitest";
+import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import type { Command } from "../state/commands";
+import { makeShape } from "../state/transfer_shapes";
+import { type Action, initialState, reduce } from "../state/viewer_state";
+import { type PanelChange, START_VIEW } from "./controls";
+import { type Focus, firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
+import { told } from "./spoken_feedback";
+
+const ALL = KEYS.flatMap(({ keys }) => keys);
+const CONTEXT: KeyContext = {
+  state: [
+    { type: "measure", points: [[0, 0, 0]] } as const,
+    { type: "notify", text: "a fault", isMendable: true } as const,
+    { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
+    {
+      type: "set-shapes",
+      channel: "c0",
+      name: "own",
+      shapes: [makeShape("rectangle", { value: 0.5, gradient: 0.5 })],
+    } as const,
+    {
+      type: "learn-plane",
+      channel: "c0",
+      plane: { gradientMax: 0.5, functions: {} },
+    } as const,
+    { type: "choose-mode", mode: "traced" } as const,
+  ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
+  view: START_VIEW,
+  shown: SPECIMEN_BOX,
+  gazed: "r0_c2",
+};
+
+describe("the keys", () => {
+  it("mean one thing each, and say what", () => {
+    const names = ALL.flatMap(({ keys }) => keys);
+    expect(new Set(names).size).toBe(names.length);
+    expect(ALL.filter(({ label }) => label.length < 3)).toEqual([]);
+  });
+
+  it("reach every action and every command", () => {
+    const wishes = ALL.map(({ to, keys }) => to(CONTEXT, keys[0]));
+    const actions = new Set(
+      wishes.flatMap((wish) =>
+        wish !== null && typeof wish !== "string" && "type" in wish ? [wish.type] : [],
+      ),
+    );
+    const wanted: Readonly<Record<Action["type"], boolean>> = {
+      show: true,
+      recolor: true,
+      fade: true,
+      window: true,
+      "draw-volume": true,
+      "choose-transfer-function": true,
+      "set-shapes": true,
+      "learn-plane": false, // the bundle's
+      select: true,
+      isolate: true,
+      "choose-mode": true,
+      "set-switch-distance": true,
+      "set-disc-radius": true,
+      "set-clip": true,
+      "choose-tool": true,
+      measure: true,
+      "set-dwell": true,
+      "choose-quality": true,
+      trace: true,
+      "move-lamp": true,
+      "show-lamps": true,
+      dismiss: true,
+      notify: false, // the viewer's own
+    };
+    for (const [type, isWanted] of Object.entries(wanted)) {
+      expect(actions.has(type as Action["type"]), type).toBe(isWanted);
+    }
+    const commands: Readonly<Record<Command, true>> = {
+      reset: true,
+      back: true,
+      stereo: true,
+      split: true,
+      scan: true,
+      share: true,
+      retry: true,
+      press: true,
+      front: true,
+      side: true,
+      top: true,
+      "zoom-in": true,
+      "zoom-out": true,
+      "turn-left": true,
+      "turn-right": true,
+      "turn-up": true,
+      "turn-down": true,
+      "pan-left": true,
+      "pan-right": true,
+      "pan-up": true,
+      "pan-down": true,
+      find: true,
+      "own-light": true,
+    };
+    const asked = wishes.filter((wish) => typeof wish === "string");
+    expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));
+  });
+
+  it("reach what the panel keeps for itself, but for what is typed and what is folded", () => {
+    const wishes = ALL.map(({ to, keys }) => to(CONTEXT, keys[0]));
+    const changes = new Set(
+      wishes.flatMap((wish) =>
+        wish !== null && typeof wish !== "string" && "panel" in wish ? [wish.panel] : [],
+      ),
+    );
+    const wanted: Readonly<Record<PanelChange["panel"], boolean>> = {
+      page: true,
+      pick: true,
+      grip: true,
+      dial: true,
+      plane: true,
+      shape: true,
+      "shape-number": true,
+      lenses: true,
+      hide: true,
+      help: true,
+      find: false,
+      code: false,
+      unfold: false,
+    };
+    for (const [panel, isWanted] of Object.entries(wanted)) {
+      expect(changes.has(panel as PanelChange["panel"]), panel).toBe(isWanted);
+    }
+  });
+
+  it("move the part of the cuts that is meant", () => {
+    expect(wishOf("N", CONTEXT)).toEqual({ panel: "grip", grip: "x-min" });
+    expect(wishOf("B", CONTEXT)).toEqual({ panel: "grip", grip: "z-max" });
+    const { min, max } = SPECIMEN_BOX;
+    const cut = (box: typeof SPECIMEN_BOX | object) => ({
+      type: "set-clip",
+      clip: { box, plane: null },
+    });
+    expect(wishOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
+    const view = { ...START_VIEW, grip: "y-max" } as const;
+    const inside = wishOf(",", { ...CONTEXT, view });
+    expect(inside).toEqual(cut({ min, max: [max[0], -0.4, max[2]] }));
+    expect(wishOf(".", { ...CONTEXT, view })).toBeNull(); // there the specimen ends
+    const whole = reduce(CONTEXT.state, { type: "set-clip", clip: { box: null, plane: null } });
+    expect(wishOf(".", { ...CONTEXT, state: whole })).toBeNull();
+    expect(wishOf("N", { ...CONTEXT, state: whole })).toBeNull();
+  });
+
+  it("have a name on every keyboard", () => {
+    const named = (key: string, code: string, shiftKey = false) => keyName({ key, code, shiftKey });
+    expect(named("a", "KeyQ")).toBe("a"); // as a French keyboard has it
+    expect(named("ф", "KeyA")).toBe("a");
+    expect(named("Ф", "KeyA", true)).toBe("A");
+    expect(named("?", "Minus", true)).toBe("?");
+    expect(named("ArrowLeft", "ArrowLeft")).toBe("ArrowLeft");
+    expect(named("ArrowLeft", "ArrowLeft", true)).toBe("Shift+ArrowLeft");
+  });
+
+  it("mean the channel whose card is open, or the first one shown", () => {
+    expect(wishOf("o", CONTEXT)).toEqual({ type: "fade", channel: "c0", opacity: 0.95 });
+    const view = { ...START_VIEW, picked: "c2" };
+    expect(wishOf("o", { ...CONTEXT, view })).toEqual({
+      type: "fade",
+      channel: "c2",
+      opacity: 0.95,
+    });
+    expect(wishOf("c", { ...CONTEXT, view })).toEqual({ panel: "pick", channel: "c3" });
+    expect(wishOf("C", { ...CONTEXT, view: { ...view, picked: "c0" } })).toEqual({
+      panel: "pick",
+      channel: "c3",
+    });
+  });
+
+  it("show the lamps where they light something", () => {
+    expect(wishOf("$", CONTEXT)).toEqual({ type: "show-lamps", areShown: true });
+    const shown = reduce(CONTEXT.state, { type: "show-lamps", areShown: true });
+    expect(wishOf("$", { ...CONTEXT, state: shown })).toEqual({
+      type: "show-lamps",
+      areShown: false,
+    });
+    const marched = reduce(shown, { type: "choose-mode", mode: "all" });
+    expect(wishOf("$", { ...CONTEXT, state: marched })).toBeNull();
+  });
+
+  it("do nothing where there is nothing to do", () => {
+    expect(wishOf("0", CONTEXT)).toBeNull();
+    expect(wishOf("F12", CONTEXT)).toBeNull();
+    expect(wishOf("g", { ...CONTEXT, gazed: null })).toBeNull();
+  });
+
+  it("go to the next tile, also of those that are shown alone", () => {
+    expect(wishOf("t", CONTEXT)).toEqual({ type: "select", tile: "r0_c0" });
+    const state = reduce(CONTEXT.state, { type: "isolate", tile: "r1_c4" });
+    expect(wishOf("t", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: "r0_c0" });
+    expect(wishOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
+  });
+
+  it("rest while something is typed, and leave a control what it is worked by", () => {
+    const press = ["Enter", " ", "Shift+Enter"];
+    const goThrough = ["ArrowLeft", "Shift+ArrowUp", "Home", "End", "PageUp", "PageDown"];
+    const others = ["o", "?", "+", "-", "=", "Escape", "Delete", "Backspace"];
+    const fire = (focus: Focus) =>
+      [press, goThrough, others].map((names) => {
+        const fired = names.filter((name) => firesOn(name, focus)).length;
+        return fired === 0 ? "none" : fired === names.length ? "all" : "some";
+      });
+    expect(fire("field")).toEqual(["none", "none", "none"]);
+    expect(fire("list")).toEqual(["none", "none", "all"]);
+    expect(fire("button")).toEqual(["none", "all", "all"]);
+    expect(fire("page")).toEqual(["all", "all", "all"]);
+  });
+
+  it("cut what is shown, also of a tile that is shown alone", () => {
+    const shown = { min: [0, -10, 0], max: [10, 0, 8] } as const;
+    const state = initialState(sampleManifest(1));
+    const clipOf = (name: string) => wishOf(name, { ...CONTEXT, state, shown });
+    expect(clipOf("b")).toMatchObject({
+      clip: { box: { min: [2.5, -7.5, 2], max: [7.5, -2.5, 6] } },
+    });
+    expect(clipOf("n")).toMatchObject({ clip: { plane: { normal: [0, 0, 1], offset_um: 4 } } });
+  });
+
+  it("are told in words that name the new value", () => {
+    const ranges = new Map([["c0", [100, 1120] as const]]);
+    const after = (name: string) => {
+      const wish = wishOf(name, CONTEXT);
+      if (wish === null || typeof wish === "string" || "panel" in wish) throw new Error(name);
+      return told(wish, CONTEXT.state, reduce(CONTEXT.state, wish), ranges);
+    };
+    expect(after("o")).toBe("Marker 0: opacity 95 %");
+    expect(after("e")).toBe("Marker 0: window 100 – 1104");
+    expect(after("1")).toBe("Marker 0: hidden");
+    expect(after("D")).toBe("Disc 13°");
+    expect(after("b")).toBe("Not cut");
+    expect(after("n")).toBe("Cut by a box and a plane");
+    expect(after(".")).toBe("Box: x from 1.00 µm");
+  });
+});

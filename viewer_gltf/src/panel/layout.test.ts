@@ -1,0 +1,261 @@
+import { describe, expect, it } from "vitest";
+import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import { type Action, initialState, LIMITS, reduce, type ViewerState } from "../state/viewer_state";
+import {
+  type Control,
+  changePanel,
+  type Group,
+  type Layout,
+  type PanelView,
+  START_VIEW,
+  type Wish,
+} from "./controls";
+import { type Facts, layOut } from "./layout";
+import { PALETTES } from "./palettes";
+import { PAGE } from "./sections/channels";
+
+const FACTS: Facts = {
+  title: "sample",
+  subtitle: "",
+  shown: SPECIMEN_BOX,
+  ranges: new Map([["c0", [100, 1120]]]),
+  gazed: "r1_c2",
+  isStereo: false,
+  stereo: { isAvailable: false, reason: "No headset was found." },
+  split: null,
+  canScan: false,
+  frame_ms: 12.3,
+  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
+  triangles: 12_345,
+  volumeLevel: 1,
+  samples: null,
+  isLoading: false,
+  values: [],
+};
+const start = (channels = 3) => initialState(sampleManifest(channels));
+
+function controlsOf(layout: Layout): readonly Control[] {
+  return layout.sections
+    .flatMap(({ items }) => items)
+    .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item]));
+}
+
+function find<K extends Control["kind"]>(layout: Layout, kind: K, id: string) {
+  const found = controlsOf(layout).find((control) => control.id === id);
+  if (found?.kind !== kind) throw new Error(`no ${kind} ${id}`);
+  return found as Extract<Control, { kind: K }>;
+}
+
+function granted(state: ViewerState, wish: Wish): ViewerState {
+  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
+  return reduce(state, wish);
+}
+
+const laid = (state: ViewerState, view: PanelView = START_VIEW, facts = FACTS) =>
+  layOut(state, facts, view);
+const channelsOf = (layout: Layout) =>
+  layout.sections[0].items.filter((item): item is Group => item.kind === "group");
+
+describe("the panel's layout", () => {
+  it("gives every control an id of its own, and a name", () => {
+    const controls = controlsOf(laid(start(70)));
+    const ids = controls.map(({ id }) => id);
+    expect(new Set(ids).size).toBe(ids.length);
+    expect(controls.filter(({ label }) => label === "")).toEqual([]);
+  });
+
+  it("changes each part of a channel to what its control says", () => {
+    const state = start();
+    const layout = laid(state);
+    const channel = (wish: Wish) => granted(state, wish).channels[0];
+    expect(channel(find(layout, "toggle", "c0/shown").to(false)).shown).toBe(false);
+    expect(channel(find(layout, "toggle", "c0/volume").to(false)).volume).toBe(false);
+    expect(channel(find(layout, "slider", "c0/opacity").to(0.25)).opacity).toBe(0.25);
+    expect(channel(find(layout, "window", "c0/window").to([0.25, 0.5])).window).toEqual([
+      0.25, 0.5,
+    ]);
+    const transfer = find(layout, "choice", "c0/transfer-function");
+    expect(transfer.options.map(({ value }) => value)).toEqual(["default", "soft"]);
+    expect(channel(transfer.to("soft")).transferFunction).toBe("soft");
+    expect(channel(find(layout, "colour", "c0/color").to("#0000ff")).color).toEqual([0, 0, 1]);
+  });
+
+  it("names the window in the source's own values, where they are known", () => {
+    const state = reduce(start(), { type: "window", channel: "c0", window: [0.25, 0.5] });
+    expect(find(laid(state), "window", "c0/window").texts).toEqual(["355", "610"]);
+    expect(find(laid(state), "window", "c2/window").texts).toEqual(["0 %", "100 %"]);
+  });
+
+  it("offers the field's colours and ones that need no red and green", () => {
+    const { palettes } = find(laid(start()), "colour", "c0/palette");
+    expect(palettes).toBe(PALETTES);
+    const names = palettes.flatMap(({ colors }) => colors.map(({ name }) => name)).join();
+    for (const dye of ["DAPI", "FITC", "TRITC", "Cy3", "Cy5"]) expect(names).toContain(dye);
+    for (const { hex } of palettes.flatMap(({ colors }) => colors)) {
+      expect(hex).toMatch(/^#[0-9a-f]{6}$/); // as a state's colour reads, so that it is marked
+    }
+  });
+
+  it("lists of seventy channels those that are shown, and a page of the others", () => {
+    const layout = laid(start(70));
+    const [cards, others] = [channelsOf(layout).slice(0, 4), channelsOf(layout).slice(4)];
+    expect(cards.map(({ id }) => id)).toEqual(["c0", "c1", "c2", "c3"]);
+    expect(others).toHaveLength(PAGE);
+    const next = find(layout, "button", "next-channels").to();
+    if (typeof next === "string" || !("panel" in next)) throw new Error("no change of the panel");
+    const second = channelsOf(laid(start(70), changePanel(START_VIEW, next))).slice(4);
+    expect(second[0].id).toBe(`c${4 + PAGE}`);
+  });
+
+  it("finds a channel by a part of its name", () => {
+    const wish = find(laid(start(70)), "search", "find-channel").to("marker 42");
+    if (typeof wish === "string" || !("panel" in wish)) throw new Error("no change of the panel");
+    const found = channelsOf(laid(start(70), changePanel(START_VIEW, wish)));
+    expect(found.map(({ id }) => id)).toEqual(["c0", "c1", "c2", "c3", "c42"]);
+    const nothing = laid(start(70), { ...START_VIEW, search: "CD999" });
+    expect(find(nothing, "text", "no-channel").value).toContain("CD999");
+  });
+
+  it("opens one channel's card at a time", () => {
+    const [first] = channelsOf(laid(start()));
+    expect(first.isOpen).toBe(false);
+    const opened = channelsOf(laid(start(), changePanel(START_VIEW, first.opener)));
+    expect(opened.map(({ isOpen }) => isOpen)).toEqual([true, false, false]);
+  });
+
+  it("brings a slider's ends to the limits, and each step back to itself", () => {
+    const state = start();
+    const layout = laid(state);
+    for (const [id, key] of [
+      ["switch-distance", "switchDistance_m"],
+      ["disc-radius", "discRadius_deg"],
+    ] as const) {
+      const slider = find(layout, "slider", id);
+      const [least, most] = LIMITS[key];
+      expect(granted(state, slider.to(0))[key]).toBe(least);
+      expect(granted(state, slider.to(1))[key]).toBe(most);
+      for (let step = 0; step <= slider.steps; step++) {
+        const moved = find(laid(granted(state, slider.to(step / slider.steps))), "slider", id);
+        expect(Math.round(moved.value * slider.steps), `${id} ${step}`).toBe(step);
+      }
+    }
+  });
+
+  it("maps the tiles by row and column, with the marks of gaze, choice and isolation", () => {
+    const actions: Action[] = [
+      { type: "select", tile: "r0_c1" },
+      { type: "isolate", tile: "r0_c4" },
+    ];
+    const map = find(laid(actions.reduce(reduce, start())), "map", "tile-map");
+    expect([map.rows, map.columns, map.tiles.length]).toEqual([2, 5, 10]);
+    const marked = (mark: "isGazed" | "isSelected" | "isIsolated") =>
+      map.tiles.filter((tile) => tile[mark]).map(({ row, column }) => [row, column]);
+    expect(marked("isGazed")).toEqual([[1, 2]]);
+    expect(marked("isSelected")).toEqual([[0, 4]]);
+    expect(marked("isIsolated")).toEqual([[0, 4]]);
+  });
+
+  it("selects a tile, isolates it when chosen again, and then shows all", () => {
+    let state = start();
+    const choose = () => {
+      state = granted(state, find(laid(state), "map", "tile-map").to("r0_c3"));
+      return [state.selected, state.isolated];
+    };
+    expect(choose()).toEqual(["r0_c3", null]);
+    expect(choose()).toEqual(["r0_c3", "r0_c3"]);
+    expect(choose()).toEqual(["r0_c3", null]);
+  });
+
+  it("lists the tiles where their names are no rows and columns", () => {
+    const state = { ...start(), tiles: [{ id: "left", representation: "mesh" }] } as const;
+    const list = find(laid(state), "choice", "tile-choice");
+    expect(list.options.map(({ value }) => value)).toEqual(["", "left"]);
+    expect(granted(state, list.to("left")).selected).toBe("left");
+  });
+
+  it("cuts at the specimen's middle, and not at all when turned off", () => {
+    let state = start();
+    state = granted(state, find(laid(state), "toggle", "clip-box").to(true));
+    expect(state.clip.box).toEqual({ min: [12.5, -15, 2], max: [37.5, -5, 6] });
+    state = granted(state, find(laid(state), "toggle", "clip-plane").to(true));
+    expect(state.clip.plane).toEqual({ normal: [0, 0, 1], offset_um: 4 });
+    state = granted(state, find(laid(state), "toggle", "clip-box").to(false));
+    expect(state.clip.box).toBeNull();
+    expect(state.clip.plane).not.toBeNull();
+  });
+
+  it("offers in stereo to try again what another try may mend, as long as it is told", () => {
+    const facts = { ...FACTS, isStereo: true };
+    const tell = (isMendable: boolean) =>
+      reduce(start(), { type: "notify", text: "a fault", isMendable });
+    const retry = find(laid(tell(true), START_VIEW, facts), "button", "retry");
+    expect(retry.to()).toBe("retry");
+    const others = controlsOf(laid(tell(false), START_VIEW, facts)).map(({ id }) => id);
+    expect(others).toContain("dismiss-0");
+    expect(others).not.toContain("retry");
+  });
+
+  it("cuts a tile that is shown alone at its own middle", () => {
+    const facts = { ...FACTS, shown: { min: [0, -10, 0], max: [10, 0, 6] } } as const;
+    const layout = laid(start(), START_VIEW, facts);
+    const clipOf = (id: string) => granted(start(), find(layout, "toggle", id).to(true)).clip;
+    expect(clipOf("clip-box").box).toEqual({ min: [2.5, -7.5, 1.5], max: [7.5, -2.5, 4.5] });
+    expect(clipOf("clip-plane").plane?.offset_um).toBe(3);
+  });
+
+  it("says the measured distance, and the channels' values at both ends", () => {
+    const points = [
+      [0, 0, 0],
+      [3, 4, 0],
+    ] as const;
+    const state = reduce(start(), { type: "measure", points });
+    const facts = { ...FACTS, values: [["Marker 0 12", "Marker 1 7"], ["Marker 0 512"]] };
+    const textsOf = (layout: Layout) =>
+      controlsOf(layout).flatMap((each) =>
+        each.kind === "text" && /^(distance|values-.)$/.test(each.id)
+          ? [`${each.label}: ${each.value}`]
+          : [],
+      );
+    expect(textsOf(laid(state, START_VIEW, facts))).toEqual([
+      "Distance: 5.00 µm",
+      "First point: Marker 0 12 · Marker 1 7",
+      "Second point: Marker 0 512",
+    ]);
+    expect(find(laid(state), "text", "values-0").value).toBe(""); // and so not there to be seen
+    expect(find(laid(state), "button", "clear-measured").refusal).toBe("");
+  });
+
+  it("says why stereo can't be had, and leaves out what the viewer has not", () => {
+    const layout = laid(start());
+    expect(find(layout, "button", "stereo").refusal).toBe("No headset was found.");
+    expect(controlsOf(layout).some(({ id }) => id === "split")).toBe(false);
+    const split = { isAvailable: true, reason: "" };
+    const had = laid(start(), START_VIEW, { ...FACTS, split });
+    expect(find(had, "button", "split").to()).toBe("split");
+    expect(find(had, "button", "split").refusal).toBe("");
+  });
+
+  it("takes the code of a phone viewer that is not Google's, and says what is wrong with it", () => {
+    const facts = { ...FACTS, split: { isAvailable: true, reason: "" } };
+    const other = changePanel(START_VIEW, { panel: "lenses", lenses: "own" });
+    const refusal = (text: string) => {
+      const view = changePanel(other, { panel: "code", text });
+      return find(laid(start(), view, facts), "button", "split").refusal;
+    };
+    expect(refusal("")).toContain("empty");
+    expect(refusal("https://example.org/")).toContain("not a Cardboard viewer's code");
+    expect(refusal("https://g.co/cardboard")).toBe("");
+    const has = (canScan: boolean) =>
+      JSON.stringify(laid(start(), other, { ...facts, canScan })).includes("Scan the code");
+    expect([has(true), has(false)]).toEqual([true, false]);
+  });
+
+  it("asks for the views by command, and shows the figures", () => {
+    const layout = laid(start());
+    for (const id of ["front", "side", "top", "reset", "share"] as const) {
+      expect(find(layout, "button", id).to()).toBe(id);
+    }
+    expect(layout.status).toBe("12 k triangles · volume level 1 · 12 ms");
+    expect(find(layout, "text", "settings").value).toBe("64 steps a ray, 50 % resolution");
+  });
+});

@@ -1,0 +1,283 @@
+/** What the panel shows of a state: see controls.ts. Pure. */
+import { distanceBetween, distanceText } from "../annotations/measure";
+import type { Box, ClipPlane } from "../math/clip";
+import type { QualityLevel, QualitySettings } from "../state/quality_controller";
+import { LIMITS, MODES, type Mode, type Tool, type ViewerState } from "../state/viewer_state";
+import type { Histogram } from "../volumes/transfer_functions_loader";
+import { command, inline } from "./control_templates";
+import type { Control, Layout, PanelView, Section, Slider } from "./controls";
+import { channelItems, type Ranges } from "./sections/channels";
+import { lightItems } from "./sections/path_trace";
+import { type StereoSupport, stereoItems } from "./sections/stereo";
+import { tileItems } from "./sections/tiles";
+
+export { chosenTile } from "./sections/tiles";
+
+/** What the state does not hold. */
+export type Facts = StereoSupport &
+  Readonly<{
+    title: string;
+    subtitle: string;
+    /** The specimen, or the isolated tile; um, world. */
+    shown: Box;
+    ranges: Ranges;
+    /** Of the channel whose plane of value and gradient is open, if it has come. */
+    histogram?: Histogram | null;
+    /** The tile that is looked at. */
+    gazed: string | null;
+    isStereo: boolean;
+    /** null: not known yet. */
+    frame_ms: number | null;
+    settings: QualitySettings | null;
+    triangles: number;
+    /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
+    volumeLevel: number | null;
+    /** Of the path-traced picture, for each pixel; null: it is none. */
+    samples: number | null;
+    isLoading: boolean;
+    /** Of each measured point: the channels' values there, as `DAPI 1210`. */
+    values: readonly (readonly string[])[];
+  }>;
+
+/** The newest few say what is wrong. */
+const MOST_NOTICES = 3;
+
+const MODE_NAMES: Readonly<Record<Mode, string>> = {
+  disc: "Disc",
+  tile: "Tile",
+  all: "All",
+  stage: "Staged",
+  traced: "Traced",
+  off: "Off",
+};
+const QUALITY_NAMES: Readonly<Record<QualityLevel, string>> = {
+  auto: "Auto",
+  low: "Low",
+  high: "High",
+};
+const TOOL_NAMES: Readonly<Record<Tool, string>> = { select: "Select", measure: "Measure" };
+const POINT_NAMES = ["First point", "Second point"] as const;
+const SLIDER_STEPS = 100;
+
+/** The modes that can be chosen: as staged only where an artist has staged something. */
+export function modesOf(state: ViewerState): readonly Mode[] {
+  const isStaged = state.tiles.some(({ representation }) => representation !== "mesh");
+  return MODES.filter((mode) =>
+    mode === "stage" ? isStaged : mode !== "traced" || state.canTrace,
+  );
+}
+
+/** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
+export function middleBox({ min, max }: Box): Box {
+  const at = (i: 0 | 1 | 2, share: number) => min[i] + share * (max[i] - min[i]);
+  return {
+    min: [at(0, 0.25), at(1, 0.25), at(2, 0.25)],
+    max: [at(0, 0.75), at(1, 0.75), at(2, 0.75)],
+  };
+}
+
+/** Through the middle of what is shown, the half towards the viewer cut away. */
+export function middlePlane({ min, max }: Box): ClipPlane {
+  return { normal: [0, 0, 1], offset_um: (min[2] + max[2]) / 2 };
+}
+
+export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layout {
+  const section = (id: string, label: string, items: Section["items"]): Section => ({
+    id,
+    label,
+    isOpen: view.open.includes(id),
+    opener: { panel: "unfold", section: id },
+    items,
+  });
+  return {
+    title: facts.title,
+    subtitle: facts.subtitle,
+    isHidden: view.isHidden,
+    sections: [
+      ...(facts.isStereo && state.notices.length > 0
+        ? [section("notices", "Notices", noticeItems(state))]
+        : []),
+      section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
+      section("volumes", "Volumes", volumeItems(state)),
+      section("light", "Light", lightItems(state, view, facts.isStereo)),
+      section("tiles", "Tiles", tileItems(state, facts.gazed)),
+      section("view", "View", [
+        command("front", "Front"),
+        command("side", "Side"),
+        command("top", "Top"),
+        command("reset", "Reset"),
+      ]),
+      section("stereo", "Stereo", stereoItems(state, facts, view)),
+      section("measure", "Measure", measureItems(state, facts.values)),
+      section("cut", "Cut open", cutItems(state, facts.shown)),
+      section("quality", "Quality", qualityItems(state, facts)),
+      section("share", "Share", [
+        command("share", "Copy a link to this view"),
+        ...(view.link === ""
+          ? []
+          : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
+        { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
+      ]),
+    ],
+    status: statusOf(facts),
+  };
+}
+
+/** On a flat screen they lie over the picture; in stereo there is the panel alone. */
+function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
+  const items = notices.slice(-MOST_NOTICES).flatMap((text, i): Control[] => [
+    { kind: "text", id: `notice-${i}`, label: "Notice", value: text },
+    {
+      kind: "button",
+      id: `dismiss-${i}`,
+      label: "Dismiss",
+      to: () => ({ type: "dismiss", text }),
+    },
+  ]);
+  return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
+}
+
+function volumeItems(state: ViewerState): readonly Control[] {
+  const [least, most] = LIMITS.switchDistance_m;
+  const [narrowest, widest] = LIMITS.discRadius_deg;
+  const distance: Slider = {
+    kind: "slider",
+    id: "switch-distance",
+    label: "Switch distance",
+    name: "Switch distance: volumes show within",
+    value: Math.log(state.switchDistance_m / least) / Math.log(most / least),
+    steps: SLIDER_STEPS,
+    text: `${state.switchDistance_m.toPrecision(2)} m`,
+    // As many digits as a step needs; more would only lengthen a link.
+    to: (value) => ({
+      type: "set-switch-distance",
+      distance_m: Number((least * (most / least) ** value).toPrecision(3)),
+    }),
+  };
+  const radius: Slider = {
+    kind: "slider",
+    id: "disc-radius",
+    label: "Disc radius",
+    value: (state.discRadius_deg - narrowest) / (widest - narrowest),
+    steps: 2 * (widest - narrowest),
+    text: `${Number(state.discRadius_deg.toFixed(1))}°`,
+    refusal: state.mode === "disc" ? "" : "Only the mode Disc has one.",
+    to: (value) => ({
+      type: "set-disc-radius",
+      radius_deg: Number((narrowest + (widest - narrowest) * value).toFixed(2)),
+    }),
+  };
+  const isNear = state.mode === "disc" || state.mode === "tile";
+  const mode = inline(
+    "mode",
+    "Where volumes show",
+    state.mode,
+    MODE_NAMES,
+    modesOf(state),
+    (each) => ({
+      type: "choose-mode",
+      mode: each,
+    }),
+  );
+  return [
+    mode,
+    { ...distance, refusal: isNear ? "" : "Only the modes Disc and Tile have one." },
+    radius,
+  ];
+}
+
+/** `12.3 µm`, or what is missing to it. */
+export function measuredText({ tool, measured }: ViewerState): string {
+  const [from, to] = measured;
+  if (from !== undefined && to !== undefined) return distanceText(distanceBetween(from, to));
+  if (from !== undefined) return "Now the other point.";
+  return tool === "measure" ? "Choose two points of the specimen." : "";
+}
+
+function measureItems(state: ViewerState, values: Facts["values"]): readonly Control[] {
+  return [
+    inline("tool", "A tap", state.tool, TOOL_NAMES, ["select", "measure"], (tool) => ({
+      type: "choose-tool",
+      tool,
+    })),
+    { kind: "text", id: "distance", label: "Distance", value: measuredText(state) },
+    ...POINT_NAMES.map((label, i): Control => {
+      const value = (values[i] ?? []).join(" · ");
+      return { kind: "text", id: `values-${i}`, label, value };
+    }),
+    {
+      kind: "button",
+      id: "clear-measured",
+      label: "Clear",
+      refusal: state.measured.length === 0 ? "Nothing is measured." : "",
+      to: () => ({ type: "measure", points: [] }),
+    },
+  ];
+}
+
+function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
+  return [
+    {
+      kind: "toggle",
+      id: "clip-box",
+      label: "Box",
+      name: "Cut by a box",
+      value: clip.box !== null,
+      to: (value) => ({
+        type: "set-clip",
+        clip: { ...clip, box: value ? middleBox(shown) : null },
+      }),
+    },
+    {
+      kind: "toggle",
+      id: "clip-plane",
+      label: "Plane",
+      name: "Cut by a plane",
+      value: clip.plane !== null,
+      to: (value) => ({
+        type: "set-clip",
+        clip: { ...clip, plane: value ? middlePlane(shown) : null },
+      }),
+    },
+  ];
+}
+
+function qualityItems(state: ViewerState, { settings, frame_ms }: Facts): readonly Control[] {
+  const levels = ["auto", "low", "high"] as const;
+  const level = inline("quality", "Quality", state.quality, QUALITY_NAMES, levels, (each) => ({
+    type: "choose-quality",
+    level: each,
+  }));
+  const items: Control[] = [
+    level,
+    {
+      kind: "text",
+      id: "frame-time",
+      label: "Frame",
+      value: frameText(frame_ms) || "not measured yet",
+    },
+  ];
+  if (settings !== null) {
+    const { steps, resolution, errorFactor } = settings;
+    const parts = [`${steps} steps a ray`, `${Math.round(100 * resolution)} % resolution`];
+    if (errorFactor !== 1) parts.push(`${errorFactor} x coarser surfaces`);
+    items.push({ kind: "text", id: "settings", label: "March", value: parts.join(", ") });
+  }
+  return items;
+}
+
+function frameText(frame_ms: number | null): string {
+  return frame_ms === null ? "" : `${frame_ms.toFixed(frame_ms < 10 ? 1 : 0)} ms`;
+}
+
+function statusOf({ triangles, volumeLevel, samples, frame_ms, isLoading }: Facts): string {
+  return [
+    `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`,
+    volumeLevel === null ? "" : `volume level ${volumeLevel}`,
+    samples === null ? "" : `${samples} samples`,
+    frameText(frame_ms),
+    isLoading ? "refining …" : "",
+  ]
+    .filter((part) => part !== "")
+    .join(" · ");
+}

@@ -1,0 +1,205 @@
+/**
+ * The channels' part of the panel. Those that are shown come first, each with a card; the others
+ * are a list to add from, by name, and a page at a time: there may be seventy. Pure.
+ */
+
+import { valueText } from "../../annotations/measure";
+import { fromHex, toHex } from "../../math/color";
+import { isTwoD } from "../../state/transfer_functions_2d";
+import type { ChannelState, ViewerState } from "../../state/viewer_state";
+import type { Histogram } from "../../volumes/transfer_functions_loader";
+import type { Control, Group, PanelView, Section } from "../controls";
+import { PALETTES } from "../palettes";
+import { planeItems } from "./transfer_function_2d";
+
+/** Channels of a page that are not shown; fewer need no search. */
+export const PAGE = 6;
+const PERCENT_STEPS = 100;
+/** The volumes have 8 bits. */
+const WINDOW_STEPS = 255;
+
+/** The voxel values of the source that are 0 and 255 in the volumes, by channel. */
+export type Ranges = ReadonlyMap<string, readonly [number, number]>;
+
+function tagsOf({ hasSurface, prefersVolume }: ChannelState): string[] {
+  if (!hasSurface) return ["no surface"];
+  return prefersVolume ? ["no clear surface"] : [];
+}
+
+function shownToggle({ id, name, shown }: ChannelState): Control {
+  return {
+    kind: "toggle",
+    id: `${id}/shown`,
+    label: "Shown",
+    name: `Show ${name}`,
+    value: shown,
+    to: (value) => ({ type: "show", channel: id, shown: value }),
+  };
+}
+
+/** A share of the intensities as the source counts them. */
+export function intensityText(share: number, range: readonly [number, number] | undefined): string {
+  if (range === undefined) return `${Math.round(100 * share)} %`;
+  return valueText(range[0] + (range[1] - range[0]) * share, range);
+}
+
+function cardOf(
+  channel: ChannelState,
+  ranges: Ranges,
+  view: PanelView,
+  histogram: Histogram | null,
+): Group {
+  const { id, name } = channel;
+  const isOpen = view.picked === id;
+  const toWindow = (window: readonly [number, number]) =>
+    ({ type: "window", channel: id, window }) as const;
+  const recolor = (hex: string) => ({ type: "recolor", channel: id, color: fromHex(hex) }) as const;
+  const value = toHex(channel.color);
+  const range = ranges.get(id);
+  return {
+    kind: "group",
+    id,
+    label: name,
+    tags: tagsOf(channel),
+    isOpen,
+    opener: { panel: "pick", channel: isOpen ? null : id },
+    controls: [
+      {
+        kind: "colour",
+        id: `${id}/color`,
+        label: "Any colour",
+        name: `Colour of ${name}`,
+        value,
+        palettes: [],
+        to: recolor,
+      },
+      shownToggle(channel),
+      {
+        kind: "toggle",
+        id: `${id}/volume`,
+        label: "Volume",
+        name: `Draw ${name} as a volume`,
+        value: channel.volume,
+        to: (volume) => ({ type: "draw-volume", channel: id, volume }),
+      },
+      {
+        kind: "choice",
+        id: `${id}/transfer-function`,
+        label: "Transfer function",
+        name: `Transfer function of ${name}`,
+        value: channel.transferFunction,
+        options: channel.transferFunctions.map((each) => ({
+          value: each,
+          label: isTwoD(channel, each) ? `${each} (2D)` : each,
+        })),
+        isInline: false,
+        refusal: channel.volume ? "" : "Only volumes have one.",
+        to: (each) => ({ type: "choose-transfer-function", channel: id, name: each }),
+      },
+    ],
+    more: [
+      {
+        kind: "slider",
+        id: `${id}/opacity`,
+        label: "Opacity",
+        name: `Opacity of ${name}`,
+        value: channel.opacity,
+        steps: PERCENT_STEPS,
+        text: `${Math.round(100 * channel.opacity)} %`,
+        to: (opacity) => ({ type: "fade", channel: id, opacity }),
+      },
+      {
+        kind: "window",
+        id: `${id}/window`,
+        label: "Window",
+        name: `Window of ${name}`,
+        value: channel.window,
+        steps: WINDOW_STEPS,
+        texts: [intensityText(channel.window[0], range), intensityText(channel.window[1], range)],
+        to: toWindow,
+      },
+      {
+        kind: "colour",
+        id: `${id}/palette`,
+        label: "Colour",
+        name: `Colour of ${name}`,
+        value,
+        palettes: PALETTES,
+        to: recolor,
+      },
+      ...planeItems(channel, view, histogram, (share) => intensityText(share, range)),
+    ],
+  };
+}
+
+/** The hidden channels whose name or id holds what is sought. */
+export function foundChannels(state: ViewerState, search: string): readonly ChannelState[] {
+  const sought = search.trim().toLowerCase();
+  return state.channels.filter(
+    ({ shown, name, id }) =>
+      !shown && (name.toLowerCase().includes(sought) || id.toLowerCase().includes(sought)),
+  );
+}
+
+/** How many pages those that are found take. */
+export function pagesOf(state: ViewerState, search: string): number {
+  return Math.max(1, Math.ceil(foundChannels(state, search).length / PAGE));
+}
+
+function addingOf(state: ViewerState, view: PanelView): readonly (Control | Group)[] {
+  const hidden = foundChannels(state, "").length;
+  if (hidden === 0) return [];
+  const isLong = hidden > PAGE;
+  const search = isLong ? view.search : "";
+  const found = foundChannels(state, search);
+  const pages = pagesOf(state, search);
+  const page = Math.min(view.page, pages - 1);
+  const listed = found.slice(page * PAGE, (page + 1) * PAGE);
+  const items: (Control | Group)[] = [];
+  if (isLong) {
+    items.push({
+      kind: "search",
+      id: "find-channel",
+      label: `Add one of ${hidden} more channels`,
+      value: view.search,
+      to: (text) => ({ panel: "find", text }),
+    });
+  }
+  for (const channel of listed) {
+    items.push({
+      kind: "group",
+      id: channel.id,
+      label: channel.name,
+      tags: tagsOf(channel),
+      controls: [shownToggle(channel)],
+      more: [],
+      isOpen: false,
+      opener: { panel: "pick", channel: null },
+    });
+  }
+  if (isLong && found.length === 0) {
+    const value = `No hidden channel is called "${view.search.trim()}".`;
+    items.push({ kind: "text", id: "no-channel", label: "Channels", value });
+  }
+  if (pages > 1) {
+    items.push({
+      kind: "button",
+      id: "next-channels",
+      label: `Next ${PAGE} (page ${page + 1} of ${pages})`,
+      to: () => ({ panel: "page", page: (page + 1) % pages }),
+    });
+  }
+  return items;
+}
+
+export function channelItems(
+  state: ViewerState,
+  ranges: Ranges,
+  view: PanelView,
+  histogram: Histogram | null = null,
+): Section["items"] {
+  const cards = state.channels
+    .filter(({ shown }) => shown)
+    .map((channel) => cardOf(channel, ranges, view, histogram));
+  return [...cards, ...addingOf(state, view)];
+}

@@ -1,0 +1,88 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../../test/support/fixture/manifest";
+import { DIALS } from "../../state/path_trace_parameters";
+import { LAMPS } from "../../state/path_trace_settings";
+import { initialState, reduce, type ViewerState } from "../../state/viewer_state";
+import { type Control, type Group, START_VIEW, type Wish } from "../controls";
+import { lightItems } from "./path_trace";
+
+const CLOSED = initialState(sampleManifest(2));
+const TRACED = reduce(CLOSED, { type: "choose-mode", mode: "traced" });
+
+const itemsOf = (state: ViewerState, isStereo = false) => lightItems(state, START_VIEW, isStereo);
+function controlsOf(state: ViewerState, isStereo = false): readonly Control[] {
+  return itemsOf(state, isStereo).flatMap((item) =>
+    item.kind === "group" ? [...item.controls, ...item.more] : [item],
+  );
+}
+function find<K extends Control["kind"]>(state: ViewerState, kind: K, id: string) {
+  const found = controlsOf(state).find((control) => control.id === id);
+  if (found?.kind !== kind) throw new Error(`no ${kind} ${id}`);
+  return found as Extract<Control, { kind: K }>;
+}
+function granted(state: ViewerState, wish: Wish): ViewerState {
+  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
+  return reduce(state, wish);
+}
+
+describe("the panel's light", () => {
+  it("is one button until paths of light are traced", () => {
+    const [button, ...others] = itemsOf(CLOSED);
+    expect(others).toEqual([]);
+    if (button.kind !== "button") throw new Error("no button");
+    expect(granted(CLOSED, button.to()).mode).toBe("traced");
+  });
+
+  it("gives every control an id of its own, and a name", () => {
+    const controls = controlsOf(TRACED);
+    const ids = controls.map(({ id }) => id);
+    expect(new Set(ids).size).toBe(ids.length);
+    expect(controls.filter(({ label }) => label === "")).toEqual([]);
+  });
+
+  it("has a slider for every number, which sets it from end to end", () => {
+    const sliders = controlsOf(TRACED).filter(({ kind }) => kind === "slider");
+    expect(sliders.map(({ id }) => id)).toEqual(DIALS.map(({ id }) => `trace/${id}`));
+    for (const dial of DIALS) {
+      const slider = find(TRACED, "slider", `trace/${dial.id}`);
+      for (const end of [0, 1] as const) {
+        const { trace } = granted(TRACED, slider.to(end));
+        expect(dial.of(trace), dial.id).toBeCloseTo(dial.limits[end], 6);
+      }
+    }
+  });
+
+  it("shows the lamps and hides them", () => {
+    const toggle = find(TRACED, "toggle", "trace/lamps");
+    expect(toggle.value).toBe(false);
+    const shown = granted(TRACED, toggle.to(true));
+    expect(shown.areLampsShown).toBe(true);
+    const again = find(shown, "toggle", "trace/lamps");
+    expect(again.value).toBe(true);
+    expect(granted(shown, again.to(false))).toEqual(TRACED);
+  });
+
+  it("has a card for each lamp, which changes that lamp alone", () => {
+    const cards = itemsOf(TRACED).filter((item): item is Group => item.kind === "group");
+    expect(cards.map(({ label }) => label)).toEqual(["Lamp 1", "Lamp 2", "Lamp 3"]);
+    expect(cards).toHaveLength(LAMPS);
+    const lit = granted(TRACED, find(TRACED, "toggle", "lamp-1/on").to(true)).trace.lamps;
+    expect(lit.map(({ isOn }) => isOn)).toEqual([true, true, false]);
+    const red = granted(TRACED, find(TRACED, "colour", "lamp-2/color").to("#ff0000")).trace.lamps;
+    expect(red[2].color).toEqual([1, 0, 0]);
+    expect(red.slice(0, 2)).toEqual(TRACED.trace.lamps.slice(0, 2));
+  });
+
+  it("offers a file of the user's where one can be chosen: not in stereo", () => {
+    const own = (isStereo: boolean) =>
+      controlsOf(TRACED, isStereo).some(({ label }) => label.includes(".hdr"));
+    expect([own(false), own(true)]).toEqual([true, false]);
+  });
+
+  it("has the same in the room, but for the file", () => {
+    const ids = (isStereo: boolean) => controlsOf(TRACED, isStereo).map(({ id }) => id);
+    const [onScreen, inRoom] = [ids(false), ids(true)];
+    expect(onScreen.filter((id) => !inRoom.includes(id))).toHaveLength(1);
+    expect(inRoom).toContain("trace/lamps");
+  });
+});

@@ -1,0 +1,79 @@
+/** The panel's stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
+import type { ViewerState } from "../../state/viewer_state";
+import { ProfileError, parseProfile } from "../../xr/cardboard/viewer_profile";
+import type { XrSupport } from "../../xr/support";
+import { command, inline } from "../control_templates";
+import type { Button, Control, Lenses, PanelView } from "../controls";
+
+/** `split` null: there is none in this viewer. `canScan`: the browser reads QR codes. */
+export type StereoSupport = Readonly<{
+  stereo: XrSupport;
+  split: XrSupport | null;
+  canScan: boolean;
+}>;
+
+export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
+  v1: "Cardboard v1 (2014)",
+  v2: "Cardboard v2 (2015)",
+  own: "another",
+};
+export const LENSES = ["v1", "v2", "own"] as const;
+
+function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "tellsWhy"> {
+  return { refusal: isAvailable ? "" : reason || "It can't be had here.", tellsWhy: true };
+}
+
+export function stereoItems(
+  state: ViewerState,
+  facts: StereoSupport,
+  view: PanelView,
+): readonly Control[] {
+  return [
+    { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
+    ...(facts.split === null ? [] : splitItems(facts.split, facts.canScan, view)),
+    {
+      kind: "toggle",
+      id: "dwell",
+      label: "Gaze for 1.5 s chooses",
+      value: state.isDwellOn,
+      to: (isOn) => ({ type: "set-dwell", isOn }),
+    },
+  ];
+}
+
+/** A phone in a viewer of lenses: which, and of another than Google's own what its code says. */
+function splitItems(split: XrSupport, canScan: boolean, view: PanelView): readonly Control[] {
+  const { lenses, code } = view;
+  const fault = lenses === "own" ? codeFault(code) : "";
+  const items: Control[] = [
+    {
+      ...inline("lenses", "Phone viewer", lenses, LENS_NAMES, LENSES, (each) => ({
+        panel: "lenses",
+        lenses: each,
+      })),
+      isInline: false,
+    },
+  ];
+  if (lenses === "own") {
+    items.push({
+      kind: "search",
+      id: "lens-code",
+      label: "What the viewer's QR code says",
+      value: code,
+      to: (text) => ({ panel: "code", text }),
+    });
+    if (canScan) items.push(command("scan", "Scan the code"));
+  }
+  const support = split.isAvailable && fault !== "" ? { isAvailable: false, reason: fault } : split;
+  return [...items, { ...command("split", "Split screen"), ...onlyIf(support) }];
+}
+
+function codeFault(code: string): string {
+  try {
+    parseProfile(code);
+    return "";
+  } catch (error) {
+    if (!(error instanceof ProfileError)) throw error;
+    return error.message;
+  }
+}

@@ -1,0 +1,66 @@
+/** The panel's tiles: a map by row and column, or a list. Pure. */
+import type { ViewerState } from "../../state/viewer_state";
+import { command } from "../control_templates";
+import type { Control } from "../controls";
+import { tileGrid } from "../tile_grid";
+
+/** What choosing a tile does: select it; again, isolate it; once more, show all. */
+export function chosenTile({ selected, isolated }: ViewerState, tile: string) {
+  if (isolated === tile) return { type: "isolate", tile: null } as const;
+  if (isolated !== null || selected === tile) return { type: "isolate", tile } as const;
+  return { type: "select", tile } as const;
+}
+
+export function tileItems(state: ViewerState, gazed: string | null): readonly Control[] {
+  const { selected, isolated } = state;
+  const grid = tileGrid(state.tiles.map(({ id }) => id));
+  const items: Control[] = [];
+  if (grid === null) {
+    items.push({
+      kind: "choice",
+      id: "tile-choice",
+      label: "Tile",
+      value: isolated ?? selected ?? "",
+      options: [
+        { value: "", label: "by gaze" },
+        ...state.tiles.map(({ id }) => ({
+          value: id,
+          label: id === gazed ? `${id} (gazed at)` : id,
+        })),
+      ],
+      isInline: false,
+      to: (id) => (id === "" ? { type: "select", tile: null } : chosenTile(state, id)),
+    });
+  } else {
+    items.push({
+      kind: "map",
+      id: "tile-map",
+      label: "Tiles by row and column",
+      rows: grid.rows,
+      columns: grid.columns,
+      tiles: grid.cells.map((cell) => ({
+        ...cell,
+        isGazed: cell.id === gazed,
+        isSelected: cell.id === selected,
+        isIsolated: cell.id === isolated,
+      })),
+      to: (id) => chosenTile(state, id),
+    });
+  }
+  const alone = isolated ?? selected ?? gazed;
+  items.push(
+    {
+      kind: "toggle",
+      id: "isolate",
+      label: isolated === null ? "Only this tile" : `Only ${isolated}`,
+      value: isolated !== null,
+      refusal: alone === null ? "Choose a tile, or look at one." : "",
+      to: (value) => ({ type: "isolate", tile: value ? alone : null }),
+    },
+    {
+      ...command("back", "Back"),
+      refusal: selected === null && isolated === null ? "No tile is chosen." : "",
+    },
+  );
+  return items;
+}

@@ -1,0 +1,134 @@
+/**
+ * The medium that paths go through: extinction and albedo of every intensity, and the largest
+ * extinction in every brick. Pure arrays.
+ */
+import type { Size3 } from "../bundle/ktx2";
+import { ROWS } from "../state/transfer_shapes";
+import { ENTRIES } from "../volumes/transfer_luts";
+import { envelopeOf, type PlaneTable } from "../volumes/transfer_table_2d";
+
+/** An opacity of 1 would be infinitely dense. */
+const MOST_OPACITY = 0.999;
+
+/** How one channel looks: see `tile_march`. */
+export type MediumLook = Readonly<{
+  color: readonly [number, number, number];
+  table: Uint8Array;
+  plane?: PlaneTable | null;
+}>;
+
+/**
+ * Albedo (rgb) and extinction per um (a) of 256 intensities, 4 floats each, a row for each channel.
+ * If any channel has a two-dimensional transfer function, each has a row for each gradient.
+ *
+ * @param voxel_um the path that an opacity of the tables holds for
+ * @param bias added to an intensity before its table: a grey value's opacity is that of
+ *   another grey value
+ * @param density factor to the extinction
+ */
+export function mediumTable(
+  looks: readonly MediumLook[],
+  voxel_um: number,
+  bias: number,
+  density: number,
+): Float32Array<ArrayBuffer> {
+  const count = rowsOf(looks);
+  const length = 4 * ENTRIES;
+  const rows = new Float32Array(looks.length * count * length);
+  looks.forEach(({ color, table, plane }, c) => {
+    for (let j = 0; j < count; j++) {
+      const to = (c * count + j) * length;
+      if (plane == null && j > 0) {
+        rows.copyWithin(to, c * count * length, (c * count + 1) * length);
+        continue;
+      }
+      const row = plane?.cells.subarray(j * length, (j + 1) * length) ?? table;
+      fillRow(rows.subarray(to, to + length), row, color, voxel_um, bias, density);
+    }
+  });
+  return rows;
+}
+
+/** Rows of each channel in `mediumTable`. */
+export function rowsOf(looks: readonly MediumLook[]): number {
+  return looks.some(({ plane }) => plane != null) ? ROWS : 1;
+}
+
+function fillRow(
+  row: Float32Array,
+  table: Uint8Array,
+  color: MediumLook["color"],
+  voxel_um: number,
+  bias: number,
+  density: number,
+): void {
+  for (let i = 0; i < ENTRIES; i++) {
+    const at = Math.min(ENTRIES - 1, Math.max(0, i + bias * (ENTRIES - 1)));
+    const left = Math.min(ENTRIES - 2, Math.floor(at));
+    for (let k = 0; k < 4; k++) {
+      const a = table[4 * left + k];
+      row[4 * i + k] = (a + (table[4 * left + 4 + k] - a) * (at - left)) / 255;
+    }
+    for (let k = 0; k < 3; k++) row[4 * i + k] *= color[k];
+    const opacity = Math.min(row[4 * i + 3], MOST_OPACITY);
+    row[4 * i + 3] = opacity === 0 ? 0 : (-Math.log(1 - opacity) / voxel_um) * density;
+  }
+}
+
+/**
+ * The largest extinction in every brick, whatever the gradients: no sample inside it exceeds that.
+ *
+ * @param table of `mediumTable`
+ * @param bricks of each channel, smallest and largest intensity of every brick, interleaved
+ */
+export function majorants(
+  table: Float32Array,
+  bricks: readonly Uint8Array[],
+): Float32Array<ArrayBuffer> {
+  const count = bricks[0].length / 2;
+  const found = new Float32Array(count);
+  const length = table.length / bricks.length;
+  bricks.forEach((channel, c) => {
+    const rows = table.subarray(c * length, (c + 1) * length);
+    const largest = largestBetween(envelopeOf(rows));
+    for (let i = 0; i < count; i++) {
+      found[i] += largest[channel[2 * i] * ENTRIES + channel[2 * i + 1]];
+    }
+  });
+  return found;
+}
+
+/** The largest of each `factor`^3 bricks, and how many there are along each axis then. */
+export function coarserMajorants(
+  fine: Float32Array<ArrayBuffer>,
+  counts: Size3,
+  factor: number,
+): Readonly<{ majorants: Float32Array<ArrayBuffer>; counts: Size3 }> {
+  if (factor === 1) return { majorants: fine, counts };
+  const [nx, ny, nz] = counts;
+  const [mx, my, mz] = counts.map((n) => Math.ceil(n / factor));
+  const found = new Float32Array(mx * my * mz);
+  for (let z = 0; z < nz; z++) {
+    for (let y = 0; y < ny; y++) {
+      const row = (Math.floor(z / factor) * my + Math.floor(y / factor)) * mx;
+      for (let x = 0; x < nx; x++) {
+        const to = row + Math.floor(x / factor);
+        found[to] = Math.max(found[to], fine[(z * ny + y) * nx + x]);
+      }
+    }
+  }
+  return { majorants: found, counts: [mx, my, mz] };
+}
+
+/** Largest extinction between intensities lo and hi, for every lo <= hi: index lo * 256 + hi. */
+function largestBetween(row: Float32Array): Float32Array {
+  const found = new Float32Array(ENTRIES * ENTRIES);
+  for (let lo = 0; lo < ENTRIES; lo++) {
+    let largest = 0;
+    for (let hi = lo; hi < ENTRIES; hi++) {
+      largest = Math.max(largest, row[4 * hi + 3]);
+      found[lo * ENTRIES + hi] = largest;
+    }
+  }
+  return found;
+}

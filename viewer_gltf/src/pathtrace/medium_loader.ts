@@ -1,0 +1,144 @@
+/**
+ * The texels that paths go through: all tiles of up to four channels in one texture, a coarse level
+ * first, then the finest that there is room for.
+ */
+import type { Data3DTexture } from "three";
+import { decodeTexels } from "../bundle/decode";
+import type { Size3 } from "../bundle/ktx2";
+import { LoadQueue } from "../volumes/load_queue";
+import { levelsToFetch, texels as texelsOf } from "../volumes/mip_levels";
+import type { VolumeSource } from "../volumes/volume_source";
+import { stride, volumeTexture } from "../volumes/volume_texture";
+import type { Assembled, AssembleRequest, Part } from "./assemble_tiles";
+import { type BlockFrame, frameOf } from "./texel_frame";
+
+const PARALLEL_LOADS = 4;
+
+export type MediumTexels = Readonly<{
+  channels: readonly string[];
+  frame: BlockFrame;
+  level: number;
+  /** Texels of the block at this level; of bricks, at the finest. */
+  size: Size3;
+  texture: Data3DTexture;
+  /** Where bricks are in the texture; null: it is the block itself. */
+  index: Data3DTexture | null;
+  /** Smallest and largest intensity of every brick of 8^3 texels, of each channel, interleaved. */
+  bricks: readonly Uint8Array[];
+  /** Frees the texture. */
+  release: () => void;
+}>;
+
+/** Where a channel's volumes come from, by tile. */
+export type ChannelSources = Readonly<{ id: string; tiles: ReadonlyMap<string, VolumeSource> }>;
+
+export class MediumLoader {
+  private readonly queue = new LoadQueue(PARALLEL_LOADS);
+  private worker: Worker | null = null;
+  private last = 0;
+
+  /**
+   * Load these channels of these tiles, coarse to fine, and hand over each level. Throws BundleError
+   * for a fault, AbortError once it is no longer wanted.
+   *
+   * @param limits bytes of the texture, and texels along an edge
+   */
+  async load(
+    channels: readonly ChannelSources[],
+    tiles: readonly string[],
+    limits: Readonly<{ bytes: number; side: number }>,
+    signal: AbortSignal,
+    onLevel: (texels: MediumTexels) => void,
+  ): Promise<void> {
+    const [first] = channels;
+    const volumes = tiles.flatMap((tile) => first.tiles.get(tile)?.volume ?? []);
+    if (volumes.length === 0) return;
+    const frame = frameOf(volumes);
+    const parts = volumes.filter(({ tile }) => frame.places.has(tile));
+    const share = limits.bytes / stride(channels.length) / parts.length;
+    const isWithin = (level: number) => Math.max(...coarser(frame.size, level)) <= limits.side;
+    const wanted = levelsToFetch(parts[0].levels, share, limits.side).filter(isWithin);
+    const [coarsest = parts[0].levels.length - 1] = wanted;
+    for (const level of new Set([coarsest, wanted.at(-1) ?? coarsest])) {
+      const made = await Promise.all(
+        parts.map(({ tile }) => this.part(channels, tile, level, frame, signal)),
+      );
+      signal.throwIfAborted();
+      const size = coarser(frame.size, level);
+      const { texels, bricks } = await this.assemble({
+        id: ++this.last,
+        size,
+        finest: frame.size,
+        stride: stride(channels.length),
+        channels: channels.length,
+        parts: made,
+      });
+      signal.throwIfAborted();
+      const texture = volumeTexture(texels, size, channels.length);
+      onLevel({
+        channels: channels.map(({ id }) => id),
+        frame,
+        level,
+        size,
+        texture,
+        index: null,
+        bricks,
+        release: () => texture.dispose(),
+      });
+    }
+  }
+
+  private async part(
+    channels: readonly ChannelSources[],
+    tile: string,
+    level: number,
+    frame: BlockFrame,
+    signal: AbortSignal,
+  ): Promise<Part> {
+    const sources = channels.flatMap(({ tiles }) => tiles.get(tile) ?? []);
+    const { volume } = sources[0];
+    const at = frame.places.get(tile);
+    if (at === undefined || sources.length < channels.length) {
+      throw new Error(`tile ${tile} is not in every channel`);
+    }
+    const cost = texelsOf(volume.levels[level]);
+    const frames = await Promise.all(
+      sources.map(async (source) => ({
+        bytes: await this.queue.add(cost, signal, () => source.level(level, signal)),
+        name: `${source.volume.file.path}: level ${level}`,
+      })),
+    );
+    const texels = await decodeTexels(frames, cost);
+    return { at, whole: volume.size, size: volume.levels[level].size, texels };
+  }
+
+  private assemble(request: AssembleRequest): Promise<Assembled> {
+    this.worker ??= new Worker(new URL("./assemble_worker.ts", import.meta.url), {
+      type: "module",
+    });
+    const { worker } = this;
+    return new Promise((resolve, reject) => {
+      const hear = ({ data }: MessageEvent<Assembled>) => {
+        if (data.id !== request.id) return;
+        worker.removeEventListener("message", hear);
+        resolve(data);
+      };
+      worker.addEventListener("message", hear);
+      worker.addEventListener("error", (event) => {
+        event.preventDefault();
+        reject(new Error(`tiles can't be put together: ${event.message || "no worker"}`));
+      });
+      worker.postMessage(request, { transfer: request.parts.map((part) => part.texels.buffer) });
+    });
+  }
+
+  dispose(): void {
+    this.worker?.terminate();
+    this.worker = null;
+  }
+}
+
+function coarser(size: Size3, level: number): Size3 {
+  const [x, y, z] = size.map((n) => Math.max(1, n >> level));
+  return [x, y, z];
+}

@@ -1,0 +1,482 @@
+/**
+ * Gathers light along paths, frame by frame, in float textures: for every pixel the sum of what its
+ * paths brought. A view that stays gathers on, one that trembles carries it along, a new one begins
+ * anew.
+ */
+import {
+  type Data3DTexture,
+  type DataTexture,
+  FloatType,
+  Matrix3,
+  Matrix4,
+  RGBAFormat,
+  RGFormat,
+  type Texture,
+  Vector2,
+  Vector3,
+  Vector4,
+  type WebGLRenderer,
+  type WebGLRenderTarget,
+} from "three";
+import type { Bounds } from "../bundle/generated/bundle";
+import { clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import type { Eyes } from "../gpu/eyes";
+import { drawWhole, float3D, floatTarget, floatTexture, nothing } from "../gpu/float_targets";
+import { drawEyes } from "../gpu/offscreen_target";
+import { ScreenPass } from "../gpu/screen_pass";
+import { ENOUGH_SAMPLES, LAMPS, type TraceSettings } from "../state/path_trace_settings";
+import { brickCounts } from "../volumes/bricks8";
+import { ENTRIES } from "../volumes/transfer_luts";
+import { Developer } from "./denoise_and_tone";
+import type { EnvironmentTables } from "./environment_sampling";
+import { coarserMajorants, type MediumLook, majorants, mediumTable, rowsOf } from "./extinction";
+import { areNear, areSame, type History, type TraceView, turnOf, viewOf } from "./eye_rays";
+import type { MediumTexels } from "./medium_loader";
+import { TRACE_FRAGMENT, TRACE_NOISE } from "./shaders/sources";
+
+/** Pixels along the edge of a tile that rests or is sampled as a whole. */
+export const NOISE_TILE = 16;
+/** The noise of the tiles is looked at anew after so many samples. */
+const NOISE_EVERY = 8;
+/** At this one a tile is as good as done. */
+const CALM = 0.004;
+/** Samples that are kept of a view a little aside. */
+const MOST_ASIDE = 48;
+/** A path that is lit more brightly counts as one that is lit so: halves of floats end at 65504 ... */
+const MOST_LIGHT = 60_000;
+/** ... and a picture of few samples would sparkle. */
+const MOST_LIGHT_MOVING = 200;
+/** More often no path is scattered, in a medium that swallows nothing. */
+const MOST_SCATTERS = 512;
+/** ... in a picture that moves: what the paths would still have met is taken for the room's mean. */
+const FEW_SCATTERS = 16;
+/** Exponent of a shiny surface's lobe. */
+const GLOSS = 60;
+/** Texels along an edge of the bricks whose ranges come with the texels. */
+const BRICK = 8;
+
+/** Of the longest edge of the box. */
+const LAMP_RADIUS = 0.08;
+const OCCLUSION_REACH = 0.06;
+
+export type TraceScene = Readonly<{
+  /** From um of the bundle's world, before tiles' matrices, to the room. */
+  specimen: Matrix4;
+  clip: MarchClip;
+  /** A number that changes with what is opaque in the room. */
+  solids: number;
+  /** The specimen's box, um: where lamps are told. */
+  bounds: Bounds;
+}>;
+
+/** How a frame is gathered. */
+export type Gathering = Readonly<{
+  /** Pixels of the picture to one of the frame buffer, 0..1. */
+  scale: number;
+  /** Samples of every pixel, or of a share of them. */
+  passes: number;
+  /**
+   * Eyes that hardly move see what was gathered, from where they are; else paths begin at the very
+   * eye.
+   */
+  mayTremble: boolean;
+  /** Paths are shorter: a picture that moves has to be quick. */
+  isDraft: boolean;
+}>;
+
+export class Tracer {
+  /** Samples of a pixel since the picture began anew; tiles that rest have fewer. */
+  samples = 0;
+  /** Those of them whose paths begin where they do now. */
+  rested = 0;
+  private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
+  private readonly noise = floatTarget(1, FloatType);
+  private readonly developer = new Developer();
+  private readonly medium = floatTexture(ENTRIES, 1, RGBAFormat);
+  private majorantTexture: Data3DTexture = float3D(new Float32Array(1), [1, 1, 1]);
+  private environment: DataTexture = floatTexture(1, 1, RGBAFormat);
+  private aliases: DataTexture = floatTexture(1, 1, RGFormat);
+  private roomLight: readonly [number, number, number] = [0, 0, 0];
+  private texels: MediumTexels | null = null;
+  /** From where paths begin: where the eyes were, as long as they only tremble. */
+  private anchors: readonly TraceView[] = [];
+  /** Where the eyes were in the frame before. */
+  private seen: readonly TraceView[] = [];
+  private drawn = 0;
+  private shownWith: TraceSettings | null = null;
+  /** Where among the tiles the next turn begins, 0..1. */
+  private turn = 0;
+  private key = "";
+  private gatheredScale = 1;
+  private isDraft = false;
+  private readonly pathPass: ScreenPass<ReturnType<typeof traceUniforms>>;
+  private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
+
+  /**
+   * @param brick texels along an edge of a brick of majorants: 8 or a multiple
+   * @param calm standard error of the luminance at which a tile rests more often; 0: none does
+   */
+  constructor(
+    sceneDepth: { value: Texture },
+    private readonly brick = 2 * BRICK,
+    private readonly calm = CALM,
+  ) {
+    this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth), {
+      CHANNELS: 1,
+      NOISE_TILE,
+    });
+  }
+
+  /** The picture, encoded and premultiplied. */
+  get picture(): WebGLRenderTarget {
+    return this.developer.picture;
+  }
+
+  /** Pixels of the picture to one of the frame buffer. */
+  get scale(): number {
+    return this.developer.scale;
+  }
+
+  /** Sums of colour and coverage, and of squared luminance, samples, distance and openness. */
+  get gathered(): WebGLRenderTarget {
+    return this.sums[this.drawn % 2];
+  }
+
+  get isReady(): boolean {
+    return this.texels !== null;
+  }
+
+  restart(): void {
+    this.anchors = [];
+    this.samples = this.rested = this.turn = 0;
+    this.shownWith = null;
+  }
+
+  /** What paths go through; takes over the texture. */
+  fill(texels: MediumTexels | null): void {
+    if (this.texels !== texels) this.texels?.release();
+    this.texels = texels;
+    this.restart();
+    if (texels === null) return;
+    const { frame, texture, channels } = texels;
+    const { uniforms } = this.pathPass;
+    uniforms.uVolume.value = uniforms.uOldVolume.value = texture;
+    uniforms.uIndex.value = texels.index;
+    uniforms.uTexels.value.set(...texels.size);
+    this.pathPass.define("BRICKS", texels.index === null ? null : 1);
+    this.pathPass.define("CHANNELS", channels.length);
+    const size = frame.max.map((v, k) => v - frame.min[k]);
+    uniforms.uSize.value.set(size[0], size[1], size[2]);
+    uniforms.uVoxel.value = Math.min(...frame.spacing_um);
+    const first = frame.size.map((n) => (frame.apron + 0.5) / n);
+    const last = frame.size.map((n) => (n - frame.apron - 0.5) / n);
+    uniforms.uTexLow.value.set(first[0], last[1], first[2]); // rows run against y
+    uniforms.uTexPerUm.value.set(
+      (last[0] - first[0]) / Math.max(size[0], 1e-9),
+      (first[1] - last[1]) / Math.max(size[1], 1e-9),
+      (last[2] - first[2]) / Math.max(size[2], 1e-9),
+    );
+    uniforms.uOcclusionReach.value = OCCLUSION_REACH * Math.max(...size);
+    this.developer.expect(uniforms.uSize.value);
+  }
+
+  /** @param looks of the channels, in the order of the texture's */
+  dress(looks: readonly MediumLook[], settings: TraceSettings): void {
+    if (this.texels === null) return;
+    const { frame, bricks, size } = this.texels;
+    const voxel = Math.min(...frame.spacing_um);
+    const table = mediumTable(looks, voxel, settings.bias, settings.density);
+    this.medium.dispose();
+    const rows = rowsOf(looks);
+    this.medium.image = { data: table, width: ENTRIES, height: rows * looks.length };
+    this.medium.needsUpdate = true;
+    this.majorantTexture.dispose();
+    const fine = majorants(table, bricks);
+    const coarse = coarserMajorants(fine, brickCounts(size), this.brick / BRICK);
+    this.majorantTexture = float3D(coarse.majorants, coarse.counts);
+    const { uniforms } = this.pathPass;
+    this.pathPass.define("TWO_D", rows === 1 ? null : 1);
+    looks.forEach(({ plane }, c) => {
+      uniforms.uGradientMax.value.setComponent(c, plane?.gradientMax ?? 1);
+    });
+    uniforms.uMedium.value = this.medium;
+    uniforms.uMajorants.value = this.majorantTexture;
+    uniforms.uBrick.value.setScalar(this.brick);
+    this.restart();
+  }
+
+  lightBy({ width, height, light, aliases, mean }: EnvironmentTables): void {
+    this.roomLight = mean;
+    this.environment.dispose();
+    this.aliases.dispose();
+    this.environment = floatTexture(width, height, RGBAFormat, light);
+    this.aliases = floatTexture(width, height, RGFormat, aliases);
+    this.pathPass.uniforms.uEnvironment.value = this.environment;
+    this.pathPass.uniforms.uAliases.value = this.aliases;
+    this.restart();
+  }
+
+  /**
+   * Whether what is gathered is worth anything to these eyes.
+   *
+   * @param mayTremble see `render`
+   */
+  goesOn(eyes: Eyes, scene: TraceScene, mayTremble: boolean): boolean {
+    if (this.texels === null) return false;
+    if (keyOf(eyes, scene, this.gatheredScale, this.isDraft) !== this.key) {
+      return false;
+    }
+    const history = this.historyFor(this.viewsOf(eyes, scene), mayTremble);
+    return history === "same" || (mayTremble && history === "aside");
+  }
+
+  /**
+   * Gather so many more samples of every pixel, or of a share of them, and make the picture, as soon
+   * as each pixel has one. A picture with enough of them only follows the eyes.
+   *
+   */
+  render(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    scene: TraceScene,
+    settings: TraceSettings,
+    { scale, passes, mayTremble, isDraft }: Gathering,
+  ): void {
+    if (this.texels === null) return;
+    this.follow(scene, settings, isDraft);
+    const key = keyOf(eyes, scene, scale, isDraft);
+    if (key !== this.key) this.restart();
+    this.key = key;
+    this.gatheredScale = scale;
+    this.isDraft = isDraft;
+    const views = this.viewsOf(eyes, scene);
+    let history = this.historyFor(views, mayTremble);
+    this.seen = views;
+    if (history === "none") this.restart();
+    if (history === "aside") {
+      this.samples = Math.min(this.samples, MOST_ASIDE);
+      this.rested = 0;
+    }
+    const begins = history === "same" ? this.anchors : views;
+    const share = Math.min(1, passes);
+    const started = this.samples;
+    for (let i = 0; i < Math.max(1, Math.floor(passes)); i++) {
+      if (this.samples >= ENOUGH_SAMPLES) break;
+      this.pathPass.uniforms.uTurn.value.set(this.turn, share);
+      this.gather(renderer, eyes, views, begins, history);
+      this.anchors = begins;
+      history = "same";
+      const before = this.samples;
+      this.samples = Math.round(1e6 * (before + share)) / 1e6;
+      this.rested += share;
+      this.turn = (this.turn + share) % 1;
+      const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
+      if (isDue) this.judge(renderer, this.gathered);
+    }
+    // a part of the pixels alone is not shown: until all have their turn, the picture before stays
+    const isRound = Math.floor(this.samples) > Math.floor(started);
+    const isOther = this.samples >= 1 && (isRound || settings !== this.shownWith);
+    if (isOther) {
+      const { developer, gathered, samples } = this;
+      developer.develop(renderer, eyes, gathered, samples, begins, scale, settings);
+      this.shownWith = settings;
+    }
+    this.developer.show(renderer, eyes, views, settings, isOther);
+  }
+
+  private viewsOf(eyes: Eyes, { specimen }: TraceScene): TraceView[] {
+    const box = this.boxMatrix(specimen);
+    return eyes.all.map(({ camera }) => viewOf(camera, box));
+  }
+
+  /** Of the box, um. */
+  private get middle(): Vector3 {
+    return this.pathPass.uniforms.uSize.value.clone().multiplyScalar(0.5);
+  }
+
+  /** What was gathered is worth to the paths that come. */
+  private historyFor(views: readonly TraceView[], mayTremble: boolean): History {
+    const { anchors, seen, middle } = this;
+    if (anchors.length !== views.length) return "none";
+    if (areSame(anchors, views)) return "same";
+    if (areNear(anchors, views, middle)) return mayTremble ? "same" : "aside";
+    // eyes also sway, slowly
+    return this.rested >= 1 && areNear(seen, views, middle) ? "aside" : "none";
+  }
+
+  /**
+   * @param views where the eyes are
+   * @param begins where the paths begin
+   */
+  private gather(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    views: readonly TraceView[],
+    begins: readonly TraceView[],
+    history: History,
+  ): void {
+    const { uniforms, uPart, scene } = this.pathPass;
+    const before = this.gathered;
+    uniforms.uSums.value = before.textures[0];
+    uniforms.uMoments.value = before.textures[1];
+    uniforms.uNoisiness.value = this.noise.texture;
+    uniforms.uCalm.value = this.samples > NOISE_EVERY ? this.calm : 0;
+    this.drawn++;
+    uniforms.uSample.value = this.drawn;
+    uniforms.uHistory.value = { none: 0, same: 1, aside: 2 }[history];
+    let k = 0;
+    drawEyes(renderer, scene, eyes, this.gathered, this.gatheredScale, ({ viewport }, part) => {
+      uPart.value.copy(part);
+      uniforms.uEye.value.copy(viewport);
+      uniforms.uSceneToBox.value.copy(views[k].toBox);
+      uniforms.uToBox.value.copy(begins[k].toBox);
+      uniforms.uEyeAt.value.copy(begins[k].eye);
+      if (history === "aside") {
+        uniforms.uToBefore.value.copy(this.anchors[k].fromBox);
+        uniforms.uEyeBefore.value.copy(this.anchors[k].eye);
+      }
+      k++;
+    });
+  }
+
+  /** How noisy each tile is. */
+  private judge(renderer: WebGLRenderer, sums: WebGLRenderTarget): void {
+    const { uniforms, scene } = this.noisePass;
+    uniforms.uSums.value = sums.textures[0];
+    uniforms.uMoments.value = sums.textures[1];
+    drawWhole(
+      renderer,
+      scene,
+      this.noise,
+      Math.ceil(sums.width / NOISE_TILE),
+      Math.ceil(sums.height / NOISE_TILE),
+    );
+  }
+
+  private follow(
+    { specimen, clip, bounds }: TraceScene,
+    settings: TraceSettings,
+    isDraft: boolean,
+  ): void {
+    if (this.texels === null) return;
+    const { uniforms } = this.pathPass;
+    const { frame } = this.texels;
+    const toWorld = new Matrix4().fromArray([...frame.matrix]).multiply(lowCorner(frame.min));
+    const toBox = toWorld.clone().invert();
+    clipInto(clip, toWorld, toBox, uniforms);
+    const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);
+    uniforms.uToRoom.value.copy(turnOf(turn.multiply(this.boxMatrix(specimen))));
+    uniforms.uEnvironmentLight.value = settings.environmentLight;
+    uniforms.uMostLight.value = isDraft ? MOST_LIGHT_MOVING : MOST_LIGHT;
+    const most = isDraft ? FEW_SCATTERS : MOST_SCATTERS;
+    uniforms.uScatters.value = settings.isMultiple ? most : 1;
+    const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
+    uniforms.uBeyond.value.set(...this.roomLight).multiplyScalar(beyond);
+    uniforms.uAnisotropy.value = settings.anisotropy;
+    uniforms.uSurface.value = settings.surface;
+    uniforms.uShine.value = settings.shine;
+    const edge = Math.max(...bounds.max.map((v, k) => v - bounds.min[k]));
+    const middle = new Vector3(...bounds.min).add(new Vector3(...bounds.max)).multiplyScalar(0.5);
+    let count = 0;
+    for (const { isOn, x, y, z, color, strength } of settings.lamps.slice(0, LAMPS)) {
+      if (!isOn || strength <= 0) continue;
+      const aside = new Vector3(x, y, z).multiplyScalar(edge);
+      const at = aside.clone().add(middle).applyMatrix4(toBox);
+      uniforms.uLamps.value[count].set(at.x, at.y, at.z, LAMP_RADIUS * edge);
+      // irradiance pi in the middle is what a white room gives
+      const intensity = strength * Math.PI * Math.max(aside.lengthSq(), (edge / 4) ** 2);
+      uniforms.uLampLight.value[count].set(...color).multiplyScalar(intensity);
+      count++;
+    }
+    uniforms.uLampCount.value = count;
+  }
+
+  /** From um of the box to the room. */
+  private boxMatrix(specimen: Matrix4): Matrix4 {
+    if (this.texels === null) throw new Error("there is nothing to trace");
+    const { frame } = this.texels;
+    return specimen
+      .clone()
+      .multiply(new Matrix4().fromArray([...frame.matrix]))
+      .multiply(lowCorner(frame.min));
+  }
+
+  dispose(): void {
+    for (const target of [...this.sums, this.noise]) target.dispose();
+    for (const texture of [this.medium, this.majorantTexture, this.environment, this.aliases]) {
+      texture.dispose();
+    }
+    this.texels?.release();
+    this.pathPass.dispose();
+    this.noisePass.dispose();
+    this.developer.dispose();
+  }
+}
+
+/** What a picture can't be gathered on without: another one begins anew. */
+function keyOf(
+  { width_px, height_px }: Eyes,
+  { solids, clip }: TraceScene,
+  scale: number,
+  isDraft: boolean,
+): string {
+  return `${width_px} ${height_px} ${scale} ${isDraft} ${solids} ${JSON.stringify(clip)}`;
+}
+
+function sumUniforms() {
+  return { uSums: nothing(), uMoments: nothing() };
+}
+
+function traceUniforms(uSceneDepth: { value: Texture }) {
+  return {
+    ...sumUniforms(),
+    uNoisiness: nothing(),
+    uSize: { value: new Vector3(1, 1, 1) },
+    uTexLow: { value: new Vector3() },
+    uTexPerUm: { value: new Vector3(1, -1, 1) },
+    uVoxel: { value: 1 },
+    uTexels: { value: new Vector3(1, 1, 1) },
+    uVolume: nothing(),
+    uIndex: nothing(),
+    uOldVolume: nothing(),
+    uFresh: { value: 1 },
+    uMedium: nothing(),
+    uGradientMax: { value: new Vector4(1, 1, 1, 1) },
+    uMajorants: nothing(),
+    uBrick: { value: new Vector3(BRICK, BRICK, BRICK) },
+    uClipLow: { value: new Vector3() },
+    uClipHigh: { value: new Vector3() },
+    uClipPlane: { value: new Vector4(0, 0, 0, 1) },
+    uToBox: { value: new Matrix4() },
+    uSceneToBox: { value: new Matrix4() },
+    uEyeAt: { value: new Vector3() },
+    uToRoom: { value: new Matrix3() },
+    uEye: { value: new Vector4(0, 0, 1, 1) },
+    uSceneDepth,
+    uEnvironment: nothing(),
+    uAliases: nothing(),
+    uEnvironmentLight: { value: 1 },
+    uLampCount: { value: 0 },
+    uLamps: { value: Array.from({ length: LAMPS }, () => new Vector4()) },
+    uLampLight: { value: Array.from({ length: LAMPS }, () => new Vector3()) },
+    uScatters: { value: MOST_SCATTERS },
+    uBeyond: { value: new Vector3() },
+    uAnisotropy: { value: 0 },
+    uSurface: { value: 0 },
+    uShine: { value: 0 },
+    uGloss: { value: GLOSS },
+    uOcclusionReach: { value: 1 },
+    uMostLight: { value: MOST_LIGHT },
+    uSample: { value: 0 },
+    uHistory: { value: 0 },
+    uToBefore: { value: new Matrix4() },
+    uEyeBefore: { value: new Vector3() },
+    uMostHistory: { value: MOST_ASIDE },
+    uTurn: { value: new Vector2(0, 1) },
+    uCalm: { value: 0 },
+  };
+}
+
+function lowCorner([x, y, z]: readonly [number, number, number]): Matrix4 {
+  return new Matrix4().makeTranslation(x, y, z);
+}

@@ -1,0 +1,216 @@
+// One path through each pixel, added to what earlier frames have gathered. Physically based volume
+// scattering with a surface's reflection where the gradient is strong: Kroes, Post & Botha, "Exposure
+// Render", PLoS ONE 2012. Space of the paths: um from the box's low corner, y up.
+precision highp float;
+precision highp int;
+precision highp sampler3D;
+precision highp usampler3D;
+
+uniform vec3 uSize;  // um
+uniform vec3 uTexLow;  // texture coordinates at the box's low corner
+uniform vec3 uTexPerUm;  // y falls
+uniform float uVoxel;  // um, finest spacing
+uniform vec3 uTexels;  // of the block that is gone through
+uniform sampler3D uVolume;
+uniform usampler3D uIndex;  // with BRICKS
+uniform sampler3D uOldVolume;  // the same volume: nothing fades here
+uniform float uFresh;
+uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um
+#ifdef TWO_D  // ... then 64 rows each, by gradient
+uniform vec4 uGradientMax;  // steps of intensity over two voxels that are 1 to the rows
+#endif
+uniform sampler3D uMajorants;  // largest extinction per um in each brick
+uniform vec3 uBrick;  // texels along a brick's edges
+uniform vec3 uClipLow;
+uniform vec3 uClipHigh;
+uniform vec4 uClipPlane;
+
+uniform mat4 uToBox;  // from normalised device coordinates
+uniform vec3 uEyeAt;  // um, box
+uniform mat4 uSceneToBox;  // the same from where the eye is by now: it may have moved a little
+uniform mat3 uToRoom;  // turns directions of the box into the environment's
+uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels ...
+uniform vec4 uEye;  // ... and of the picture
+uniform sampler2D uSceneDepth;
+
+uniform sampler2D uEnvironment;
+uniform sampler2D uAliases;
+uniform float uEnvironmentLight;  // factor
+uniform int uLampCount;
+uniform vec4 uLamps[3];  // um, box: centre, radius
+uniform vec3 uLampLight[3];  // radiant intensity, um^2: irradiance is this by squared distance
+uniform int uScatters;  // a path is scattered so many times at most ...
+uniform vec3 uBeyond;  // ... and meets this radiance then
+uniform float uAnisotropy;  // Henyey-Greenstein g
+uniform float uSurface;  // 0..1: how readily a gradient makes a surface
+uniform float uShine;  // 0..1: reflection of a surface seen straight on, in 8 % of it
+uniform float uGloss;  // exponent of its lobe
+uniform float uOcclusionReach;  // um
+uniform float uMostLight;  // of one path: rare bright ones would sparkle for long
+
+uniform uint uSample;
+uniform int uHistory;  // 0: there is none; 1: this view's; 2: one a little aside
+uniform mat4 uToBefore;  // from the box to the device coordinates of the last frame
+uniform vec3 uEyeBefore;
+uniform float uMostHistory;  // samples that are kept of a view aside
+uniform sampler2D uSums;  // premultiplied colour and coverage, summed
+uniform sampler2D uMoments;  // summed: squared luminance, samples, distance, openness
+uniform sampler2D uNoisiness;  // of tiles of NOISE_TILE pixels: standard error of the mean luminance
+uniform vec2 uTurn;  // which tiles take their turn: from x on, a share of y
+uniform float uCalm;  // the standard error at which a tile is as good as done; 0: no tile rests
+
+layout(location = 0) out vec4 oSums;
+layout(location = 1) out vec4 oMoments;
+
+#include <chunks/intersect_box>
+#include <chunks/clip_span>
+#include <chunks/sample_intensities>
+#include <chunks/gradient>
+#include <chunks/random>
+#include <chunks/phase_function>
+#include <chunks/environment>
+#ifdef TWO_D
+#include <chunks/transfer_table_2d>
+#include <chunks/medium_2d>
+#endif
+#include <chunks/medium>
+#include <chunks/delta_tracking>
+#include <chunks/reproject_search>
+#include <chunks/temporal_history>
+
+// The part of a ray in what is left of the box.
+vec2 spanOf(vec3 origin, vec3 dir) {
+  vec3 invDir = 1.0 / dir;
+  vec2 span = intersectBox(origin, invDir, vec3(0.0), uSize);
+  return clipSpan(vec2(max(span.x, 0.0), span.y), origin, dir, invDir);
+}
+
+vec3 withoutZeros(vec3 dir) {
+  return dir + 1e-7 * vec3(equal(dir, vec3(0.0)));
+}
+
+// Which way a path goes on; `weight` is the way's colour.
+Scatter chooseScatter(vec3 p, vec3 dir, vec3 albedo, out vec3 weight) {
+  Scatter s = Scatter(PHASE, vec3(0.0), vec3(0.0));
+  weight = albedo;
+  vec3 gradient = gradientAt(uTexLow + p * uTexPerUm, uTexPerUm);
+  float steepness = length(gradient);
+  // Kroes et al., equation 9, with the gradient's share of the whole range
+  float isSurface = 1.0 - exp(-25.0 * uSurface * uSurface * uSurface * steepness);
+  if (steepness < 1e-4 || random() >= isSurface) return s;
+  vec3 normal = gradient / steepness;
+  s.normal = dot(normal, dir) > 0.0 ? -normal : normal;
+  s.mirrored = reflect(dir, s.normal);
+  float straight = 0.08 * uShine;
+  float fresnel = straight + (1.0 - straight) * pow(1.0 + dot(dir, s.normal), 5.0);  // Schlick 1994
+  s.way = random() < fresnel * step(1e-6, uShine) ? GLOSSY : DIFFUSE;
+  if (s.way == GLOSSY) weight = vec3(1.0);
+  return s;
+}
+
+// Light that reaches a point straight from a lamp or from the environment, one of them drawn.
+vec3 lightAt(vec3 p, vec3 from, Scatter s) {
+  int sources = uLampCount + 1;
+  int drawn = min(int(random() * float(sources)), sources - 1);
+  float share = 1.0 / float(sources);
+  vec3 to;
+  vec3 light;
+  float reach = 1e30;
+  if (drawn == uLampCount) {
+    vec4 found;
+    to = sampleEnvironment(found) * uToRoom;  // the transposed turns back
+    if (found.a <= 0.0) return vec3(0.0);
+    float density = scatterDensity(s, from, to);
+    // the balance heuristic (Veach 1997), as paths meet the environment by themselves, too
+    light = uEnvironmentLight * found.rgb * density / (share * found.a + density);
+  } else {
+    vec4 lamp = uLamps[drawn];
+    vec3 aside = lamp.xyz - p;
+    float away = length(aside);
+    if (away <= lamp.w) return vec3(0.0);
+    float sine = lamp.w / away;
+    float height = sine * sine / (1.0 + sqrt(1.0 - sine * sine));  // 1 - cosine of the cone
+    to = around(aside / away, 1.0 - random() * height, random());
+    // radiance I / (pi r^2) over the cone's solid angle 2 pi height
+    vec3 lit = uLampLight[drawn] * 2.0 * height / max(lamp.w * lamp.w, 1e-12);
+    light = lit * scatterDensity(s, from, to) / share;
+    reach = away;
+  }
+  if (max(light.r, max(light.g, light.b)) <= 0.0) return vec3(0.0);
+  to = withoutZeros(to);
+  vec2 span = spanOf(p, to);
+  span.y = min(span.y, reach);
+  return span.y > span.x ? light * transmittance(p, to, span.x, span.y) : light;
+}
+
+// How open it is along a ray, as far as shade reaches; what is nearer than the softness of a surface
+// is the surface itself.
+float openness(vec3 p, vec3 to, vec2 span) {
+  span = vec2(max(span.x, 1.5 * uVoxel), min(span.y, uOcclusionReach));
+  vec4 medium;
+  float t = span.y > span.x ? track(p, to, span.x, span.y, medium) : -1.0;
+  return t < 0.0 ? 1.0 : smoothstep(0.0, uOcclusionReach, t);
+}
+
+// Colour of a path that begins at `p` (already scattered there), and how open it is beyond.
+vec3 follow(vec3 p, vec3 dir, vec4 medium, out float open) {
+  vec3 sum = vec3(0.0);
+  vec3 weight = vec3(1.0);
+  open = 1.0;
+  for (int i = 1; i <= uScatters; i++) {
+    vec3 color;
+    Scatter s = chooseScatter(p, dir, medium.rgb, color);
+    weight *= color;
+    sum += weight * lightAt(p, dir, s);
+    float survives = min(1.0, max(weight.r, max(weight.g, weight.b)));
+    if (i > 3) {  // Russian roulette
+      if (random() >= survives) return sum;
+      weight /= survives;
+    }
+    vec3 to = withoutZeros(sampleScatter(s, dir));
+    vec2 span = spanOf(p, to);
+    float t = span.y > span.x ? track(p, to, span.x, span.y, medium) : -1.0;
+    if (i == 1) open = openness(p, to, span);
+    if (t < 0.0) {
+      vec4 found = environmentAt(uToRoom * to);
+      float density = scatterDensity(s, dir, to);
+      float drawn = found.a / float(uLampCount + 1);
+      return sum + weight * uEnvironmentLight * found.rgb * density / max(density + drawn, 1e-12);
+    }
+    p += t * to;
+    dir = to;
+  }
+  return sum + weight * uBeyond;
+}
+
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec2 at = gl_FragCoord.xy - uPart.xy;
+  History before = historyAt(pixel, at);
+  if (!isDrawn(pixel / NOISE_TILE)) {
+    oSums = before.sums;
+    oMoments = before.moments;
+    return;
+  }
+  seedRandom(uvec3(pixel, uSample));
+  vec2 place = 2.0 * (at + vec2(random(), random()) - 0.5) / uPart.zw - 1.0;
+  vec4 far = uToBox * vec4(place, 1.0, 1.0);
+  vec3 dir = withoutZeros(normalize(far.xyz / far.w - uEyeAt));
+  vec2 span = spanOf(uEyeAt, dir);
+  ivec2 shown = ivec2(at * uEye.zw / uPart.zw + uEye.xy);
+  vec4 scene = uSceneToBox * vec4(place, 2.0 * texelFetch(uSceneDepth, shown, 0).r - 1.0, 1.0);
+  span.y = min(span.y, length(scene.xyz / scene.w - uEyeAt));
+  oSums = before.sums;
+  oMoments = before.moments + vec4(0.0, 1.0, 0.0, 0.0);
+  if (span.y <= span.x) return;
+  // from where the ray comes in: far from the eye, floats would be too coarse
+  vec3 start = uEyeAt + span.x * dir;
+  vec4 medium;
+  float t = track(start, dir, 0.0, span.y - span.x, medium);
+  if (t < 0.0) return;
+  float open;
+  vec3 color = min(follow(start + t * dir, dir, medium, open), vec3(uMostLight));
+  float luminance = dot(color, vec3(0.2126, 0.7152, 0.0722));
+  oSums += vec4(color, 1.0);
+  oMoments += vec4(luminance * luminance, 0.0, span.x + t, open);
+}

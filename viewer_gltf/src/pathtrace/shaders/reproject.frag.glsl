@@ -1,0 +1,42 @@
+// The picture as it is seen from a little aside of where its paths began: each pixel looks for its
+// surface in it. What is gathered stays as sharp as it was; one look-up alone is between pixels.
+precision highp float;
+
+uniform sampler2D uColor;  // linear, premultiplied
+uniform sampler2D uGuide;  // distance in edges; 0: nothing is met
+uniform float uEdge;  // um
+uniform vec4 uPart;  // the eye's
+uniform mat4 uToBox;  // where it is now: from normalised device coordinates to um of the box
+uniform vec3 uEyeAt;
+uniform mat4 uFromBox;  // where its paths began
+uniform vec3 uEyeThere;
+uniform float uAway;  // um, to the middle of the box
+
+out vec4 oColor;
+
+float metAt(ivec2 pixel) {
+  return uEdge * texelFetch(uGuide, pixel, 0).r;
+}
+
+#include <chunks/reproject_search>
+
+void main() {
+  vec2 at = gl_FragCoord.xy - uPart.xy;
+  vec4 far = uToBox * vec4(2.0 * at / uPart.zw - 1.0, 1.0, 1.0);
+  vec3 dir = normalize(far.xyz / far.w - uEyeAt);
+  float away = uAway;
+  bool isMet;
+  vec2 there = seek(uEyeAt, dir, uFromBox, uEyeThere, uPart, away, isMet);
+  ivec2 low = ivec2(uPart.xy);
+  ivec2 high = ivec2(uPart.xy + uPart.zw) - 1;
+  vec2 corner = floor(there - 0.5);
+  vec2 share = there - 0.5 - corner;
+  vec4 sum = vec4(0.0);
+  for (int k = 0; k < 4; k++) {
+    ivec2 side = ivec2(k & 1, k >> 1);
+    vec2 near = mix(1.0 - share, share, vec2(side));
+    ivec2 source = clamp(ivec2(corner) + side + low, low, high);
+    sum += near.x * near.y * texelFetch(uColor, source, 0);
+  }
+  oColor = sum;
+}

@@ -1,0 +1,16 @@
+/** The text of the path tracer's shaders: apart, as not everybody needs them. */
+import { includeChunks } from "../../gpu/glsl_include";
+import { CHUNKS } from "../../volumes/shaders/sources";
+import denoise from "./denoise.frag.glsl?raw";
+import mean from "./mean.frag.glsl?raw";
+import trace from "./path_trace.frag.glsl?raw";
+import warp from "./reproject.frag.glsl?raw";
+import show from "./tone_map.frag.glsl?raw";
+import noise from "./variance.frag.glsl?raw";
+
+export const TRACE_FRAGMENT = includeChunks(trace, CHUNKS);
+export const TRACE_NOISE = noise;
+export const TRACE_MEAN = mean;
+export const TRACE_DENOISE = denoise;
+export const TRACE_WARP = includeChunks(warp, CHUNKS);
+export const TRACE_SHOW = includeChunks(show, CHUNKS);

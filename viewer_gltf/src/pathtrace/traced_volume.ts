@@ -1,0 +1,363 @@
+/** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
+import { Group, type Texture, type WebGLRenderer } from "three";
+import type { ShownVolume } from "../annotations/probe_reader";
+import { BundleError, TemporaryError } from "../bundle/errors";
+import { LAST, Overlay } from "../gpu/composite_pass";
+import type { Eyes } from "../gpu/eyes";
+import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "../state/path_trace_settings";
+import { isTraced, type ViewerState, volumeChannels } from "../state/viewer_state";
+import type { BrickTile } from "../volumes/bricks/brick_atlas";
+import type { BrickService } from "../volumes/bricks/brick_service";
+import type { Look } from "../volumes/tile_raymarch";
+import type { Packed } from "../volumes/tile_texture";
+import type { PlaneTable } from "../volumes/transfer_table_2d";
+import { showsBelow } from "../volumes/volume_set";
+import type { VolumeSource } from "../volumes/volume_source";
+import { loadEnvironment, readEnvironment } from "./environment_file";
+import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium_loader";
+import type { Tracer, TraceScene } from "./path_tracer";
+import { frameOf } from "./texel_frame";
+
+const NOT_LOADED = "The part of the page that follows light could not be had.";
+/** More pixels take more memory than a phone's browser gives. */
+const MOST_PIXELS = 2_000_000;
+const FIRST_SAMPLES = 6;
+/** While the picture moves: what the denoiser makes a whole of. */
+const MOST_MOVING_PIXELS = 160_000;
+
+/** What of the volumes is used. */
+export type Volumes = Readonly<{
+  sourcesOf: (channel: string) => Promise<ReadonlyMap<string, VolumeSource> | null>;
+  look: (state: ViewerState, channel: string) => Look;
+}>;
+
+export class TracedVolume {
+  private readonly loader = new MediumLoader();
+  /** What is drawn of it. */
+  readonly group = new Group();
+  /** null: not asked for yet, or on its way. */
+  private tracer: Tracer | null = null;
+  private overlay: Overlay | null = null;
+  private coming: Promise<Tracer> | null = null;
+  private isDisposed = false;
+  private state: ViewerState | null = null;
+  private texels: MediumTexels | null = null;
+  private sources: readonly ChannelSources[] = [];
+  private loading: AbortController | null = null;
+  /** What is on the GPU or on its way there: channels and tiles. */
+  private wanted = "";
+  private hasFailed = false;
+  private hasLightFailed = false;
+  /** Where texels come from as bricks; null: as files. */
+  private brickTile: BrickTile | null = null;
+  private packed: Packed | null = null;
+  /** What the medium was dressed in. */
+  private dressed = "";
+  private planes: readonly (PlaneTable | null)[] = [];
+  private settings: TraceSettings | null = null;
+  private environment = "";
+  private isLightComing = false;
+  /** Whether the picture is the small one of a moving view, and how small. */
+  private isSmall = false;
+  private resolution = 1;
+  private resolutionAtRest = 1;
+
+  constructor(
+    private readonly volumes: Volumes,
+    private readonly bricks: BrickService | null,
+    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private readonly sceneDepth: { value: Texture },
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {}
+
+  get isLoading(): boolean {
+    const isPreparing = this.coming !== null && this.tracer === null;
+    const isComing = this.loading !== null || this.brickTile?.isLoading === true;
+    return isPreparing || isComing || this.isLightComing;
+  }
+
+  /** Whether there is anything to draw. */
+  get isShown(): boolean {
+    return this.state !== null && isTraced(this.state) && this.tracer?.isReady === true;
+  }
+
+  /** Whether a picture at rest still gathers. */
+  get isGathering(): boolean {
+    return this.isShown && this.samples < ENOUGH_SAMPLES;
+  }
+
+  status(): Readonly<{ samples: number; level: number | null }> {
+    return { samples: this.samples, level: this.isShown ? (this.texels?.level ?? 0) : null };
+  }
+
+  private get samples(): number {
+    return this.tracer?.samples ?? 0;
+  }
+
+  /** The volumes on screen, for who asks what is at a point. */
+  shown(): readonly ShownVolume[] {
+    const { state } = this;
+    if (state === null || !this.isShown) return [];
+    return this.sources.flatMap(({ id, tiles }) => {
+      const { table } = this.volumes.look(state, id);
+      return [...tiles].flatMap(([tile, source]) => {
+        const isHidden = state.isolated !== null && tile !== state.isolated;
+        return isHidden ? [] : [{ tile, channel: id, source, table, isInDisc: false }];
+      });
+    });
+  }
+
+  follow(state: ViewerState): void {
+    this.state = state;
+    if (!isTraced(state)) {
+      this.drop();
+      return;
+    }
+    if (this.tracer === null) {
+      if (!this.hasFailed) void this.prepare().catch((error) => this.fail(error));
+      return;
+    }
+    const channels = volumeChannels(state).map(({ id }) => id);
+    const tiles = state.isolated === null ? state.tiles.map(({ id }) => id) : [state.isolated];
+    const wanted = JSON.stringify([channels, tiles]);
+    if (wanted !== this.wanted) {
+      this.drop();
+      this.wanted = wanted;
+      if (channels.length > 0) void this.load(channels, tiles);
+    }
+    if (state.trace.environment !== "own" && state.trace.environment !== this.environment) {
+      void this.light(state.trace.environment);
+    }
+    this.dress();
+  }
+
+  /** Light by a file of the user's; the state then has to say "own". */
+  async lightBy(file: File): Promise<void> {
+    const [tables, tracer] = await Promise.all([readEnvironment(file), this.prepare()]);
+    tracer.lightBy(tables);
+    this.environment = "own";
+  }
+
+  retryFailed(): void {
+    if (this.hasFailed) this.drop();
+    if (this.hasLightFailed) this.environment = "";
+  }
+
+  /** What is on the GPU went with its context. */
+  forget(): void {
+    this.drop();
+    this.environment = "";
+  }
+
+  /**
+   * @param resolution of the march, 0..1: the frame's budget
+   * @param passes samples of every pixel
+   */
+  render(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    scene: TraceScene,
+    resolution: number,
+    isMoving: boolean,
+    passes: number,
+  ): void {
+    const { tracer, overlay } = this;
+    if (this.state === null || tracer === null || overlay === null) return;
+    const isWorn = eyes.all.length > 1; // by a head, which never rests
+    const isOther = isMoving && !tracer.goesOn(eyes, scene, isWorn);
+    // what came to rest first clears up as it is, then is begun anew at its full size
+    const isFirst = isOther || (this.isSmall && tracer.rested < FIRST_SAMPLES);
+    this.isSmall = isFirst;
+    const most = isFirst ? MOST_MOVING_PIXELS : MOST_PIXELS;
+    const fits = Math.sqrt(most / (eyes.width_px * eyes.height_px));
+    if (isOther) this.resolution = resolution;
+    if (!isMoving) this.resolutionAtRest = resolution;
+    const scale = Math.min(isFirst ? this.resolution : this.resolutionAtRest, fits);
+    tracer.render(renderer, eyes, scene, this.state.trace, {
+      scale,
+      passes: isFirst ? 1 : isMoving ? Math.min(1, passes) : passes,
+      mayTremble: isWorn,
+      isDraft: isFirst,
+    });
+    overlay.show(eyes, tracer.scale);
+  }
+
+  /** Show what has come of bricks; whether there is more. */
+  advance(dt_s: number): boolean {
+    return this.brickTile?.advance(dt_s) ?? false;
+  }
+
+  hide(): void {
+    this.overlay?.hide();
+  }
+
+  /** What follows the paths: a part of the page that is fetched when it is first asked for. */
+  private prepare(): Promise<Tracer> {
+    this.coming ??= import("./path_tracer")
+      .catch((cause) => {
+        this.coming = null;
+        throw new TemporaryError(NOT_LOADED, { cause });
+      })
+      .then(({ Tracer }) => {
+        const tracer = new Tracer(this.sceneDepth);
+        if (this.isDisposed) {
+          tracer.dispose();
+          return tracer;
+        }
+        this.tracer = tracer;
+        this.overlay = new Overlay(tracer.picture.texture, this.sceneDepth, LAST);
+        this.group.add(this.overlay.mesh);
+        if (this.state !== null) this.follow(this.state);
+        this.onChange();
+        return tracer;
+      });
+    return this.coming;
+  }
+
+  private fail(error: unknown): void {
+    this.hasFailed = true;
+    this.onError(error);
+    this.onChange();
+  }
+
+  private drop(): void {
+    this.loading?.abort();
+    this.loading = null;
+    this.wanted = this.dressed = "";
+    this.brickTile?.dispose();
+    this.brickTile = null;
+    this.packed = null;
+    this.hasFailed = false;
+    if (this.texels === null) return;
+    this.texels = null;
+    this.tracer?.fill(null);
+  }
+
+  private async load(channels: readonly string[], tiles: readonly string[]): Promise<void> {
+    const abort = new AbortController();
+    this.loading = abort;
+    try {
+      const found = await Promise.all(
+        channels.map(async (id) => ({ id, tiles: await this.volumes.sourcesOf(id) })),
+      );
+      if (abort.signal.aborted) return;
+      // a channel whose list did not come has been told of
+      this.sources = found.flatMap((each) =>
+        each.tiles === null ? [] : [{ id: each.id, tiles: each.tiles }],
+      );
+      if (this.sources.length > 0 && !this.streams(tiles)) {
+        await this.loader.load(this.sources, tiles, this.limits, abort.signal, (texels) => {
+          this.texels = texels;
+          this.dressed = "";
+          this.tracer?.fill(texels);
+          this.dress();
+          this.onChange();
+        });
+      }
+    } catch (error) {
+      if (!abort.signal.aborted) this.fail(error);
+    } finally {
+      if (this.loading === abort) this.loading = null;
+      this.onChange();
+    }
+  }
+
+  /** Bricks by view, of a single tile, where the host sends them; whether it does. */
+  private streams(tiles: readonly string[]): boolean {
+    const [tile] = tiles;
+    const [first] = this.sources;
+    const volume = first.tiles.get(tile)?.volume;
+    if (tiles.length !== 1 || volume === undefined || this.bricks === null) return false;
+    const made = this.bricks.tile(
+      tile,
+      this.limits,
+      () => this.takeBricks(),
+      () => this.loadFiles(),
+    );
+    if (made === null) return false;
+    const sources = this.sources.flatMap(({ id, tiles: of }) => {
+      const source = of.get(tile);
+      return source === undefined ? [] : [[id, source] as const];
+    });
+    this.brickTile = made;
+    made.want(new Map(sources));
+    return true;
+  }
+
+  /** What has come of the bricks, from time to time. */
+  private takeBricks(): void {
+    const { brickTile } = this;
+    if (brickTile?.shown != null && brickTile.shown !== this.packed) {
+      const { shown } = brickTile;
+      this.packed = shown;
+      const [source] = brickTile.kept.values();
+      const frame = frameOf([source.volume]);
+      const { channels, level, texture, index, bricks } = shown;
+      const release = () => undefined; // the tile's own
+      this.texels = { channels, frame, level, size: frame.size, texture, index, bricks, release };
+      this.dressed = "";
+      this.tracer?.fill(this.texels);
+      this.dress();
+    }
+    this.onChange();
+  }
+
+  /** The tile can't be had as bricks, or not for what it is to show. */
+  private loadFiles(): void {
+    if (this.brickTile === null) return;
+    const [{ tile }] = [...this.brickTile.kept.values()].map(({ volume }) => volume);
+    this.bricks?.refuse(tile);
+    this.drop();
+    if (this.state !== null) this.follow(this.state);
+  }
+
+  private async light(name: string): Promise<void> {
+    this.environment = name;
+    this.hasLightFailed = false;
+    this.isLightComing = true;
+    try {
+      const tables = await loadEnvironment(document.baseURI, name);
+      if (this.environment === name) this.tracer?.lightBy(tables);
+    } catch (error) {
+      if (!(error instanceof BundleError)) throw error;
+      this.hasLightFailed = true;
+      this.onError(error);
+    } finally {
+      this.isLightComing = false;
+      this.onChange();
+    }
+  }
+
+  /** The medium in the colours and functions of the state, if they differ. */
+  private dress(): void {
+    const { state, texels } = this;
+    if (state === null || texels === null) return;
+    const looks = texels.channels.map((id) => this.volumes.look(state, id));
+    const { bias, density } = state.trace;
+    const { brickTile } = this;
+    if (brickTile !== null && (bias !== 0 || showsBelow(brickTile, looks))) {
+      this.loadFiles(); // what bricks leave out may show
+      return;
+    }
+    const dressed = JSON.stringify([looks.map(({ color }) => color), bias, density]);
+    const tables = looks.map(({ table }) => table.join()).join();
+    const planes = looks.map(({ plane }) => plane ?? null);
+    const isSame = planes.every((plane, c) => plane === (this.planes[c] ?? null));
+    if (dressed + tables !== this.dressed || !isSame) this.tracer?.dress(looks, state.trace);
+    else if (this.settings === null || gathersAnew(this.settings, state.trace)) {
+      this.tracer?.restart();
+    }
+    this.dressed = dressed + tables;
+    this.planes = planes;
+    this.settings = state.trace;
+  }
+
+  dispose(): void {
+    this.drop();
+    this.loader.dispose();
+    this.isDisposed = true;
+    this.tracer?.dispose();
+    this.overlay?.dispose();
+  }
+}

@@ -1,0 +1,92 @@
+/** What the gaze makes of the state, frame by frame: which volumes are wanted, and where they show. */
+import { Matrix4, Vector3 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
+import { shownTiles } from "../math/pick";
+import {
+  advanceNearby,
+  discReach,
+  FAR_AWAY,
+  isWaiting,
+  type NearbyState,
+} from "../state/nearby_tiles";
+import type { ViewerState } from "../state/viewer_state";
+
+/** The disc opens in this time once its volumes are there. */
+export const OPENING_S = 0.4;
+/** Share of the outer radius within which there is no surface any more. */
+const INNER = 0.6;
+/** Finer levels are fetched once the gaze has been on the same tiles for so long. */
+const REFINE_S = 0.25;
+
+const RADIANS = Math.PI / 180;
+
+export class Hybrid {
+  nearby: NearbyState = FAR_AWAY;
+  /** Share of the set radius that the frame's budget allows, 0..1. */
+  radiusShare = 1;
+  /** Of the disc, radians: 0 is closed. */
+  outer_rad = 0;
+  /** Head in the room: where the disc's cone comes from, and where to. */
+  readonly apex = new Vector3();
+  readonly axis = new Vector3(0, 0, -1);
+  /** The same in the specimen, um. */
+  readonly apex_um = new Vector3();
+  readonly axis_um = new Vector3(0, 0, -1);
+  private reach_rad = 0;
+  private rested_s = 0;
+  private readonly toSpecimen = new Matrix4();
+
+  constructor(private readonly manifest: Manifest) {}
+
+  get mayRefine(): boolean {
+    return this.rested_s >= REFINE_S;
+  }
+
+  /** Cosines of the inner and outer radius. */
+  get cosines(): readonly [number, number] {
+    return [Math.cos(INNER * this.outer_rad), Math.cos(this.outer_rad)];
+  }
+
+  /**
+   * Look along the head's own -z. True if other volumes may be wanted now than before.
+   */
+  look(
+    state: ViewerState,
+    head: Matrix4,
+    specimen: Matrix4,
+    isReady: (tile: string) => boolean,
+    dt_s: number,
+  ): boolean {
+    this.apex.setFromMatrixPosition(head);
+    this.axis.set(0, 0, -1).transformDirection(head);
+    this.toSpecimen.copy(specimen).invert();
+    this.apex_um.copy(this.apex).applyMatrix4(this.toSpecimen);
+    this.axis_um.copy(this.axis).transformDirection(this.toSpecimen);
+    const before = this.nearby;
+    const couldRefine = this.mayRefine;
+    const set_rad = state.discRadius_deg * RADIANS;
+    const limit_rad = set_rad * this.radiusShare;
+    this.nearby = advanceNearby(before, {
+      gaze: { origin: this.apex_um.toArray(), direction: this.axis_um.toArray() },
+      tiles: shownTiles(this.manifest.tiles, state.isolated),
+      clip: state.clip,
+      switchDistance_um: state.switchDistance_m / specimen.getMaxScaleOnAxis(),
+      discRadius_rad: set_rad, // a tile does not come and go with the frame's budget
+      dt_s,
+    });
+    const isSame =
+      before.gazed === this.nearby.gazed && before.disc.join() === this.nearby.disc.join();
+    this.rested_s = isSame ? this.rested_s + dt_s : 0;
+    const reach = Math.min(limit_rad, discReach(this.nearby, set_rad, isReady));
+    const opened = this.outer_rad + (limit_rad / OPENING_S) * dt_s;
+    this.outer_rad = state.mode === "disc" ? Math.min(reach, opened) : 0;
+    this.reach_rad = reach;
+    return !isSame || couldRefine !== this.mayRefine;
+  }
+
+  /** Whether the next frame differs though nothing moves. */
+  isChanging(state: ViewerState): boolean {
+    const isOpening = state.mode === "disc" && this.outer_rad < this.reach_rad;
+    return isOpening || !this.mayRefine || isWaiting(this.nearby);
+  }
+}

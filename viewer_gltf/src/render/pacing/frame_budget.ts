@@ -1,0 +1,69 @@
+/** Keeps a moving picture in the frame's budget; a still one is drawn as well as can be. */
+
+import { GpuTimer, type TimedContext } from "../../gpu/gpu_timer";
+import {
+  advanceQuality,
+  frameBudget_ms,
+  initialQuality,
+  type Quality,
+  type QualityLevel,
+  type QualitySettings,
+  qualitySettings,
+  withLevel,
+} from "../../state/quality_controller";
+
+const RATE_HZ = 60;
+/** So many times a frame's time between two frames: the picture is not kept up. */
+const LATE = 1.3;
+
+export class Pace {
+  /** Between the last two frames, smoothed. */
+  frame_ms = 0;
+  /** What the last frame was drawn with. */
+  settings: QualitySettings;
+  private readonly timer: GpuTimer | null;
+  private quality: Quality;
+  private wasMoving = false;
+
+  constructor(gl: TimedContext) {
+    this.timer = GpuTimer.create(gl);
+    this.quality = initialQuality(this.timer === null ? "interval" : "work");
+    this.settings = qualitySettings(this.quality);
+  }
+
+  setLevel(level: QualityLevel): void {
+    this.quality = withLevel(this.quality, level);
+  }
+
+  /**
+   * What to draw the next frame with.
+   *
+   * @param isMoving whether another frame follows by itself
+   * @param rate_hz of the display, where it is known
+   */
+  begin(isMoving: boolean, interval_ms: number, rate_hz = RATE_HZ): QualitySettings {
+    if (isMoving && this.wasMoving) {
+      this.frame_ms += (interval_ms - this.frame_ms) / 8;
+      const { timing } = this.quality;
+      const budget_ms = frameBudget_ms(rate_hz, timing);
+      const work_ms = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
+      // where frames are late, or no answer comes, the GPU's own time says nothing
+      const isLate = this.frame_ms > LATE * (1000 / rate_hz);
+      const spent_ms = isLate ? Math.max(work_ms ?? 0, interval_ms) : work_ms;
+      if (spent_ms !== null) this.quality = advanceQuality(this.quality, spent_ms, budget_ms);
+    }
+    this.wasMoving = isMoving;
+    this.timer?.begin();
+    const still: QualityLevel = this.quality.level === "low" ? "low" : "high";
+    this.settings = qualitySettings(isMoving ? this.quality : { ...this.quality, level: still });
+    return this.settings;
+  }
+
+  end(): void {
+    this.timer?.end();
+  }
+
+  dispose(): void {
+    this.timer?.dispose();
+  }
+}

@@ -1,0 +1,113 @@
+/** Where the specimen is in the room: at home, with one tile in the middle, or where hands put it. */
+import { Group, Matrix4, Quaternion, Vector3 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
+import { limitPlacement, poseMatrix, type SpecimenPose } from "../math/grab";
+import { LONGEST_EDGE_M, place } from "./placement";
+
+type Bounds = Manifest["specimen"]["bounds_um"];
+
+/** A change that is not made by hand is followed with the eyes. */
+export const MOVE_S = 0.4;
+/** Nobody carries the specimen out of sight. */
+const FARTHEST_M = 5;
+
+export class Specimen {
+  /** Its children are in um, world. */
+  readonly group = new Group();
+  pose: SpecimenPose;
+  /** Whether hands put it where it is. */
+  isMoved = false;
+  private goal: SpecimenPose;
+  private start: SpecimenPose;
+  /** 0..1: of the way from start to goal. */
+  private way = 1;
+  /** Where in the room the middle of what is shown is as long as nobody moves it. */
+  readonly anchor = new Vector3();
+  private readonly base: Matrix4;
+  private focus: Bounds | null = null;
+
+  constructor(private readonly bounds: Bounds) {
+    const { scale, center } = place(bounds);
+    this.base = new Matrix4()
+      .makeScale(scale, scale, scale)
+      .multiply(new Matrix4().makeTranslation(-center[0], -center[1], -center[2]));
+    this.pose = this.goal = this.start = this.home;
+    this.group.matrixAutoUpdate = false;
+    this.apply();
+  }
+
+  /** Metres of the room per um. */
+  get scale(): number {
+    return this.group.matrixWorld.getMaxScaleOnAxis();
+  }
+
+  /** Put the middle of what is shown at a point of the room, at once. */
+  anchorAt(point: Vector3): void {
+    this.anchor.copy(point);
+    this.settle(this.home);
+  }
+
+  /** Bring a tile to the middle, as large as fits where the whole was; null: the whole again. */
+  show(tile: Bounds | null): void {
+    if (tile === this.focus) return;
+    this.focus = tile;
+    this.isMoved = false;
+    this.start = this.pose;
+    this.goal = this.home;
+    this.way = 0;
+  }
+
+  /** Where it is as long as nobody moves it. */
+  get home(): SpecimenPose {
+    const orientation = new Quaternion();
+    const { focus } = this;
+    if (focus === null) return { position: this.anchor.clone(), orientation, scale: 1 };
+    const whole = place(this.bounds);
+    const tile = place(focus);
+    const edge = ({ min, max }: Bounds, axis: 0 | 1) => Math.max(max[axis] - min[axis], 1e-9);
+    const fits = ([0, 1] as const).map((axis) => edge(this.bounds, axis) / edge(focus, axis));
+    const scale = Math.min(...fits);
+    const aside = new Vector3(...whole.center).sub(new Vector3(...tile.center));
+    const position = aside.multiplyScalar(scale * whole.scale).add(this.anchor);
+    return { position, orientation, scale };
+  }
+
+  goHome(): void {
+    this.settle(this.home);
+  }
+
+  /** Moved by hand; `viewer` is where the eyes are, room. */
+  moveTo(pose: SpecimenPose, viewer: Vector3): void {
+    const farthest_m = FARTHEST_M + (LONGEST_EDGE_M * pose.scale) / 2;
+    this.settle(limitPlacement(pose, viewer, farthest_m, this.home));
+    this.isMoved = true;
+  }
+
+  /** Go on with a move; whether it is still under way. */
+  advance(dt_s: number): boolean {
+    if (this.way === 1) return false;
+    this.way = Math.min(1, this.way + dt_s / MOVE_S);
+    const eased = this.way * this.way * (3 - 2 * this.way);
+    const { start, goal } = this;
+    this.pose = {
+      position: start.position.clone().lerp(goal.position, eased),
+      orientation: start.orientation.clone().slerp(goal.orientation, eased),
+      scale: start.scale * (goal.scale / start.scale) ** eased,
+    };
+    this.apply();
+    return this.way < 1;
+  }
+
+  private settle(pose: SpecimenPose): void {
+    this.isMoved = false;
+    this.pose = this.start = this.goal = pose;
+    this.way = 1;
+    this.apply();
+  }
+
+  private apply(): void {
+    this.group.matrix.copy(poseMatrix(this.pose)).multiply(this.base);
+    this.group.matrixWorldNeedsUpdate = true;
+    this.group.updateMatrixWorld(true);
+  }
+}

@@ -1,0 +1,61 @@
+/** From where the specimen is seen, in an address. Metres of the room. Pure. */
+
+import { LARGEST_SCALE, SMALLEST_SCALE } from "../math/grab";
+import type { Vec3 } from "../math/pick";
+import { readNumbers, written } from "./numbers";
+
+/** The specimen's centre, its turn (a quaternion x, y, z, w), a multiple of its usual size. */
+export type SpecimenLook = Readonly<{
+  position: Vec3;
+  orientation: readonly [number, number, number, number];
+  scale: number;
+}>;
+
+export type Look = Readonly<{
+  /** The camera, and the point that it is turned about. */
+  position: Vec3;
+  target: Vec3;
+  /** null: where it opens. */
+  specimen: SpecimenLook | null;
+}>;
+
+/** The room is no larger; nobody finds what is farther away. */
+const FARTHEST_M = 100;
+/** Closer to its target a camera has no direction. */
+const NEAREST_M = 1e-4;
+
+/** `eye`, and `pose` where the specimen was moved. */
+export function writeLook({ position, target, specimen }: Look): Record<string, string> {
+  const eye = written([...position, ...target]);
+  if (specimen === null) return { eye };
+  const pose = written([...specimen.position, ...specimen.orientation, specimen.scale]);
+  return { eye, pose };
+}
+
+/** null: there is none, or none that shows anything. */
+export function readLook(eye: string, pose: string | null): Look | null {
+  const camera = readNumbers(eye, 6);
+  const specimen = pose === null ? null : readSpecimen(pose);
+  if (camera === null || (pose !== null && specimen === null)) return null;
+  const [px, py, pz, tx, ty, tz] = camera;
+  const isBlind = Math.hypot(px - tx, py - ty, pz - tz) < NEAREST_M;
+  if (isBlind || !areInRoom(camera)) return null;
+  return { position: [px, py, pz], target: [tx, ty, tz], specimen };
+}
+
+function readSpecimen(pose: string): SpecimenLook | null {
+  const values = readNumbers(pose, 8);
+  if (values === null) return null;
+  const [x, y, z, qx, qy, qz, qw, size] = values;
+  const length = Math.hypot(qx, qy, qz, qw);
+  if (!(length > 0.5) || !(size > 0) || !areInRoom([x, y, z])) return null;
+  return {
+    position: [x, y, z],
+    orientation: [qx / length, qy / length, qz / length, qw / length],
+    scale: Math.min(Math.max(size, SMALLEST_SCALE), LARGEST_SCALE),
+  };
+}
+
+function areInRoom(values: readonly number[]): boolean {
+  return values.every((value) => Math.abs(value) <= FARTHEST_M);
+}

@@ -1,0 +1,199 @@
+import { describe, expect, it } from "vitest";
+import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import { seeded } from "../../test/support/seeded";
+import { fromHex } from "../math/color";
+import {
+  type Action,
+  initialState,
+  MAX_CHANNELS,
+  reduce,
+  type ViewerState,
+} from "../state/viewer_state";
+import type { Look } from "./camera_link";
+import { readLink, writeLink } from "./permalink";
+
+const start = (channels = 6) => initialState(sampleManifest(channels));
+const after = (state: ViewerState, actions: readonly Action[]) => actions.reduce(reduce, state);
+const read = (hash: string, state = start()) => readLink(hash, state, SPECIMEN_BOX);
+const opened = (hash: string) => after(start(), read(hash).actions);
+const noticesOf = (hash: string) => opened(hash).notices;
+
+const CHANGES: readonly Action[] = [
+  { type: "show", channel: "c1", shown: false },
+  { type: "show", channel: "c5", shown: true },
+  { type: "recolor", channel: "c5", color: fromHex("#12ab9f") },
+  { type: "recolor", channel: "c4", color: fromHex("#0000ff") }, // hidden, and yet of the state
+  { type: "fade", channel: "c0", opacity: 0.35 },
+  { type: "window", channel: "c0", window: [0.125, 0.75] },
+  { type: "draw-volume", channel: "c2", volume: false },
+  { type: "choose-transfer-function", channel: "c3", name: "soft" },
+  { type: "choose-mode", mode: "tile" },
+  { type: "set-switch-distance", distance_m: 2.34 },
+  { type: "set-disc-radius", radius_deg: 17.5 },
+  { type: "select", tile: "r1_c3" },
+  { type: "isolate", tile: "r0_c2" },
+  {
+    type: "set-clip",
+    clip: {
+      box: { min: [1, -12.5, 2], max: [30, -2, 7.25] },
+      plane: { normal: [0.6, 0, 0.8], offset_um: 12 },
+    },
+  },
+  {
+    type: "measure",
+    points: [
+      [1.25, -3, 4],
+      [40.5, -17, 0],
+    ],
+  },
+  { type: "choose-tool", tool: "measure" },
+  { type: "set-dwell", isOn: false },
+  { type: "choose-quality", level: "low" },
+  { type: "show-lamps", areShown: true },
+];
+const LOOK: Look = {
+  position: [0.5, -0.25, 1.75],
+  target: [0.1, 0, -0.05],
+  specimen: { position: [0, 0, -1.5], orientation: [0, 0.6, 0, 0.8], scale: 2.5 },
+};
+/** Which channel has been shown for how long is no part of a view, nor is what was told. */
+const viewOf = (state: ViewerState) => ({
+  ...state,
+  notices: [],
+  channels: state.channels.map((channel) => ({ ...channel, turn: 0 })),
+});
+
+describe("a link to a view", () => {
+  it("brings back the whole state and the look", () => {
+    const state = after(start(), CHANGES);
+    const hash = writeLink(state, start(), LOOK);
+    expect(viewOf(opened(hash))).toEqual(viewOf(state));
+    const look = read(hash).look;
+    expect(look?.position).toEqual(LOOK.position);
+    expect(look?.target).toEqual(LOOK.target);
+    expect(look?.specimen?.scale).toBe(2.5);
+    look?.specimen?.orientation.forEach((part, i) => {
+      expect(part).toBeCloseTo(LOOK.specimen?.orientation[i] ?? Number.NaN, 6);
+    });
+  });
+
+  it("brings back each single change", () => {
+    for (const change of CHANGES) {
+      const state = after(start(), [change]);
+      const hash = writeLink(state, start(), null);
+      expect(viewOf(opened(hash)), hash).toEqual(viewOf(state));
+    }
+  });
+
+  it("leaves out what is as it opens, and is short", () => {
+    expect(writeLink(start(), start(), null)).toBe("#v=1");
+    const eye = { ...LOOK, specimen: null };
+    expect(writeLink(start(), start(), eye)).toBe("#v=1&eye=0.5,-0.25,1.75,0.1,0,-0.05");
+    expect(writeLink(after(start(), CHANGES), start(), LOOK).length).toBeLessThan(400);
+  });
+
+  it("needs no escaping: a URL keeps it as it is", () => {
+    const hash = writeLink(after(start(), CHANGES), start(), LOOK);
+    const url = new URL("https://example.org/view/?bundle=x");
+    url.hash = hash;
+    expect(url.hash).toBe(hash);
+    expect(hash).toMatch(/^#[\w=&,.:+-]*$/);
+  });
+
+  it("can hide every channel", () => {
+    const hidden = start().channels.map(
+      ({ id }): Action => ({ type: "show", channel: id, shown: false }),
+    );
+    const state = after(start(), hidden);
+    const hash = writeLink(state, start(), null);
+    expect(opened(hash).channels.some(({ shown }) => shown)).toBe(false);
+  });
+
+  it("tells of channels and tiles that are not here, and shows the rest", () => {
+    const state = opened("#v=1&c=c5,CD8&l=CD4:o0.5,c5:o0.5&tile=r9_c9&disc=20");
+    expect(state.notices).toEqual([
+      "Link: this bundle has no channel CD8, channel CD4, tile r9_c9.",
+    ]);
+    expect(state.channels.flatMap(({ id, shown }) => (shown ? [id] : []))).toEqual(["c5"]);
+    expect(state.channels[5].opacity).toBe(0.5);
+    expect(state.discRadius_deg).toBe(20);
+    expect(state.selected).toBeNull();
+  });
+
+  it("of another bundle altogether leaves the channels that open", () => {
+    const shown = (state: ViewerState) => state.channels.map((channel) => channel.shown);
+    expect(shown(opened("#v=1&c=CD8,CD4"))).toEqual(shown(start()));
+  });
+
+  it("of a newer viewer, or of none, is told and does nothing else", () => {
+    expect(noticesOf("#v=2&disc=20")).toEqual(["Link: this viewer reads version 1, found 2."]);
+    expect(noticesOf("#section-3")).toHaveLength(1);
+    expect(opened("#v=2&disc=20").discRadius_deg).toBe(start().discRadius_deg);
+    expect(read("")).toEqual({ actions: [], look: null });
+    expect(read("#")).toEqual({ actions: [], look: null });
+  });
+
+  it("shows no more channels than fit", () => {
+    const state = opened("#v=1&c=c5,c4,c3,c2,c1,c0,c5,c5");
+    expect(state.channels.filter(({ shown }) => shown)).toHaveLength(MAX_CHANNELS);
+    expect(state.notices).toEqual([]);
+  });
+
+  it.each([
+    ["#v=1&switch=NaN", "switch"],
+    ["#v=1&switch=Infinity", "switch"],
+    ["#v=1&disc=1e99", "disc"],
+    ["#v=1&disc=", "disc"],
+    ["#v=1&mode=constructor", "mode"],
+    ["#v=1&box=0,0,0,0,0,0", "box"],
+    ["#v=1&box=40,-10,4,10,-5,6", "box"],
+    ["#v=1&cut=0,0,0,5", "cut"],
+    ["#v=1&points=1,2", "points"],
+    ["#v=1&points=1,2,3,4,5,6,7", "points"],
+    ["#v=1&eye=0,0,0,0,0,0", "eye"],
+    ["#v=1&eye=0,0,1e6,0,0,0", "eye"],
+    ["#v=1&eye=0,0,1,0,0,0&pose=0,0,0,0,0,0,0,1", "eye"],
+    ["#v=1&quality=ultra", "quality"],
+    ["#v=1&l=c0:oNaN", "l c0:oNaN"],
+    ["#v=1&l=c0:c12345", "l c0:c12345"],
+    ["#v=1&l=c0:tevil", "l c0:tevil"],
+  ])("%s is told and left out", (hash, named) => {
+    expect(noticesOf(hash)).toEqual([`Link: left out what can't be read: ${named}.`]);
+    const { notices, ...state } = opened(hash);
+    const { notices: _, ...opening } = start();
+    expect(state).toEqual(opening);
+  });
+
+  it("keeps cuts and points within the specimen", () => {
+    const state = opened("#v=1&box=-900,-900,-900,900,900,900&cut=0,0,1,9999&points=7e5,0,-7e5");
+    expect(state.clip.box).toEqual(SPECIMEN_BOX);
+    expect(state.clip.plane?.offset_um).toBe(8);
+    expect(state.measured).toEqual([[50, 0, 0]]);
+  });
+
+  it("of ten kilobytes of junk is harmless", () => {
+    const random = seeded(7);
+    const letters = "v=1&cl,:~%00ff_.-+eye<>\"'{}[]\\ \u0000\ud800ctwon0129";
+    for (let round = 0; round < 200; round++) {
+      const length = Math.floor(random() * 10_000);
+      let junk = round % 2 === 0 ? "#v=1&" : "#";
+      for (let i = 0; i < length; i++) junk += letters[Math.floor(random() * letters.length)];
+      const { actions } = read(junk);
+      const state = after(start(), actions);
+      expect(state.notices.length).toBeLessThan(4);
+      expect(state.notices.join().length).toBeLessThan(600);
+      const numbers = JSON.stringify(
+        state.channels.map(({ window, opacity }) => [window, opacity]),
+      );
+      expect(numbers).not.toContain("null"); // as JSON writes NaN
+    }
+  });
+
+  it("cut short anywhere still opens", () => {
+    const hash = writeLink(after(start(), CHANGES), start(), LOOK);
+    for (let length = 0; length < hash.length; length++) {
+      const state = opened(hash.slice(0, length));
+      expect(state.channels.some(({ opacity }) => !Number.isFinite(opacity))).toBe(false);
+    }
+  });
+});

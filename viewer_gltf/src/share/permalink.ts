@@ -1,0 +1,357 @@
+/**
+ * A view as the part of an address behind `#`, and back. Pure.
+ *
+ *   #v=1&c=DAPI,CD8&l=DAPI:c3050ff:o0.5,CD8:n&mode=tile&eye=0,0,1.8,0,0,0
+ *
+ * What is as the bundle opens is left out. `c`: the channels shown; `l`: channels that look
+ * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
+ * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
+ * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
+ * corner), cut (a plane's normal and offset), points (um), tool, dwell, quality, light (see
+ * path_trace_link.ts), lamps (shown or not), eye and pose.
+ * An address is somebody else's text: whatever it holds, the actions are ones that a user could
+ * have taken, and what can't be read is told and left out.
+ */
+
+import { AXES, type Box, type Clip, withinSpecimen } from "../math/clip";
+import { fromHex, toHex } from "../math/color";
+import type { Vec3 } from "../math/pick";
+import { OWN } from "../state/transfer_functions_2d";
+import {
+  type Action,
+  type ChannelState,
+  MAX_CHANNELS,
+  MODES,
+  type ViewerState,
+} from "../state/viewer_state";
+import { type Look, readLook, writeLook } from "./camera_link";
+import { readNumbers, written } from "./numbers";
+import { readTrace, writeTrace } from "./path_trace_link";
+import { readShapes, writeShapes } from "./shapes_link";
+
+const VERSION = "1";
+/** Seventy channels that all look different take less. */
+const LONGEST = 8000;
+const QUALITIES = ["auto", "low", "high"] as const;
+const TOOLS = ["select", "measure"] as const;
+
+export type Shared = Readonly<{ actions: readonly Action[]; look: Look | null }>;
+
+/**
+ * @param start the state in which the bundle opens
+ * @param look null: as the bundle opens
+ */
+export function writeLink(state: ViewerState, start: ViewerState, look: Look | null): string {
+  const links = [isAnything, isChosen, isShown].map((has) => linkOf(state, start, look, has));
+  return links.find(({ length }) => length <= LONGEST) ?? links[links.length - 1];
+}
+
+/** Whether the shapes of a function are part of a link: where not all of them have room in one. */
+type HasShapes = (channel: ChannelState, name: string) => boolean;
+const isAnything: HasShapes = () => true;
+const isChosen: HasShapes = ({ transferFunction }, name) => name === transferFunction;
+const isShown: HasShapes = (channel, name) => channel.shown && isChosen(channel, name);
+
+function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: HasShapes): string {
+  const parts: Record<string, string> = { v: VERSION };
+  const shownOf = ({ channels }: ViewerState) =>
+    channels
+      .filter(({ shown }) => shown)
+      .map(({ id }) => encodeURIComponent(id))
+      .join(",");
+  if (shownOf(state) !== shownOf(start)) parts.c = shownOf(state);
+  const looks = state.channels.flatMap((channel, i) =>
+    writeChannel(channel, start.channels[i], has),
+  );
+  if (looks.length > 0) parts.l = looks.join(",");
+  if (state.mode !== start.mode) parts.mode = state.mode;
+  if (state.switchDistance_m !== start.switchDistance_m) {
+    parts.switch = written([state.switchDistance_m]);
+  }
+  if (state.discRadius_deg !== start.discRadius_deg) parts.disc = written([state.discRadius_deg]);
+  if (state.selected !== null) parts.tile = encodeURIComponent(state.selected);
+  if (state.isolated !== null) parts.only = encodeURIComponent(state.isolated);
+  const { box, plane } = state.clip;
+  if (box !== null) parts.box = written([...box.min, ...box.max]);
+  if (plane !== null) parts.cut = written([...plane.normal, plane.offset_um]);
+  if (state.measured.length > 0) parts.points = written(state.measured.flat());
+  if (state.tool !== start.tool) parts.tool = state.tool;
+  if (state.isDwellOn !== start.isDwellOn) parts.dwell = state.isDwellOn ? "on" : "off";
+  if (state.quality !== start.quality) parts.quality = state.quality;
+  const light = writeTrace(state.trace);
+  if (light !== "") parts.light = light;
+  if (state.areLampsShown !== start.areLampsShown) parts.lamps = state.areLampsShown ? "on" : "off";
+  Object.assign(parts, look === null ? {} : writeLook(look));
+  return `#${Object.entries(parts)
+    .map(([name, text]) => `${name}=${text}`)
+    .join("&")}`;
+}
+
+/** Nothing, or the one entry of a channel that looks different. */
+function writeChannel(
+  channel: ChannelState,
+  start: ChannelState | undefined,
+  has: HasShapes,
+): string[] {
+  const parts: string[] = [];
+  const color = toHex(channel.color);
+  if (color !== toHex(channel.original)) parts.push(`c${color.slice(1)}`);
+  if (channel.opacity !== 1) parts.push(`o${written([channel.opacity])}`);
+  const [low, high] = channel.window;
+  if (low !== 0 || high !== 1) parts.push(`w${written([low])}_${written([high])}`);
+  const shaped = Object.entries(channel.shapes).filter(([name]) => has(channel, name));
+  for (const [name, shapes] of shaped) {
+    parts.push(`s${encodeURIComponent(name)}_${writeShapes(shapes)}`);
+  }
+  // shapes that are read choose their function
+  if (shaped.length > 0 || channel.transferFunction !== start?.transferFunction) {
+    parts.push(`t${encodeURIComponent(channel.transferFunction)}`);
+  }
+  if (!channel.volume) parts.push("n");
+  return parts.length > 0 ? [[encodeURIComponent(channel.id), ...parts].join(":")] : [];
+}
+
+/**
+ * What brings a bundle that has just been opened to the view of a link.
+ *
+ * @param hash of the page's address, with its `#`
+ * @param specimen um, world: nothing is cut or measured beyond it
+ */
+export function readLink(hash: string, state: ViewerState, specimen: Box): Shared {
+  const text = hash.replace(/^#/, "");
+  const told = (what: string): Shared => ({
+    actions: [{ type: "notify", text: `Link: ${what}` }],
+    look: null,
+  });
+  if (text === "") return { actions: [], look: null };
+  if (text.length > LONGEST) return told("it is too long to be one of this viewer's.");
+  const parts = new Map(
+    text.split("&").map((part) => {
+      const at = part.indexOf("=");
+      return at === -1 ? ([part, ""] as const) : ([part.slice(0, at), part.slice(at + 1)] as const);
+    }),
+  );
+  const version = parts.get("v");
+  if (version === undefined) return told("what follows the # is no view of this viewer.");
+  if (version !== VERSION) {
+    return told(`this viewer reads version ${VERSION}, found ${shortened(version)}.`);
+  }
+  return new LinkReader(parts, state, specimen).read();
+}
+
+/** Of an address as it may be quoted in a notice. */
+function shortened(text: string): string {
+  return text.length > 24 ? `${text.slice(0, 24)} …` : text;
+}
+
+/** null: no text at all, such as %ff. */
+function decoded(text: string): string | null {
+  try {
+    return decodeURIComponent(text);
+  } catch (error) {
+    if (error instanceof URIError) return null;
+    throw error;
+  }
+}
+
+const isOneOf = <T extends string>(values: readonly T[], text: string): text is T =>
+  (values as readonly string[]).includes(text);
+
+class LinkReader {
+  private readonly actions: Action[] = [];
+  private readonly unread: string[] = [];
+  private readonly unknown: string[] = [];
+
+  constructor(
+    private readonly parts: ReadonlyMap<string, string>,
+    private readonly state: ViewerState,
+    private readonly specimen: Box,
+  ) {}
+
+  read(): Shared {
+    this.readShown();
+    this.readLooks();
+    this.number("switch", (distance_m) => ({ type: "set-switch-distance", distance_m }));
+    this.number("disc", (radius_deg) => ({ type: "set-disc-radius", radius_deg }));
+    this.word("mode", MODES, (mode) => ({ type: "choose-mode", mode }));
+    this.tile("tile", "select");
+    this.tile("only", "isolate");
+    this.readClip();
+    this.readPoints();
+    this.word("tool", TOOLS, (tool) => ({ type: "choose-tool", tool }));
+    this.word("dwell", ["on", "off"], (word) => ({ type: "set-dwell", isOn: word === "on" }));
+    this.word("quality", QUALITIES, (level) => ({ type: "choose-quality", level }));
+    this.readLight();
+    this.word("lamps", ["on", "off"], (word) => ({ type: "show-lamps", areShown: word === "on" }));
+    const eye = this.parts.get("eye");
+    const look = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
+    if (eye !== undefined && look === null) this.unread.push("eye");
+    this.tell("this bundle has no", this.unknown);
+    this.tell("left out what can't be read:", this.unread);
+    return { actions: this.actions, look };
+  }
+
+  private tell(what: string, names: readonly string[]): void {
+    if (names.length === 0) return;
+    const listed = names.slice(0, 5).join(", ");
+    const more = names.length > 5 ? ` and ${names.length - 5} more` : "";
+    this.actions.push({ type: "notify", text: `Link: ${what} ${listed}${more}.` });
+  }
+
+  private channel(text: string): ChannelState | null {
+    const id = decoded(text);
+    const channel = this.state.channels.find((each) => each.id === id);
+    if (channel === undefined) this.unknown.push(`channel ${shortened(text)}`);
+    return channel ?? null;
+  }
+
+  private readShown(): void {
+    const text = this.parts.get("c");
+    if (text === undefined) return;
+    const named = text === "" ? [] : text.split(",").flatMap((id) => this.channel(id) ?? []);
+    if (text !== "" && named.length === 0) return; // none of them is here: better what opens
+    const wanted = new Set(named.slice(0, MAX_CHANNELS).map(({ id }) => id));
+    const show = (shown: boolean) => {
+      for (const each of this.state.channels) {
+        if (each.shown !== shown && wanted.has(each.id) === shown) {
+          this.actions.push({ type: "show", channel: each.id, shown });
+        }
+      }
+    };
+    show(false); // first, so that there is room
+    show(true);
+  }
+
+  private readLight(): void {
+    const text = this.parts.get("light");
+    if (text === undefined) return;
+    readTrace(text).forEach((action, i) => {
+      if (action !== null) this.actions.push(action);
+      else this.unread.push(`light ${shortened(text.split(",")[i])}`);
+    });
+  }
+
+  private readLooks(): void {
+    const text = this.parts.get("l");
+    if (text === undefined) return;
+    for (const entry of text.split(",")) {
+      const [id, ...looks] = entry.split(":");
+      const channel = this.channel(id);
+      if (channel === null) continue;
+      for (const look of looks) {
+        const action = lookAction(channel, look);
+        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${look}`)}`);
+        else this.actions.push(action);
+      }
+    }
+  }
+
+  private number(name: string, action: (value: number) => Action): void {
+    const text = this.parts.get(name);
+    if (text === undefined) return;
+    const values = readNumbers(text, 1);
+    if (values === null) this.unread.push(name);
+    else this.actions.push(action(values[0]));
+  }
+
+  private word<T extends string>(
+    name: string,
+    values: readonly T[],
+    action: (value: T) => Action,
+  ): void {
+    const text = this.parts.get(name);
+    if (text === undefined) return;
+    if (isOneOf(values, text)) this.actions.push(action(text));
+    else this.unread.push(name);
+  }
+
+  private tile(name: string, type: "select" | "isolate"): void {
+    const text = this.parts.get(name);
+    if (text === undefined) return;
+    const tile = decoded(text);
+    if (tile !== null && this.state.tiles.some(({ id }) => id === tile)) {
+      this.actions.push({ type, tile });
+    } else this.unknown.push(`tile ${shortened(text)}`);
+  }
+
+  private readClip(): void {
+    const clip: { -readonly [K in keyof Clip]: Clip[K] } = { ...this.state.clip };
+    const box = this.parts.get("box");
+    const cut = this.parts.get("cut");
+    if (box !== undefined) {
+      const read = this.boxOf(readNumbers(box, 6));
+      if (read === null) this.unread.push("box");
+      else clip.box = read;
+    }
+    if (cut !== undefined) {
+      const [x, y, z, offset_um] = readNumbers(cut, 4) ?? [0, 0, 0, 0];
+      const length = Math.hypot(x, y, z);
+      if (!(length > 0.5)) this.unread.push("cut");
+      else {
+        const normal: Vec3 = [x / length, y / length, z / length];
+        clip.plane = withinSpecimen(normal, offset_um, this.specimen);
+      }
+    }
+    if (clip.box !== this.state.clip.box || clip.plane !== this.state.clip.plane) {
+      this.actions.push({ type: "set-clip", clip });
+    }
+  }
+
+  private boxOf(values: readonly number[] | null): Box | null {
+    if (values === null) return null;
+    const [min, max] = [this.within(values.slice(0, 3)), this.within(values.slice(3))];
+    return AXES.every((i) => min[i] < max[i]) ? { min, max } : null;
+  }
+
+  private readPoints(): void {
+    const text = this.parts.get("points");
+    if (text === undefined) return;
+    const values = readNumbers(text, 6) ?? readNumbers(text, 3);
+    if (values === null) this.unread.push("points");
+    else {
+      const points = [values.slice(0, 3), values.slice(3)].filter(({ length }) => length > 0);
+      this.actions.push({ type: "measure", points: points.map((point) => this.within(point)) });
+    }
+  }
+
+  /** The nearest point of the specimen. */
+  private within(point: readonly number[]): Vec3 {
+    const { min, max } = this.specimen;
+    const at = (i: 0 | 1 | 2) => Math.min(Math.max(point[i], min[i]), max[i]);
+    return [at(0), at(1), at(2)];
+  }
+}
+
+function lookAction({ id, transferFunctions }: ChannelState, look: string): Action | null {
+  const value = look.slice(1);
+  switch (look[0]) {
+    case "c":
+      if (!/^[0-9a-f]{6}$/i.test(value)) return null;
+      return { type: "recolor", channel: id, color: fromHex(`#${value}`) };
+    case "o": {
+      const opacity = readNumbers(value, 1);
+      return opacity && { type: "fade", channel: id, opacity: opacity[0] };
+    }
+    case "w": {
+      const ends = readNumbers(value.replace("_", ","), 2);
+      return ends && { type: "window", channel: id, window: [ends[0], ends[1]] };
+    }
+    case "s": {
+      const at = value.lastIndexOf("_");
+      const name = decoded(value.slice(0, Math.max(0, at)));
+      const shapes = readShapes(value.slice(at + 1));
+      if (name === null || shapes === null) return null;
+      if (name !== OWN && !transferFunctions.includes(name)) return null;
+      return { type: "set-shapes", channel: id, name, shapes };
+    }
+    case "t": {
+      const name = decoded(value);
+      if (name === null || (name !== OWN && !transferFunctions.includes(name))) return null;
+      return { type: "choose-transfer-function", channel: id, name };
+    }
+    case "n":
+      return value === "" ? { type: "draw-volume", channel: id, volume: false } : null;
+    default:
+      return null;
+  }
+}

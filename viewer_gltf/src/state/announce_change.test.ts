@@ -1,0 +1,36 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { remarkOn } from "./announce_change";
+import { type Action, initialState, reduce, type ViewerState } from "./viewer_state";
+
+const MANIFEST = sampleManifest(6);
+const START = initialState(MANIFEST);
+const remark = (state: ViewerState, action: Action) =>
+  remarkOn(state, reduce(state, action), MANIFEST.tiles);
+
+describe("a remark", () => {
+  it("says which channel left for another", () => {
+    const fifth: Action = { type: "show", channel: "c5", shown: true };
+    expect(remark(START, fifth)).toBe("4 channels show at once: Marker 0 left for Marker 5.");
+    const room = reduce(START, { type: "show", channel: "c2", shown: false });
+    expect(remark(START, { type: "show", channel: "c2", shown: false })).toBeNull();
+    expect(remark(room, fifth)).toBeNull();
+  });
+
+  it("says that the cut has taken all of the only tile that is shown", () => {
+    const [{ id: near, bounds_um }] = MANIFEST.tiles;
+    const far = MANIFEST.tiles.at(-1)?.id ?? "";
+    const cutTo: Action = { type: "set-clip", clip: { box: bounds_um, plane: null } };
+    const cut = reduce(START, cutTo);
+    const words = `Only tile ${far}: the cut leaves nothing of it.`;
+    expect(remark(START, cutTo)).toBeNull();
+    expect(remark(cut, { type: "isolate", tile: near })).toBeNull();
+    expect(remark(cut, { type: "isolate", tile: far })).toBe(words);
+    const alone = reduce(START, { type: "isolate", tile: far });
+    expect(remark(alone, cutTo)).toBe(words);
+    const empty = reduce(alone, cutTo);
+    expect(remark(empty, { type: "fade", channel: "c0", opacity: 0.5 })).toBeNull();
+    expect(remark(empty, { type: "set-clip", clip: { ...empty.clip } })).toBeNull(); // it is known
+    expect(remark(empty, { type: "isolate", tile: null })).toBeNull();
+  });
+});

@@ -1,0 +1,114 @@
+/** Who is drawn how: for each channel and tile, surface or volume. Pure. */
+import {
+  type ChannelState,
+  isTraced,
+  type Representation,
+  type TileState,
+  type ViewerState,
+  VOLUME_TILES_AT_START,
+  volumeChannels,
+} from "./viewer_state";
+
+/** What lies near enough to be drawn as a volume. */
+export type Nearby = Readonly<{
+  /** The tile that the view's centre looks at. */
+  gazed: string | null;
+  /** The tiles that the disc round the gaze meets first, the gazed one first. */
+  disc: readonly string[];
+  /** All tiles within the switch distance. */
+  near: ReadonlySet<string>;
+}>;
+
+export const NOTHING_NEAR: Nearby = { gazed: null, disc: [], near: new Set() };
+
+/** A tile whose volume is wanted, with its channels in the bundle's order. */
+export type WantedTile = Readonly<{
+  tile: string;
+  channels: readonly string[];
+}>;
+
+/** The tile that volumes follow: the selected one, or the gazed one. */
+export function followedTile(state: ViewerState, nearby: Nearby): string | null {
+  return state.selected ?? nearby.gazed;
+}
+
+/** How a channel is drawn in a tile, once all has arrived; null: not at all. */
+export function drawnAs(
+  state: ViewerState,
+  channel: ChannelState,
+  tile: TileState,
+  nearby: Nearby,
+): Representation | null {
+  if (!channel.shown || (state.isolated !== null && tile.id !== state.isolated)) return null;
+  if (!channel.volume || state.mode === "off") return "mesh";
+  if (state.mode === "stage" && tile.representation !== "mesh") return tile.representation;
+  if (isTraced(state) || isMarched(state, tile.id, nearby)) return "volume";
+  if (!channel.prefersVolume) return "mesh";
+  const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
+  return isSmall || tile.id === (followedTile(state, nearby) ?? state.middle) ? "volume" : null;
+}
+
+function isMarched(state: ViewerState, tile: string, nearby: Nearby): boolean {
+  switch (state.mode) {
+    case "tile":
+      return tile === followedTile(state, nearby) && nearby.near.has(tile);
+    case "disc":
+      return nearby.disc.includes(tile);
+    case "all":
+      return true;
+    case "stage":
+    case "traced":
+    case "off":
+      return false;
+  }
+}
+
+/** Whether a channel's volumes show in the disc alone. */
+export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
+  return state.mode === "disc" && !channel.prefersVolume;
+}
+
+/** The tiles that are marched, those in the disc first. */
+export function wantedTiles(state: ViewerState, nearby: Nearby): readonly WantedTile[] {
+  if (isTraced(state)) return [];
+  const channels = volumeChannels(state);
+  const wanted = state.tiles.flatMap((tile) => {
+    const drawn = channels.filter((channel) => {
+      const as = drawnAs(state, channel, tile, nearby);
+      return as === "volume" || as === "both";
+    });
+    if (drawn.length === 0) return [];
+    return [
+      {
+        tile: tile.id,
+        channels: drawn.map(({ id }) => id),
+      },
+    ];
+  });
+  const rank = (id: string) => {
+    const place = nearby.disc.indexOf(id);
+    return place === -1 ? nearby.disc.length : place;
+  };
+  return wanted.sort((a, b) => rank(a.tile) - rank(b.tile));
+}
+
+/** Whether a channel's surfaces, if it has any, are drawn anywhere: else they aren't loaded. */
+export function wantsSurface(state: ViewerState, channel: ChannelState): boolean {
+  if (!channel.shown) return false;
+  if (channel.volume && isTraced(state)) return false;
+  if (!channel.volume || !channel.prefersVolume || state.mode === "off") return true;
+  return state.mode === "stage" && state.tiles.some((tile) => tile.representation === "both");
+}
+
+/** How much of a tile's surface its volume takes away, 0..1; null: the surface is not drawn. */
+export function takenFrom(
+  state: ViewerState,
+  channel: ChannelState,
+  tile: TileState,
+  nearby: Nearby,
+  presence: number,
+): number | null {
+  const as = drawnAs(state, channel, tile, nearby);
+  if (as === null || (as === "volume" && (channel.prefersVolume || isTraced(state)))) return null;
+  return as === "both" ? 0 : presence;
+}

@@ -1,0 +1,100 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { editedName, isTwoD, OWN, STEPS, shapesOf } from "./transfer_functions_2d";
+import {
+  faultOf,
+  LEAST_HEIGHT,
+  LEAST_WIDTH,
+  MAX_SHAPES,
+  makeShape,
+  type Shape,
+} from "./transfer_shapes";
+import { type Action, type ChannelState, initialState, reduce } from "./viewer_state";
+
+const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.4 });
+
+/** The first channel, whose function `soft` is two-dimensional in the bundle, after some actions. */
+function channelAfter(...actions: readonly Action[]): ChannelState {
+  const [first, ...others] = sampleManifest(2).channels;
+  const names = { ...first.transfer_functions_2d, names: ["soft"] };
+  const channels = [{ ...first, transfer_functions_2d: names }, ...others] as const;
+  const start = initialState({ ...sampleManifest(2), channels: [...channels] });
+  return actions.reduce(reduce, start).channels[0];
+}
+
+const choose = (name: string): Action => ({
+  type: "choose-transfer-function",
+  channel: "c0",
+  name,
+});
+const set = (name: string, shapes: readonly Shape[]): Action => ({
+  type: "set-shapes",
+  channel: "c0",
+  name,
+  shapes,
+});
+const LEARN: Action = {
+  type: "learn-plane",
+  channel: "c0",
+  plane: { gradientMax: 0.4, functions: { soft: [SHAPE] } },
+};
+
+describe("the two-dimensional functions of a channel", () => {
+  it("are the bundle's until they are edited", () => {
+    expect(isTwoD(channelAfter())).toBe(false);
+    const unknown = channelAfter(choose("soft"));
+    expect([isTwoD(unknown), shapesOf(unknown)]).toEqual([true, []]);
+    expect(shapesOf(channelAfter(choose("soft"), LEARN))).toEqual([SHAPE]);
+    const edited = channelAfter(choose("soft"), LEARN, set("soft", [SHAPE, SHAPE]));
+    expect(shapesOf(edited)).toHaveLength(2);
+    const emptied = channelAfter(LEARN, set("soft", []));
+    expect([isTwoD(emptied), emptied.transferFunction]).toEqual([false, "soft"]);
+  });
+
+  it("become one's own where a one-dimensional one is chosen, which stays as it is", () => {
+    expect(editedName(channelAfter())).toBe(OWN);
+    expect(editedName(channelAfter(choose("soft")))).toBe("soft");
+    const own = channelAfter(set(OWN, [SHAPE]));
+    expect(own.transferFunction).toBe(OWN);
+    expect(own.transferFunctions).toEqual(["default", "soft", OWN]);
+    expect(isTwoD(own, "default")).toBe(false);
+    const back = channelAfter(set(OWN, [SHAPE]), choose("default"), choose(OWN));
+    expect(shapesOf(back)).toHaveLength(1);
+    expect(channelAfter(set("none", [SHAPE]))).toEqual(channelAfter());
+  });
+
+  it("keep within the limits, whoever made the shapes", () => {
+    const wrong = [
+      { ...SHAPE, opacity: Number.NaN },
+      { ...SHAPE, values: [0.5, 0.4] as const },
+      { ...SHAPE, gradients: [0.5, 1.5] as const },
+    ];
+    expect(shapesOf(channelAfter(set(OWN, [...wrong, SHAPE])))).toHaveLength(1);
+    const many = Array.from({ length: MAX_SHAPES + 9 }, () => SHAPE);
+    expect(shapesOf(channelAfter(set(OWN, many)))).toHaveLength(MAX_SHAPES);
+  });
+
+  it("lie on a lattice, however thin, and still are shapes", () => {
+    const [v, g] = [LEAST_WIDTH, LEAST_HEIGHT];
+    const thin = [0, 0.12345, 1 - v, 0.9999 - v].flatMap((low) =>
+      [0, 0.54321, 1 - g].map((bottom) => ({
+        ...SHAPE,
+        values: [low, low + v] as const,
+        gradients: [bottom, bottom + g] as const,
+        tip: 0.777777,
+        opacity: 0.123456,
+      })),
+    );
+    const kept = shapesOf(channelAfter(set(OWN, thin)));
+    expect(kept).toHaveLength(thin.length);
+    for (const shape of kept) {
+      expect(faultOf(shape)).toBeNull();
+      expect(shape.values[1] - shape.values[0]).toBeGreaterThan(v - 1e-9);
+      expect(shape.gradients[1] - shape.gradients[0]).toBeGreaterThan(g - 1e-9);
+      for (const number of [...shape.values, ...shape.gradients, shape.tip, shape.opacity]) {
+        expect(number * STEPS).toBeCloseTo(Math.round(number * STEPS), 9);
+      }
+    }
+    expect(shapesOf(channelAfter(set(OWN, kept)))).toEqual(kept); // what lies on it stays
+  });
+});

@@ -1,0 +1,101 @@
+/**
+ * A channel's two-dimensional transfer functions as the state has them: what the bundle brought and
+ * what a user has made of it. Plain data and pure functions; see docs/transfer-functions.md.
+ */
+import { fromHex, toHex } from "../math/color";
+import {
+  faultOf,
+  LEAST_HEIGHT,
+  LEAST_WIDTH,
+  MAX_SHAPES,
+  type Range,
+  type Shape,
+  type Shapes,
+} from "./transfer_shapes";
+
+/** The function that a user's shapes make of a channel that is shown by a one-dimensional one. */
+export const OWN = "own";
+/**
+ * Places in the plane, opacities and softness are whole multiples of one part of so many, so that a
+ * link says them exactly: a quarter of the table's columns, two characters of base 36.
+ */
+export const STEPS = 1020;
+
+/** What `transfer2d.json` says of a channel. */
+export type Plane = Readonly<{
+  /** The step of intensity over two finest voxel spacings that is 1 to shapes. */
+  gradientMax: number;
+  functions: Readonly<Record<string, Shapes>>;
+}>;
+
+export type Functions = Readonly<{
+  transferFunction: string;
+  transferFunctions: readonly string[];
+  /** Of these, the bundle's two-dimensional ones. */
+  transferFunctions2d: readonly string[];
+  /** null: it has not come, as it is asked for only when something needs it. */
+  plane: Plane | null;
+  /** What the user has made of functions, by name. */
+  shapes: Readonly<Record<string, Shapes>>;
+}>;
+
+function own<T>(record: Readonly<Record<string, T>>, name: string): T | undefined {
+  return Object.hasOwn(record, name) ? record[name] : undefined;
+}
+
+/** The shapes of a function; none: it is one-dimensional, or the bundle's have not come. */
+export function shapesOf(functions: Functions, name = functions.transferFunction): Shapes {
+  const { shapes, plane } = functions;
+  return own(shapes, name) ?? (plane === null ? undefined : own(plane.functions, name)) ?? [];
+}
+
+/** Whether a function has shapes, also such as have not come. */
+export function isTwoD(functions: Functions, name = functions.transferFunction): boolean {
+  const made = own(functions.shapes, name);
+  return made === undefined
+    ? functions.transferFunctions2d.includes(name)
+    : made.length > 0 || name === OWN;
+}
+
+/** Whose shapes an editor changes: the chosen function's, if it has any, or those of one's own. */
+export function editedName(functions: Functions): string {
+  return isTwoD(functions) ? functions.transferFunction : OWN;
+}
+
+/** The functions with other shapes in one of them, which is chosen; the same if it can't be. */
+export function withShapes<F extends Functions>(functions: F, name: string, shapes: Shapes): F {
+  const { transferFunctions } = functions;
+  const isKnown = transferFunctions.includes(name);
+  if (!isKnown && name !== OWN) return functions;
+  const kept = shapes.map(onLattice).flatMap((shape) => shape ?? []);
+  return {
+    ...functions,
+    transferFunctions: isKnown ? transferFunctions : [...transferFunctions, name],
+    transferFunction: name,
+    shapes: { ...functions.shapes, [name]: kept.slice(0, MAX_SHAPES) },
+  };
+}
+
+const rounded = (x: number) => Math.round(x * STEPS) / STEPS;
+
+/** Rounded so that it still has its least size. */
+function roundedRange([low, high]: Range, least: number): Range {
+  const steps = Math.ceil(least * STEPS - 1e-9);
+  const from = Math.min(Math.round(low * STEPS), STEPS - steps);
+  const to = Math.max(Math.round(high * STEPS), from + steps);
+  return [from / STEPS, to / STEPS];
+}
+
+/** The shape in such numbers as a link says; null: it is none. */
+export function onLattice(shape: Shape): Shape | null {
+  if (faultOf(shape) !== null) return null;
+  return {
+    kind: shape.kind,
+    values: roundedRange(shape.values, LEAST_WIDTH),
+    gradients: roundedRange(shape.gradients, LEAST_HEIGHT),
+    tip: rounded(shape.tip),
+    color: fromHex(toHex(shape.color)),
+    opacity: rounded(shape.opacity),
+    softness: rounded(shape.softness),
+  };
+}

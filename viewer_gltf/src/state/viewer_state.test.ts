@@ -1,0 +1,310 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import type { Manifest } from "../bundle/generated/bundle";
+import {
+  drawnAs,
+  isInDisc,
+  type Nearby,
+  NOTHING_NEAR,
+  takenFrom,
+  wantedTiles,
+  wantsSurface,
+} from "./representation";
+import {
+  initialState,
+  LIMITS,
+  MAX_CHANNELS,
+  newNotice,
+  type Representation,
+  reduce,
+  type ViewerState,
+  VOLUME_TILES_AT_START,
+} from "./viewer_state";
+
+function unclear(given: Manifest, ...indices: number[]): Manifest {
+  const channels = given.channels.map((channel, i) =>
+    indices.includes(i) ? { ...channel, surface: "unclear" as const } : channel,
+  );
+  return { ...given, channels };
+}
+
+/** What the stage draws in the tiles of the row, from the left. */
+function staged(given: Manifest, representations: Readonly<Record<string, Representation>>) {
+  const [first, ...others] = given.tiles.map((each) => ({
+    ...each,
+    representation: representations[each.id] ?? each.representation,
+  }));
+  return { ...given, tiles: [first, ...others] } satisfies Manifest;
+}
+
+/** The tile in the middle, and a row of so many others beside it. */
+function withRow(given: Manifest, count: number, representation: Representation = "mesh") {
+  const middle = given.tiles[2];
+  const row = Array.from({ length: count }, (_, i): typeof middle => {
+    const x = 25 + 10 * (i - count / 2);
+    const bounds_um: typeof middle.bounds_um = { min: [x, -10, 0], max: [x + 10, 0, 8] };
+    return { id: `r1_c${i}`, representation, bounds_um };
+  });
+  return { ...given, tiles: [middle, ...row] } satisfies Manifest;
+}
+
+/** Within the switch distance, the first of them looked at. */
+const near = (...tiles: readonly string[]): Nearby => ({
+  gazed: tiles[0],
+  disc: tiles,
+  near: new Set(tiles),
+});
+
+/** The tiles in which any channel is a volume. */
+function marched(state: ViewerState, nearby: Nearby = NOTHING_NEAR): readonly string[] {
+  return wantedTiles(state, nearby).map(({ tile: id }) => id);
+}
+
+function find(state: ViewerState, channel: string, id: string) {
+  const c = state.channels.find((each) => each.id === channel);
+  const t = state.tiles.find((each) => each.id === id);
+  if (c === undefined || t === undefined) throw new Error(`no ${channel} in ${id}`);
+  return [c, t] as const;
+}
+
+/** How a channel is drawn in a tile once all has arrived. */
+function looks(state: ViewerState, channel: string, id: string, nearby = NOTHING_NEAR): string {
+  const [c, t] = find(state, channel, id);
+  const as = drawnAs(state, c, t, nearby);
+  return as === null ? "" : { mesh: "surface", volume: "volume", both: "surface + volume" }[as];
+}
+
+function after(state: ViewerState, ...actions: Parameters<typeof reduce>[1][]): ViewerState {
+  return actions.reduce(reduce, state);
+}
+
+describe("the viewer's state", () => {
+  it("opens with surfaces of the first channels, and volumes for what comes near", () => {
+    const state = initialState(sampleManifest(70));
+    expect(state.channels.filter((c) => c.shown)).toHaveLength(MAX_CHANNELS);
+    expect(state.channels[1].hasSurface).toBe(false);
+    expect(state.mode).toBe("disc");
+    expect(marched(state)).toEqual([]);
+    expect(marched(state, near("r0_c2", "r0_c1"))).toEqual(["r0_c2", "r0_c1"]);
+    expect(state.middle).toBe("r0_c2");
+  });
+
+  it("lets the channel that was shown longest leave for a fifth, which is no fault", () => {
+    const state = initialState(sampleManifest(7));
+    const five = reduce(state, { type: "show", channel: "c5", shown: true });
+    const shown = (each: ViewerState) => each.channels.filter((c) => c.shown).map((c) => c.id);
+    expect(shown(five)).toEqual(["c1", "c2", "c3", "c5"]);
+    expect(five.notices).toEqual([]);
+    const back = reduce(five, { type: "show", channel: "c0", shown: true });
+    expect(shown(back)).toEqual(["c0", "c2", "c3", "c5"]);
+    const room = after(
+      back,
+      { type: "show", channel: "c2", shown: false },
+      { type: "show", channel: "c6", shown: true },
+    );
+    expect(shown(room)).toEqual(["c0", "c3", "c5", "c6"]);
+    expect(reduce(state, { type: "show", channel: "c0", shown: true })).toBe(state);
+  });
+
+  it("opens channels without a clear surface as volumes in all tiles, and loads no surface", () => {
+    const state = initialState(unclear(sampleManifest(3), 0));
+    expect(marched(state)).toHaveLength(state.tiles.length);
+    expect(wantedTiles(state, NOTHING_NEAR)[0].channels).toEqual(["c0"]);
+    expect(wantsSurface(state, state.channels[0])).toBe(false);
+    expect(looks(state, "c0", "r0_c0")).toBe("volume");
+    expect(isInDisc(state, state.channels[0])).toBe(false);
+    expect(isInDisc(state, state.channels[2])).toBe(true);
+    expect(wantsSurface(state, state.channels[2])).toBe(true);
+    const asked = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
+    expect(looks(asked, "c0", "r0_c0")).toBe("surface");
+    const off = reduce(state, { type: "choose-mode", mode: "off" });
+    expect(looks(off, "c0", "r0_c0")).toBe("surface");
+    expect(wantsSurface(off, off.channels[0])).toBe(true);
+  });
+
+  it("opens a specimen of many tiles with the volumes of one", () => {
+    const many = unclear(sampleManifest(1), 0);
+    const state = initialState(withRow(many, VOLUME_TILES_AT_START));
+    expect(marched(state)).toEqual([state.middle]);
+    expect(marched(state, { ...near("r1_c0"), disc: [] })).toEqual(["r1_c0"]);
+    expect(marched(reduce(state, { type: "select", tile: "r1_c3" }))).toEqual(["r1_c3"]);
+  });
+
+  it("shows a volume in the gazed tile, the selected one, or in all", () => {
+    const gaze = near("r0_c1", "r0_c0", "r0_c2");
+    const state = reduce(initialState(sampleManifest(2)), { type: "choose-mode", mode: "tile" });
+    expect(marched(state)).toEqual([]);
+    expect(marched(state, gaze)).toEqual(["r0_c1"]);
+    const selected = reduce(state, { type: "select", tile: "r0_c2" });
+    expect(marched(selected, gaze)).toEqual(["r0_c2"]);
+    expect(marched(selected, near("r0_c1"))).toEqual([]); // it is too far away
+    expect(marched(reduce(state, { type: "choose-mode", mode: "all" }))).toHaveLength(
+      state.tiles.length,
+    );
+    expect(marched(reduce(state, { type: "choose-mode", mode: "off" }), gaze)).toEqual([]);
+    const none = after(
+      state,
+      { type: "show", channel: "c0", shown: false },
+      { type: "show", channel: "c1", shown: false },
+    );
+    expect(marched(none, gaze)).toEqual([]);
+  });
+
+  it("shows nothing but the isolated tile", () => {
+    const state = reduce(initialState(sampleManifest(2)), { type: "isolate", tile: "r0_c0" });
+    expect(looks(state, "c0", "r0_c0")).toBe("surface");
+    expect(looks(state, "c0", "r0_c1")).toBe("");
+    const all = reduce(state, { type: "choose-mode", mode: "all" });
+    expect(marched(all)).toEqual(["r0_c0"]);
+  });
+
+  it("takes from a surface what its volume shows, once that has come", () => {
+    const nearby = near("r0_c1");
+    const state = initialState(unclear(sampleManifest(3), 2));
+    const taken = (channel: string, id: string, presence: number) =>
+      takenFrom(state, ...find(state, channel, id), nearby, presence);
+    expect(taken("c0", "r0_c1", 0)).toBe(0);
+    expect(taken("c0", "r0_c1", 0.4)).toBe(0.4);
+    expect(taken("c0", "r0_c0", 0)).toBe(0);
+    expect(taken("c0", "r0_c0", 0.7)).toBe(0.7); // it fades out where it is no longer wanted
+    expect(taken("c2", "r0_c1", 0)).toBeNull();
+  });
+
+  it("keeps what is set within its limits", () => {
+    const state = initialState(sampleManifest(1));
+    const far = reduce(state, { type: "set-switch-distance", distance_m: 1e9 });
+    expect(far.switchDistance_m).toBe(LIMITS.switchDistance_m[1]);
+    const wide = reduce(state, { type: "set-disc-radius", radius_deg: -3 });
+    expect(wide.discRadius_deg).toBe(LIMITS.discRadius_deg[0]);
+    const set = after(
+      state,
+      { type: "fade", channel: "c0", opacity: 3 },
+      { type: "window", channel: "c0", window: [0.9, 0.2] },
+    );
+    const [{ opacity, window }] = set.channels;
+    expect(opacity).toBe(1);
+    expect(window[0]).toBe(0.9);
+    expect(window[1]).toBeGreaterThan(0.9);
+  });
+
+  it("ignores tiles and transfer functions that the bundle does not have", () => {
+    const state = initialState(sampleManifest(1));
+    expect(reduce(state, { type: "select", tile: "r9_c9" })).toBe(state);
+    const chosen = reduce(state, {
+      type: "choose-transfer-function",
+      channel: "c0",
+      name: "no such",
+    });
+    expect(chosen.channels[0].transferFunction).toBe("default");
+  });
+
+  it("says each fault once and forgets it when dismissed", () => {
+    const text = "channels/c0/r0_c0/lod0.glb: not found (404)";
+    const twice = after(
+      initialState(sampleManifest(1)),
+      { type: "notify", text },
+      { type: "notify", text },
+    );
+    expect(twice.notices).toEqual([text]);
+    expect(reduce(twice, { type: "dismiss", text }).notices).toEqual([]);
+    expect(reduce(twice, { type: "dismiss", text: "another" })).toBe(twice);
+  });
+
+  it("knows which notices another try may mend, until they are dismissed", () => {
+    const opened = initialState(sampleManifest(6));
+    const faulty = after(
+      opened,
+      { type: "notify", text: "a file is spoilt" },
+      { type: "notify", text: "no network", isMendable: true },
+    );
+    expect(faulty.mendable).toEqual(["no network"]);
+    expect(reduce(faulty, { type: "dismiss", text: "a file is spoilt" }).mendable).toEqual([
+      "no network",
+    ]);
+    expect(reduce(faulty, { type: "dismiss", text: "no network" }).mendable).toEqual([]);
+  });
+
+  it("tells which notice a change has brought, also once more", () => {
+    const brought = (before: ViewerState, action: Parameters<typeof reduce>[1]) =>
+      newNotice(before, reduce(before, action));
+    const faulty = after(
+      initialState(sampleManifest(6)),
+      { type: "notify", text: "a" },
+      { type: "notify", text: "b" },
+    );
+    expect(brought(faulty, { type: "notify", text: "c" })).toBe("c");
+    expect(brought(faulty, { type: "notify", text: "a" })).toBe("a");
+    expect(brought(faulty, { type: "notify", text: "b" })).toBe("b");
+    expect(brought(faulty, { type: "show", channel: "c4", shown: true })).toBeNull();
+    expect(brought(faulty, { type: "dismiss", text: "a" })).toBeNull();
+    expect(brought(faulty, { type: "fade", channel: "c0", opacity: 0.5 })).toBeNull();
+  });
+});
+
+describe("what the stage draws in a tile", () => {
+  const MIXED = { r0_c0: "volume", r0_c2: "both" } as const;
+
+  it("is what the viewer opens with, whatever the other tiles are", () => {
+    const state = initialState(staged(sampleManifest(3), MIXED));
+    expect(state.channels.every((c) => c.shown && c.volume)).toBe(true);
+    for (const channel of ["c0", "c2"]) {
+      expect(looks(state, channel, "r0_c0")).toBe("volume");
+      expect(looks(state, channel, "r0_c1")).toBe("surface");
+      expect(looks(state, channel, "r0_c2")).toBe("surface + volume");
+      expect(wantsSurface(state, state.channels[0])).toBe(true);
+    }
+    expect(marched(state)).toEqual(["r0_c0", "r0_c2"]);
+  });
+
+  it("leaves channels without a clear surface as volumes, and gives their surface to `both`", () => {
+    const state = initialState(staged(unclear(sampleManifest(3), 0), MIXED));
+    expect(looks(state, "c0", "r0_c0")).toBe("volume");
+    expect(looks(state, "c0", "r0_c1")).toBe("volume");
+    expect(looks(state, "c0", "r0_c2")).toBe("surface + volume");
+    expect(looks(state, "c2", "r0_c1")).toBe("surface");
+    expect(wantsSurface(state, state.channels[0])).toBe(true);
+    const without = initialState(staged(unclear(sampleManifest(3), 0), { r0_c0: "volume" }));
+    expect(wantsSurface(without, without.channels[0])).toBe(false);
+  });
+
+  it("gives way to what the user chooses", () => {
+    const state = initialState(staged(sampleManifest(3), MIXED));
+    const off = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
+    expect(looks(off, "c0", "r0_c0")).toBe("surface");
+    expect(looks(off, "c2", "r0_c0")).toBe("volume");
+
+    const all = reduce(state, { type: "choose-mode", mode: "all" });
+    for (const { id } of state.tiles) expect(looks(all, "c0", id)).toBe("volume");
+    const back = reduce(all, { type: "choose-mode", mode: "stage" });
+    expect(back).toEqual(state);
+  });
+
+  it("opens as volumes only so many tiles, from the middle, and says so", () => {
+    const many = unclear(sampleManifest(3), 2);
+    const state = initialState(withRow(many, VOLUME_TILES_AT_START + 4, "volume"));
+    const tilesOf = (channel: string) =>
+      wantedTiles(state, NOTHING_NEAR).filter(({ channels }) => channels.includes(channel));
+    expect(tilesOf("c0")).toHaveLength(VOLUME_TILES_AT_START);
+    expect(tilesOf("c0").map((each) => each.tile)).not.toContain("r1_c0");
+    expect(looks(state, "c0", "r1_c0")).toBe("surface");
+    // without a clear surface: there and in the middle tile
+    expect(new Set(tilesOf("c2").map((each) => each.tile))).toEqual(
+      new Set([...tilesOf("c0").map((each) => each.tile), state.middle]),
+    );
+    expect(state.notices).toEqual([
+      'The stage draws 20 tiles as volumes: the 16 in the middle are, "All" draws the rest.',
+    ]);
+  });
+});
+
+describe("the lamps", () => {
+  it("are shown when they are asked for, whatever becomes of the mode", () => {
+    const start = initialState(sampleManifest(3));
+    expect(start.areLampsShown).toBe(false);
+    const shown = reduce(start, { type: "show-lamps", areShown: true });
+    expect(shown).toEqual({ ...start, areLampsShown: true });
+    expect(reduce(shown, { type: "show-lamps", areShown: true })).toBe(shown);
+    expect(reduce(shown, { type: "choose-mode", mode: "off" }).areLampsShown).toBe(true);
+    expect(reduce(shown, { type: "show-lamps", areShown: false })).toEqual(start);
+  });
+});

@@ -1,0 +1,163 @@
+/** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
+import { type Camera, Group, Mesh, type Object3D, ShaderMaterial } from "three";
+import type { ShownSurface } from "../annotations/probe";
+import type { Bundle } from "../bundle/load";
+import { surfaceColor } from "../math/color";
+import {
+  isInDisc,
+  type Nearby,
+  NOTHING_NEAR,
+  takenFrom,
+  wantsSurface,
+} from "../state/representation";
+import type { ViewerState } from "../state/viewer_state";
+import type { SurfaceFrame } from "./blend_material";
+import type { SurfaceLoader } from "./gltf_loader";
+import { overview, type Progress } from "./overview_progress";
+import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
+
+/** Screen-space error, in pixels, down to which LODs are refined where frames come in time. */
+export const ERROR_TARGET_PX = 2;
+
+export class SurfaceSet {
+  /** In um, world. */
+  readonly group = new Group();
+  private readonly tilesets = new Map<string, SurfaceTileset>();
+  private state: ViewerState | null = null;
+  private nearby: Nearby = NOTHING_NEAR;
+  /** Whether the first picture is whole. */
+  private hasBegun = false;
+  private errorTarget_px = ERROR_TARGET_PX;
+
+  constructor(
+    private readonly bundle: Bundle,
+    private readonly loader: SurfaceLoader,
+    private readonly frame: SurfaceFrame,
+    /** Of the GPU's memory, for all channels. */
+    private readonly bytes: number,
+    /** How far the volume of a tile and channel has faded in, 0..1. */
+    private readonly presence: (tile: string, channel: string) => number,
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {}
+
+  get overview(): Progress {
+    return overview(this.shown().map(([, tileset]) => tileset.progress));
+  }
+
+  /** Whether one channel shows all tiles. */
+  get hasFirst(): boolean {
+    const [first] = this.shown();
+    return first === undefined || overview([first[1].progress]).isComplete;
+  }
+
+  get isLoading(): boolean {
+    return this.shown().some(([, tileset]) => tileset.isLoading);
+  }
+
+  get triangles(): number {
+    return this.shown().reduce((sum, [, tileset]) => sum + tileset.triangles, 0);
+  }
+
+  retryFailed(): void {
+    for (const [, tileset] of this.shown()) tileset.retryFailed();
+  }
+
+  setErrorTarget(pixels: number): void {
+    this.errorTarget_px = pixels;
+  }
+
+  /** Those that are not opaque now. */
+  get blended(): readonly Object3D[] {
+    return this.shown().flatMap(([, { surfaces }]) =>
+      [...surfaces.values()].flatMap(({ scene, blend }) => (blend.isBlended ? [scene] : [])),
+    );
+  }
+
+  /** The meshes on screen, but for those that write depth alone. */
+  get meshes(): readonly ShownSurface[] {
+    const found: ShownSurface[] = [];
+    for (const [channel, { drawn }] of this.shown()) {
+      for (const { scene, tile } of drawn) {
+        scene.traverse((object) => {
+          if (!(object instanceof Mesh) || object.material instanceof ShaderMaterial) return;
+          found.push({ mesh: object, tile, channel });
+        });
+      }
+    }
+    return found;
+  }
+
+  /** Volumes came, went, or fade. */
+  dressAll(): void {
+    for (const [id, { surfaces }] of this.shown()) {
+      for (const surface of surfaces.values()) this.dress(id, surface);
+    }
+  }
+
+  follow(state: ViewerState, nearby: Nearby): void {
+    this.state = state;
+    this.nearby = nearby;
+    for (const channel of state.channels) {
+      const isWanted = wantsSurface(state, channel);
+      if (isWanted && channel.hasSurface && !this.tilesets.has(channel.id)) this.add(channel.id);
+      const tileset = this.tilesets.get(channel.id);
+      if (tileset === undefined) continue;
+      tileset.show(isWanted);
+      for (const surface of tileset.surfaces.values()) this.dress(channel.id, surface);
+    }
+  }
+
+  update(camera: Camera, width_px: number, height_px: number): void {
+    const isComplete = this.overview.isComplete;
+    for (const [, tileset] of this.shown()) {
+      if (isComplete) tileset.refine(this.errorTarget_px);
+      tileset.update(camera, width_px, height_px);
+      // one channel after another: the first shows all tiles the sooner
+      if (!this.hasBegun && !overview([tileset.progress]).isComplete) break;
+    }
+    this.hasBegun ||= isComplete;
+  }
+
+  private shown(): [string, SurfaceTileset][] {
+    return [...this.tilesets].filter(([, tileset]) => tileset.isShown);
+  }
+
+  private add(id: string): void {
+    const channel = this.bundle.manifest.channels.find((c) => c.id === id);
+    if (channel === undefined) throw new Error(`the bundle has no channel ${id}`);
+    const tileset = new SurfaceTileset(
+      this.bundle.base,
+      channel,
+      this.loader,
+      this.frame,
+      this.bytes,
+      (surface) => this.dress(id, surface),
+      this.onChange,
+      this.onError,
+    );
+    this.tilesets.set(id, tileset);
+    this.group.add(tileset.group);
+  }
+
+  /** Colour and visibility of one loaded surface, by the state. */
+  private dress(id: string, surface: Surface): void {
+    const { state } = this;
+    const channel = state?.channels.find((c) => c.id === id);
+    const tile = state?.tiles.find((each) => each.id === surface.tile);
+    if (state === null || channel === undefined || tile === undefined) return;
+    const presence = this.presence(tile.id, id);
+    const taken = takenFrom(state, channel, tile, this.nearby, presence);
+    surface.blend.set({
+      opacity: taken === null ? 0 : channel.opacity,
+      taken: taken ?? 0,
+      isInDisc: isInDisc(state, channel),
+    });
+    paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
+  }
+
+  dispose(): void {
+    for (const tileset of this.tilesets.values()) tileset.dispose();
+    this.tilesets.clear();
+  }
+}

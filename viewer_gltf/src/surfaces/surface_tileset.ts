@@ -1,0 +1,235 @@
+/**
+ * The surfaces of one channel, streamed by 3d-tiles-renderer.
+ *
+ * The tileset is in metres and z-up (3D Tiles 1.1); 3d-tiles-renderer turns the glTF content, which
+ * is y-up, into that space. `group` turns it back and into um, so that its parent is the stage's
+ * world.
+ */
+import { TilesRenderer } from "3d-tiles-renderer";
+import type { Tile } from "3d-tiles-renderer/core";
+import {
+  type Camera,
+  Color,
+  DoubleSide,
+  Group,
+  type Material,
+  Mesh,
+  MeshStandardMaterial,
+  type Object3D,
+} from "three";
+import { BundleError } from "../bundle/errors";
+import type { Channel } from "../bundle/generated/bundle";
+import type { Rgb } from "../math/color";
+import { BlendedSurface, type SurfaceFrame } from "./blend_material";
+import { branchOf, leaveOut, putBack } from "./failed_branch";
+import { TilesetFiles } from "./fetch_content";
+import type { SurfaceLoader } from "./gltf_loader";
+import type { TileProgress } from "./overview_progress";
+
+const UM_PER_METRE = 1e6;
+/** The root holds no content; below it lie the tiles' coarsest LODs. */
+const DEPTH_OF_COARSEST = 1;
+/** What is left of a full cache after hidden surfaces were dropped. */
+const KEPT_SHARE = 0.75;
+
+export type Surface = Readonly<{
+  scene: Object3D;
+  tile: string;
+  materials: readonly MeshStandardMaterial[];
+  /** Linear, as the glb has it. */
+  colors: readonly Rgb[];
+  triangles: number;
+  blend: BlendedSurface;
+}>;
+
+export class SurfaceTileset {
+  readonly group = new Group();
+  readonly surfaces = new Map<Object3D, Surface>();
+  private readonly tiles: TilesRenderer;
+  private total: number | null = null;
+  /** Coarsest tiles that have been loaded or given up. */
+  private readonly done = new Set<Tile>();
+  private readonly failed = new Set<Tile>();
+
+  constructor(
+    base: string,
+    channel: Channel,
+    loader: SurfaceLoader,
+    private readonly frame: SurfaceFrame,
+    bytes: number,
+    private readonly onSurface: (surface: Surface) => void,
+    private readonly onChange: () => void,
+    onError: (error: unknown) => void,
+  ) {
+    if (channel.tileset === null) throw new Error(`channel ${channel.id} has no surface`);
+    const files = new TilesetFiles(base, channel.tileset);
+    this.tiles = new TilesRenderer(files.root);
+    this.tiles.lruCache.maxBytesSize = bytes;
+    this.tiles.lruCache.minBytesSize = KEPT_SHARE * bytes;
+    this.tiles.maxDepth = DEPTH_OF_COARSEST + 1;
+    this.tiles.manager.addHandler(/\.(gltf|glb)$/, loader.gltf);
+    this.tiles.registerPlugin({
+      name: "STEREOCELL_BUNDLE",
+      fetchData: (url: string, { signal }: RequestInit) => files.fetch(url, signal),
+      // Before the renderer puts its own `tile` into every userData.
+      processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
+    });
+    this.tiles.addEventListener("load-root-tileset", () => {
+      const coarsest = this.tiles.root?.children ?? [];
+      this.total = coarsest.filter((tile) => tile.content !== undefined).length;
+      this.onChange();
+    });
+    this.tiles.addEventListener("load-model", ({ tile }) => this.count(tile));
+    this.tiles.addEventListener("load-error", ({ tile, error, url }) => {
+      if (tile === null) this.total = 0;
+      else this.giveUp(tile);
+      onError(
+        error instanceof BundleError
+          ? error
+          : new BundleError(
+              `${files.nameOf(String(url))}: the surface can't be read: ${error.message}`,
+              { cause: error },
+            ),
+      );
+    });
+    this.tiles.addEventListener("dispose-model", ({ scene }) => {
+      this.surfaces.get(scene)?.blend.dispose();
+      this.surfaces.delete(scene);
+    });
+    this.tiles.addEventListener("needs-update", this.onChange);
+    this.tiles.addEventListener("tile-visibility-change", this.onChange);
+
+    this.tiles.group.rotation.x = -Math.PI / 2;
+    this.tiles.group.scale.setScalar(UM_PER_METRE);
+    this.group.name = `surfaces of ${channel.id}`;
+    this.group.add(this.tiles.group);
+  }
+
+  get isShown(): boolean {
+    return this.group.visible;
+  }
+
+  /** A hidden tileset gives its memory up where another needs it; a shown one tries all again. */
+  show(isShown: boolean): void {
+    if (isShown === this.group.visible) return;
+    this.group.visible = isShown;
+    if (isShown) {
+      this.retryFailed();
+      return;
+    }
+    const { lruCache } = this.tiles;
+    const release = (tile: object) => {
+      lruCache.markUnused(tile);
+      return false;
+    };
+    this.tiles.traverse(release, null);
+    lruCache.scheduleUnload();
+  }
+
+  get progress(): TileProgress {
+    return { total: this.total, done: this.done.size };
+  }
+
+  get isLoading(): boolean {
+    const { downloadQueue, parseQueue, processNodeQueue } = this.tiles;
+    return (
+      this.total === null || downloadQueue.running || parseQueue.running || processNodeQueue.running
+    );
+  }
+
+  /** Those on screen. */
+  get drawn(): readonly Surface[] {
+    return [...this.surfaces.values()].filter(
+      ({ scene }) => scene.visible && this.tiles.group.children.includes(scene),
+    );
+  }
+
+  /** Triangles on screen. */
+  get triangles(): number {
+    return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
+  }
+
+  /** Go on to finer LODs, by screen-space error: `errorTarget_px` pixels. */
+  refine(errorTarget_px: number): void {
+    this.tiles.maxDepth = Number.POSITIVE_INFINITY;
+    this.tiles.errorTarget = errorTarget_px;
+  }
+
+  update(camera: Camera, width_px: number, height_px: number): void {
+    for (const other of [...this.tiles.cameras]) {
+      if (other !== camera) this.tiles.deleteCamera(other);
+    }
+    this.tiles.setCamera(camera);
+    this.tiles.setResolution(camera, width_px, height_px);
+    this.tiles.update();
+  }
+
+  /**
+   * The renderer draws a failed tile as a hole in place of its parent: without the failed child the
+   * parent stays. The coarsest have no parent to show; their finer LODs may still come.
+   */
+  private giveUp(tile: Tile): void {
+    this.failed.add(tile);
+    const branch = branchOf(tile);
+    if (branch.internal.depth > DEPTH_OF_COARSEST) leaveOut(branch);
+    this.count(tile);
+  }
+
+  /** What was given up is loaded anew where it is needed. */
+  retryFailed(): void {
+    if (this.tiles.root === null) this.total = null;
+    for (const tile of this.failed) {
+      putBack(branchOf(tile));
+      this.tiles.lruCache.remove(tile); // makes it a tile that was never loaded
+    }
+    this.failed.clear();
+    this.tiles.resetFailedTiles(); // the root
+  }
+
+  private count(tile: Tile): void {
+    if (tile.internal.depth === DEPTH_OF_COARSEST) this.done.add(tile);
+    this.onChange();
+  }
+
+  private adopt(scene: Object3D, tile: Tile): void {
+    const materials = new Set<MeshStandardMaterial>();
+    let id: string | null = null;
+    let triangles = 0;
+    scene.traverse((object) => {
+      if (typeof object.userData.tile === "string") id = object.userData.tile;
+      if (!(object instanceof Mesh)) return;
+      triangles += (object.geometry.index ?? object.geometry.attributes.position).count / 3;
+      for (const material of [object.material].flat() as Material[]) {
+        if (material instanceof MeshStandardMaterial) materials.add(material);
+      }
+    });
+    if (id === null) {
+      throw new BundleError(`${tile.content?.uri}: expected extras.tile with the tile's id`);
+    }
+    for (const material of materials) material.side = DoubleSide; // cut open at the tile's border
+    const list = [...materials];
+    const surface = {
+      scene,
+      tile: id,
+      materials: list,
+      colors: list.map(({ color }) => [color.r, color.g, color.b] as const),
+      triangles,
+      blend: new BlendedSurface(scene, list, this.frame),
+    };
+    this.surfaces.set(scene, surface);
+    this.onSurface(surface);
+  }
+
+  dispose(): void {
+    this.tiles.dispose();
+    this.group.removeFromParent();
+    this.surfaces.clear();
+  }
+}
+
+/** Paint a surface; the colour is linear. */
+export function paint(surface: Surface, colorOf: (glb: Rgb) => Rgb): void {
+  surface.materials.forEach((material, i) => {
+    material.color = new Color(...colorOf(surface.colors[i]));
+  });
+}

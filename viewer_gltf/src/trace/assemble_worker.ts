@@ -1,7 +1,0 @@
-/** Module worker: puts tiles together, off the thread that draws. See `medium.ts`. */
-import { type AssembleRequest, assemble } from "./assemble";
-
-self.addEventListener("message", ({ data }: MessageEvent<AssembleRequest>) => {
-  const made = assemble(data);
-  self.postMessage(made, { transfer: [made.texels.buffer, ...made.bricks.map((b) => b.buffer)] });
-});

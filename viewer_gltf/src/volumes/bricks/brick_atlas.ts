@@ -1,0 +1,265 @@
+/**
+ * The volumes of one tile as bricks that come by view: an atlas of bricks, and of every cell of 16^3
+ * texels where in the atlas it is to be found (virtual texturing). Stands in for `TileTexture`.
+ */
+import {
+  ClampToEdgeWrapping,
+  Data3DTexture,
+  LinearFilter,
+  NearestFilter,
+  RedFormat,
+  RGBAIntegerFormat,
+  UnsignedByteType,
+} from "three";
+import { brickCounts } from "../bricks8";
+import type { Packed } from "../tile_texture";
+import type { VolumeSource } from "../volume_source";
+import type { Brick, BrickLink, Taker } from "./client";
+import { drawnNodes, NOTHING, rangesOf, STORED, STORED_BYTES, type Table } from "./tree";
+
+/** Slots along an edge of an atlas: a byte tells one. */
+const MOST_SLOTS = 254;
+/** What came is shown so often: tables of leaps are made anew each time. */
+const SHOW_EVERY_MS = 250;
+/** A cell that is the same throughout. */
+const UNIFORM = 255;
+
+type Tree = {
+  readonly taker: Taker;
+  table: Table | null;
+  present: Uint8Array;
+  /** Of each node that has come: its slot. */
+  readonly slots: Map<number, number>;
+  /** What came before the atlas was made. */
+  waiting: Brick[];
+};
+
+/** Copies a brick into an atlas, on the GPU. */
+export type Uploader = (atlas: Data3DTexture, slot: readonly number[], texels: Uint8Array) => void;
+
+export class BrickTile {
+  shown: Packed | null = null;
+  readonly old = null;
+  readonly fresh = 1;
+
+  private sources: ReadonlyMap<string, VolumeSource> = new Map();
+  private readonly trees = new Map<string, Tree>();
+  private atlas: Data3DTexture | null = null;
+  private index: Data3DTexture | null = null;
+  private side: readonly [number, number, number] = [0, 0, 0];
+  private used = 0;
+  /** Nodes of this level and coarser have room in the atlas. */
+  private finest = 0;
+  private isStale = false;
+  private shown_ms = 0;
+  private isDisposed = false;
+
+  constructor(
+    private readonly tile: string,
+    private readonly link: BrickLink,
+    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private readonly upload: Uploader,
+    private readonly onChange: () => void,
+    /** It can't be had as bricks. */
+    private readonly onRefused: () => void,
+  ) {}
+
+  get isLoading(): boolean {
+    const isComing = this.shown === null && this.trees.size > 0;
+    return this.link.isBusy || this.isStale || isComing;
+  }
+
+  get bytes(): number {
+    const [x, y, z] = this.side;
+    return x * y * z * STORED_BYTES;
+  }
+
+  get kept(): ReadonlyMap<string, VolumeSource> {
+    return this.sources;
+  }
+
+  hasFailed(): boolean {
+    return false; // whole tiles are refused
+  }
+
+  retryFailed(): void {}
+
+  /** Of each channel: what is left out can't be seen if nothing up to this intensity shows. */
+  get thresholds(): readonly number[] {
+    return [...this.trees.values()].map(({ table }) => table?.threshold ?? -1);
+  }
+
+  /** All levels come by view. */
+  want(
+    sources: ReadonlyMap<string, VolumeSource>,
+    _levels?: readonly number[],
+    _finest?: number,
+  ): void {
+    this.sources = sources;
+    const isSame =
+      this.trees.size === sources.size && [...sources.keys()].every((id) => this.trees.has(id));
+    if (isSame) return;
+    this.closeAll();
+    for (const [id, { volume }] of sources) {
+      const taker: Taker = {
+        onTable: (table) => this.begin(id, taker, table),
+        onBricks: (bricks) => this.take(id, taker, bricks),
+        // what has come stays when the connection goes
+        onRefused: () => {
+          if (this.shown === null) this.onRefused();
+        },
+      };
+      const tree: Tree = { taker, table: null, present: NONE, slots: new Map(), waiting: [] };
+      this.trees.set(id, tree);
+      this.link.open(this.tile, id, volume.file.sha256, taker);
+    }
+  }
+
+  /** Show what has come since, now and then; whether more is to be shown. */
+  advance(_dt_s: number, now_ms = performance.now()): boolean {
+    if (!this.isStale) return false;
+    if (now_ms - this.shown_ms < SHOW_EVERY_MS) return true;
+    this.shown_ms = now_ms;
+    this.isStale = false;
+    this.pack();
+    return false;
+  }
+
+  private treeOf(id: string, taker: Taker): Tree | null {
+    const tree = this.trees.get(id);
+    return tree?.taker === taker ? tree : null;
+  }
+
+  private begin(id: string, taker: Taker, table: Table): void {
+    const tree = this.treeOf(id, taker);
+    if (tree === null) return;
+    if (tree.table !== null) {
+      // on a new connection: of the same volume all is here, of another nothing is
+      if (tree.table.nodes[0]?.hash !== table.nodes[0]?.hash) this.onRefused();
+      return;
+    }
+    tree.table = table;
+    tree.present = new Uint8Array(table.nodes.length);
+    const tables = [...this.trees.values()].map((each) => each.table);
+    if (tables.includes(null)) return;
+    this.makeAtlas(tables.flatMap((each) => each ?? []));
+    for (const each of this.trees.values()) this.place(each, each.waiting.splice(0));
+    this.isStale = true;
+    this.onChange();
+  }
+
+  private makeAtlas(tables: readonly Table[]): void {
+    const most = Math.floor(this.limits.bytes / STORED_BYTES);
+    const longest = Math.min(MOST_SLOTS, Math.floor(this.limits.side / STORED));
+    const countFrom = (level: number) =>
+      tables.reduce(
+        (sum, { nodes }) => sum + nodes.filter((n) => !n.isEmpty && n.level >= level).length,
+        0,
+      );
+    this.finest = 0;
+    while (countFrom(this.finest) > Math.min(most, longest ** 3)) this.finest++;
+    const count = Math.max(1, countFrom(this.finest));
+    const x = Math.min(longest, Math.ceil(Math.cbrt(count)));
+    const y = Math.min(longest, Math.ceil(Math.sqrt(count / x)));
+    this.side = [x, y, Math.ceil(count / (x * y))];
+    const [w, h, d] = this.side.map((n) => n * STORED);
+    this.atlas = new Data3DTexture(null, w, h, d);
+    this.atlas.format = RedFormat;
+    this.atlas.type = UnsignedByteType;
+    this.atlas.minFilter = this.atlas.magFilter = LinearFilter;
+    this.atlas.wrapS = this.atlas.wrapT = this.atlas.wrapR = ClampToEdgeWrapping;
+    this.atlas.unpackAlignment = 1;
+    this.atlas.source.dataReady = false; // bricks are put into it one by one
+    this.atlas.needsUpdate = true;
+    const [cx, cy, cz] = tables[0].cells;
+    const cells = new Uint8Array(4 * cx * cy * cz * tables.length);
+    this.index = new Data3DTexture(cells, cx, cy, cz * tables.length);
+    this.index.format = RGBAIntegerFormat;
+    this.index.internalFormat = "RGBA8UI";
+    this.index.type = UnsignedByteType;
+    this.index.minFilter = this.index.magFilter = NearestFilter;
+    this.index.unpackAlignment = 4;
+  }
+
+  private take(id: string, taker: Taker, bricks: readonly Brick[]): void {
+    const tree = this.treeOf(id, taker);
+    if (tree === null) return;
+    if (this.atlas === null) tree.waiting.push(...bricks);
+    else this.place(tree, bricks);
+    this.isStale = true;
+    this.onChange();
+  }
+
+  private place(tree: Tree, bricks: readonly Brick[]): void {
+    if (this.atlas === null || tree.table === null) return;
+    for (const { node, texels } of bricks) {
+      const known = tree.table.nodes[node];
+      if (known === undefined || known.level < this.finest || tree.slots.has(node)) continue;
+      const slot = this.used++;
+      tree.slots.set(node, slot);
+      tree.present[node] = 1;
+      const at = this.slotAt(slot).map((v) => v * STORED);
+      this.upload(this.atlas, at, texels);
+    }
+  }
+
+  private slotAt(slot: number): readonly [number, number, number] {
+    const [x, y] = this.side;
+    return [slot % x, Math.floor(slot / x) % y, Math.floor(slot / (x * y))];
+  }
+
+  /** The index, and the ranges of what is drawn. */
+  private pack(): void {
+    const { atlas, index } = this;
+    if (atlas === null || index === null) return;
+    const cells = index.image.data as Uint8Array;
+    const ids = [...this.trees.keys()];
+    const bricks: Uint8Array[] = [];
+    let isWhole = true;
+    let level = Number.POSITIVE_INFINITY;
+    let to = 0;
+    for (const { table, present, slots } of this.trees.values()) {
+      if (table === null) return;
+      const drawn = drawnNodes(table, present);
+      for (const node of drawn) {
+        if (node === NOTHING) {
+          isWhole = false;
+          cells.set([0, 0, 0, UNIFORM], to);
+        } else if (table.nodes[node].isEmpty) {
+          cells.set([table.nodes[node].constant, 0, 0, UNIFORM], to);
+        } else {
+          cells.set(this.slotAt(slots.get(node) ?? 0), to);
+          cells[to + 3] = table.nodes[node].level;
+          level = Math.min(level, table.nodes[node].level);
+        }
+        to += 4;
+      }
+      bricks.push(rangesOf(table, drawn, brickCounts(table.size)));
+    }
+    if (!isWhole) return; // the root of each comes first, and soon
+    index.needsUpdate = true;
+    const finest = Number.isFinite(level) ? level : 0;
+    this.shown = { channels: ids, level: finest, texture: atlas, bricks, index };
+    this.onChange();
+  }
+
+  private closeAll(): void {
+    for (const [id, { taker }] of this.trees) this.link.close(this.tile, id, taker);
+    this.trees.clear();
+    this.atlas?.dispose();
+    this.index?.dispose();
+    this.atlas = this.index = null;
+    this.side = [0, 0, 0];
+    this.used = 0;
+    this.isStale = false;
+    this.shown = null;
+  }
+
+  dispose(): void {
+    if (this.isDisposed) return;
+    this.isDisposed = true;
+    this.closeAll();
+  }
+}
+
+const NONE = new Uint8Array(0);

@@ -1,0 +1,128 @@
+/** The thread that draws, and its worker for `/bricks`: what they say to one another. */
+import { TemporaryError } from "../../bundle/errors";
+import type { BrickView } from "./protocol";
+import { parseTable, STORED_BYTES, type Table } from "./tree";
+
+export type LinkAsk =
+  | Readonly<{ type: "connect"; address: string }>
+  | Readonly<{ type: "open"; tile: string; channel: string; source: string }>
+  | (Readonly<{ type: "view"; texel_px: number; budget: number }> & BrickView);
+
+export type LinkTold =
+  | Readonly<{ type: "tree"; tile: string; channel: string; table: Uint8Array<ArrayBuffer> }>
+  | Readonly<{
+      type: "bricks";
+      tile: string;
+      channel: string;
+      nodes: Uint32Array<ArrayBuffer>;
+      /** 18^3 bytes for each node. */
+      texels: Uint8Array<ArrayBuffer>;
+    }>
+  | Readonly<{ type: "done" }>
+  | Readonly<{ type: "refused"; tile: string; channel: string; text: string }>
+  /** The answer could not be read; the connection begins anew. */
+  | Readonly<{ type: "fault"; text: string }>
+  /** No connection any more. */
+  | Readonly<{ type: "lost"; reason: string }>;
+
+export type Brick = Readonly<{ node: number; texels: Uint8Array<ArrayBuffer> }>;
+
+/** Whoever draws one volume. */
+export type Taker = Readonly<{
+  onTable: (table: Table) => void;
+  onBricks: (bricks: readonly Brick[]) => void;
+  onRefused: (text: string) => void;
+}>;
+
+/** A view that is asked for again and again: not more often. */
+const VIEW_EVERY_MS = 200;
+/** Bytes of bricks that one view may bring: what is most wrong comes first. */
+const BUDGET_BYTES = 64 * 1024 * 1024;
+/** A texel may be so long on the screen before finer ones are asked for. */
+const TEXEL_PX = 1;
+
+export class BrickLink {
+  isBusy = false;
+  private readonly worker: Worker;
+  private readonly takers = new Map<string, Taker>();
+  private last = "";
+  private asked_ms = 0;
+  /** Whether there is a connection, or may be one again. */
+  isOpen = true;
+
+  /** @param address of the websocket */
+  constructor(
+    address: string,
+    private readonly onDone: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {
+    this.worker = new Worker(new URL("./client_worker.ts", import.meta.url), { type: "module" });
+    this.worker.addEventListener("message", ({ data }: MessageEvent<LinkTold>) => this.hear(data));
+    this.post({ type: "connect", address });
+  }
+
+  /** Take what comes of a volume, from the start: also what came before. */
+  open(tile: string, channel: string, source: string, taker: Taker): void {
+    this.takers.set(`${tile}/${channel}`, taker);
+    this.isBusy = true;
+    this.last = ""; // the same view then asks for more
+    this.post({ type: "open", tile, channel, source });
+  }
+
+  close(tile: string, channel: string, taker: Taker): void {
+    const name = `${tile}/${channel}`;
+    if (this.takers.get(name) === taker) this.takers.delete(name);
+  }
+
+  /** What is looked at now; to be called in every frame. */
+  look(view: BrickView, now_ms: number): void {
+    if (!this.isOpen || this.takers.size === 0 || now_ms - this.asked_ms < VIEW_EVERY_MS) return;
+    const text = JSON.stringify(view);
+    if (text === this.last) return;
+    this.last = text;
+    this.asked_ms = now_ms;
+    this.isBusy = true;
+    this.post({ type: "view", texel_px: TEXEL_PX, budget: BUDGET_BYTES, ...view });
+  }
+
+  private hear(told: LinkTold): void {
+    switch (told.type) {
+      case "tree": {
+        const name = `${told.tile}/${told.channel}`;
+        this.takers.get(name)?.onTable(parseTable(told.table, `/bricks: ${name}`));
+        break;
+      }
+      case "bricks": {
+        const bricks = Array.from(told.nodes, (node, i) => ({
+          node,
+          texels: told.texels.subarray(i * STORED_BYTES, (i + 1) * STORED_BYTES),
+        }));
+        this.takers.get(`${told.tile}/${told.channel}`)?.onBricks(bricks);
+        break;
+      }
+      case "done":
+        this.isBusy = false;
+        this.onDone();
+        break;
+      case "refused":
+        this.takers.get(`${told.tile}/${told.channel}`)?.onRefused(told.text);
+        break;
+      case "fault":
+        this.onError(new TemporaryError(told.text, { notice: told.text }));
+        break;
+      case "lost":
+        this.isOpen = this.isBusy = false;
+        for (const taker of this.takers.values()) taker.onRefused("the connection was lost");
+        break;
+    }
+  }
+
+  private post(ask: LinkAsk): void {
+    this.worker.postMessage(ask);
+  }
+
+  dispose(): void {
+    this.worker.terminate();
+    this.takers.clear();
+  }
+}

@@ -1,0 +1,97 @@
+/**
+ * Asks the worker for tables of leaps. Dragging a transfer function asks faster than anyone needs
+ * the answers, so of each key (a tile) only the latest request counts: the worker has one request
+ * at a time, and those that wait are overtaken here.
+ */
+import type { OccupancyRequest } from "./empty_space";
+
+/** What of a Worker is used, so that tests need none. */
+export type OccupancyPort = Pick<
+  Worker,
+  "postMessage" | "terminate" | "onmessage" | "onerror" | "onmessageerror"
+>;
+
+type Job = Readonly<{
+  key: string;
+  request: OccupancyRequest;
+  resolve: (distances: Uint8Array<ArrayBuffer> | null) => void;
+  reject: (error: Error) => void;
+}>;
+
+export function startOccupancyWorker(): Worker {
+  return new Worker(new URL("./empty_space_worker.ts", import.meta.url), { type: "module" });
+}
+
+export class OccupancyClient {
+  private readonly port: OccupancyPort;
+  private readonly waiting = new Map<string, Job>();
+  private running: Job | null = null;
+  private isDisposed = false;
+  /** Why no worker answers any more: its script did not load. */
+  private fault: Error | null = null;
+
+  constructor(start: () => OccupancyPort = startOccupancyWorker) {
+    this.port = start();
+    this.port.onmessage = ({ data }: MessageEvent<Uint8Array<ArrayBuffer>>) => {
+      const job = this.running;
+      if (job !== null) job.resolve(this.waiting.has(job.key) ? null : data);
+      this.next();
+    };
+    this.port.onerror = (event) => {
+      event.preventDefault(); // told through the promise, so not once more to the console
+      if (event.message) this.fail(event.message);
+      else this.giveUp("the worker's script did not load");
+    };
+    this.port.onmessageerror = () => this.fail("its answer can't be read");
+  }
+
+  /**
+   * The distances of `brickDistances`; null if a newer request of the same key has overtaken this
+   * one, or the client was disposed of. The request's arrays are copied, not taken. Rejects if the
+   * arrays don't fit each other or the worker can't run.
+   */
+  computeDistances(
+    key: string,
+    request: OccupancyRequest,
+  ): Promise<Uint8Array<ArrayBuffer> | null> {
+    if (this.isDisposed) return Promise.resolve(null);
+    if (this.fault !== null) return Promise.reject(this.fault);
+    return new Promise((resolve, reject) => {
+      this.waiting.get(key)?.resolve(null);
+      this.waiting.delete(key); // the newest goes to the end: no key starves another
+      this.waiting.set(key, { key, request, resolve, reject });
+      if (this.running === null) this.next();
+    });
+  }
+
+  private next(): void {
+    this.running = null;
+    const [job] = this.waiting.values();
+    if (job === undefined) return;
+    this.waiting.delete(job.key);
+    this.running = job;
+    this.port.postMessage(job.request);
+  }
+
+  private fail(reason: string): void {
+    this.running?.reject(new Error(`the table of leaps could not be made: ${reason}`));
+    this.next();
+  }
+
+  private giveUp(reason: string): void {
+    this.fault = new Error(`no table of leaps can be made: ${reason}`);
+    this.running?.reject(this.fault);
+    for (const job of this.waiting.values()) job.reject(this.fault);
+    this.waiting.clear();
+    this.running = null;
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    this.port.terminate();
+    this.running?.resolve(null);
+    for (const job of this.waiting.values()) job.resolve(null);
+    this.waiting.clear();
+    this.running = null;
+  }
+}

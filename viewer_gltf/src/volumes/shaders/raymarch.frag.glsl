@@ -1,0 +1,190 @@
+// March the volume of one tile, up to CHANNELS channels together, front to back. What lies in front
+// of the nearest translucent surface, a pane, and what lies behind it come out apart: the pane itself
+// is drawn between them.
+// Space of the ray: um from the box's low corner, y up, so anisotropic voxels need no care.
+// After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
+precision highp float;
+precision highp sampler3D;
+precision highp sampler2DArray;
+precision highp usampler3D;
+
+uniform vec3 uSize;  // um
+uniform vec3 uTexLow;  // texture coordinates at the box's low corner ...
+uniform vec3 uTexHigh;  // ... and at its high corner
+uniform vec3 uTexels;  // of mip level 0
+uniform float uVoxel;  // um: the opacities of the transfer functions hold for a path this long
+uniform float uMinStep;  // um
+uniform vec4 uFloor;  // intensities of each channel up to which its table shows nothing
+uniform int uSteps;  // for the whole ray, at most MAX_STEPS
+uniform int uSpare;  // of these, one for each other tile
+uniform vec3 uAllLow;  // um, the same space: the box around all tiles that are marched ...
+uniform vec3 uAllHigh;  // ... which share the ray's steps by length
+uniform float uBrickSlack;  // bricks by which a coarse mip level smears beyond its brick
+uniform vec3 uColor[CHANNELS];  // linear RGB
+#ifdef DISC
+uniform bvec4 uInDisc;  // which channels show in the disc alone
+uniform bool uAllInDisc;
+uniform vec3 uApex;  // um: the disc is a cone from here ...
+uniform vec3 uAxis;  // ... along this unit vector
+uniform vec2 uDisc;  // cosines of its inner and outer radius
+#endif
+uniform float uPresence;  // 0..1: volumes fade in once they have come
+uniform vec3 uClipLow;  // um: nothing outside is drawn
+uniform vec3 uClipHigh;
+uniform vec4 uClipPlane;  // xyz unit normal, w um: nothing with dot(normal, p) > w is drawn
+uniform sampler3D uVolume;
+uniform usampler3D uIndex;  // with BRICKS
+uniform sampler3D uOldVolume;  // what the volume takes the place of, at another mip level
+uniform float uFresh;  // 0..1: share of the new one
+uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
+uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
+#ifdef TWO_D
+uniform sampler2DArray uPlanes;  // 256 x 64 x CHANNELS: the same by value and steepness
+uniform vec4 uGradientMax;  // steps of intensity over two voxels that are 1 to the tables
+#endif
+uniform sampler2D uSceneDepth;
+uniform sampler2D uPaneDepth;
+uniform bool uHasPane;  // whether any surface is translucent
+uniform sampler2D uNoise;  // blue noise
+uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
+uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
+
+// At a sample that is covered: else rays at a tile's rim would miss the tile and leave a seam.
+centroid in vec3 vPosition;
+flat in vec3 vEye;
+flat in vec3 vLight;
+flat in vec2 vDepth;
+centroid in float vViewZ;
+
+layout(location = 0) out vec4 oColor;  // premultiplied: up to the pane, or all
+layout(location = 1) out vec4 oBehind;  // beyond the pane
+
+#include <chunks/intersect_box>
+#include <chunks/clip_span>
+#ifdef DISC
+#include <chunks/focus_disc>
+#include <chunks/cone_span>
+#include <chunks/disc_weights>
+#endif
+#include <chunks/scene_distance>
+#include <chunks/skip_empty_bricks>
+#include <chunks/sample_intensities>
+#include <chunks/classify>
+#ifdef TWO_D
+#include <chunks/transfer_table_2d>
+#include <chunks/classify_2d>
+#endif
+#include <chunks/gradient>
+#include <chunks/shade>
+#include <chunks/jitter>
+#include <chunks/encode_srgb>
+
+const float NOWHERE = 1e30;
+
+// Blending happens on encoded colours, as for every other surface of the page.
+vec4 shown(vec4 sum) {
+  if (sum.a <= 0.0) return vec4(0.0);
+  float whole = sum.a >= OPAQUE ? sum.a : 1.0;  // what was left out behind looks as what is in front
+  return vec4(encoded(sum.rgb / sum.a) * sum.a, sum.a) / whole;
+}
+
+void main() {
+  vec3 ray = vPosition - vEye;
+  float back = length(ray);
+  vec3 dir = ray / back;
+  vec3 invDir = 1.0 / (dir + 1e-6 * vec3(equal(dir, vec3(0.0))));
+  vec2 span = intersectBox(vEye, invDir, vec3(0.0), uSize);
+  span.x = max(span.x, 0.0);
+  vec2 all = intersectBox(vEye, invDir, uAllLow, uAllHigh);
+  float share = (span.y - span.x) / max(all.y - max(all.x, 0.0), 1e-6);
+  int steps = clamp(int(min(1.0, share) * float(uSteps - uSpare) + 1e-3), 1, MAX_STEPS);
+  span = clipSpan(span, vEye, dir, invDir);
+#ifdef DISC
+  if (uAllInDisc) span = coneSpan(span, vEye, dir);
+#endif
+  vec3 scene = sceneDistances(back);
+  // From here on t counts from where the ray comes in: far from the eye, floats would be too coarse.
+  vec3 start = vEye + span.x * dir;
+  float edge = min(span.y, scene.x) - span.x;
+  float end = min(span.y, scene.y) - span.x;
+  if (end <= 0.0) discard;
+
+  vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
+  vec3 texStart = uTexLow + start * texPerUm;
+  vec3 texDir = dir * texPerUm;
+  vec3 brickStart = texStart * uTexels / 8.0;  // the same ray in bricks
+  vec3 brickDir = texDir * uTexels / 8.0;
+  brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
+  vec3 invBrickDir = 1.0 / brickDir;
+  vec4 sum = vec4(0.0);
+  vec4 veil = vec4(0.0);  // the sum in front of the edge
+  float pane = uHasPane ? paneDistance(back) - span.x : NOWHERE;
+  vec4 front = vec4(0.0);  // the sum in front of the pane
+  bool isBehind = false;
+  float shift = jitter(gl_FragCoord.xy - uPart.xy);
+  float t = 0.0;
+  float exit = 0.0;  // of the bricks that are known
+  int i = 0;
+  for (; i < steps && t < end && sum.a < OPAQUE; i++) {
+    // What remains of the ray over what remains of the budget: it always reaches the end.
+    float dt = max(uMinStep, (end - t) / float(steps - i));
+    // A loop of its own: rays beside each other then sample together, whatever they leapt over.
+    while (t >= exit) {
+      vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
+      // By whole steps, so that samples lie where they would without leaps.
+      float leap = block.y * floor((block.x - t) / dt) * dt;
+      exit = leap > 0.0 ? t + leap : block.x;
+      if (leap <= 0.0) break;
+      t = exit;
+      if (++i >= steps || t >= end) break;
+      dt = max(uMinStep, (end - t) / float(steps - i));
+    }
+    if (i >= steps || t >= end) break;
+    if (t >= pane) {
+      front = mix(veil, sum, scene.z);
+      sum = veil = vec4(0.0);
+      pane = NOWHERE;
+      isBehind = true;
+    }
+    bool isInFront = t < edge;
+    float here = min(dt, min(isInFront ? edge : end, pane) - t);  // the last step may be shorter
+    float at = t + shift * here;
+    vec3 p = texStart + at * texDir;
+    vec4 v = sampleIntensities(p);
+#ifdef TWO_D
+    if (any(greaterThan(v, uFloor)) && mayShow(v)) {
+#else
+    if (any(greaterThan(v, uFloor))) {
+#endif
+#ifdef DISC
+      vec4 voxels = here / uVoxel * weights(start + at * dir);
+#else
+      vec4 voxels = vec4(here / uVoxel * uPresence);
+#endif
+#ifdef TWO_D
+      Steps around = stepsAt(p, uVoxel * abs(texPerUm));
+      vec4 s = classify2d(v, steepnessOf(around), voxels);
+#else
+      vec4 s = classify(v, voxels);
+#endif
+      if (s.a > 0.0) {
+#ifdef TWO_D
+        s.rgb *= shadeBy(gradientOf(around) * sign(texPerUm), dir);
+#else
+        s.rgb *= shade(p, texPerUm, dir);
+#endif
+        sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
+      }
+    }
+    if (isInFront) veil = sum;
+    t += here;
+  }
+#ifdef COUNT_STEPS  // for tests: the number of steps, and the share of the ray that they covered
+  oColor = vec4(float(i % 256) / 255.0, float(i / 256) / 255.0, clamp(t / end, 0.0, 1.0), 1.0);
+  return;
+#endif
+  sum = mix(veil, sum, scene.z);
+  if (max(sum.a, front.a) <= 0.0) discard;
+  oColor = shown(isBehind ? front : sum);
+  oBehind = isBehind ? shown(sum) : vec4(0.0);
+}

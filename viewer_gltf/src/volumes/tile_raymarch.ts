@@ -1,0 +1,336 @@
+/** The ray-marched box of one tile: up to four channels in one pass. */
+import {
+  BackSide,
+  BoxGeometry,
+  Data3DTexture,
+  DataArrayTexture,
+  DataTexture,
+  type DepthTexture,
+  GLSL3,
+  LinearFilter,
+  Matrix4,
+  Mesh,
+  NearestFilter,
+  RedFormat,
+  RepeatWrapping,
+  RGBAFormat,
+  ShaderMaterial,
+  type Texture,
+  UnsignedByteType,
+  Vector2,
+  Vector3,
+  Vector4,
+} from "three";
+import type { TileVolume } from "../bundle/generated/volumes";
+import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
+import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import type { Rgb } from "../math/color";
+import { COLUMNS, ROWS } from "../state/transfer_shapes";
+import { distanceInGrid } from "./blend_order";
+import { brickCounts } from "./bricks8";
+import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
+import type { Packed } from "./tile_texture";
+import { ENTRIES } from "./transfer_luts";
+import { alikeRows, type PlaneTable } from "./transfer_table_2d";
+
+/** Hard limit of a ray, whatever the volume's size and through however many tiles it goes. */
+export const MAX_STEPS = 100;
+/** A ray that is this opaque goes no further. */
+const OPAQUE = 0.99;
+/** Steps are not shorter than this share of a voxel. */
+const STEP_VOXELS = 1;
+
+/** What all tiles share in a frame: uniforms by reference. */
+export type MarchFrame = Readonly<{
+  uSceneDepth: { value: DepthTexture };
+  /** Of the nearest translucent surface, if there is any. */
+  uPaneDepth: { value: DepthTexture };
+  uHasPane: { value: boolean };
+  uNoise: { value: Texture };
+  /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
+  uEye: { value: Vector4 };
+  uPart: { value: Vector4 };
+  /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
+  uDisc: { value: Vector2 };
+  uSteps: { value: number };
+}>;
+
+/** Depth of what is opaque, and of the nearest that is translucent. */
+export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
+  const noise = new DataTexture(blueNoise(), NOISE_SIZE, NOISE_SIZE, RedFormat, UnsignedByteType);
+  noise.wrapS = noise.wrapT = RepeatWrapping;
+  noise.minFilter = noise.magFilter = NearestFilter;
+  noise.needsUpdate = true;
+  return {
+    uSceneDepth: { value: depth },
+    uPaneDepth: { value: pane },
+    uHasPane: { value: false },
+    uNoise: { value: noise },
+    uEye: { value: new Vector4(0, 0, 1, 1) },
+    uPart: { value: new Vector4(0, 0, 1, 1) },
+    uDisc: { value: new Vector2(-2, -3) },
+    uSteps: { value: MAX_STEPS },
+  };
+}
+
+/** How one channel of a tile looks. */
+export type Look = Readonly<{
+  color: Rgb;
+  /** 256 RGBA entries, of `lookUpTable`; beside a plane, what of it shows at any gradient. */
+  table: Uint8Array;
+  /** A two-dimensional transfer function. */
+  plane?: PlaneTable | null;
+  isInDisc: boolean;
+}>;
+
+const UNIT_CUBE = new BoxGeometry(1, 1, 1);
+
+function tableOfLeaps(leaps: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
+  const texture = new Data3DTexture(leaps, ...size);
+  texture.format = RedFormat;
+  texture.type = UnsignedByteType;
+  texture.minFilter = texture.magFilter = NearestFilter;
+  texture.unpackAlignment = 1;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function emptyPlanes(channels: number): DataArrayTexture {
+  const texture = new DataArrayTexture(
+    new Uint8Array(channels * ROWS * COLUMNS * 4),
+    COLUMNS,
+    ROWS,
+    channels,
+  );
+  texture.format = RGBAFormat;
+  texture.type = UnsignedByteType;
+  texture.minFilter = texture.magFilter = LinearFilter;
+  return texture;
+}
+
+/** Texture coordinates at the low and high corner of the box; image rows run against world y. */
+export function textureCorners(volume: TileVolume): { low: Vector3; high: Vector3 } {
+  const first = volume.size.map((n) => (volume.apron + 0.5) / n);
+  const last = volume.size.map((n) => (n - volume.apron - 0.5) / n);
+  return {
+    low: new Vector3(first[0], last[1], first[2]),
+    high: new Vector3(last[0], first[1], last[2]),
+  };
+}
+
+export class TileMarch {
+  readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
+  /** All zero, nothing may be leapt over, until the table has come. */
+  private readonly leaps: Uint8Array<ArrayBuffer>;
+  private readonly occupancy: Data3DTexture;
+  private readonly lut: DataTexture;
+  /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
+  private planes: DataArrayTexture | null = null;
+  /** What each layer holds; null: a table that knows no gradients. */
+  private readonly layers: (Uint8Array | null)[] = [];
+  private readonly low: Vector3;
+  private readonly toTile: Matrix4;
+  /** Between the world and the box from its low corner. */
+  private readonly fromBox: Matrix4;
+  private readonly toBox: Matrix4;
+
+  constructor(
+    readonly volume: TileVolume,
+    readonly channelCount: number,
+    frame: MarchFrame,
+  ) {
+    const { min, max } = volume.bounds_um;
+    this.low = new Vector3(...min);
+    const size = new Vector3(...max).sub(this.low);
+    const { low, high } = textureCorners(volume);
+    const intervals = volume.size.map((n) => n - 1 - 2 * volume.apron);
+    const voxel = Math.min(...size.toArray().map((edge, i) => edge / Math.max(1, intervals[i])));
+    const rows = new Uint8Array(channelCount * ENTRIES * 4);
+    this.lut = new DataTexture(rows, ENTRIES, channelCount, RGBAFormat, UnsignedByteType);
+    this.lut.minFilter = this.lut.magFilter = LinearFilter;
+    const bricks = brickCounts(volume.size);
+    this.leaps = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
+    this.occupancy = tableOfLeaps(this.leaps, bricks);
+    const material = new ShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: RAYMARCH_VERTEX,
+      fragmentShader: RAYMARCH_FRAGMENT,
+      defines: { CHANNELS: channelCount, MAX_STEPS, OPAQUE },
+      side: BackSide,
+      transparent: true,
+      premultipliedAlpha: true,
+      depthTest: false, // the march ends at the scene's depth itself
+      depthWrite: false,
+      uniforms: {
+        ...frame,
+        uSize: { value: size },
+        uTexLow: { value: low },
+        uTexHigh: { value: high },
+        uTexels: { value: new Vector3(...volume.size) },
+        uVoxel: { value: voxel },
+        uMinStep: { value: voxel },
+        uFloor: { value: new Vector4(1, 1, 1, 1) },
+        uBrickSlack: { value: 0 },
+        uLight: { value: new Vector3(-0.35, 0.5, 0.8).normalize() },
+        uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
+        uInDisc: { value: [false, false, false, false] },
+        uAllInDisc: { value: false },
+        uApex: { value: new Vector3() },
+        uAxis: { value: new Vector3(0, 0, -1) },
+        uPresence: { value: 1 },
+        uAllLow: { value: new Vector3() },
+        uAllHigh: { value: size.clone() },
+        uSpare: { value: 0 },
+        uClipLow: { value: new Vector3() },
+        uClipHigh: { value: size.clone() },
+        uClipPlane: { value: new Vector4(0, 0, 0, 1) },
+        uVolume: { value: null },
+        uIndex: { value: null },
+        uOldVolume: { value: null },
+        uFresh: { value: 1 },
+        uOccupancy: { value: this.occupancy },
+        uLut: { value: this.lut },
+        uPlanes: { value: null },
+        uGradientMax: { value: new Vector4(1, 1, 1, 1) },
+      },
+    });
+    const matrix = new Matrix4().fromArray(volume.matrix);
+    this.toTile = matrix.clone().invert();
+    this.fromBox = matrix.multiply(new Matrix4().makeTranslation(this.low));
+    this.toBox = this.fromBox.clone().invert();
+    this.mesh = new Mesh(UNIT_CUBE, material);
+    this.mesh.name = `volume of ${volume.tile}`;
+    this.mesh.frustumCulled = false;
+    this.mesh.matrixAutoUpdate = false;
+    this.mesh.matrix
+      .fromArray(volume.matrix)
+      .multiply(new Matrix4().makeTranslation(this.low.clone().addScaledVector(size, 0.5)))
+      .multiply(new Matrix4().makeScale(size.x, size.y, size.z));
+  }
+
+  /** Blend in the right order with the other tiles. `eye` in um, world. */
+  sortBy(eye: Vector3): void {
+    const { min, max } = this.volume.bounds_um;
+    const local = eye.clone().applyMatrix4(this.toTile).toArray();
+    this.mesh.renderOrder = -distanceInGrid(local, min, max);
+  }
+
+  /** Where the disc's cone comes from and where to; um, world. */
+  aim(apex: Vector3, axis: Vector3): void {
+    const { uApex, uAxis } = this.mesh.material.uniforms;
+    uApex.value.copy(apex).applyMatrix4(this.toBox);
+    uAxis.value.copy(axis).transformDirection(this.toBox);
+  }
+
+  /** The box, um, world, round all tiles that are marched: they share a ray's steps by length. */
+  shareWith(min: Vector3, max: Vector3, tiles: number): void {
+    const { uniforms } = this.mesh.material;
+    boxAround(min, max, this.toBox, uniforms.uAllLow.value, uniforms.uAllHigh.value);
+    // each tile takes a step at least, however short the ray's way through it
+    uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
+  }
+
+  clip(clip: MarchClip): void {
+    clipInto(clip, this.fromBox, this.toBox, this.mesh.material.uniforms as ClipUniforms);
+  }
+
+  /** Show what has come. `presence` 0..1: how far it has faded in. */
+  show(shown: Packed, old: Packed | null, fresh: number, presence: number): void {
+    if (shown.channels.length !== this.channelCount) {
+      throw new RangeError(
+        `expected ${this.channelCount} channels, found ${shown.channels.length}`,
+      );
+    }
+    const { uniforms } = this.mesh.material;
+    uniforms.uVolume.value = shown.texture;
+    uniforms.uOldVolume.value = (old ?? shown).texture;
+    uniforms.uIndex.value = shown.index;
+    this.define("BRICKS", shown.index !== null);
+    uniforms.uFresh.value = fresh;
+    uniforms.uPresence.value = presence;
+    const coarsest = Math.max(shown.level, old?.level ?? 0);
+    // ranges of bricks hold for what is drawn, however coarse
+    const isExact = coarsest === 0 || shown.index !== null;
+    uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / 8);
+    uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
+  }
+
+  /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
+  dress(looks: readonly Look[]): boolean {
+    const { uniforms } = this.mesh.material;
+    const rows = this.lut.image.data as Uint8Array;
+    let differs = false;
+    looks.forEach(({ color, table, isInDisc }, c) => {
+      (uniforms.uColor.value as Vector3[])[c].set(...color);
+      uniforms.uInDisc.value[c] = isInDisc;
+      uniforms.uFloor.value.setComponent(c, floorOf(table));
+      const row = rows.subarray(c * table.length, (c + 1) * table.length);
+      if (table.every((value, i) => value === row[i])) return;
+      row.set(table);
+      differs = true;
+    });
+    if (differs) this.lut.needsUpdate = true;
+    this.dressPlanes(looks);
+    uniforms.uAllInDisc.value = looks.every((look) => look.isInDisc);
+    this.define(
+      "DISC",
+      looks.some((look) => look.isInDisc),
+    );
+    return differs;
+  }
+
+  /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
+  private dressPlanes(looks: readonly Look[]): void {
+    const isTwoD = looks.some(({ plane }) => plane != null);
+    this.define("TWO_D", isTwoD);
+    if (!isTwoD) return;
+    const { uniforms } = this.mesh.material;
+    this.planes ??= emptyPlanes(this.channelCount);
+    uniforms.uPlanes.value = this.planes;
+    const cells = this.planes.image.data as Uint8Array;
+    const { length } = looks[0].table;
+    looks.forEach(({ table, plane }, c) => {
+      uniforms.uGradientMax.value.setComponent(c, plane?.gradientMax ?? 1);
+      const at = c * ROWS * length;
+      const isThere =
+        plane != null
+          ? this.layers[c] === plane.cells
+          : this.layers[c] === null && table.every((value, i) => value === cells[at + i]);
+      if (isThere) return;
+      cells.set(plane?.cells ?? alikeRows(table), at);
+      this.layers[c] = plane?.cells ?? null;
+      if (this.planes === null) return;
+      this.planes.addLayerUpdate(c); // the others stay as they are on the GPU
+      this.planes.needsUpdate = true;
+    });
+  }
+
+  /** Where rays may leap, one byte a brick, of `brickDistances`; null: nowhere, for now. */
+  leapBy(distances: Uint8Array<ArrayBuffer> | null): void {
+    if (distances === null) this.leaps.fill(0);
+    else this.leaps.set(distances);
+    this.occupancy.needsUpdate = true;
+  }
+
+  private define(name: string, isOn: boolean): void {
+    const { material } = this.mesh;
+    if (name in material.defines === isOn) return;
+    if (isOn) material.defines[name] = 1;
+    else delete material.defines[name];
+    material.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.mesh.removeFromParent();
+    this.mesh.material.dispose();
+    this.lut.dispose();
+    this.planes?.dispose();
+    this.occupancy.dispose();
+  }
+}
+
+/** The intensity 0..1 up to which a table shows nothing; it is linear between its entries. */
+export function floorOf(table: Uint8Array): number {
+  for (let i = 0; i < ENTRIES; i++) if (table[4 * i + 3] > 0) return (i - 1) / (ENTRIES - 1);
+  return 1;
+}

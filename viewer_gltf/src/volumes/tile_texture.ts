@@ -1,0 +1,222 @@
+/**
+ * The GPU texture of one tile: up to four channels side by side, coarse first, replaced as finer
+ * levels arrive. A replacement fades in; another set of channels takes its place at once.
+ */
+import type { Data3DTexture } from "three";
+import { DecodeError, decodeTexels } from "../bundle/decode";
+import type { LoadQueue } from "./load_queue";
+import { texels } from "./mip_levels";
+import type { VolumeSource } from "./volume_source";
+import { stride, volumeTexture } from "./volume_texture";
+
+export const LEVEL_FADE_S = 0.2;
+
+/** What has come: the texture's channels, in its order, and their bricks. */
+export type Packed = Readonly<{
+  channels: readonly string[];
+  level: number;
+  texture: Data3DTexture;
+  /** Where bricks are in the texture, which is an atlas of them then: see bricks/brick_atlas.ts. */
+  index: Data3DTexture | null;
+  /** Smallest and largest intensity of every brick of each channel, interleaved. */
+  bricks: readonly Uint8Array[];
+}>;
+
+export class TileTexture {
+  shown: Packed | null = null;
+  /** What `shown` takes the place of, while it fades in. */
+  old: Packed | null = null;
+  /** 0..1: share of `shown`. */
+  fresh = 1;
+  isLoading = false;
+
+  private sources: ReadonlyMap<string, VolumeSource> = new Map();
+  private levels: readonly number[] = [];
+  /** That there is room for: what is finer gives way to it. */
+  private finest = 0;
+  /** After a fault, which was told, a channel is not tried again until it is turned on anew. */
+  private readonly failed = new Set<string>();
+  private isDisposed = false;
+  /** What is being loaded now; aborted when it is no longer wanted. */
+  private loading: Readonly<{
+    channels: readonly string[];
+    level: number;
+    abort: AbortController;
+  }> | null = null;
+
+  constructor(
+    private readonly queue: LoadQueue,
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {}
+
+  /** Of the GPU's memory. */
+  get bytes(): number {
+    return [this.shown, this.old].reduce((sum, each) => sum + (each ? sizeOf(each) : 0), 0);
+  }
+
+  /** Where what is wanted, or was, comes from. */
+  get kept(): ReadonlyMap<string, VolumeSource> {
+    return this.sources;
+  }
+
+  hasFailed(channel: string): boolean {
+    return this.failed.has(channel);
+  }
+
+  /** With the next `want`, what has failed is loaded anew. */
+  retryFailed(): void {
+    this.failed.clear();
+  }
+
+  /** Load these channels and levels, given coarse to fine; what is there already is kept. */
+  want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
+    for (const [id, source] of this.sources) {
+      if (sources.get(id) === source) continue;
+      this.failed.delete(id);
+      source.release();
+    }
+    this.sources = sources;
+    this.levels = levels;
+    this.finest = finest;
+    if (this.loading !== null) {
+      const { channels, level, abort } = this.loading;
+      const isOf = levels.includes(level) || level === finest;
+      if (!same(channels, this.wanted) || !isOf || levels.length === 0) abort.abort();
+    }
+    if (!this.isLoading) void this.run();
+  }
+
+  /** Go on with the fade; whether it is still under way. */
+  advance(dt_s: number): boolean {
+    if (this.old === null) return false;
+    this.fresh = Math.min(1, this.fresh + dt_s / LEVEL_FADE_S);
+    if (this.fresh === 1) this.forgetOld();
+    return this.old !== null;
+  }
+
+  private get wanted(): readonly string[] {
+    return [...this.sources.keys()].filter((id) => !this.failed.has(id));
+  }
+
+  private async run(): Promise<void> {
+    this.isLoading = true;
+    for (;;) {
+      const channels = this.wanted;
+      if (channels.length === 0) this.replace(null);
+      const level = this.nextLevel(channels);
+      if (level === null) break;
+      const abort = new AbortController();
+      this.loading = { channels, level, abort };
+      const packed = await this.load(channels, level, abort.signal);
+      this.loading = null;
+      if (this.isDisposed) {
+        packed?.texture.dispose();
+        return;
+      }
+      if (packed === null) continue; // aborted, or a channel failed: without it
+      if (same(channels, this.wanted)) {
+        this.replace(packed);
+        this.onChange();
+      } else {
+        packed.texture.dispose();
+      }
+    }
+    this.isLoading = false;
+    this.onChange();
+  }
+
+  private nextLevel(channels: readonly string[]): number | null {
+    if (channels.length === 0) return null;
+    const { shown } = this;
+    if (shown !== null && same(shown.channels, channels)) {
+      if (this.levels.length > 0 && this.finest > shown.level) return this.finest;
+      return this.levels.find((index) => index < shown.level) ?? null;
+    }
+    // the same level as before, if all of it has come; else what comes first
+    const isHere = (index: number) =>
+      channels.every((id) => this.sources.get(id)?.has(index) === true);
+    return [...this.levels].reverse().find(isHere) ?? this.levels[0] ?? null;
+  }
+
+  /** The level of all channels; null if one of them failed, which was told. */
+  private async load(
+    channels: readonly string[],
+    level: number,
+    signal: AbortSignal,
+  ): Promise<Packed | null> {
+    const parts = await Promise.all(channels.map((id) => this.fetch(id, level, signal)));
+    if (signal.aborted || parts.includes(null)) return null;
+    const whole = parts.flatMap((part) => (part === null ? [] : [part]));
+    const [{ source }] = whole;
+    const { size } = source.volume.levels[level];
+    const frames = whole.map((each) => ({
+      bytes: each.frame,
+      name: `${each.source.volume.file.path}: level ${level}`,
+    }));
+    let data: Uint8Array<ArrayBuffer>;
+    try {
+      data = await decodeTexels(frames, texels(source.volume.levels[level]));
+    } catch (error) {
+      if (!(error instanceof DecodeError)) throw error;
+      this.failed.add(channels[error.part]);
+      this.onError(error);
+      return null;
+    }
+    const texture = volumeTexture(data, size, channels.length);
+    return { channels, level, texture, index: null, bricks: whole.map(({ bricks }) => bricks) };
+  }
+
+  private async fetch(id: string, level: number, signal: AbortSignal) {
+    const source = this.sources.get(id);
+    if (source === undefined) return null;
+    try {
+      const bricks = await this.queue.add(0, signal, () => source.bricks(signal));
+      const cost = texels(source.volume.levels[level]);
+      const frame = await this.queue.add(cost, signal, () => source.level(level, signal));
+      return { source, bricks, frame };
+    } catch (error) {
+      if (signal.aborted) return null;
+      this.failed.add(id);
+      this.onError(error);
+      return null;
+    }
+  }
+
+  private replace(packed: Packed | null): void {
+    this.forgetOld();
+    const before = this.shown;
+    this.shown = packed;
+    if (before === null) return;
+    if (packed !== null && same(packed.channels, before.channels)) {
+      this.old = before;
+      this.fresh = 0;
+    } else {
+      before.texture.dispose();
+    }
+  }
+
+  private forgetOld(): void {
+    this.old?.texture.dispose();
+    this.old = null;
+    this.fresh = 1;
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    this.loading?.abort.abort();
+    this.forgetOld();
+    this.shown?.texture.dispose();
+    this.shown = null;
+    for (const source of this.sources.values()) source.release();
+  }
+}
+
+function sizeOf({ texture, channels }: Packed): number {
+  const { width, height, depth } = texture.image;
+  return width * height * depth * stride(channels.length);
+}
+
+function same(a: readonly string[], b: readonly string[]): boolean {
+  return a.length === b.length && a.every((id, i) => id === b[i]);
+}

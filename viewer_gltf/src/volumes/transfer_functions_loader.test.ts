@@ -1,0 +1,90 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { writeKtx2 } from "../../test/support/fixture/ktx2";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { BASE, WorkerStub } from "../../test/support/fixture/unit";
+import type { FileRef } from "../bundle/generated/bundle";
+import type { Plane } from "../state/transfer_functions_2d";
+import { makeShape } from "../state/transfer_shapes";
+import { TransferPlanes } from "./transfer_functions_loader";
+
+const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.5 });
+const HISTOGRAM = writeKtx2([256, 64, 1], 1, [new Uint8Array(256 * 64)]).file;
+
+function refOf(path: string, bytes: Uint8Array | string): FileRef {
+  return { path, bytes: new Blob([bytes as string]).size, sha256: "" }; // no secure context
+}
+
+function textOf(functions: object): string {
+  const histogram = { ...refOf("histogram2d.ktx2", HISTOGRAM), sha256: "0".repeat(64) };
+  return JSON.stringify({ gradient_max: 0.4, functions, histogram, most: 3 });
+}
+
+describe("what a bundle has of two-dimensional transfer functions", () => {
+  const asked: string[] = [];
+  const faults: unknown[] = [];
+  const learned: Plane[] = [];
+  let text = "";
+
+  beforeEach(() => {
+    for (const list of [asked, faults, learned]) list.length = 0;
+    vi.stubGlobal("Worker", WorkerStub);
+    vi.stubGlobal("fetch", async (address: URL | string) => {
+      const path = String(address).slice(BASE.length);
+      asked.push(path);
+      return new Response(path === "histogram2d.ktx2" ? HISTOGRAM : text);
+    });
+  });
+  afterEach(() => vi.unstubAllGlobals());
+
+  function planes(functions: object): TransferPlanes {
+    text = textOf(functions);
+    const manifest = sampleManifest(1);
+    manifest.channels[0].transfer_functions_2d.file = refOf("transfer2d.json", text);
+    const onPlane = (_: string, plane: Plane) => learned.push(plane);
+    const onError = (error: unknown) => faults.push(error);
+    return new TransferPlanes({ base: BASE, manifest }, onPlane, () => undefined, onError);
+  }
+
+  const come = (set: TransferPlanes) => vi.waitUntil(() => !set.isLoading);
+
+  it("is fetched once, the histogram only when it is to be seen", async () => {
+    const set = planes({ soft: [SHAPE] });
+    for (let i = 0; i < 3; i++) set.want("c0");
+    expect(set.isLoading).toBe(true);
+    await come(set);
+    set.want("c0");
+    expect(asked).toEqual(["transfer2d.json"]);
+    expect(learned).toEqual([{ gradientMax: 0.4, functions: { soft: [SHAPE] } }]);
+    for (let i = 0; i < 3; i++) expect(set.histogram("c0")).toBeNull();
+    await come(set);
+    expect(set.histogram("c0")?.cells).toHaveLength(256 * 64);
+    expect(asked).toEqual(["transfer2d.json", "histogram2d.ktx2"]);
+    expect(JSON.stringify(set.histogram("c0"))).toBe('"histogram2d.ktx2"');
+    expect(faults).toEqual([]);
+  });
+
+  it("tells a fault once, and is asked for again when that is wanted", async () => {
+    const wrong = [
+      [{ ...SHAPE, values: [0.6, 0.4] }, "functions.soft.0: values are (0.6, 0.4)"],
+      [{ ...SHAPE, opacity: 2 }, "functions.soft.0.opacity"],
+    ] as const;
+    for (const [shape, words] of wrong) {
+      faults.length = 0;
+      const set = planes({ soft: [shape] });
+      set.want("c0");
+      await come(set);
+      set.want("c0");
+      await come(set);
+      expect(faults.map(String)).toEqual([expect.stringContaining(`transfer2d.json: ${words}`)]);
+      set.retryFailed();
+      set.want("c0");
+      await come(set);
+      expect(faults).toHaveLength(2);
+    }
+    const many = planes({ soft: Array.from({ length: 33 }, () => SHAPE) });
+    many.want("c0");
+    await come(many);
+    expect(String(faults.at(-1))).toContain("expected at most 32 shapes, found 33");
+    expect(learned).toEqual([]);
+  });
+});

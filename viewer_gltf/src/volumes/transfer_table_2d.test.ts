@@ -1,0 +1,95 @@
+import { describe, expect, it } from "vitest";
+import { seeded } from "../../test/support/seeded";
+import { majorants, mediumTable } from "../pathtrace/extinction";
+import { COLUMNS, makeShape, ROWS, type Shape } from "../state/transfer_shapes";
+import { opacityRanges } from "./empty_space";
+import { opacities } from "./transfer_luts";
+import { alikeRows, envelopeOf, planeTable } from "./transfer_table_2d";
+
+function randomShapes(random: () => number): readonly Shape[] {
+  return Array.from({ length: 1 + Math.floor(4 * random()) }, (_, i) => ({
+    ...makeShape(i % 2 ? "triangle" : "rectangle", { value: random(), gradient: random() }),
+    softness: random() < 0.3 ? 0 : random(),
+    opacity: random(),
+  }));
+}
+
+/** As the GPU samples it, linear between cells. */
+function sampled(cells: ArrayLike<number>, value: number, gradient: number, part: number): number {
+  const [x, y] = [value * (COLUMNS - 1), gradient * (ROWS - 1)];
+  const [left, below] = [Math.min(COLUMNS - 2, Math.floor(x)), Math.min(ROWS - 2, Math.floor(y))];
+  const at = (j: number, k: number) => cells[4 * (j * COLUMNS + k) + part];
+  const row = (j: number) => at(j, left) + (at(j, left + 1) - at(j, left)) * (x - left);
+  return row(below) + (row(below + 1) - row(below)) * (y - below);
+}
+
+describe("the table of value and gradient", () => {
+  it("never shows what its envelope hides: leaps and majorants hold at every gradient", () => {
+    const random = seeded(3);
+    for (let run = 0; run < 40; run++) {
+      const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
+      const plane = planeTable(randomShapes(random), 0.5, window, random());
+      const table = { alpha: opacityRanges(opacities(plane.envelope)) };
+      const medium = mediumTable([{ color: [1, 1, 1], table: plane.envelope, plane }], 0.5, 0, 2);
+      const low = Math.floor(256 * random());
+      const high = low + Math.floor((256 - low) * random());
+      const [largest] = majorants(medium, [Uint8Array.of(low, high)]);
+      for (let i = 0; i < 40; i++) {
+        const value = (low + (high - low) * random()) / 255;
+        const gradient = random();
+        expect(sampled(plane.cells, value, gradient, 3)).toBeLessThanOrEqual(
+          table.alpha[256 * low + high] + 1e-9,
+        );
+        const extinction = sampled(medium, value, gradient, 3);
+        expect(extinction).toBeLessThanOrEqual(largest * (1 + 1e-6));
+      }
+    }
+  });
+
+  it("of a narrower window reads further out, by value and by gradient", () => {
+    const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), softness: 0 };
+    const whole = planeTable([shape], 0.8, [0, 1], 1);
+    const narrow = planeTable([shape], 0.8, [0.25, 0.75], 0.5);
+    expect(narrow.gradientMax).toBeCloseTo(0.4, 12);
+    for (const value of [0.1, 0.3, 0.44, 0.46, 0.5, 0.56, 0.7, 0.9]) {
+      const within = Math.min(1, Math.max(0, (value - 0.25) / 0.5));
+      const expected = 0.5 * sampled(whole.cells, within, 0.5, 3);
+      expect(Math.abs(sampled(narrow.cells, value, 0.5, 3) - expected), `${value}`).toBeLessThan(1);
+    }
+  });
+
+  it("of a one-dimensional function is the same at every gradient", () => {
+    const random = seeded(5);
+    const entries = Uint8Array.from({ length: 4 * COLUMNS }, () => Math.floor(256 * random()));
+    const cells = alikeRows(entries);
+    expect(cells).toHaveLength(4 * COLUMNS * ROWS);
+    for (const gradient of [0, 0.3, 1]) {
+      for (const value of [0, 0.5, 1]) {
+        const k = value * (COLUMNS - 1);
+        const [left, share] = [Math.min(COLUMNS - 2, Math.floor(k)), k % 1];
+        const [a, b] = [entries[4 * left + 3], entries[4 * left + 7]];
+        const expected = value === 1 ? entries[4 * COLUMNS - 1] : a + (b - a) * share;
+        expect(sampled(cells, value, gradient, 3)).toBeCloseTo(expected, 9);
+      }
+    }
+    expect(envelopeOf(cells)).toEqual(entries);
+  });
+
+  it("gives what lies beside a hard edge the shape's colour", () => {
+    const shape: Shape = {
+      ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }),
+      color: [1, 0, 0],
+      softness: 0,
+      opacity: 1,
+    };
+    const { cells } = planeTable([shape], 0.5, [0, 1], 1);
+    let edges = 0;
+    for (let at = 4; at < cells.length - 4; at += 4) {
+      const hasNeighbour = cells[at + 7] > 0 || cells[at - 1] > 0;
+      if (cells[at + 3] > 0 || !hasNeighbour) continue;
+      edges++;
+      expect([...cells.subarray(at, at + 4)]).toEqual([255, 0, 0, 0]);
+    }
+    expect(edges).toBeGreaterThan(20);
+  });
+});

@@ -1,0 +1,513 @@
+/** All volumes on screen: follows who is drawn how, loads what is missing, drops what is gone. */
+import { Group, Matrix4, Scene, Vector3 } from "three";
+import type { ShownVolume } from "../annotations/probe_reader";
+import { BundleError } from "../bundle/errors";
+import type { Bundle } from "../bundle/load";
+import { loadVolumes } from "../bundle/load";
+import type { MarchClip } from "../gpu/clip_uniforms";
+import { isInDisc, type WantedTile } from "../state/representation";
+import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
+import type { Shapes } from "../state/transfer_shapes";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
+import { BrickTile } from "./bricks/brick_atlas";
+import type { BrickService } from "./bricks/brick_service";
+import { brickCounts } from "./bricks8";
+import { OccupancyClient } from "./empty_space_client";
+import { LoadQueue } from "./load_queue";
+import { levelsToFetch } from "./mip_levels";
+import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_raymarch";
+import { type Packed, TileTexture } from "./tile_texture";
+import {
+  loadTransferFunctions,
+  lookUpTable,
+  opacities,
+  type TransferFunction,
+} from "./transfer_luts";
+import { NO_ENTRIES, type PlaneTable, planeTable } from "./transfer_table_2d";
+import { VolumeSource } from "./volume_source";
+import { stride } from "./volume_texture";
+
+const PARALLEL_LOADS = 4;
+/** A volume that has come fades in, one that goes fades out. */
+export const PRESENCE_S = 0.25;
+/** So many tiles that are no longer looked at stay for a while: the gaze often comes back. */
+const KEPT_TILES = 2;
+/** Bytes of a level and of the next coarser one, which stays while the finer one fades in. */
+const WITH_OLD_LEVEL = 9 / 8;
+
+type ChannelVolumes = Readonly<{
+  sources: ReadonlyMap<string, VolumeSource>;
+  transferFunctions: ReadonlyMap<string, TransferFunction>;
+}>;
+
+type MadePlane = Readonly<{
+  shapes: Shapes;
+  gradientMax: number;
+  window: readonly [number, number];
+  opacity: number;
+  table: PlaneTable;
+}>;
+
+export type VolumeStatus = Readonly<{
+  tile: string;
+  channel: string;
+  /** Mip level on screen, 0 is the finest; null: none yet. */
+  level: number | null;
+}>;
+
+type Resident = {
+  readonly texture: TileTexture | BrickTile;
+  march: TileMarch | null;
+  /** What the march's tables were made of. */
+  packed: Packed | null;
+  wanted: WantedTile | null;
+  /** 0..1 */
+  presence: number;
+  /** When it was last wanted. */
+  turn: number;
+};
+
+export class VolumeSet {
+  readonly scene = new Scene();
+  private readonly group = new Group();
+  private readonly queue = new LoadQueue(PARALLEL_LOADS);
+  private readonly occupancy = new OccupancyClient();
+  private readonly channels = new Map<string, ChannelVolumes>();
+  private readonly channelsUnderWay = new Map<string, Promise<void>>();
+  private readonly failedChannels = new Set<string>();
+  private readonly residents = new Map<string, Resident>();
+  /** The last table of each channel: all tiles ask for the same. */
+  private readonly planes = new Map<string, MadePlane>();
+  private state: ViewerState | null = null;
+  private wanted: readonly WantedTile[] = [];
+  private mayRefine = true;
+  private turn = 0;
+  /** Tables of leaps that are being made. */
+  private leapsUnderWay = 0;
+  private hasToldLimit = false;
+
+  constructor(
+    private readonly bundle: Bundle,
+    private readonly frame: MarchFrame,
+    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+    /** From a host that sends bricks by view; null: volumes come as files. */
+    private readonly bricks: BrickService | null = null,
+  ) {
+    this.group.matrixAutoUpdate = false;
+    this.scene.add(this.group);
+  }
+
+  get isLoading(): boolean {
+    return (
+      this.leapsUnderWay > 0 ||
+      this.channelsUnderWay.size > 0 ||
+      [...this.residents.values()].some(({ texture }) => texture.isLoading)
+    );
+  }
+
+  /** Whether anything is to be marched. */
+  get isEmpty(): boolean {
+    return !this.group.children.some(({ visible }) => visible);
+  }
+
+  /** Bytes on the GPU. */
+  get bytes(): number {
+    return [...this.residents.values()].reduce((sum, { texture }) => sum + texture.bytes, 0);
+  }
+
+  status(): readonly VolumeStatus[] {
+    return [...this.residents].flatMap(([tile, { texture, wanted }]) =>
+      (wanted?.channels ?? []).map((id) => ({
+        tile,
+        channel: id,
+        level: texture.shown?.channels.includes(id) ? texture.shown.level : null,
+      })),
+    );
+  }
+
+  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  presence(tile: string, channel: string): number {
+    const resident = this.residents.get(tile);
+    if (resident === undefined || resident.march === null) return 0;
+    return resident.packed?.channels.includes(channel) ? resident.presence : 0;
+  }
+
+  /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
+  source(tile: string, channel: string): VolumeSource | null {
+    return this.channels.get(channel)?.sources.get(tile) ?? null;
+  }
+
+  /** All volumes of a channel, by tile; null: its list has not come, which was told. */
+  async sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null> {
+    await this.loadChannel(channel);
+    return this.channels.get(channel)?.sources ?? null;
+  }
+
+  /** The same, once it is known; null also after a fault, which was told. */
+  async sourceOf(tile: string, channel: string): Promise<VolumeSource | null> {
+    await this.loadChannel(channel);
+    return this.source(tile, channel);
+  }
+
+  /** The channels of the tiles that are on screen. */
+  shown(): readonly ShownVolume[] {
+    const { state } = this;
+    return [...this.residents].flatMap(([tile, { march, packed, texture }]) => {
+      if (state === null || packed === null || !march?.mesh.visible) return [];
+      return packed.channels.flatMap((channel) => {
+        const source = texture.kept.get(channel);
+        if (source === undefined) return [];
+        const { table, isInDisc } = this.look(state, channel);
+        return [{ tile, channel, source, table, isInDisc }];
+      });
+    });
+  }
+
+  /** Whether all that is wanted of a tile is there, at some level. */
+  isReady(tile: string): boolean {
+    const resident = this.residents.get(tile);
+    const shown = resident?.texture.shown;
+    if (resident?.wanted == null || shown == null) return false;
+    return resident.wanted.channels.every(
+      (id) => shown.channels.includes(id) || !this.canCome(id, tile),
+    );
+  }
+
+  /** Volumes lie in the world of the specimen, whose place in the room this is. */
+  placeAs(specimen: Matrix4): void {
+    this.group.matrix.copy(specimen);
+    this.group.matrixWorldNeedsUpdate = true;
+  }
+
+  /** Before every frame. `eye` and the disc's cone in um, world. */
+  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: MarchClip): void {
+    const boxes = new Bounds();
+    for (const { march } of this.drawn()) boxes.add(march);
+    for (const { march } of this.drawn()) {
+      march.sortBy(eye);
+      march.aim(apex, axis);
+      march.clip(clip);
+      march.shareWith(boxes.min, boxes.max, boxes.count);
+    }
+  }
+
+  /** Go on with all fades; whether any is still under way. */
+  advance(dt_s: number): boolean {
+    let isFading = false;
+    for (const resident of this.residents.values()) {
+      isFading = resident.texture.advance(dt_s) || isFading;
+      const goal = resident.wanted !== null && resident.march !== null ? 1 : 0;
+      const step = dt_s / PRESENCE_S;
+      const { presence } = resident;
+      resident.presence =
+        goal > presence ? Math.min(1, presence + step) : Math.max(goal, presence - step);
+      if (resident.presence !== goal) isFading = true;
+      else if (presence !== goal && goal === 0) this.evict();
+      this.show(resident);
+    }
+    return isFading;
+  }
+
+  /**
+   * @param mayRefine false while the gaze wanders: then nothing finer is begun
+   */
+  follow(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
+    this.state = state;
+    this.wanted = wanted;
+    this.mayRefine = mayRefine;
+    this.turn++;
+    for (const resident of this.residents.values()) resident.wanted = null;
+    for (const each of wanted) this.want(each);
+    for (const id of this.failedChannels) {
+      const isUsed = wanted.some(({ channels }) => channels.includes(id));
+      if (!isUsed) this.failedChannels.delete(id);
+    }
+    this.evict();
+    for (const resident of this.residents.values()) this.dress(resident);
+  }
+
+  /** With the next `follow`, what has failed is loaded anew. */
+  retryFailed(): void {
+    this.failedChannels.clear();
+    for (const { texture } of this.residents.values()) texture.retryFailed();
+  }
+
+  private want(wanted: WantedTile): void {
+    const sources = new Map<string, VolumeSource>();
+    for (const id of wanted.channels) {
+      void this.loadChannel(id);
+      const source = this.source(wanted.tile, id);
+      if (source !== null) sources.set(id, source);
+    }
+    let resident = this.residents.get(wanted.tile);
+    if (resident === undefined) {
+      if (sources.size === 0) return;
+      resident = this.addTile(wanted.tile);
+    }
+    resident.wanted = wanted;
+    resident.turn = this.turn;
+    const [first] = sources.values();
+    if (first === undefined) return;
+    this.tellLimit(first);
+    const levels = levelsToFetch(
+      first.volume.levels,
+      this.share / stride(sources.size),
+      this.limits.side,
+    );
+    const finest = levels[levels.length - 1];
+    resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
+  }
+
+  /** Said once: what is drawn is coarser than what there is. */
+  private tellLimit({ volume }: VolumeSource): void {
+    const { side } = this.limits;
+    const longest = Math.max(...volume.size);
+    if (longest <= side || this.hasToldLimit) return;
+    this.hasToldLimit = true;
+    this.onError(
+      new BundleError(
+        `This device draws volumes of at most ${side} voxels along an edge: ` +
+          `those of ${longest} are shown at a coarser level.`,
+      ),
+    );
+  }
+
+  private addTile(tile: string): Resident {
+    const onChange = () => {
+      const resident = this.residents.get(tile);
+      if (resident !== undefined) this.dress(resident);
+      this.onChange();
+    };
+    const limits = { bytes: this.share, side: this.limits.side };
+    const texture =
+      this.bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
+      new TileTexture(this.queue, onChange, this.onError);
+    const resident = { texture, march: null, packed: null, wanted: null, presence: 0, turn: 0 };
+    this.residents.set(tile, resident);
+    return resident;
+  }
+
+  /** A tile that can't be had as bricks comes as files. */
+  private replace(tile: string): void {
+    const resident = this.residents.get(tile);
+    if (resident === undefined) return;
+    this.bricks?.refuse(tile);
+    resident.march?.dispose();
+    resident.texture.dispose();
+    this.residents.delete(tile);
+    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
+  }
+
+  /** Bytes of the GPU's memory for each tile. */
+  private get share(): number {
+    return this.limits.bytes / (WITH_OLD_LEVEL * (this.wanted.length + KEPT_TILES));
+  }
+
+  /** Drop what is no longer wanted and has faded out, but for the few that were wanted last. */
+  private evict(): void {
+    const idle = [...this.residents].filter(
+      ([, { wanted, presence }]) => !wanted && presence === 0,
+    );
+    idle.sort(([, a], [, b]) => b.turn - a.turn);
+    for (const [, resident] of idle) resident.texture.want(new Map(resident.texture.kept), []);
+    const leaving = [...this.residents.values()].filter(
+      ({ wanted, presence }) => !wanted && presence > 0,
+    );
+    for (const [tile, resident] of idle.slice(Math.max(0, KEPT_TILES - leaving.length))) {
+      resident.march?.dispose();
+      resident.texture.dispose();
+      this.residents.delete(tile);
+    }
+  }
+
+  private canCome(channel: string, tile: string): boolean {
+    const volumes = this.channels.get(channel);
+    if (volumes === undefined) return !this.failedChannels.has(channel);
+    return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
+  }
+
+  /** A channel's list of volumes, unless it is known or has failed. */
+  private async loadChannel(id: string): Promise<void> {
+    if (this.channels.has(id) || this.failedChannels.has(id)) return;
+    let underWay = this.channelsUnderWay.get(id);
+    if (underWay === undefined) {
+      underWay = this.fetchChannel(id).finally(() => this.channelsUnderWay.delete(id));
+      this.channelsUnderWay.set(id, underWay);
+    }
+    await underWay;
+  }
+
+  private async fetchChannel(id: string): Promise<void> {
+    const channel = this.bundle.manifest.channels.find((c) => c.id === id);
+    if (channel === undefined) throw new Error(`the bundle has no channel ${id}`);
+    try {
+      const { base } = this.bundle;
+      const [volumes, transferFunctions] = await Promise.all([
+        loadVolumes(base, channel.volumes),
+        loadTransferFunctions(base, channel),
+      ]);
+      const sources = new Map(
+        [...volumes].map(([tile, volume]) => [tile, new VolumeSource(base, volume)]),
+      );
+      this.channels.set(id, { sources, transferFunctions });
+    } catch (error) {
+      this.failedChannels.add(id);
+      this.onError(error);
+    }
+    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
+    this.onChange();
+  }
+
+  /** A march for what has come, in the colours of the state. */
+  private dress(resident: Resident): void {
+    const { state } = this;
+    const { shown } = resident.texture;
+    if (state === null) return;
+    if (shown === null) {
+      resident.march?.dispose();
+      resident.march = null;
+      resident.packed = null;
+      return;
+    }
+    const looks = shown.channels.map((id) => this.look(state, id));
+    if (showsBelow(resident.texture, looks)) {
+      const [{ tile }] = [...resident.texture.kept.values()].map(({ volume }) => volume);
+      this.replace(tile);
+      return;
+    }
+    const isNewSet = resident.packed?.channels.join() !== shown.channels.join();
+    const { march: before } = resident;
+    let march = before;
+    if (march === null || march.channelCount !== shown.channels.length) {
+      before?.dispose();
+      const volume = this.volumeOf(shown.channels[0], resident);
+      march = new TileMarch(volume, shown.channels.length, this.frame);
+      resident.march = march;
+      this.group.add(march.mesh);
+    }
+    resident.packed = shown;
+    const differs = march.dress(looks);
+    if (differs || isNewSet || march !== before) void this.findLeaps(march, shown, looks);
+  }
+
+  private volumeOf(channel: string, { texture }: Resident) {
+    const source = texture.kept.get(channel);
+    if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
+    return source.volume;
+  }
+
+  /** How a channel whose list has come is to look. */
+  look(state: ViewerState, id: string): Look {
+    const channel = state.channels.find((c) => c.id === id);
+    const volumes = this.channels.get(id);
+    if (channel === undefined || volumes === undefined) {
+      throw new Error(`channel ${id} has come without a look`);
+    }
+    const plane = this.planeOf(channel);
+    if (plane !== null) {
+      const { color } = channel;
+      return { color, table: plane.envelope, plane, isInDisc: isInDisc(state, channel) };
+    }
+    const { transferFunction: name } = channel;
+    // one's own function has no one-dimensional one that stands for it
+    const entries =
+      volumes.transferFunctions.get(name) ?? (isTwoD(channel) ? NO_ENTRIES : undefined);
+    if (entries === undefined) throw new Error(`no transfer function ${name}`);
+    return {
+      color: channel.color,
+      table: lookUpTable(entries, channel.window, channel.opacity),
+      isInDisc: isInDisc(state, channel),
+    };
+  }
+
+  /** The table of a two-dimensional function, as soon as its shapes have come. */
+  private planeOf(channel: ChannelState): PlaneTable | null {
+    const { id, plane, window, opacity } = channel;
+    const shapes = shapesOf(channel);
+    if (plane === null || shapes.length === 0) return null;
+    const { gradientMax } = plane;
+    const made = this.planes.get(id);
+    const isSame =
+      made?.shapes === shapes &&
+      made.gradientMax === gradientMax &&
+      made.window === window &&
+      made.opacity === opacity;
+    if (isSame) return made.table;
+    const table = planeTable(shapes, gradientMax, window, opacity);
+    this.planes.set(id, { shapes, gradientMax, window, opacity, table });
+    return table;
+  }
+
+  private async findLeaps(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
+    march.leapBy(null); // what the old table leaps over may show now
+    this.leapsUnderWay++;
+    const distances = await this.occupancy
+      .computeDistances(march.volume.tile, {
+        bricks: shown.bricks,
+        alphas: looks.map(({ table }) => opacities(table)),
+        count: brickCounts(march.volume.size),
+      })
+      .finally(() => {
+        this.leapsUnderWay--;
+        this.onChange();
+      });
+    if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
+    march.leapBy(distances);
+  }
+
+  private show({ march, texture, packed, presence }: Resident): void {
+    if (march === null || packed === null) return;
+    march.mesh.visible = presence > 0;
+    march.show(packed, texture.old, texture.fresh, presence);
+  }
+
+  private drawn(): { march: TileMarch }[] {
+    return [...this.residents.values()].flatMap(({ march }) =>
+      march?.mesh.visible ? [{ march }] : [],
+    );
+  }
+
+  /** Drop all that is on the GPU; what is wanted comes anew. */
+  forget(): void {
+    for (const { march, texture } of this.residents.values()) {
+      march?.dispose();
+      texture.dispose();
+    }
+    this.residents.clear();
+  }
+
+  dispose(): void {
+    this.forget();
+    this.occupancy.dispose();
+  }
+}
+
+/** Whether functions show what bricks leave out. */
+export function showsBelow(texture: TileTexture | BrickTile, looks: readonly Look[]): boolean {
+  if (!(texture instanceof BrickTile)) return false;
+  const { thresholds } = texture;
+  return looks.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
+}
+
+/** The box round several marched tiles, um, world. */
+class Bounds {
+  readonly min = new Vector3().setScalar(Number.POSITIVE_INFINITY);
+  readonly max = new Vector3().setScalar(Number.NEGATIVE_INFINITY);
+  count = 0;
+
+  add({ volume }: TileMarch): void {
+    const matrix = new Matrix4().fromArray(volume.matrix);
+    const { min, max } = volume.bounds_um;
+    for (let i = 0; i < 8; i++) {
+      const x = i & 1 ? max[0] : min[0];
+      const y = i & 2 ? max[1] : min[1];
+      const z = i & 4 ? max[2] : min[2];
+      const at = new Vector3(x, y, z).applyMatrix4(matrix);
+      this.min.min(at);
+      this.max.max(at);
+    }
+    this.count++;
+  }
+}

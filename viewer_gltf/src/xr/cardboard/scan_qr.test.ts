@@ -1,0 +1,46 @@
+import { afterEach, describe, expect, it, vi } from "vitest";
+import { canScan, scanCode } from "./scan_qr";
+
+const video = (readyState = 4) => ({ readyState }) as HTMLVideoElement;
+const noAbort = new AbortController().signal;
+
+/** A browser whose detector sees one answer a call. */
+function see(answers: string[][], formats = ["qr_code"]): void {
+  vi.stubGlobal(
+    "BarcodeDetector",
+    class {
+      static getSupportedFormats = async () => formats;
+      detect = async () => (answers.shift() ?? []).map((rawValue) => ({ rawValue }));
+    },
+  );
+}
+
+describe("scanning a viewer's code", () => {
+  afterEach(() => void vi.unstubAllGlobals());
+
+  it("waits for the first code that the camera sees", async () => {
+    see([[], [], ["https://g.co/cardboard"]]);
+    expect(await canScan()).toBe(true);
+    expect(await scanCode(video(), noAbort)).toBe("https://g.co/cardboard");
+  });
+
+  it("asks for the code's address where the browser can't scan", async () => {
+    expect(await canScan()).toBe(false);
+    await expect(scanCode(video(), noAbort)).rejects.toThrow(/can't read QR codes.*paste/);
+    see([], ["ean_13"]);
+    expect(await canScan()).toBe(false);
+  });
+
+  it("tells that a code is another's", async () => {
+    see([["https://example.org/menu"]]);
+    await expect(scanCode(video(), noAbort)).rejects.toThrow("not a Cardboard viewer's code");
+  });
+
+  it("stops when it is told to, before the camera's first frame too", async () => {
+    see([["https://g.co/cardboard"]]);
+    const stop = new AbortController();
+    const scanned = scanCode(video(0), stop.signal);
+    stop.abort(new Error("closed"));
+    await expect(scanned).rejects.toThrow("closed");
+  });
+});

@@ -1,0 +1,145 @@
+import { describe, expect, it } from "vitest";
+import { CARDBOARD_V1, CARDBOARD_V2, parseProfile } from "./viewer_profile";
+
+const V2 =
+  "CgZHb29nbGUSEkNhcmRib2FyZCBJL08gMjAxNR0rGBU9JQHegj0qEAAASEIAAEhCAABIQgAASEJYADUpXA89OggeZnc-Ej6aPlAAYAM";
+const XIAOMI =
+  "CgZYaWFvbWkSCk1pIFZSIFBsYXkddEYUPSW28309KhAAAHBCAABwQgAAcEIAAHBCWAA12qz6PDoI7FG4PgrXI7xQAGAD";
+/** The SDK's own message of Cardboard v1. */
+const V1 =
+  "0a0c476f6f676c652c20496e632e120c43617264626f6172642076311d31082c3d258fc2753d2a10" +
+  "0000204200002042000020420000204235295c0f3d3a08c1cae13e77be1f3e58006001";
+
+const toBase64 = (hex: string) => Buffer.from(hex, "hex").toString("base64url");
+const floats = (...values: number[]) =>
+  Buffer.from(new Float32Array(values).buffer).toString("hex");
+const message = (parts: Record<string, string>) =>
+  Object.entries({
+    screen: `1d${floats(0.04)}`,
+    lenses: `25${floats(0.06)}`,
+    fov: `2a10${floats(40, 40, 40, 40)}`,
+    tray: `35${floats(0.035)}`,
+    distortion: `3a08${floats(0.4, 0.1)}`,
+    ...parts,
+  })
+    .map(([, hex]) => hex)
+    .join("");
+
+function near(found: number, wanted: number): void {
+  expect(found / wanted).toBeCloseTo(1, 3); // floats of 32 bits, printed with four digits
+}
+
+describe("a viewer's code", () => {
+  it("of Cardboard v2, as published, is the one built in", () => {
+    const profile = parseProfile(`http://google.com/cardboard/cfg?p=${V2}`);
+    expect(profile).toMatchObject({
+      vendor: "Google",
+      model: "Cardboard I/O 2015",
+      fov_deg: { outer: 50, inner: 50, bottom: 50, top: 50 },
+      alignment: "bottom",
+      button: "indirect-touch",
+    });
+    near(profile.screenToLens_m, CARDBOARD_V2.screenToLens_m);
+    near(profile.interLens_m, CARDBOARD_V2.interLens_m);
+    near(profile.trayToLens_m, CARDBOARD_V2.trayToLens_m);
+    expect(profile.distortion).toHaveLength(2);
+    profile.distortion.forEach((k, i) => {
+      near(k, CARDBOARD_V2.distortion[i]);
+    });
+  });
+
+  it("of Cardboard v1, in the SDK's bytes, is the one built in", () => {
+    const profile = parseProfile(toBase64(V1));
+    near(profile.screenToLens_m, CARDBOARD_V1.screenToLens_m);
+    near(profile.interLens_m, CARDBOARD_V1.interLens_m);
+    near(profile.distortion[0], 0.441);
+    near(profile.distortion[1], 0.156);
+    const { vendor, model, fov_deg, alignment, button } = CARDBOARD_V1;
+    expect(profile).toMatchObject({ vendor, model, fov_deg, alignment, button });
+  });
+
+  it("of another maker has its own numbers", () => {
+    const profile = parseProfile(`https://www.google.com/cardboard/cfg?p=${XIAOMI}`);
+    expect(profile).toMatchObject({ vendor: "Xiaomi", model: "Mi VR Play", alignment: "bottom" });
+    near(profile.screenToLens_m, 0.0362);
+    near(profile.interLens_m, 0.062);
+    near(profile.trayToLens_m, 0.0306);
+    near(profile.distortion[0], 0.36);
+    near(profile.distortion[1], -0.01);
+    expect(profile.fov_deg.outer).toBe(60);
+  });
+
+  it("is the same however it is pasted", () => {
+    const wanted = parseProfile(V2);
+    for (const text of [
+      `  https://google.com/cardboard/cfg?p=${V2}\n`,
+      `google.com/cardboard/cfg?p=${V2}`,
+      `https://google.com/cardboard/cfg?p=${V2}%3D`,
+      `${V2.slice(0, 40)}\n${V2.slice(40)}`,
+    ]) {
+      expect(parseProfile(text)).toEqual(wanted);
+    }
+  });
+
+  it("of a viewer of 2014 is an address without numbers", () => {
+    for (const text of [
+      "http://g.co/cardboard",
+      "https://google.com/cardboard/",
+      "g.co/cardboard",
+    ]) {
+      expect(parseProfile(text)).toBe(CARDBOARD_V1);
+    }
+  });
+
+  it("takes floats one by one, and passes over what it doesn't know", () => {
+    const single = `2d${floats(41)}2d${floats(42)}2d${floats(43)}2d${floats(44)}`;
+    const unknown = `a00601${"a906"}${floats(1, 2)}ba060161`; // a varint, a double, a string
+    const code = toBase64(message({ fov: single, unknown, alignment: "5802" }));
+    const profile = parseProfile(code);
+    expect(profile.fov_deg).toEqual({ outer: 41, inner: 42, bottom: 43, top: 44 });
+    expect(profile.alignment).toBe("top");
+  });
+
+  it("of a viewer that centres the phone needs no tray", () => {
+    const profile = parseProfile(toBase64(message({ tray: "", alignment: "5801" })));
+    expect(profile.alignment).toBe("center");
+  });
+
+  it.each([
+    ["", "is empty"],
+    ["https://example.org/cardboard", "not a Cardboard viewer's code: https://example.org"],
+    ["hello", "not a Cardboard viewer's code: hello"],
+    ["https://goo.gl/6tWJAX", "goo.gl/6tWJAX is a short link"],
+    ["https://google.com/cardboard/cfg", "no parameter p"],
+    ["https://google.com/cardboard/cfg?p=%%%", "damaged or cut off"],
+    [V2.slice(0, 60), "damaged or cut off"],
+    [toBase64(message({ extra: "07" })), "damaged or cut off"],
+    [toBase64(message({ screen: "" })), "screen to lens: expected 0.01 to 0.2 m, found none"],
+    [toBase64(message({ lenses: `25${floats(Number.NaN)}` })), "lenses: expected 0.03 to 0.1 m"],
+    [toBase64(message({ fov: `2a08${floats(40, 40)}` })), "field of view, bottom"],
+    [toBase64(message({ fov: `2a10${floats(40, 95, 40, 40)}` })), "5 to 85 degrees, found 95"],
+    [toBase64(message({ distortion: `3a04${floats(-2)}` })), "folds the picture: -2.00"],
+    [toBase64(message({ distortion: `3a04${floats(Number.NaN)}` })), "folds the picture: NaN"],
+  ])("that is bad is told in words: %j", (text, words) => {
+    expect(() => parseProfile(text)).toThrow(words);
+    expect(() => parseProfile(text)).toThrow(expect.objectContaining({ name: "ProfileError" }));
+  });
+
+  it("never throws anything else, however it is cut or bent", () => {
+    const bytes = Buffer.from(V2, "base64url");
+    let seed = 1;
+    const random = (below: number) => {
+      seed = (seed * 48271) % 2147483647;
+      return seed % below;
+    };
+    for (let i = 0; i < 3000; i++) {
+      const bent = Buffer.from(bytes.subarray(0, 30 + random(bytes.length - 29)));
+      for (let n = random(4); n >= 0; n--) bent[random(bent.length)] = random(256);
+      try {
+        parseProfile(bent.toString("base64url"));
+      } catch (error) {
+        expect(error).toMatchObject({ name: "ProfileError" });
+      }
+    }
+  });
+});

@@ -1,0 +1,164 @@
+/**
+ * The viewer profile: what a Cardboard's maker says of its lenses, printed on it as a QR code. The
+ * code is an address whose parameter `p` is base64url of the protocol buffer `DeviceParams`, by
+ * the field numbers of Google's Cardboard SDK (proto/cardboard_device.proto, Apache-2.0).
+ */
+import { BundleError } from "../../bundle/errors";
+import { isIncreasing } from "./lens";
+import { type Fields, readFields } from "./protobuf";
+
+export type Alignment = "bottom" | "center" | "top";
+export type Button = "none" | "magnet" | "touch" | "indirect-touch";
+
+export type Profile = Readonly<{
+  vendor: string;
+  model: string;
+  screenToLens_m: number;
+  interLens_m: number;
+  /** How far the left lens lets the eye see to each side; the right one mirrors it. */
+  fov_deg: Readonly<{ outer: number; inner: number; bottom: number; top: number }>;
+  /** Where the phone rests, and how far the lenses' centres are from there. */
+  alignment: Alignment;
+  trayToLens_m: number;
+  /** k1, k2, ... of r (1 + k1 r^2 + k2 r^4 + ...), r in tangents of the angle. */
+  distortion: readonly number[];
+  button: Button;
+}>;
+
+/** What is wrong with a profile's code, in words for the page. */
+export class ProfileError extends BundleError {
+  override readonly name = "ProfileError";
+}
+
+/** Numbers of the SDK's own v1 profile (sdk/qrcode/cardboard_v1). */
+export const CARDBOARD_V1: Profile = {
+  vendor: "Google, Inc.",
+  model: "Cardboard v1",
+  screenToLens_m: 0.042,
+  interLens_m: 0.06,
+  fov_deg: { outer: 40, inner: 40, bottom: 40, top: 40 },
+  alignment: "bottom",
+  trayToLens_m: 0.035,
+  distortion: [0.441, 0.156],
+  button: "magnet",
+};
+
+/**
+ * Numbers of the code that Google prints on the viewer of 2015. (The browser polyfills hold others,
+ * 39 mm, 64 mm, 60 degrees, 0.34 and 0.55, which no published code has.)
+ */
+export const CARDBOARD_V2: Profile = {
+  vendor: "Google",
+  model: "Cardboard I/O 2015",
+  screenToLens_m: 0.0364,
+  interLens_m: 0.0639,
+  fov_deg: { outer: 50, inner: 50, bottom: 50, top: 50 },
+  alignment: "bottom",
+  trayToLens_m: 0.035,
+  distortion: [0.2416, 0.3012],
+  button: "indirect-touch",
+};
+
+export const BUILT_IN = { v1: CARDBOARD_V1, v2: CARDBOARD_V2 } as const;
+
+const ALIGNMENTS: readonly Alignment[] = ["bottom", "center", "top"];
+const BUTTONS: readonly Button[] = ["none", "magnet", "touch", "indirect-touch"];
+const HOW = "Paste what the code says: https://google.com/cardboard/cfg?p=...";
+
+/** The profile of a code's text: its address, or the part after `p=`. Throws ProfileError. */
+export function parseProfile(text: string): Profile {
+  const pasted = text.replace(/\s+/g, "");
+  if (pasted === "") throw new ProfileError(`The viewer's code is empty. ${HOW}`);
+  const isBare = /^[\w-]{40,}=*$/.test(pasted);
+  if (isBare) return readParams(pasted);
+
+  const address = readAddress(/^https?:/i.test(pasted) ? pasted : `https://${pasted}`);
+  const host = address?.hostname.replace(/^www\./, "");
+  const path = address?.pathname.replace(/\/$/, "");
+  if (host === "goo.gl") {
+    throw new ProfileError(
+      `${host}${path} is a short link, which can't be followed from here: open it in a browser, ` +
+        "and paste the long address that it leads to, google.com/cardboard/cfg?p=...",
+    );
+  }
+  const isGoogle = host === "google.com" || host === "g.co" || host === "vr.google.com";
+  if (!isGoogle || !path?.startsWith("/cardboard")) {
+    throw new ProfileError(`This is not a Cardboard viewer's code: ${shortened(pasted)}. ${HOW}`);
+  }
+  const params = address?.searchParams.get("p");
+  if (params) return readParams(params.replaceAll(" ", "+"));
+  // Viewers of 2014 have no numbers in their code: it is the address of the project alone.
+  if (path === "/cardboard") return CARDBOARD_V1;
+  throw new ProfileError(`The viewer's code has no parameter p: ${shortened(pasted)}. ${HOW}`);
+}
+
+function readAddress(text: string): URL | null {
+  try {
+    return new URL(text); // URL.parse is younger than many a phone's browser
+  } catch {
+    return null;
+  }
+}
+
+function readParams(base64: string): Profile {
+  let fields: Fields;
+  try {
+    const standard = base64.replaceAll("-", "+").replaceAll("_", "/").replace(/=+$/, "");
+    fields = readFields(Uint8Array.from(atob(standard), (c) => c.charCodeAt(0)));
+  } catch (error) {
+    // atob has its own way to say that it found no base64, the reader that the bytes end too soon.
+    if (!(error instanceof DOMException || error instanceof RangeError)) throw error;
+    throw new ProfileError(`The viewer's code is damaged or cut off: ${shortened(base64)}. ${HOW}`);
+  }
+  const length_m = (field: number, name: string, least: number, most: number) =>
+    within(fields.floats(field)[0], name, least, most, "m");
+  const angles = fields.floats(5);
+  const angle_deg = (i: number, name: string) =>
+    within(angles[i], `field of view, ${name}`, 5, 85, "degrees");
+  const profile: Profile = {
+    vendor: fields.text(1),
+    model: fields.text(2),
+    screenToLens_m: length_m(3, "screen to lens", 0.01, 0.2),
+    interLens_m: length_m(4, "between the lenses", 0.03, 0.1),
+    fov_deg: {
+      outer: angle_deg(0, "outer"),
+      inner: angle_deg(1, "inner"),
+      bottom: angle_deg(2, "bottom"),
+      top: angle_deg(3, "top"),
+    },
+    alignment: ALIGNMENTS[fields.whole(11) ?? 0] ?? "bottom",
+    trayToLens_m:
+      fields.whole(11) === 1 && fields.floats(6).length === 0
+        ? CARDBOARD_V1.trayToLens_m // a centred phone rests on no tray
+        : length_m(6, "tray to lens", 0.005, 0.1),
+    distortion: fields.floats(7),
+    button: BUTTONS[fields.whole(12) ?? 1] ?? "magnet",
+  };
+  const { outer, inner, bottom, top } = profile.fov_deg;
+  const tan = (deg: number) => Math.tan((deg * Math.PI) / 180);
+  const corner = Math.hypot(tan(Math.max(outer, inner)), tan(Math.max(bottom, top)));
+  if (!isIncreasing(profile.distortion, corner)) {
+    const found = profile.distortion.map((k) => k.toPrecision(3)).join(", ");
+    throw new ProfileError(`The viewer's code has a distortion that folds the picture: ${found}.`);
+  }
+  return profile;
+}
+
+function within(
+  value: number | undefined,
+  name: string,
+  least: number,
+  most: number,
+  unit: string,
+): number {
+  // A NaN is not within anything either.
+  if (value !== undefined && value >= least && value <= most) return value;
+  const found = value === undefined ? "none" : value.toPrecision(3);
+  throw new ProfileError(
+    `The viewer's code, ${name}: expected ${least} to ${most} ${unit}, found ${found}.`,
+  );
+}
+
+function shortened(text: string): string {
+  return text.length > 60 ? `${text.slice(0, 57)}...` : text;
+}

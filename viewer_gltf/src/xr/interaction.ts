@@ -1,0 +1,325 @@
+/**
+ * Everything that is done in stereo: looking, pointing, pressing, holding. One of it serves both
+ * WebXR and the split screen, where there is nothing but the gaze and a tap.
+ */
+import { Matrix4, type Scene, Vector3, type WebXRManager } from "three";
+import { Ring } from "../interaction/dwell_ring";
+import {
+  gazeOf,
+  type Met,
+  meetFirst,
+  Pointer,
+  type RoomRay,
+  type Target,
+} from "../interaction/ray_pointer";
+import { TILE, TileTarget } from "../interaction/tile_target";
+import type { HandPose } from "../math/grab";
+import { type BoxedTile, type Ray, shownTiles } from "../math/pick";
+import type { Layout, PanelView } from "../panel/controls";
+import type { Specimen } from "../render/specimen_pose";
+import type { Command } from "../state/commands";
+import type { Action, ViewerState } from "../state/viewer_state";
+import { GazeCarry } from "./carry_handle";
+import { Controllers, type Hand, type HandEvent } from "./controllers";
+import { moveByCommand, moveByHolders, moveByStick } from "./hold_specimen";
+import { RoomNotice } from "./panel/notice";
+import { RoomPanel } from "./panel/panel";
+import { hullOf, middleOf } from "./shown_hull";
+
+export type HandsOptions = Readonly<{
+  xr: Pick<WebXRManager, "getFrame" | "getReferenceSpace">;
+  scene: Scene;
+  specimen: Specimen;
+  tiles: readonly BoxedTile[];
+  /** Between the panel and the tiles: what is dragged, such as a cut's handles. */
+  handles?: readonly Target[];
+  layOut: (view: PanelView) => Layout;
+  onAction: (action: Action) => void;
+  onCommand: (command: Command) => void;
+  /** A tile was chosen by dwell or button; the ray is in um of the specimen. */
+  onChoose: (ray: Ray, tile: string) => void;
+  /** Stereo is to end. */
+  onLeave: () => void;
+}>;
+
+/** A trigger held on the specimen for so long, or moved so far, holds it: where nothing squeezes. */
+const HOLD_S = 0.35;
+const HOLD_M = 0.02;
+
+/** A trigger that is down. */
+type Press = {
+  /** Where it went down. */
+  readonly met: Met | null;
+  readonly at: Vector3 | null;
+  elapsed_s: number;
+  /** It drags or holds something: letting go of it chooses nothing. */
+  isUsed: boolean;
+};
+
+export class Hands {
+  readonly panel: RoomPanel;
+  readonly ring = new Ring();
+  readonly notice = new RoomNotice();
+  private readonly controllers = new Controllers();
+  private readonly pointer = new Pointer();
+  private readonly tiles: TileTarget;
+  private readonly targets: readonly Target[];
+  private readonly carry = new GazeCarry();
+  private readonly presses = new Map<XRInputSource, Press>();
+  /** Who holds the specimen, and where their hands were in the frame before. */
+  private held = new Map<XRInputSource, HandPose | null>();
+  private gaze: RoomRay = gazeOf(new Matrix4());
+  private taps = 0;
+  private isRunning = false;
+  private shown = "";
+
+  constructor(private readonly options: HandsOptions) {
+    const { scene, specimen, handles = [], layOut, onLeave } = options;
+    this.panel = new RoomPanel({
+      layOut,
+      onLeave,
+      onTell: (text) => this.tell(text),
+      onWish: (wish) => {
+        if (typeof wish === "string") options.onCommand(wish);
+        else options.onAction(wish);
+      },
+    });
+    this.tiles = new TileTarget(specimen.group, options.onChoose);
+    this.targets = [...this.panel.targets, ...handles, this.tiles];
+    scene.add(...this.groups);
+  }
+
+  /** What is no opaque thing, which the pass for the depth has to leave out. */
+  get overlays() {
+    return [this.ring.group, this.notice.mesh];
+  }
+
+  private get groups() {
+    return [this.panel.group, this.controllers.group, ...this.overlays];
+  }
+
+  /** What is met now, for tests and for the names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
+  get pointed(): string | null {
+    return this.pointer.leading?.key ?? null;
+  }
+
+  /** Of the dwell, 0..1. */
+  get progress(): number {
+    return this.pointer.progress;
+  }
+
+  get isHolding(): boolean {
+    return this.held.size > 0;
+  }
+
+  /** @param session null: split screen, without any controllers */
+  start(session: XRSession | null): void {
+    this.stop();
+    this.isRunning = true;
+    this.panel.setShown(true);
+    if (session !== null) this.controllers.begin(session, this.options.xr.getReferenceSpace());
+  }
+
+  stop(): void {
+    this.isRunning = false;
+    this.controllers.end();
+    this.pointer.reset();
+    this.carry.drop();
+    this.presses.clear();
+    this.held.clear();
+    this.taps = 0;
+    this.panel.setShown(false);
+    this.notice.clear();
+    this.ring.hide();
+  }
+
+  /** The only button of the split screen. */
+  tap(): void {
+    this.taps++;
+  }
+
+  /** Say something where the head looks. */
+  tell(text: string): void {
+    if (this.isRunning) this.notice.tell(text);
+  }
+
+  /** What would move the camera of a flat screen; false: the command is another's. */
+  run(command: Command, state: ViewerState): boolean {
+    const { specimen } = this.options;
+    const pose = moveByCommand(specimen.pose, command, middleOf(this.around(state)));
+    if (pose === null) return false;
+    specimen.moveTo(pose, this.gaze.origin);
+    return true;
+  }
+
+  /** Once a frame of stereo, before it is drawn. True if the picture differs from the last one. */
+  update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
+    if (!this.isRunning) return false;
+    const { xr } = this.options;
+    this.gaze = gazeOf(head);
+    this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
+    this.tiles.clip = state.clip;
+    this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
+    for (const event of this.controllers.take()) this.handle(event);
+    for (; this.taps > 0; this.taps--) this.press(this.gaze);
+    this.forgetTheLost();
+    const hasHeld = this.hold(dt_s);
+    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld;
+    const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
+    const isToldAnew = this.notice.update(dt_s, head);
+    const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
+    const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
+    if (fired !== null) this.choose(fired);
+    const hasCarried = this.carry.follow(this.gaze);
+    return this.draw(head) || hasMoved || isRepainted || isToldAnew || hasCarried;
+  }
+
+  dispose(): void {
+    this.stop();
+    const { scene } = this.options;
+    scene.remove(...this.groups);
+    this.panel.dispose();
+    this.notice.dispose();
+    this.controllers.dispose();
+    this.ring.dispose();
+  }
+
+  private get tracked(): readonly Hand[] {
+    return this.controllers.hands.filter(({ isTracked }) => isTracked);
+  }
+
+  /** What the gaze carries covers all else until it is put down. */
+  private get free(): readonly Target[] {
+    return this.carry.isCarrying ? [this.carry] : this.targets;
+  }
+
+  private handOf(source: XRInputSource): Hand | undefined {
+    return this.controllers.hands.find((hand) => hand.source === source);
+  }
+
+  private handle({ kind, source, ray }: HandEvent): void {
+    const press = this.presses.get(source);
+    switch (kind) {
+      case "press":
+        this.presses.set(source, this.begin(source, ray));
+        break;
+      case "select":
+        if (!press?.isUsed) this.press(ray ?? this.gaze);
+        break;
+      case "release":
+        this.presses.delete(source);
+        if (press?.isUsed) this.held.delete(source);
+        break;
+      case "squeeze":
+        this.held.set(source, null);
+        break;
+      case "let-go":
+        this.held.delete(source);
+        break;
+    }
+  }
+
+  private begin(source: XRInputSource, ray: RoomRay | null): Press {
+    const met = meetFirst(ray ?? this.gaze, this.free);
+    // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
+    const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
+    if (met !== null && isUsed) met.target.choose(met, met.ray);
+    const at = this.handOf(source)?.pose?.position ?? null;
+    return { met, at, elapsed_s: 0, isUsed };
+  }
+
+  /** The button: what the ray meets, or if that is nothing, what is gazed at. */
+  private press(ray: RoomRay): void {
+    const met = meetFirst(ray, this.free) ?? meetFirst(this.gaze, this.free);
+    if (met !== null) this.choose(met);
+  }
+
+  private choose(met: Met): void {
+    if (met.key === null) return;
+    this.pointer.press(met.key);
+    met.target.choose(met, met.ray);
+    if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
+  }
+
+  /** Input sources come and go, also while they hold something. */
+  private forgetTheLost(): void {
+    for (const map of [this.presses, this.held]) {
+      for (const source of [...map.keys()]) {
+        if (this.handOf(source) === undefined) map.delete(source);
+      }
+    }
+  }
+
+  /** What the buttons that are down drag and hold; whether anything has moved. */
+  private hold(dt_s: number): boolean {
+    for (const [source, press] of this.presses) this.advance(source, press, dt_s);
+    const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
+    const { specimen } = this.options;
+    const pose = moveByHolders(specimen.pose, this.held, now);
+    this.held = now;
+    if (pose === specimen.pose) return false;
+    specimen.moveTo(pose, this.gaze.origin);
+    return true;
+  }
+
+  private advance(source: XRInputSource, press: Press, dt_s: number): void {
+    const hand = this.handOf(source);
+    press.elapsed_s += dt_s;
+    const { met } = press;
+    if (met?.key == null) return;
+    if (met.hold !== undefined) {
+      if (press.isUsed) met.target.drag?.(met.key, hand?.ray ?? this.gaze);
+      return;
+    }
+    const mayHold = hand?.pose && !hand.canSqueeze && met.key.startsWith(TILE);
+    if (press.isUsed || !mayHold || !hand?.pose) return;
+    const isFar = press.at !== null && press.at.distanceTo(hand.pose.position) > HOLD_M;
+    if (!isFar && press.elapsed_s < HOLD_S) return;
+    press.isUsed = true;
+    this.held.set(source, null);
+  }
+
+  private moveBySticks(dt_s: number, state: ViewerState): boolean {
+    if (this.isHolding) return false;
+    const { specimen } = this.options;
+    let { pose } = specimen;
+    for (const { stick, ray } of this.tracked) {
+      if (stick.x === 0 && stick.y === 0) continue;
+      const met = this.tileAlong(ray) ?? this.tileAlong(this.gaze);
+      pose = moveByStick(pose, stick, met ?? middleOf(this.around(state)), dt_s);
+    }
+    if (pose === specimen.pose) return false;
+    specimen.moveTo(pose, this.gaze.origin);
+    return true;
+  }
+
+  private tileAlong(ray: RoomRay | null): Vector3 | null {
+    const hit = ray && this.tiles.meet(ray);
+    return hit && pointOn({ ...hit, ray });
+  }
+
+  private around({ isolated }: ViewerState): readonly Vector3[] {
+    const { tiles, specimen } = this.options;
+    return hullOf(shownTiles(tiles, isolated), specimen.group.matrixWorld);
+  }
+
+  /** Ring, rays, and the light on what is pointed at. */
+  private draw(head: Matrix4): boolean {
+    this.tracked.forEach((hand, i) => {
+      this.controllers.draw(hand, this.pointer.hands[i]?.distance_m ?? null);
+    });
+    const { leading, progress } = this.pointer;
+    this.panel.light(leading?.key ?? null);
+    const eye = new Vector3().setFromMatrixPosition(head);
+    if (leading === null) this.ring.hide();
+    else this.ring.show(pointOn(leading), eye, progress, leading.key !== null);
+    const shown = `${leading?.key} ${leading?.distance_m} ${progress}`;
+    const isChanged = shown !== this.shown;
+    this.shown = shown;
+    return isChanged || this.tracked.length > 0;
+  }
+}
+
+function pointOn({ ray, distance_m }: Pick<Met, "ray" | "distance_m">): Vector3 {
+  return ray.direction.clone().multiplyScalar(distance_m).add(ray.origin);
+}

@@ -1,0 +1,127 @@
+/** A flat opaque thing in the room with a picture on it, painted anew only when it differs. */
+import {
+  CanvasTexture,
+  LinearFilter,
+  LinearMipmapLinearFilter,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  PlaneGeometry,
+  SRGBColorSpace,
+  type Vector3,
+} from "three";
+import { leaveUncut } from "../../gpu/unclipped_material";
+import type { RoomRay } from "../../interaction/ray_pointer";
+import { holds, type Mark, type Rect } from "../../panel/canvas/draw_list";
+import { PX_PER_M } from "../../panel/canvas/page";
+import { paint } from "../../panel/canvas/paint";
+
+const LIT = 0xffffff;
+const LIT_OPACITY = 0.14;
+/** Before the plane by so much. */
+const LIT_M = 0.001;
+/** Text is looked at aslant. */
+const ANISOTROPY = 4;
+
+/** px on the plane. */
+export type Spot = Readonly<{ x: number; y: number; distance_m: number }>;
+
+export class Plane {
+  readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  /** How often it was painted. */
+  paints = 0;
+  private readonly lit: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  private readonly texture: CanvasTexture;
+  private readonly context: CanvasRenderingContext2D;
+  private painted = "";
+  private readonly toPlane = new Matrix4();
+
+  constructor(
+    readonly width: number,
+    readonly height: number,
+  ) {
+    const canvas = document.createElement("canvas");
+    canvas.width = width;
+    canvas.height = height;
+    const context = canvas.getContext("2d");
+    if (context === null) throw new Error("the browser has no 2D canvas");
+    this.context = context;
+    this.texture = new CanvasTexture(canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.minFilter = LinearMipmapLinearFilter;
+    this.texture.magFilter = LinearFilter;
+    this.texture.anisotropy = ANISOTROPY;
+    this.mesh = new Mesh(
+      new PlaneGeometry(width / PX_PER_M, height / PX_PER_M),
+      new MeshBasicMaterial({ map: this.texture, toneMapped: false }),
+    );
+    this.mesh.visible = false;
+    leaveUncut(this.mesh);
+    this.lit = new Mesh(
+      new PlaneGeometry(1, 1),
+      new MeshBasicMaterial({
+        color: LIT,
+        opacity: LIT_OPACITY,
+        transparent: true,
+        depthWrite: false,
+        toneMapped: false,
+      }),
+    );
+    this.lit.visible = false;
+    this.mesh.add(this.lit);
+  }
+
+  /** True if the picture differs from what was painted before. */
+  show(marks: readonly Mark[]): boolean {
+    const text = JSON.stringify(marks);
+    if (text === this.painted) return false;
+    this.painted = text;
+    this.context.clearRect(0, 0, this.width, this.height);
+    paint(this.context, marks);
+    this.texture.needsUpdate = true;
+    this.paints++;
+    return true;
+  }
+
+  /** Put its middle there, to be seen from `eye`. */
+  place(at: Vector3, eye: Vector3): void {
+    this.mesh.position.copy(at);
+    this.mesh.lookAt(eye);
+    this.mesh.updateMatrixWorld();
+  }
+
+  /** Where a ray meets its front; null: not at all, or it is not shown. */
+  meet({ origin, direction }: RoomRay): Spot | null {
+    if (!this.mesh.visible) return null;
+    this.toPlane.copy(this.mesh.matrixWorld).invert();
+    const from = origin.clone().applyMatrix4(this.toPlane);
+    const to = direction.clone().transformDirection(this.toPlane);
+    if (from.z <= 0 || to.z >= 0) return null;
+    const distance_m = -from.z / to.z; // the plane is not scaled
+    const x = (from.x + distance_m * to.x) * PX_PER_M + this.width / 2;
+    const y = this.height / 2 - (from.y + distance_m * to.y) * PX_PER_M;
+    const whole: Rect = { x: 0, y: 0, width: this.width, height: this.height };
+    return holds(whole, { x, y }) ? { x, y, distance_m } : null;
+  }
+
+  /** Light up what is pointed at; null: nothing. Costs no painting. */
+  light(rect: Rect | null): void {
+    this.lit.visible = rect !== null;
+    if (rect === null) return;
+    const { x, y, width, height } = rect;
+    this.lit.position.set(
+      (x + width / 2 - this.width / 2) / PX_PER_M,
+      (this.height / 2 - y - height / 2) / PX_PER_M,
+      LIT_M,
+    );
+    this.lit.scale.set(width / PX_PER_M, height / PX_PER_M, 1);
+  }
+
+  dispose(): void {
+    this.texture.dispose();
+    for (const { geometry, material } of [this.mesh, this.lit]) {
+      geometry.dispose();
+      material.dispose();
+    }
+  }
+}

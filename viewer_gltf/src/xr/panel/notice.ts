@@ -1,0 +1,73 @@
+/**
+ * What is told in stereo: a label under the place that the head looks at when it comes. It stays
+ * there in the room, since what moves with the head makes sick, and goes by itself.
+ */
+import { type Matrix4, Vector3 } from "three";
+import { Plane } from "./canvas_plane";
+import {
+  advanceTelling,
+  NOTHING_TOLD,
+  type Telling,
+  TOLD_HEIGHT,
+  TOLD_WIDTH,
+  tell,
+  toldMarks,
+} from "./notice_queue";
+import { headBearing, pointAt, toldBearing } from "./placement";
+
+/** Nearer than the specimen mostly is, and not so near that eyes have to cross. */
+const DISTANCE_M = 0.9;
+/** Over volumes, marks and a specimen that is held closer; under the ring. */
+const RENDER_ORDER = 1900;
+
+export class RoomNotice {
+  private readonly plane = new Plane(TOLD_WIDTH, TOLD_HEIGHT);
+  private telling: Telling = NOTHING_TOLD;
+  /** It comes with the next frame, which knows where the head looks. */
+  private wantsPlace = false;
+
+  constructor() {
+    const { material } = this.plane.mesh;
+    material.transparent = true;
+    material.depthTest = material.depthWrite = false;
+    this.plane.mesh.renderOrder = RENDER_ORDER;
+    this.plane.mesh.name = "notice";
+  }
+
+  get mesh() {
+    return this.plane.mesh;
+  }
+
+  /** What can be read now. */
+  get texts(): readonly string[] {
+    return this.telling.texts;
+  }
+
+  tell(text: string): void {
+    this.telling = tell(this.telling, text);
+    this.wantsPlace = true;
+  }
+
+  clear(): void {
+    this.telling = NOTHING_TOLD;
+    this.wantsPlace = false;
+    this.mesh.visible = false;
+  }
+
+  /** Once a frame; whether it looks otherwise than before. */
+  update(dt_s: number, head: Matrix4): boolean {
+    const wasShown = this.mesh.visible;
+    if (this.wantsPlace) {
+      this.wantsPlace = false;
+      const eye = new Vector3().setFromMatrixPosition(head);
+      this.plane.place(pointAt(toldBearing(headBearing(head)), eye, DISTANCE_M), eye);
+    } else this.telling = advanceTelling(this.telling, dt_s);
+    this.mesh.visible = this.texts.length > 0;
+    if (!this.mesh.visible) return wasShown;
+    return this.plane.show(toldMarks(this.texts)) || !wasShown;
+  }
+
+  dispose(): void {
+    this.plane.dispose();
+  }
+}

@@ -1,0 +1,249 @@
+/**
+ * The panel in the room: a plane with one section of the layout at a time, and a button under all
+ * that is looked at, which opens and closes it. It opens beside the specimen, never before it.
+ */
+import { Group, type Matrix4, Vector3 } from "three";
+import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
+import { holds, type PlaneWish, type Rect, type Region, text } from "../../panel/canvas/draw_list";
+import {
+  HEIGHT,
+  type Page,
+  type PlaneView,
+  PX_PER_M,
+  pageOf,
+  START_PLANE,
+  WIDTH,
+} from "../../panel/canvas/page";
+import { changePanel, type Layout, type PanelView, START_VIEW } from "../../panel/controls";
+import type { Command } from "../../state/commands";
+import type { Action, ViewerState } from "../../state/viewer_state";
+import { Plane, type Spot } from "./canvas_plane";
+import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } from "./placement";
+
+const DISTANCE_M = 1.2;
+const OPENER_M = 0.7;
+const OPENER: Rect = { x: 0, y: 0, width: 208, height: 80 };
+/** What is no part of the state (frame time, gazed tile) is read as often. */
+const REFRESH_S = 0.5;
+const HALF = {
+  yaw: Math.atan(WIDTH / PX_PER_M / 2 / DISTANCE_M),
+  pitch: Math.atan(HEIGHT / PX_PER_M / 2 / DISTANCE_M),
+};
+
+export const PANEL = "panel:";
+const OPENER_KEY = "opener";
+
+export type RoomPanelOptions = Readonly<{
+  layOut: (view: PanelView) => Layout;
+  onWish: (wish: Action | Command) => void;
+  onLeave: () => void;
+  /** What was asked for can't be done: why. */
+  onTell: (text: string) => void;
+}>;
+
+export class RoomPanel {
+  readonly group = new Group();
+  readonly plane = new Plane(WIDTH, HEIGHT);
+  private readonly opener = new Plane(OPENER.width, OPENER.height);
+  /** In the order in which rays meet them. */
+  readonly targets: readonly Target[];
+  private page: Page = { marks: [], regions: [] };
+  private view: PanelView = START_VIEW;
+  private section: PlaneView = START_PLANE;
+  private state: ViewerState | null = null;
+  private isStale = true;
+  private rested_s = 0;
+  /** null until the first frame tells where the head looks. */
+  private openerYaw: number | null = null;
+  /** It opens with the next frame, which knows where the eye is. */
+  private wantsPlace = false;
+  /** What was last asked for: a button that is held still asks for nothing more. */
+  private dragged = "";
+
+  constructor(private readonly options: RoomPanelOptions) {
+    this.group.name = "panel";
+    this.group.visible = false;
+    this.group.add(this.plane.mesh, this.opener.mesh);
+    this.opener.mesh.visible = true;
+    this.targets = [
+      {
+        isOnTop: false,
+        meet: (ray) => this.meet(ray),
+        choose: (hit, ray) => this.choose(hit, ray),
+        drag: (key, ray) => this.drag(key, ray),
+      },
+      {
+        isOnTop: false,
+        meet: (ray) => this.meetOpener(ray),
+        choose: () => this.toggle(),
+      },
+    ];
+    this.paintOpener();
+  }
+
+  get isOpen(): boolean {
+    return this.plane.mesh.visible;
+  }
+
+  /** What can be pointed at now, for tests and for whoever reads it aloud. */
+  get regions(): readonly Region[] {
+    return this.isOpen ? this.page.regions : [];
+  }
+
+  /** Stereo has begun, or has ended. */
+  setShown(isShown: boolean): void {
+    this.group.visible = isShown;
+    this.openerYaw = null;
+    if (!isShown) this.close();
+  }
+
+  close(): void {
+    this.plane.mesh.visible = false;
+    this.paintOpener();
+  }
+
+  toggle(): void {
+    if (this.isOpen) this.close();
+    else this.wantsPlace = true;
+  }
+
+  /**
+   * @param around tells points of the specimen's hull, room
+   * @returns whether it looks otherwise than before
+   */
+  update(
+    dt_s: number,
+    head: Matrix4,
+    state: ViewerState,
+    around: () => readonly Vector3[],
+  ): boolean {
+    const eye = new Vector3().setFromMatrixPosition(head);
+    const bearing = headBearing(head);
+    this.openerYaw = followHead(this.openerYaw ?? bearing.yaw, bearing, dt_s);
+    const at = pointAt({ yaw: this.openerYaw, pitch: OPENER_PITCH }, eye, OPENER_M);
+    this.opener.place(at, eye);
+    let isChanged = false;
+    if (this.wantsPlace) {
+      this.wantsPlace = false;
+      // Whoever looks down at the button has no clear heading: the button has.
+      this.open(eye, this.openerYaw, around());
+      isChanged = true;
+    }
+    if (!this.isOpen) return isChanged;
+    this.rested_s += dt_s;
+    if (state !== this.state || this.rested_s >= REFRESH_S) this.isStale = true;
+    this.state = state;
+    if (!this.isStale) return isChanged;
+    return this.refresh() || isChanged;
+  }
+
+  /** Light up what is pointed at. */
+  light(key: string | null): void {
+    const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
+    this.plane.light(this.page.regions.find((region) => region.id === id)?.rect ?? null);
+    this.opener.light(key === OPENER_KEY ? OPENER : null);
+  }
+
+  /** Where the middle of a region is in the room; for tests. */
+  pointOf(id: string, across = 0.5, down = 0.5): Vector3 | null {
+    const region = this.regions.find((each) => each.id === id);
+    if (id === OPENER_KEY) return this.opener.mesh.getWorldPosition(new Vector3());
+    if (region === undefined) return null;
+    const { x, y, width, height } = region.rect;
+    return this.plane.mesh.localToWorld(
+      new Vector3(
+        (x + across * width - WIDTH / 2) / PX_PER_M,
+        (HEIGHT / 2 - y - down * height) / PX_PER_M,
+        0,
+      ),
+    );
+  }
+
+  dispose(): void {
+    this.plane.dispose();
+    this.opener.dispose();
+  }
+
+  private open(eye: Vector3, yaw: number, around: readonly Vector3[]): void {
+    const aside = placePanel(extentOf(around, eye, yaw), HALF);
+    const bearing = { yaw: yaw + aside.yaw, pitch: aside.pitch };
+    this.plane.place(pointAt(bearing, eye, DISTANCE_M), eye);
+    this.plane.mesh.visible = true;
+    this.isStale = true;
+    this.paintOpener();
+  }
+
+  private refresh(): boolean {
+    this.isStale = false;
+    this.rested_s = 0;
+    this.page = pageOf(this.options.layOut(this.view), this.section);
+    return this.plane.show(this.page.marks);
+  }
+
+  private paintOpener(): void {
+    const words = this.isOpen ? "Close" : "Menu";
+    this.opener.show([
+      { kind: "box", rect: OPENER, fill: "back", stroke: "accent", radius: 0 },
+      text(OPENER, words, { align: "center", size: 38 }),
+    ]);
+  }
+
+  private regionAt(spot: Spot): Region | null {
+    return this.page.regions.find(({ rect }) => holds(rect, spot)) ?? null;
+  }
+
+  private meet(ray: RoomRay): Hit | null {
+    const spot = this.plane.meet(ray);
+    if (spot === null) return null;
+    const region = this.regionAt(spot);
+    const key = region && PANEL + region.id;
+    if (!region?.isSlide) return { key, distance_m: spot.distance_m };
+    // what is first taken hold of can be carried by the gaze alone
+    const hold = region.press === undefined ? "slide" : "carry";
+    return { key, distance_m: spot.distance_m, hold };
+  }
+
+  private meetOpener(ray: RoomRay): Hit | null {
+    const spot = this.opener.meet(ray);
+    return spot && { key: OPENER_KEY, distance_m: spot.distance_m };
+  }
+
+  private choose({ key }: Hit, ray: RoomRay): void {
+    const wish = key === null ? null : this.wishAt(key, ray, true);
+    if (wish === null) return;
+    this.dragged = JSON.stringify(wish);
+    this.grant(wish);
+  }
+
+  private drag(key: string, ray: RoomRay): void {
+    if (this.isStale) this.refresh(); // what was taken hold of is part of it by now
+    const wish = this.wishAt(key, ray, false);
+    const text = JSON.stringify(wish);
+    if (wish === null || text === this.dragged) return;
+    this.dragged = text;
+    this.grant(wish);
+  }
+
+  /** Beyond a region's ends is at its ends: a slider is dragged past them. */
+  private wishAt(key: string, ray: RoomRay, isPress: boolean): PlaneWish | null {
+    const region = this.page.regions.find(({ id }) => PANEL + id === key);
+    const spot = this.plane.meet(ray);
+    if (region === undefined || spot === null) return null;
+    const { x, y, width, height } = region.rect;
+    const inside = (share: number) => Math.min(1, Math.max(0, share));
+    const at = [inside((spot.x - x) / width), inside((spot.y - y) / height)] as const;
+    return isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
+  }
+
+  private grant(wish: PlaneWish): void {
+    this.isStale = true;
+    if (typeof wish === "string") this.options.onWish(wish);
+    else if ("panel" in wish) this.view = changePanel(this.view, wish);
+    else if ("type" in wish) this.options.onWish(wish);
+    else if (wish.plane === "tab") this.section = { tab: wish.section, page: 0 };
+    else if (wish.plane === "page") this.section = { ...this.section, page: wish.page };
+    else if (wish.plane === "tell") this.options.onTell(wish.text);
+    else if (wish.plane === "close") this.close();
+    else this.options.onLeave();
+  }
+}

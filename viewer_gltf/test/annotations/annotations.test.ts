@@ -1,0 +1,285 @@
+/** Marks on the specimen, in a page of their own: lengths, angles, drags and names. */
+import { readFile } from "node:fs/promises";
+import type { Page } from "playwright-core";
+import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
+import { LABEL_HEIGHT, LABEL_PX } from "../../src/annotations/style";
+import type { Vec3 } from "../../src/math/pick";
+import { bundled } from "../support/browser/bundled";
+import { type Browser, launch } from "../support/browser/chromium";
+import { describeInChromium } from "../support/browser/skip";
+
+const WIDTH = 720;
+const HEIGHT = 480;
+/** Where screenshots go, if anybody wants to look. */
+const PICTURES = process.env.MARKS_PICTURES;
+
+describeInChromium("marks", () => {
+  let browser: Browser;
+  let page: Page;
+  let script: string;
+
+  beforeAll(async () => {
+    browser = await launch({ width: WIDTH, height: HEIGHT });
+    const built = await bundled(new URL("../support/annotations/harness.ts", import.meta.url));
+    script = built.replaceAll("{}.url", "location.href"); // a classic script has no import.meta
+  });
+
+  afterAll(() => browser?.close());
+
+  beforeEach(async () => {
+    await page?.close();
+    page = await browser.context.newPage();
+    // a page with an address, as a worker's is told from it
+    await page.route("http://marks.test/", (route) =>
+      route.fulfill({
+        contentType: "text/html",
+        body: '<main class="view"><div class="stage"></div></main>',
+      }),
+    );
+    await page.goto("http://marks.test/");
+    for (const sheet of ["panel/html/page.css", "annotations/annotations.css"]) {
+      const content = await readFile(new URL(`../../src/${sheet}`, import.meta.url), "utf8");
+      await page.addStyleTag({ content });
+    }
+    await page.addStyleTag({ content: ".view { height: 100vh; }" });
+    await page.addScriptTag({ content: script });
+    await page.evaluate(() => {
+      const stage = document.querySelector<HTMLElement>(".stage");
+      if (stage !== null) window.bench = window.makeBench?.(stage);
+    });
+  });
+
+  const look = (position: Vec3, target: Vec3 = [0, 0, 0], more = {}) =>
+    page.evaluate((view) => window.bench?.look(view), { position, target, ...more });
+  const shoot = async (name: string) => {
+    if (PICTURES) await page.screenshot({ path: `${PICTURES}/${name}.png` });
+  };
+  const stateNow = async () => {
+    const state = await page.evaluate(() => window.bench?.state);
+    if (state === undefined) throw new Error("the page has no bench");
+    return state;
+  };
+  const project = async (point: Vec3) => {
+    const place = await page.evaluate((each) => window.bench?.project(each), point);
+    if (place === undefined) throw new Error("the page has no bench");
+    return place;
+  };
+  const cutOpen = () =>
+    page.evaluate(() => {
+      const box = { min: [100, -350, 20], max: [900, -50, 180] } as const;
+      const plane = { normal: [0.6, 0, 0.8], offset_um: 420 } as const;
+      window.bench?.dispatch({ type: "set-clip", clip: { box, plane } });
+    });
+
+  it("have a scale bar that is true within a pixel at any zoom and from any side", async () => {
+    const said = new Set<string>();
+    for (const [position, target] of [
+      [
+        [0, 0, 2.2],
+        [0, 0, 0],
+      ],
+      [
+        [0.4, 0.3, 0.7],
+        [0.1, 0, 0.05],
+      ],
+      [
+        [-0.05, 0.1, 0.12],
+        [0, 0.05, 0],
+      ],
+      [
+        [3, 4, -5],
+        [0.2, 0.1, 0],
+      ],
+    ] as const) {
+      await look(position, target);
+      const scale = await page.evaluate(() => window.bench?.scale());
+      expect(Math.abs((scale?.shown_px ?? 0) - (scale?.true_px ?? 99))).toBeLessThan(1);
+      expect(scale?.shown_px).toBeGreaterThan(60);
+      said.add(scale?.text ?? "");
+    }
+    expect(said.size).toBeGreaterThan(2);
+  });
+
+  it("say the true distance of two measured points", async () => {
+    await look([0.3, 0.2, 1.6]);
+    const points = [
+      [250, -200, 100],
+      [550, -400, 130],
+    ] as const;
+    await page.evaluate((each) => window.bench?.measure(each), points);
+    const label = await page.evaluate(() => window.bench?.label());
+    expect(label?.text).toBe("362 µm"); // the root of 300² + 200² + 30² is 361.8
+    expect(label?.draws).toBe(1);
+    await page.evaluate((each) => window.bench?.measure(each), points);
+    await look([0, 0, 1]);
+    expect((await page.evaluate(() => window.bench?.label()))?.draws).toBe(1);
+    await look([0.1, 0.3, 1.1]);
+    await shoot("measure");
+  });
+
+  it("measure from surface to surface by what is tapped", async () => {
+    await look([0, 0, 1.6]);
+    const tap = async (point: Vec3) => {
+      const { x, y } = await project(point);
+      return page.evaluate(([px, py]) => window.bench?.measureAt(px, py), [x, y] as const);
+    };
+    await tap([250, -200, 190]); // the balls' poles
+    const measured = await tap([750, -200, 190]);
+    expect(measured).toHaveLength(2);
+    [250, -200, 190, 750, -200, 190].forEach((v, i) => {
+      expect(Math.abs((measured?.flat()[i] ?? 0) - v)).toBeLessThan(0.5); // balls of flat faces
+    });
+    expect(await tap([20, -380, 200])).toHaveLength(1); // begins anew, on the tile's box
+  });
+
+  it("say what the channels are there, on the source's scale", async () => {
+    await look([0, 0, 1.6]);
+    await page.evaluate(() =>
+      window.bench?.measure([
+        [250, -200, 190],
+        [750, -200, 190],
+      ]),
+    );
+    const at = (index: 0 | 1) => page.evaluate((i) => window.bench?.valuesAt(i), index);
+    await expect.poll(() => at(1)).toBe("CD8 T cells 13107"); // 51 / 255 of 65535
+    expect(await at(0)).toBe(""); // that tile has no volume
+    await shoot("values");
+    const measureAbove = (above_um: number) =>
+      page.evaluate((z) => window.bench?.measure([[750, -200, z]]), 200 + above_um);
+    await measureAbove(300);
+    await expect.poll(() => at(0)).toBe("");
+    await measureAbove(0.1); // surfaces end a little outside
+    await expect.poll(() => at(0)).toBe("CD8 T cells 13107");
+  });
+
+  it("have labels of the same angle from near and far", async () => {
+    await page.evaluate(() =>
+      window.bench?.measure([
+        [400, -200, 190],
+        [600, -200, 190],
+      ]),
+    );
+    const angles: number[] = [];
+    for (const distance of [0.5, 1, 4]) {
+      await look([0.2 * distance, 0, distance]);
+      angles.push((await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0);
+    }
+    const px_per_rad = HEIGHT / 2 / Math.tan((20 * Math.PI) / 180);
+    for (const angle of angles) expect(angle * px_per_rad).toBeCloseTo(LABEL_PX, 1);
+    await look([0, 0, 2], [0, 0, 0], { isStereo: true });
+    const inRoom = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
+    expect(inRoom).toBeCloseTo(LABEL_HEIGHT, 5);
+  });
+
+  it("let a handle be dragged: the face follows the pointer, and the camera does not", async () => {
+    await look([0, 0, 1.6]);
+    await cutOpen();
+    const from = await project([100, -200, 100]);
+    const to = await project([300, -200, 100]);
+    await page.mouse.move(from.x, from.y);
+    await page.mouse.down();
+    await page.mouse.move((from.x + to.x) / 2, to.y);
+    await page.mouse.move(to.x, to.y);
+    await page.mouse.up();
+    const { clip } = await stateNow();
+    // the pointer is on the axis of the handle: a pixel is 2.4 um there
+    expect(Math.abs((clip.box?.min[0] ?? 0) - 300)).toBeLessThan(1);
+    expect(clip.box?.min.slice(1)).toEqual([-350, 20]);
+    expect(clip.box?.max).toEqual([900, -50, 180]);
+    expect(await page.evaluate(() => window.bench?.leaked)).toBe(0);
+    await page.mouse.click(5, 5);
+    expect(await page.evaluate(() => window.bench?.leaked)).toBe(1);
+  });
+
+  it("let the gaze carry a handle in a headset", async () => {
+    await cutOpen();
+    // 1.2 mm of the room to a um; the specimen's middle is the room's
+    const gaze = (x_um: number) =>
+      look([0, 0, 1.6], [(x_um - 500) * 1.2e-3, 0, 0], { isStereo: true });
+    const meet = () => page.evaluate(() => window.bench?.meet());
+    await gaze(903);
+    const met = await meet();
+    expect(met).toMatchObject({ key: "handle:x-max", hold: "carry" });
+    expect(met?.distance_m).toBeCloseTo(Math.hypot(1.6, 0.48), 3);
+    await gaze(250);
+    expect(await meet()).toBeNull();
+    await gaze(700);
+    await page.evaluate(() => window.bench?.carry("handle:x-max"));
+    expect((await stateNow()).clip.box?.max[0]).toBeCloseTo(700, 3);
+    await page.evaluate(() => {
+      window.bench?.dispatch({ type: "set-clip", clip: { box: null, plane: null } });
+      window.bench?.carry("handle:x-max");
+    });
+    expect((await stateNow()).clip.box).toBeNull();
+    expect(await meet()).toBeNull();
+  });
+
+  it("name what is looked at, once the gaze rests", async () => {
+    const name = () => page.evaluate(() => window.bench?.name());
+    await look([-0.3, 0, 1.6], [-0.3, 0, 0], { dt_s: 0.1 });
+    expect(await name()).toBe("");
+    for (let i = 0; i < 5; i++) await look([-0.3, 0, 1.6], [-0.3, 0, 0], { dt_s: 0.1 });
+    expect(await name()).toBe("r0_c0 · CD8 T cells");
+    await shoot("name");
+    const [mark, bar] = await page.evaluate(() =>
+      [".name-mark", ".scale-bar"].map((each) =>
+        document.querySelector(each)?.getBoundingClientRect().toJSON(),
+      ),
+    );
+    expect(mark.bottom).toBeLessThan(bar.top); // above the scale bar, out of what is looked at
+    expect(mark.top).toBeGreaterThan(0.75 * HEIGHT);
+    expect([mark.left, mark.right < WIDTH / 2]).toEqual([bar.left, true]);
+    await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
+    expect(await name()).toBe("");
+    for (let i = 0; i < 5; i++) await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
+    expect(await name()).toBe("r0_c1");
+  });
+
+  it("turn the axes with the specimen, and say whither they lead", async () => {
+    await look([0, 0, 1.6]);
+    const label = () => page.locator(".orientation-mark").getAttribute("aria-label");
+    expect(await label()).toBe("x leads right, y up, z towards you");
+    await page.evaluate(() => window.bench?.turn([0, 1, 0], Math.PI / 2));
+    expect(await label()).toBe("x leads away, y up, z right");
+  });
+
+  it("stand beside the specimen in a headset, and not on the glass", async () => {
+    await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true });
+    const ruler = await page.evaluate(() => window.bench?.ruler());
+    expect(ruler?.isVisible).toBe(true);
+    expect(ruler?.length_um).toBeGreaterThan(100);
+    await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isPanelOpen: true });
+    const behindPanel = await page.evaluate(() => window.bench?.ruler());
+    expect(behindPanel).toMatchObject({ isVisible: false, hasAxes: false });
+    for (const mark of [".scale-bar", ".orientation-mark", ".name-mark"]) {
+      expect(await page.locator(mark).isVisible()).toBe(false);
+    }
+    for (let i = 0; i < 6; i++) {
+      await look([0.5, 0.4, 1.7], [-0.3, 0, 0.05], { isStereo: true, dt_s: 0.1 });
+    }
+    await shoot("stereo");
+    await look([0, 0, 1.6]);
+    expect((await page.evaluate(() => window.bench?.ruler()))?.isVisible).toBe(false);
+    expect(await page.locator(".scale-bar").isVisible()).toBe(true);
+  });
+
+  it("show handles, the box and the plane's cut", async () => {
+    await look([0.7, 0.5, 1.3]);
+    const bare = await page.evaluate(() => window.bench?.memory());
+    await cutOpen();
+    await page.evaluate(() =>
+      window.bench?.measure([
+        [250, -200, 190],
+        [750, -200, 190],
+      ]),
+    );
+    await shoot("handles");
+    const before = await page.evaluate(() => window.bench?.memory());
+    await page.evaluate(() => window.bench?.dispose());
+    const after = await page.evaluate(() => window.bench?.memory());
+    expect(before?.textures).toBeGreaterThan(bare?.textures ?? 99);
+    expect(after?.textures).toBe(bare?.textures);
+    // three keeps the one square of all sprites
+    expect(after?.geometries).toBe((bare?.geometries ?? 0) + 1);
+  });
+});

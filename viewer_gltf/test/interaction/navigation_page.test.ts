@@ -1,0 +1,136 @@
+/**
+ * Moving and zooming on a flat screen, by mouse and by two fingers: neither turns the view, and
+ * nobody loses the specimen, however far it is pushed.
+ */
+import { beforeEach, expect, it } from "vitest";
+import { difference, isBackground, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+/** Of the little axes in the corner, which are 76 pixels wide: half a degree is a quarter. */
+const UNTURNED_PX = 0.25;
+/** Of the stage: that which is seen of a specimen whose corner is in the middle, and more. */
+const SEEN = 0.01;
+
+describeInChromium("a view that is moved and zoomed", () => {
+  const stand = prepareStand({ viewport: { width: 504, height: 240 }, hasTouch: true });
+  const page = () => stand.viewer.page;
+
+  beforeEach(async () => {
+    await stand.open("&mode=off");
+    await page().keyboard.press("ArrowRight"); // so that moving goes along no axis of the specimen
+    await page().keyboard.press("ArrowDown");
+    await stand.viewer.still();
+  });
+
+  /** Whither the specimen's axes lead on screen. */
+  const axes = () =>
+    page()
+      .locator(".orientation-mark line")
+      .evaluateAll((lines) =>
+        lines.flatMap((line) => ["x2", "y2"].map((name) => Number(line.getAttribute(name)))),
+      );
+  const scaleText = () => page().locator(".scale-bar").textContent();
+
+  async function expectSeenFrom(before: readonly number[]): Promise<void> {
+    await stand.viewer.still();
+    const now = await axes();
+    expect(now).toHaveLength(before.length);
+    now.forEach((v, i) => {
+      expect(Math.abs(v - before[i])).toBeLessThan(UNTURNED_PX);
+    });
+    const picture = await takePicture(page());
+    const seen = picture.count((pixel) => !isBackground(pixel));
+    expect(seen / (picture.width * picture.height)).toBeGreaterThan(SEEN);
+  }
+
+  it("is not turned by the right button, though it goes beyond the specimen's end", async () => {
+    const before = await axes();
+    const start = await takePicture(page());
+    for (const [dx, dy] of [
+      [160, 0],
+      [160, 0],
+      [160, 30],
+      [0, 160],
+      [160, 160],
+    ]) {
+      await page().mouse.move(40, 40);
+      await page().mouse.down({ button: "right" });
+      await page().mouse.move(40 + dx, 40 + dy, { steps: 6 });
+      await page().mouse.up({ button: "right" });
+      await expectSeenFrom(before);
+    }
+    expect(difference(start, await takePicture(page()))).toBeGreaterThan(SEEN);
+  });
+
+  type Point = readonly [number, number];
+
+  /** Two fingers go from where they are put to where they are lifted. */
+  async function twoFingers(from: readonly [Point, Point], to: readonly [Point, Point]) {
+    const devtools = await page().context().newCDPSession(page());
+    const at = (share: number) =>
+      from.map(([x, y], id) => ({
+        x: x + share * (to[id][0] - x),
+        y: y + share * (to[id][1] - y),
+        id,
+      }));
+    const touch = (type: "touchStart" | "touchMove" | "touchEnd", points: ReturnType<typeof at>) =>
+      devtools.send("Input.dispatchTouchEvent", { type, touchPoints: points });
+    await touch("touchStart", at(0).slice(0, 1));
+    await touch("touchStart", at(0));
+    for (let i = 1; i <= 6; i++) await touch("touchMove", at(i / 6));
+    await touch("touchEnd", []);
+    await devtools.detach();
+  }
+
+  it("is not turned by two fingers either", async () => {
+    const before = await axes();
+    const start = await takePicture(page());
+    for (let i = 0; i < 5; i++) {
+      await twoFingers(
+        [
+          [30, 60],
+          [80, 60],
+        ],
+        [
+          [170, 90],
+          [220, 90],
+        ],
+      );
+      await expectSeenFrom(before);
+    }
+    expect(difference(start, await takePicture(page()))).toBeGreaterThan(SEEN);
+  });
+
+  it("is zoomed by a pinch, which turns nothing", async () => {
+    const before = await axes();
+    const scale = await scaleText();
+    await twoFingers(
+      [
+        [100, 110],
+        [130, 110],
+      ],
+      [
+        [70, 110],
+        [160, 110],
+      ],
+    );
+    await expectSeenFrom(before);
+    expect(await scaleText()).not.toBe(scale);
+  });
+
+  it("is zoomed by the wheel about the point that is looked at", async () => {
+    for (const key of ["Shift+ArrowRight", "Shift+ArrowUp"]) await page().keyboard.press(key);
+    await stand.viewer.still();
+    const before = await axes();
+    const start = await takePicture(page());
+    const scale = await scaleText();
+    await page().mouse.move(60, 60); // the pointer is elsewhere
+    for (let i = 0; i < 6; i++) await page().mouse.wheel(0, -100);
+    await expectSeenFrom(before);
+    expect(await scaleText()).not.toBe(scale);
+    for (let i = 0; i < 6; i++) await page().mouse.wheel(0, 100);
+    await expectSeenFrom(before);
+    expect(difference(start, await takePicture(page()))).toBeLessThan(SEEN);
+  });
+});

@@ -1,0 +1,29 @@
+/**
+ * The pipeline's own letter F, from voxels to the picture. STEREOCELL_F_BUNDLES holds the bundles
+ * built from what tests/phantoms.py writes, joined by ":"; without it these tests are skipped.
+ */
+import { describe, expect, it } from "vitest";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { PHANTOM_LETTER } from "../support/fixture/letter";
+import { expectLetter } from "../support/letter";
+
+const BUNDLES = (process.env.STEREOCELL_F_BUNDLES ?? "").split(":").filter((path) => path !== "");
+
+describeInChromium("the pipeline's F", () => {
+  if (BUNDLES.length === 0) it.skip("needs STEREOCELL_F_BUNDLES");
+
+  describe.each(BUNDLES)("of %s", (bundle) => {
+    const stand = prepareStand({ bundle, viewport: { width: 504, height: 240 } });
+
+    it.each(["surface", "volume"] as const)(
+      "as a %s is neither mirrored nor turned",
+      async (as) => {
+        const { channels } = stand.manifest;
+        expect(channels).toHaveLength(1); // DICOM and NIfTI give it no name of its own
+        await stand.open();
+        await expectLetter(stand.viewer, stand.manifest, channels[0].id, as, PHANTOM_LETTER);
+      },
+    );
+  });
+});

@@ -1,0 +1,135 @@
+/**
+ * What the viewer weighs: its code, and what a bundle sends until the first picture, which is the
+ * overview of all tiles. The bundle is the one in STEREOCELL_TEST_BUNDLE, or the fixture.
+ */
+import { readdir, readFile } from "node:fs/promises";
+import { basename, join } from "node:path";
+import { gzipSync } from "node:zlib";
+import { describe, expect, it } from "vitest";
+import { needsOf } from "../../src/surfaces/required_decoders";
+import { describeInChromium } from "../support/browser/skip";
+import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
+
+const CODE_GZIP_BYTES = 350_000;
+const FIRST_PICTURE_BYTES = 300_000;
+/** Fetched where they are wanted: textures of surfaces, bricks from a server, paths of light. */
+const OPTIONAL = /basis|client_worker|assemble_worker|path_tracer|EXRLoader|HDRLoader/;
+const CODE = /\.(js|css|wasm|html)$/;
+
+async function gzipBytes(): Promise<Map<string, number>> {
+  const names = await readdir(DIST, { recursive: true });
+  const code = names.filter((name) => CODE.test(name));
+  const sizes = await Promise.all(
+    code.map(async (name) => gzipSync(await readFile(join(DIST, name)), { level: 9 }).length),
+  );
+  return new Map(code.map((name, i) => [name, sizes[i]]));
+}
+
+type Sent = Readonly<{ path: string; bytes: number }>;
+
+/**
+ * What had come when all tiles stood on screen: in the first channel (`first`), or in all that are
+ * shown at the start.
+ */
+async function sentBefore(
+  picture: "first" | "whole",
+  stand: Stand,
+  query = "",
+): Promise<readonly Sent[]> {
+  await stand.viewer.page.addInitScript(() => performance.setResourceTimingBufferSize(10_000));
+  await stand.viewer.page.goto(`${stand.host.address}/app/?bundle=../bundle/${query}`);
+  await stand.viewer.page.waitForFunction(() => window.stereocell !== undefined);
+  return stand.viewer.page.evaluate(async (until) => {
+    const isFirst = () => {
+      try {
+        return window.stereocell?.snapshot().hasFirstPicture === true;
+      } catch {
+        return false; // nothing is open yet
+      }
+    };
+    while (until === "first" && !isFirst()) {
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+    if (until === "whole") await window.stereocell?.ready;
+    const entries = performance.getEntriesByType("resource") as PerformanceResourceTiming[];
+    return entries.map(({ name, encodedBodySize }) => ({
+      path: new URL(name).pathname,
+      bytes: encodedBodySize,
+    }));
+  }, picture);
+}
+
+const sum = (list: readonly Sent[]) => list.reduce((all, { bytes }) => all + bytes, 0);
+
+/** Bytes by kind of file, for people. */
+function table(list: readonly Sent[]): string {
+  const kinds = new Map<string, [number, number]>();
+  for (const { path, bytes } of list) {
+    const kind = basename(path);
+    const [count, all] = kinds.get(kind) ?? [0, 0];
+    kinds.set(kind, [count + 1, all + bytes]);
+  }
+  return [...kinds]
+    .sort(([, [, a]], [, [, b]]) => b - a)
+    .map(([kind, [count, all]]) => `${kind} x ${count}: ${all}`)
+    .join(", ");
+}
+
+describe("the viewer's code", () => {
+  it("without optional parts is at most 350 kB gzip", async () => {
+    const sizes = await gzipBytes();
+    const needed = [...sizes].filter(([name]) => !OPTIONAL.test(name));
+    expect(needed.length).toBeGreaterThan(4); // page, style, main, decoders, workers
+    const total = needed.reduce((all, [, bytes]) => all + bytes, 0);
+    process.stdout.write(
+      `code, gzip: ${total} bytes; optional: ${[...sizes]
+        .filter(([name]) => OPTIONAL.test(name))
+        .reduce((all, [, bytes]) => all + bytes, 0)}\n`,
+    );
+    expect(total).toBeLessThanOrEqual(CODE_GZIP_BYTES);
+  });
+});
+
+describeInChromium("the first picture", () => {
+  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 640, height: 360 } });
+
+  /** Whether a surface of the overview has Basis Universal textures. */
+  async function overviewHasMaps(): Promise<boolean> {
+    for (const { tileset } of stand.manifest.channels) {
+      if (tileset === null) continue;
+      const folder = join(stand.bundle, tileset.path, "..");
+      const { root } = JSON.parse(await readFile(join(stand.bundle, tileset.path), "utf8"));
+      for (const { content } of root.children) {
+        const { buffer, byteOffset, byteLength } = await readFile(join(folder, content.uri));
+        const glb = buffer.slice(byteOffset, byteOffset + byteLength) as ArrayBuffer;
+        if (needsOf(glb).basis) return true;
+      }
+    }
+    return false;
+  }
+
+  it("needs no decoder that it doesn't use", async () => {
+    const sent = await sentBefore("whole", stand, "&mode=off");
+    const code = sent.map(({ path }) => path).filter((path) => path.startsWith("/app/assets/"));
+    expect(code.some((path) => /\/index-.*\.js$/.test(path))).toBe(true);
+    expect(code.filter((path) => /decode_worker/.test(path))).toEqual([]);
+    expect(code.some((path) => OPTIONAL.test(path))).toBe(await overviewHasMaps());
+  });
+
+  it("comes after at most 300 kB of the bundle, all channels included", async () => {
+    const isBundle = ({ path }: Sent) => path.startsWith("/bundle/");
+    const first = (await sentBefore("first", stand)).filter(isBundle);
+    const told = `${sum(first)} bytes: ${table(first)}`;
+    expect(first.length, told).toBeGreaterThan(1);
+    expect(sum(first), told).toBeLessThanOrEqual(FIRST_PICTURE_BYTES);
+    const whole = (await sentBefore("whole", stand)).filter(isBundle);
+    process.stdout.write(`first picture after ${told}\nall channels: ${sum(whole)} bytes\n`);
+    expect(sum(whole)).toBeGreaterThan(sum(first));
+    expect(sum(whole)).toBeLessThanOrEqual(FIRST_PICTURE_BYTES);
+  });
+
+  it("asks for no volume where none is drawn", async () => {
+    const sent = await sentBefore("whole", stand, "&mode=off");
+    expect(sent.filter(({ path }) => path.includes("/volumes/"))).toEqual([]);
+  });
+});

@@ -1,0 +1,293 @@
+/** Faults on the way to the page: a network that goes and comes, files cut short, nothing to show. */
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
+import { afterEach, beforeEach, expect, it } from "vitest";
+import { ViewerPage } from "../support/browser/page";
+import { hasColor, isBackground, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { swapSurface } from "../support/fixture/swap";
+import { Gate } from "../support/offline/gate";
+
+describeInChromium("a fault on the way", () => {
+  const stand = prepareStand({ viewport: { width: 640, height: 360 }, pixelRatio: 0.5 });
+  let gate: Gate;
+
+  beforeEach(async () => {
+    gate = await Gate.before(stand.host.address);
+  });
+
+  afterEach(async () => {
+    await gate.stop();
+  });
+
+  const through = (query = "") => `${gate.address}/app/?bundle=../bundle/${query}`;
+  const notices = async () => (await stand.viewer.snapshot()).state.notices;
+
+  /** The file with one byte changed; 40 before the end of a glb lie the bytes of its mesh. */
+  async function changed(path: string): Promise<Buffer> {
+    const body = Buffer.from(await readFile(join(stand.bundle, path)));
+    body[body.length - 40] ^= 1;
+    return body;
+  }
+
+  function answer(path: string, body: string | Uint8Array): void {
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+  }
+
+  async function fatalText(body: string | Uint8Array, path = "manifest.json"): Promise<string> {
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+    await stand.viewer.page.goto(`${stand.host.address}/app/?bundle=../bundle/`);
+    return (await stand.viewer.page.locator("[data-fatal]").textContent()) ?? "";
+  }
+
+  it("a decoder that can't be had is told for every surface, and nothing hangs", async () => {
+    await stand.viewer.page.route("**/meshopt_worker*", (route) => route.abort());
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    const told = await notices();
+    expect(told.length).toBeGreaterThan(1); // what comes after the first is told too
+    for (const text of told) expect(text).toMatch(/\.glb: the surface can't be read: meshopt: /);
+    expect((await stand.viewer.snapshot()).triangles).toBe(0);
+  });
+
+  it("a manifest that is cut short is told as such", async () => {
+    const text = JSON.stringify(stand.manifest);
+    expect(await fatalText(text.slice(0, text.length / 2))).toContain(
+      "manifest.json: the JSON is broken or cut short (",
+    );
+  });
+
+  it("a manifest of a newer format is told with both versions", async () => {
+    expect(await fatalText(JSON.stringify({ ...stand.manifest, version: 2 }))).toContain(
+      "manifest.json: version: this viewer reads version 1, found 2; open the bundle with the viewer",
+    );
+  });
+
+  it("a bundle without channels is told in one line", async () => {
+    expect(await fatalText(JSON.stringify({ ...stand.manifest, channels: [] }))).toContain(
+      "manifest.json: channels: the bundle holds none, so nothing can be shown",
+    );
+  });
+
+  it("a host that can't be reached is told as such", async () => {
+    await stand.viewer.page.route("**/manifest.json", (route) => route.abort());
+    await stand.viewer.page.goto(through());
+    const fatal = stand.viewer.page.locator("[data-fatal]");
+    expect(await fatal.textContent()).toMatch(
+      /^.*manifest\.json: the host of .* can't be reached/s,
+    );
+  });
+
+  it("a volume that is cut short is named, and the surfaces stay", async () => {
+    const path = "volumes/r0_c0/Block.ktx2";
+    const whole = await readFile(join(stand.bundle, path));
+    stand.host.hasRanges = false;
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body: whole.subarray(0, 100) });
+    await stand.open();
+    await stand.viewer.drawVolume("Block", true);
+    await stand.viewer.chooseMode("all");
+    expect((await notices()).join()).toContain(
+      `${path}: expected ${whole.length} bytes, found 100 (a broken upload?)`,
+    );
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0); // the other tile's
+    const picture = await takePicture(stand.viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+  });
+
+  it("a volume with other bytes than it should have is named", async () => {
+    const path = "volumes/r0_c0/Block.ktx2";
+    const body = Buffer.from(await readFile(join(stand.bundle, path)));
+    body[body.length - 1] ^= 1;
+    stand.host.hasRanges = false;
+    stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+    await stand.open();
+    await stand.viewer.drawVolume("Block", true);
+    await stand.viewer.chooseMode("all");
+    expect((await notices()).join()).toMatch(new RegExp(`${path}: expected SHA-256 .*, found`));
+  });
+
+  it("a level with other bytes than it should have is named once, and the surfaces stay", async () => {
+    const path = "volumes/r0_c0/Block.ktx2";
+    const statuses: number[] = [];
+    await stand.viewer.page.route(`**/${path}`, async (route) => {
+      const response = await route.fetch();
+      const body = await response.body();
+      body[body.length >> 1] ^= 1;
+      statuses.push(response.status());
+      await route.fulfill({ response, body });
+    });
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    const { triangles } = await stand.viewer.snapshot();
+    expect(triangles).toBeGreaterThan(0);
+    await stand.viewer.drawVolume("Block", true);
+    await stand.viewer.chooseMode("all");
+    expect(statuses).toEqual([206, 206]); // a range, asked for once more past all caches
+    expect(await notices()).toEqual([
+      expect.stringMatching(
+        new RegExp(`^${path}: level \\d+: expected SHA-256 [0-9a-f]{64}, found [0-9a-f]{64}$`),
+      ),
+    ]);
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0); // the other tile's
+    const picture = await takePicture(stand.viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    await stand.viewer.chooseMode("off");
+    expect((await stand.viewer.snapshot()).triangles).toBe(triangles);
+  });
+
+  it("a surface with another byte than it should have is named, and the others stay", async () => {
+    const path = "channels/Balls/r0_c1/lod2.glb";
+    answer(path, await changed(path));
+    await stand.open("&mode=off");
+    await stand.viewer.show("F_x20_body", false);
+    expect(await notices()).toEqual([
+      expect.stringMatching(
+        new RegExp(`^${path}: expected sha-256-128 [\\w-]{22}, found [\\w-]{22}$`),
+      ),
+    ]);
+    expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
+  });
+
+  it("a finer surface with another byte is named, and the coarser one stays", async () => {
+    await stand.open("&mode=off");
+    await stand.viewer.show("F_x20_body", false);
+    const whole = (await stand.viewer.snapshot()).triangles;
+    const path = "channels/Balls/r0_c1/lod1.glb";
+    answer(path, await changed(path));
+    await stand.open("&mode=off");
+    await stand.viewer.show("F_x20_body", false);
+    expect(await notices()).toEqual([expect.stringContaining(`${path}: expected sha-256-128 `)]);
+    expect((await stand.viewer.snapshot()).triangles).toBeLessThan(whole);
+    const picture = await takePicture(stand.viewer.page);
+    const places = picture.where(hasColor([0.05, 0.4, 1]));
+    expect(places.filter(([x]) => x > picture.width / 2).length).toBeGreaterThan(100);
+  });
+
+  it("a surface that is no glTF inside is named, and the others stay", async () => {
+    const path = "channels/Balls/r0_c1/lod2.glb";
+    const body = Buffer.from(await readFile(join(stand.bundle, path)));
+    body.fill(0x7b, 20, 40); // the JSON chunk's start
+    const files = await swapSurface(stand.bundle, "Balls", "r0_c1/lod2.glb", body);
+    for (const [file, content] of files) answer(file, content);
+    await stand.open();
+    await stand.viewer.settled();
+    expect((await notices()).join()).toContain(`${path}: the surface can't be read`);
+    expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
+  });
+
+  it("a network that is lost in the middle, and comes back, leaves no trace", async () => {
+    const viewer = new ViewerPage(stand.viewer.page);
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    gate.shut();
+    const shown = viewer.drawVolume("Block", true).then(() => viewer.chooseMode("all"));
+    await new Promise((resolve) => setTimeout(resolve, 700)); // a first try has failed
+    gate.open();
+    await shown;
+    await viewer.settled();
+    expect(await notices()).toEqual([]);
+    expect((await viewer.snapshot()).volumes.length).toBeGreaterThan(0);
+  });
+
+  it("a network that stays away is told, and what is here stays on screen", async () => {
+    const viewer = new ViewerPage(stand.viewer.page);
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    const { triangles } = await viewer.snapshot();
+    gate.shut();
+    await viewer.drawVolume("Block", true);
+    await viewer.chooseMode("all");
+    expect((await notices()).join()).toMatch(/can't be reached/);
+    expect((await viewer.snapshot()).triangles).toBeGreaterThan(0);
+    await viewer.chooseMode("off");
+    expect((await viewer.snapshot()).triangles).toBe(triangles);
+    const picture = await takePicture(viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+  });
+
+  it("a bundle without faults leaves no warning in the console", async () => {
+    const said: string[] = [];
+    stand.viewer.page.on("console", (message) => {
+      if (["warning", "error"].includes(message.type())) said.push(message.text());
+    });
+    await stand.open("&mode=all");
+    await stand.viewer.settled();
+    // the driver allows none, and software draws slowly
+    expect(said.filter((text) => !/Service Worker|GL Driver/.test(text))).toEqual([]);
+  });
+
+  /** Turn volumes on and come near, without a network, until all tries are used up. */
+  async function starve(viewer: ViewerPage): Promise<number> {
+    for (let i = 0; i < 10; i++) await viewer.page.keyboard.press("+");
+    await viewer.settled();
+    const { triangles } = await viewer.snapshot();
+    await viewer.chooseMode("all");
+    const { state, volumes } = await viewer.snapshot();
+    expect(state.notices).toEqual([
+      expect.stringMatching(/^The host .* can't be reached, or forbids this page: not all files/),
+    ]);
+    expect(volumes).toEqual([]);
+    return triangles;
+  }
+
+  async function expectAll(viewer: ViewerPage, starved: number): Promise<void> {
+    await expect.poll(notices).toEqual([]);
+    await viewer.settled();
+    const { volumes } = await viewer.snapshot();
+    expect(volumes.length).toBeGreaterThan(0);
+    expect(volumes.filter(({ level }) => level === null)).toEqual([]);
+    await viewer.chooseMode("off");
+    expect((await viewer.snapshot()).triangles).toBeGreaterThan(starved);
+    expect(await viewer.page.locator("[data-action=retry]").count()).toBe(0);
+    expect(await notices()).toEqual([]);
+  }
+
+  /** The pauses between tries are over at once. */
+  const hurry = () =>
+    stand.viewer.page.addInitScript(() => {
+      const real = window.setTimeout.bind(window);
+      const hurried = (job: TimerHandler, pause_ms?: number) =>
+        real(job, Math.min(pause_ms ?? 0, 50));
+      window.setTimeout = hurried as typeof setTimeout;
+    });
+
+  it("an outage that outlasts all tries leaves no trace, once the device has a network", async () => {
+    await hurry();
+    const viewer = new ViewerPage(stand.viewer.page);
+    const context = viewer.page.context();
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    await context.setOffline(true);
+    const starved = await starve(viewer);
+    await context.setOffline(false);
+    await expectAll(viewer, starved);
+  });
+
+  it("a host that was away for long brings all once it is asked to try again", async () => {
+    await hurry();
+    const viewer = new ViewerPage(stand.viewer.page);
+    await viewer.page.route("**/Balls/tileset.json", (route) => route.abort());
+    await viewer.open(through("&mode=off"));
+    await viewer.settled();
+    await viewer.page.unroute("**/Balls/tileset.json");
+    gate.shut();
+    const starved = await starve(viewer);
+    gate.open();
+    await viewer.page.locator("[data-action=retry]").click();
+    await expectAll(viewer, starved);
+  });
+
+  it("a connection that breaks is tried again", async () => {
+    const path = "/bundle/channels/Balls/r0_c1/lod2.glb";
+    let broken = 0;
+    await stand.viewer.page.route(`**${path}`, async (route) => {
+      if (broken++ > 0) return route.continue();
+      return route.abort("connectionreset");
+    });
+    await stand.open();
+    await stand.viewer.settled();
+    expect(await notices()).toEqual([]);
+    expect(broken).toBe(2);
+  });
+});

@@ -1,0 +1,247 @@
+/** The panel on a plane in the room: what it shows, what rays do to it, and when it is painted. */
+import { mkdir } from "node:fs/promises";
+import { expect, it } from "vitest";
+import { describeInChromium } from "../support/browser/skip";
+import { type At, prepareHands } from "../support/xr/stand";
+
+const RIGHT: At = [0.25, -0.3, -0.3];
+const AWAY: At = [0, 5, -1];
+/** Where pictures to look at are kept, if they are wanted. */
+const PICTURES = process.env.STEREO_PICTURES;
+
+describeInChromium("the panel in the room", () => {
+  const hands = prepareHands(PICTURES === undefined ? undefined : { width: 1800, height: 900 });
+
+  async function picture(name: string): Promise<void> {
+    if (PICTURES === undefined) return;
+    await mkdir(PICTURES, { recursive: true });
+    await hands().step([0, 0]);
+    await hands().page.screenshot({ path: `${PICTURES}/${name}.png` });
+  }
+
+  async function gazeAt(id: string, across?: number): Promise<void> {
+    await hands().lookAt(await hands().controlAt(id, across));
+  }
+
+  it("opens by a look down, beside the specimen, and closes again", async () => {
+    await hands().gazeOnly();
+    expect((await hands().status()).isOpen).toBe(false);
+    await gazeAt("opener");
+    await hands().wait(1.4);
+    expect((await hands().status()).isOpen).toBe(false);
+    await hands().wait(0.2);
+    expect((await hands().status()).isOpen).toBe(true);
+    await hands().lookAt([0, 0, -1]);
+    await picture("ahead");
+    // all tiles can still be gazed at
+    for (const tile of ["r0_c0", "r0_c4", "r1_c0", "r1_c2", "r1_c4"]) {
+      await hands().lookAt(await hands().tileAt(tile));
+      expect((await hands().status()).pointed).toBe(`tile:${tile}`);
+    }
+    await gazeAt("close");
+    await hands().tap();
+    expect((await hands().status()).isOpen).toBe(false);
+  });
+
+  it("toggles what a ray points at, by gaze, tap and trigger", async () => {
+    await hands().gazeOnly();
+    await hands().openPanel();
+    await hands().page.evaluate(() => {
+      window.hands.fieldOfView_deg = 60;
+    });
+    await gazeAt("c1/shown");
+    await hands().wait(0.75);
+    await picture("dwell");
+    await hands().wait(0.75);
+    expect(await hands().actions()).toEqual([{ type: "show", channel: "c1", shown: false }]);
+    await hands().connect("right", true);
+    await hands().point("right", RIGHT, await hands().controlAt("c0/volume"));
+    expect((await hands().status()).pointed).toBe("panel:c0/volume");
+    await hands().press("right");
+    expect((await hands().actions()).slice(1)).toEqual([
+      { type: "draw-volume", channel: "c0", volume: false },
+    ]);
+    await hands().point("right", RIGHT, AWAY);
+    await gazeAt("tab=tiles");
+    await hands().tap();
+    await gazeAt("tile-map=r1_c4");
+    await hands().tap();
+    expect((await hands().actions()).at(-1)).toEqual({ type: "select", tile: "r1_c4" });
+    await picture("tiles");
+  });
+
+  it("sets a slider where it is pointed at, and drags it while the trigger is held", async () => {
+    await hands().connect("left", false);
+    await hands().point("right", RIGHT, AWAY);
+    await hands().openPanel();
+    const choose = async (id: string) => {
+      await hands().point("right", RIGHT, await hands().controlAt(id));
+      await hands().press("right");
+    };
+    await choose("c0/open");
+    await hands().point("right", RIGHT, await hands().controlAt("c0/opacity", 0.5));
+    await hands().button("right", "trigger", 1);
+    await hands().point("right", RIGHT, await hands().controlAt("c0/opacity", 1));
+    await hands().wait(0.5);
+    await hands().button("right", "trigger", 0);
+    const opacities = (await hands().actions()).flatMap((action) =>
+      action.type === "fade" ? [action.opacity] : [],
+    );
+    expect(new Set(opacities)).toEqual(new Set([0.5, 1]));
+    expect(opacities.length).toBeLessThan(5); // not one for each frame
+    await picture("card");
+    await choose("tab=view");
+    await choose("top");
+    expect(await hands().page.evaluate(() => window.hands.commands)).toEqual(["top"]);
+    await choose("leave");
+    expect(await hands().page.evaluate(() => window.hands.leaves)).toBe(1);
+  });
+
+  it("places shapes by value and gradient, and draws them by their corners", async () => {
+    await hands().connect("left", false);
+    await hands().point("right", RIGHT, AWAY);
+    await hands().openPanel();
+    const choose = async (id: string) => {
+      await hands().point("right", RIGHT, await hands().controlAt(id));
+      await hands().press("right");
+    };
+    await choose("c0/open");
+    for (let page = 0; page < 2; page++) {
+      if (!(await hands().status()).regions.includes("c0/plane")) await choose("more");
+    }
+    await choose("c0/plane");
+    const reach = async (id: string) => {
+      for (let page = 0; page < 5; page++) {
+        if ((await hands().status()).regions.includes(id)) return;
+        await choose("more");
+      }
+    };
+    await reach("c0/add-rectangle");
+    await choose("c0/add-rectangle");
+    const shapes = async () => {
+      const made = (await hands().actions()).flatMap((action) =>
+        action.type === "set-shapes" ? [action] : [],
+      );
+      return made.map((action) => action.shapes[0]);
+    };
+    const [placed] = await shapes();
+    await reach("c0/shapes");
+    await picture("shapes");
+    const at = (value: number, gradient: number) =>
+      hands().controlAt("c0/shapes", value, 1 - gradient);
+    const drag = async (
+      from: readonly [number, number],
+      to: readonly [number, number],
+      by: "trigger" | "gaze" = "trigger",
+    ) => {
+      if (by === "gaze") {
+        await hands().lookAt(await at(...from));
+        await hands().tap(); // takes it up
+        await hands().lookAt(await at(...to));
+        await hands().wait(0.2);
+        await hands().tap(); // puts it down
+        return;
+      }
+      await hands().point("right", RIGHT, await at(...from));
+      await hands().button("right", "trigger", 1);
+      await hands().point("right", RIGHT, await at(...to));
+      await hands().wait(0.2);
+      await hands().button("right", "trigger", 0);
+    };
+    const corner = [placed.values[1], placed.gradients[1]] as const;
+    await drag(corner, [0.8, 0.9]);
+    const drawn = (await shapes()).at(-1);
+    expect(drawn?.values[0]).toBeCloseTo(placed.values[0], 2);
+    expect(drawn?.values[1]).toBeCloseTo(0.8, 2);
+    expect(drawn?.gradients[1]).toBeCloseTo(0.9, 2);
+    await picture("drawn");
+    await hands().gazeOnly();
+    await drag([0.5, 0.6], [0.6, 0.5], "gaze");
+    const moved = (await shapes()).at(-1);
+    expect(moved?.values[0]).toBeCloseTo(placed.values[0] + 0.1, 2);
+    expect(moved?.gradients[1]).toBeCloseTo(0.8, 2);
+  });
+
+  it("says why a control refuses, under the gaze, for a while", async () => {
+    await hands().gazeOnly();
+    await hands().openPanel();
+    await gazeAt("tab=tiles");
+    await hands().tap();
+    await gazeAt("back");
+    await hands().tap();
+    const why = "No tile is chosen.";
+    const commands = await hands().page.evaluate(() => window.hands.commands);
+    expect([(await hands().status()).told, commands]).toEqual([[why], []]);
+    const [aside, up] = await hands().page.evaluate(() => window.hands.noticeAt());
+    expect(aside).toBeCloseTo(0);
+    expect(up).toBeCloseTo(-20);
+    await picture("refusal");
+    await hands().wait(5);
+    expect((await hands().status()).told).toEqual([why]);
+    await hands().wait(1.1);
+    expect((await hands().status()).told).toEqual([]);
+  });
+
+  it("leaves what is told where the head looked when it came", async () => {
+    const fault = "channels/c0/r0_c0/lod0.glb: not found (404). The other tiles go on.";
+    const tell = (text: string) => hands().page.evaluate((t) => window.hands.tell(t), text);
+    const noticeAt = () => hands().page.evaluate(() => window.hands.noticeAt());
+    await hands().gazeOnly();
+    await hands().lookAt([0, 0, -1]);
+    await tell(fault);
+    await picture("notice");
+    await hands().lookAt([0.3, 0, -1]);
+    const [aside] = await noticeAt();
+    expect(aside).toBeCloseTo((-Math.atan(0.3) * 180) / Math.PI);
+    await tell("Another comes where the head looks now.");
+    expect((await noticeAt())[0]).toBeCloseTo(0);
+    expect((await hands().status()).told).toHaveLength(2);
+    await picture("notices");
+    await hands().wait(12.2);
+    expect((await hands().status()).told).toEqual([]);
+  });
+
+  it("is painted only when what it shows changes", async () => {
+    await hands().gazeOnly();
+    await hands().openPanel();
+    const paints = async () => (await hands().status()).paints;
+    const before = await paints();
+    await hands().wait(3);
+    await gazeAt("c0/shown");
+    await gazeAt("c1/shown");
+    await hands().wait(0.5);
+    expect(await paints()).toBe(before);
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "choose-quality", level: "low" }),
+    );
+    await hands().step([0.05]);
+    expect(await paints()).toBe(before); // the section that is open does not show it
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "fade", channel: "c0", opacity: 0.5 }),
+    );
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "draw-volume", channel: "c0", volume: false }),
+    );
+    await hands().step([0.05]);
+    expect(await paints()).toBe(before + 1);
+  });
+
+  it("stays whole for the march where the specimen is cut away", async () => {
+    const left = await hands().page.evaluate(() => window.leftOfTheUncut());
+    expect(left).toEqual([
+      [1, 0],
+      [1, 0],
+    ]);
+  });
+
+  it("leaves nothing on the GPU", async () => {
+    const before = await hands().status();
+    await hands().openPanel();
+    await hands().page.evaluate(() => window.hands.dispose());
+    await hands().step([0]);
+    const after = await hands().status();
+    expect(after.textures).toBeLessThan(before.textures + 1);
+    expect(after.geometries).toBeLessThanOrEqual(before.geometries);
+    expect(after.isRingShown).toBe(false);
+  });
+});

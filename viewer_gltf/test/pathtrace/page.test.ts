@@ -1,0 +1,379 @@
+/**
+ * The page in its path-traced mode: it opens so for a scan of a whole body, gathers at rest, begins
+ * anew with what paths depend on, and with nothing else.
+ */
+import { expect, it } from "vitest";
+import type { Manifest } from "../../src/bundle/generated/bundle";
+import { place } from "../../src/render/placement";
+import { DIALS } from "../../src/state/path_trace_parameters";
+import { project } from "../support/browser/camera";
+import { addHeadset } from "../support/browser/chromium";
+import {
+  hasColor,
+  isBackground,
+  type Picture,
+  type Pixel,
+  takePicture,
+} from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { BALLS, SPECIMEN } from "../support/fixture/bodies";
+import { BODIES } from "../support/fixture/bundle";
+
+type FilePayload = { name: string; mimeType: string; buffer: Buffer };
+
+const [F, BALL] = BODIES;
+const STUDIO = "/app/environments/studio.hdr";
+/** Small: software follows the light. */
+const VIEWPORT = { width: 240, height: 150 };
+const PATIENT = { timeout: 120_000 };
+const bounds = SPECIMEN as unknown as Manifest["specimen"]["bounds_um"];
+
+/** A picture of light, 4 x 2, all of one colour: Radiance's format, not packed. */
+function hdr(red: number, green: number, blue: number): Buffer {
+  const head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n";
+  const texel = [red, green, blue].map((v) => Math.round(128 * v));
+  return Buffer.concat([
+    Buffer.from(head, "ascii"),
+    Buffer.from(Array.from({ length: 8 }, () => [...texel, 129]).flat()), // of 2
+  ]);
+}
+
+/** How much two pictures differ, in the mean of all that either shows; of 255. */
+function apart(a: Picture, b: Picture): number {
+  const shown = a.where((pixel) => !isBackground(pixel));
+  const sum = shown.reduce(
+    (all, [x, y]) => all + a.at(x, y).reduce((off, v, i) => off + Math.abs(v - b.at(x, y)[i]), 0),
+    0,
+  );
+  return sum / 3 / shown.length;
+}
+
+/** The mean of all pixels of a kind, 0 to 255. */
+function meanColor(picture: Picture, isOfKind: (pixel: Pixel) => boolean): readonly number[] {
+  const shown = picture.where(isOfKind);
+  return [0, 1, 2].map(
+    (k) => shown.reduce((sum, [x, y]) => sum + picture.at(x, y)[k], 0) / shown.length,
+  );
+}
+
+/** The same of all that lies within the outlines, which take more of a coarser or noisier picture. */
+function meanWithin(picture: Picture): readonly number[] {
+  const { width, height } = picture;
+  const isDrawn = (x: number, y: number) =>
+    x >= 0 && y >= 0 && x < width && y < height && !isBackground(picture.at(x, y));
+  const inner = picture
+    .where((pixel) => !isBackground(pixel))
+    .filter(([x, y]) => [-2, 2].every((d) => isDrawn(x + d, y) && isDrawn(x, y + d)));
+  expect(inner.length).toBeGreaterThan(100);
+  return [0, 1, 2].map(
+    (k) => inner.reduce((sum, [x, y]) => sum + picture.at(x, y)[k], 0) / inner.length,
+  );
+}
+
+const between = (a: readonly number[], b: readonly number[]) => a.map((v, k) => v - b[k]);
+
+describeInChromium("the path-traced page", () => {
+  const stand = prepareStand({ viewport: VIEWPORT });
+  const page = () => stand.viewer.page;
+  const snapshot = () => stand.viewer.snapshot();
+  const trace = async () => (await snapshot()).state.trace;
+  const notices = async () => (await snapshot()).state.notices;
+  const samples = async () => (await snapshot()).traced.samples;
+  const drawn = (picture: Picture) => picture.count((pixel) => !isBackground(pixel));
+
+  /** Paths that are scattered once: that is quicker, and most tests are of other things. */
+  const ONCE = "light=many:false";
+  /** As a scan of a whole body: the bundle says so. */
+  async function open(query = `&quality=low#v=1&${ONCE}`): Promise<void> {
+    const { manifest } = stand;
+    const scan = { ...manifest, specimen: { ...manifest.specimen, modality: "MR" } };
+    stand.host.overrides.set("/bundle/manifest.json", { status: 200, body: JSON.stringify(scan) });
+    await stand.open(query);
+    await stand.viewer.settled();
+  }
+  const gathered = (least: number) => expect.poll(samples, PATIENT).toBeGreaterThanOrEqual(least);
+  async function press(...keys: readonly string[]): Promise<void> {
+    for (const key of keys) await page().keyboard.press(key);
+  }
+  /** Of a picture with nothing said over it. */
+  async function shoot(least = 5): Promise<Picture> {
+    await gathered(least);
+    const said = () => page().locator("[data-said]").textContent();
+    await expect.poll(said, PATIENT).toBe("");
+    return takePicture(page());
+  }
+
+  it("shows a scan, gathers, and changes only what a key or a slider is for", async () => {
+    await open();
+    expect((await snapshot()).state.mode).toBe("traced");
+    expect(stand.host.requests.filter(({ path }) => path.endsWith(".glb"))).toEqual([]);
+    const early = await shoot(10);
+    expect(drawn(early)).toBeGreaterThan(340);
+    for (const { color } of [F, BALL]) expect(early.count(hasColor(color))).toBeGreaterThan(34);
+    const late = await shoot((await samples()) + 10);
+    expect(apart(early, late)).toBeLessThan(12);
+
+    // before and after: at once, of the same samples
+    const before = await samples();
+    await press("Z");
+    await expect.poll(async () => (await trace()).isPostOn).toBe(false);
+    expect(await samples()).toBeGreaterThanOrEqual(before);
+    const plain = await shoot(10);
+    await press("Z");
+    await expect.poll(async () => (await trace()).isPostOn).toBe(true);
+    const again = await shoot(10);
+    // in the mean of all, where noise is no more, but for outlines: those are wider while it is
+    const off = (picture: Picture) => Math.hypot(...between(meanWithin(picture), meanWithin(late)));
+    expect(off(plain)).toBeGreaterThan(6);
+    expect(off(again)).toBeLessThan(off(plain) / 2);
+
+    // a lamp elsewhere
+    const keys = DIALS.findIndex(({ id }) => id === "lamp-0/x") + 1;
+    await press(...new Array<string>(keys).fill("F"));
+    const many = await samples();
+    await press(...new Array<string>(20).fill("]")); // each a sixtieth of the way
+    await expect.poll(async () => (await trace()).lamps[0].x).toBeCloseTo(1.1, 4);
+    expect(await samples()).toBeLessThan(many);
+    const lit = await shoot();
+    // against the picture before it; what one side gains the other loses: the mean of all won't do
+    const ofF = (picture: Picture) => meanColor(picture, hasColor(F.color));
+    expect(apart(again, lit)).toBeGreaterThan(8);
+    expect(Math.hypot(...between(ofF(lit), ofF(again)))).toBeGreaterThan(8);
+
+    // a channel that is hidden, and one of another colour
+    await press("2");
+    await stand.viewer.settled();
+    const alone = await shoot();
+    expect(alone.count(hasColor(BALL.color))).toBeLessThan(12);
+    expect(alone.count(hasColor(F.color))).toBeGreaterThan(34);
+    await stand.viewer.recolor(F.id, "#00ff00");
+    expect((await shoot()).count(hasColor([0, 1, 0]))).toBeGreaterThan(34);
+
+    // out of the mode and back
+    await press("G");
+    await stand.viewer.settled();
+    expect((await snapshot()).state.mode).toBe("all");
+    expect((await snapshot()).traced.level).toBeNull();
+    expect((await snapshot()).volumes.length).toBeGreaterThan(0);
+    await press("G");
+    await stand.viewer.settled();
+    await gathered(4);
+    expect(await notices()).toEqual([]);
+
+    // a link brings all of it back
+    await press("Z", "I", "M", "l");
+    await expect.poll(() => page().url()).toContain("light=");
+    const wanted = await trace();
+    const address = page().url();
+    await page().goto("about:blank");
+    await stand.viewer.open(address);
+    await stand.viewer.settled();
+    expect(await trace()).toEqual(wanted);
+    expect(wanted.environment).toBe("sky");
+    expect(await notices()).toEqual([]);
+  });
+
+  it("is cut open, and measured", async () => {
+    await open(`&quality=low#v=1&mode=traced&dwell=off&${ONCE}`);
+    const whole = await shoot(4);
+    const right = (picture: Picture, from: number) => {
+      const handle_y = picture.height / 2;
+      return picture
+        .where((pixel) => !isBackground(pixel))
+        .filter(([x, y]) => x > from && Math.abs(y - handle_y) > 22).length;
+    };
+    const { width, height } = whole;
+    const at = (p: readonly [number, number, number]) => project(p, bounds, width, height);
+    const edge = Math.max(at([34, -48, 24]).x, at([34, 0, 24]).x) + 2;
+    expect(right(whole, edge)).toBeGreaterThan(25);
+    await page().goto("about:blank");
+    await open(`&quality=low#v=1&mode=traced&dwell=off&cut=1,0,0,34&${ONCE}`);
+    const cut = await shoot(4);
+    expect(right(cut, edge)).toBe(0);
+    expect(drawn(cut)).toBeGreaterThan(280);
+
+    await press("n", "p"); // whole again; a tap measures
+    await stand.viewer.settled();
+    const [ball] = BALLS;
+    const { x, y } = at([...ball.center]);
+    const box = await page().locator(".stage").boundingBox();
+    if (box === null) throw new Error("no stage");
+    await page().mouse.click(box.x + x, box.y + y);
+    const measured = async () => (await snapshot()).state.measured;
+    await expect.poll(async () => (await measured()).length, PATIENT).toBe(1);
+    const [point] = await measured();
+    const away = Math.hypot(...point.map((v, k) => v - ball.center[k]));
+    expect(Math.abs(away - ball.radius)).toBeLessThan(1.5);
+    expect(point[2]).toBeGreaterThan(ball.center[2]);
+  });
+
+  it("lets a lamp be dragged round the specimen, and no camera by it", async () => {
+    const { scale, center } = place(bounds);
+    const edge_m = 64 * scale;
+    /** Of the page: a point in edges from the middle, seen by an eye before it. */
+    async function pixelOf([x, y, z]: readonly number[], eye_m: number) {
+      const box = await page().locator(".stage").boundingBox();
+      if (box === null) throw new Error("no stage");
+      const px = box.height / 2 / Math.tan((20 * Math.PI) / 180) / (eye_m - z * edge_m);
+      const middle = [box.x + box.width / 2, box.y + box.height / 2];
+      return [middle[0] + px * x * edge_m, middle[1] - px * y * edge_m] as const;
+    }
+    async function eyeOf(): Promise<string> {
+      await page().evaluate(() => history.replaceState(null, "", "#"));
+      await press("l");
+      await expect.poll(() => page().url(), PATIENT).toContain("v=1");
+      return /eye=([^&]*)/.exec(page().url())?.[1] ?? "";
+    }
+    expect(center).toEqual([32, -24, 12]);
+    const light =
+      "many:false,lamp-0/x:-0.6,lamp-0/y:0,lamp-0/z:0.8,lamp-0/strength:4,lamp-0/color:00ff00";
+    await open(`&quality=low#v=1&mode=traced&dwell=off&eye=0,0,4,0,0,0&light=${light}`);
+    const left = await shoot(6);
+    await press("$");
+    const start = await pixelOf([-0.6, 0, 0.8], 4);
+    const end = await pixelOf([0.6, 0.25, Math.sqrt(0.5775)], 4);
+    const isBallAt = (picture: Picture, [x, y]: readonly [number, number]) =>
+      hasColor([0, 1, 0])(picture.at(Math.round(x), Math.round(y)));
+    const before = await shoot(1);
+    expect([start, end].map((at) => isBallAt(before, at))).toEqual([true, false]);
+    await page().mouse.move(...start);
+    await page().mouse.down();
+    await page().mouse.move(...end, { steps: 4 });
+    await page().mouse.up();
+    await expect.poll(async () => (await trace()).lamps[0].x, PATIENT).toBeGreaterThan(0.5);
+    const { x, y, z } = (await trace()).lamps[0];
+    expect(Math.hypot(x, y, z)).toBeCloseTo(1, 6);
+    expect(Math.hypot(x - 0.6, y - 0.25)).toBeLessThan(0.02); // half a pixel is 0.008
+    expect(z).toBeGreaterThan(0.7);
+    expect(isBallAt(await shoot(1), end)).toBe(true);
+    expect(await eyeOf()).toBe("0,0,4,0,0,0");
+    await press("$");
+    const right = await shoot(6);
+    expect(isBallAt(right, end)).toBe(false);
+    expect(apart(left, right)).toBeGreaterThan(8);
+
+    // a lamp beside the eye comes into sight
+    await press("r", "$");
+    const eye_m = Number((await eyeOf()).split(",")[2]);
+    expect(isBallAt(await shoot(1), await pixelOf([x, y, z], eye_m))).toBe(true);
+  });
+
+  it("is lit by a file of the user's, and survives a lost context", async () => {
+    await page().addInitScript(() => {
+      const original = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, ...given) {
+        const made = (original as (...each: unknown[]) => unknown).apply(this, given);
+        if (made instanceof WebGL2RenderingContext) Object.assign(window, { drawnBy: made });
+        return made as never;
+      };
+    });
+    let chosen: FilePayload = { name: "", mimeType: "", buffer: Buffer.alloc(0) };
+    page().on("filechooser", (chooser) => chooser.setFiles(chosen));
+    await open();
+    const light = async (name: string, buffer: Buffer) => {
+      chosen = { name, mimeType: "image/vnd.radiance", buffer };
+      await press("U");
+    };
+    await light("broken.hdr", Buffer.from("no picture of light"));
+    await expect.poll(notices, PATIENT).toEqual([expect.stringMatching(/^broken\.hdr: expected/)]);
+    expect((await trace()).environment).toBe("studio");
+    await press("Delete", "!"); // its notice, and the lamp
+    expect((await trace()).lamps[0].isOn).toBe(false);
+    await light("green.hdr", hdr(0, 1, 0));
+    await expect.poll(async () => (await trace()).environment, PATIENT).toBe("own");
+    await stand.viewer.settled();
+    const green = await shoot();
+    expect(drawn(green)).toBeGreaterThan(340);
+    const isGreen = hasColor([0, 1, 0]);
+    const others = (picture: Picture) =>
+      picture.count((pixel) => Math.max(...pixel) > 60 && !isGreen(pixel));
+    expect(others(green)).toBeLessThan(0.03 * drawn(green));
+
+    const call = (name: "loseContext" | "restoreContext") =>
+      page().evaluate((each) => {
+        const held = window as unknown as {
+          drawnBy: WebGL2RenderingContext;
+          loss?: WEBGL_lose_context | null;
+        };
+        held.loss ??= held.drawnBy.getExtension("WEBGL_lose_context");
+        held.loss?.[each]();
+      }, name);
+    await call("loseContext");
+    await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
+    await call("restoreContext");
+    await expect.poll(notices).toEqual([]);
+    await stand.viewer.settled();
+    const back = await shoot();
+    // of all pixels together: each by itself is noisy after a few samples, and a busy machine's
+    // picture is coarser, so that its outlines take more of it
+    expect(Math.abs(drawn(back) / drawn(green) - 1)).toBeLessThan(0.25);
+    expect(others(back)).toBeLessThan(0.03 * drawn(back));
+    const [was, is] = [green, back].map(meanWithin);
+    for (const [k, v] of is.entries()) expect(Math.abs(v - was[k])).toBeLessThan(8);
+  });
+
+  it("says once that the light can't be had, and tries again when asked", async () => {
+    stand.host.overrides.set(STUDIO, { status: 503, body: "" });
+    await open();
+    await expect.poll(notices, PATIENT).toHaveLength(1);
+    await press("2", "1", "2"); // what changes the state does not ask again
+    await stand.viewer.settled();
+    expect(await notices()).toHaveLength(1);
+    stand.host.overrides.delete(STUDIO);
+    await press("1", "R");
+    await expect.poll(notices, PATIENT).toEqual([]);
+    expect(drawn(await shoot(4))).toBeGreaterThan(340);
+  });
+
+  it("says so where the page lacks what follows light, and asks for it again", async () => {
+    await page().route(/\/path_tracer-[^/]*\.js$/, (route) => route.abort());
+    await open();
+    await expect.poll(notices, PATIENT).toEqual([expect.stringContaining("follows light")]);
+    await press("2", "1", "2"); // what changes the state does not ask again
+    await stand.viewer.settled();
+    expect(await notices()).toHaveLength(1);
+    await page().unroute(/\/path_tracer-[^/]*\.js$/);
+    await press("1", "R");
+    await expect.poll(notices, PATIENT).toEqual([]);
+    expect(drawn(await shoot(2))).toBeGreaterThan(340);
+  });
+
+  it("is drawn to both eyes, and gathers while the head rests", async () => {
+    const { width, height } = { width: 160, height: 200 }; // of an eye
+    await page().setViewportSize({ width: 2 * width, height });
+    await addHeadset(page(), true);
+    await open(`#v=1&mode=traced&dwell=off&quality=low&${ONCE}`);
+    await stand.viewer.enterStereo();
+    await gathered(4);
+    for (const x of [0, width]) {
+      const eye = await takePicture(page(), { x, y: 0, width, height });
+      expect(eye.count(hasColor(F.color)), `eye at ${x}`).toBeGreaterThan(12);
+      expect(eye.count(hasColor(BALL.color)), `eye at ${x}`).toBeGreaterThan(12);
+    }
+    await page().evaluate(() => {
+      const { headset } = window as unknown as { headset: import("iwer").XRDevice };
+      const { x, y, z } = headset.position;
+      let k = 0;
+      const trembling = window.setInterval(() => {
+        k++; // a millimetre to all sides
+        headset.position.set(x + 1e-3 * Math.sin(k), y + 1e-3 * Math.cos(2 * k), z);
+      }, 5);
+      Object.assign(window, { trembling });
+    });
+    const resting = await samples();
+    await gathered(resting + 3); // nothing is lost
+    const before = await samples();
+    await page().evaluate(() => {
+      const { headset, trembling } = window as unknown as {
+        headset: import("iwer").XRDevice;
+        trembling: number;
+      };
+      window.clearInterval(trembling);
+      headset.position.set(0.3, 1.7, 0.1); // a real step
+    });
+    await expect.poll(samples, PATIENT).toBeLessThan(before);
+    await gathered(4);
+    expect(await notices()).toEqual([]);
+  });
+});

@@ -1,0 +1,215 @@
+/** Who is drawn how: surfaces from afar, volumes round the gaze, in one tile, or everywhere. */
+import { expect, it } from "vitest";
+import type { Mode } from "../../src/state/viewer_state";
+import { project } from "../support/browser/camera";
+import { addClock, holdFrames, tick } from "../support/browser/clock";
+import { isBackground, type Picture, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { BALLS } from "../support/fixture/bodies";
+
+const VIEWPORT = { width: 480, height: 272 };
+const FIELD_OF_VIEW_DEG = 40;
+const DISC_DEG = 10;
+const NEAR = "&switch=9";
+
+describeInChromium("surface or volume", () => {
+  const stand = prepareStand({ viewport: VIEWPORT });
+
+  async function pictureOf(query: string): Promise<Picture> {
+    await stand.open(`${query}&quality=high`);
+    await stand.viewer.settled();
+    return takePicture(stand.viewer.page);
+  }
+
+  const as = (mode: Mode) => pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}`);
+
+  /** How many pixels of a ring round the middle differ by more than `by`. */
+  function apart(a: Picture, b: Picture, from_deg: number, to_deg: number, by = 2): number {
+    const perTan = a.height / 2 / Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const [inner, outer] = [from_deg, to_deg].map(
+      (deg) => perTan * Math.tan((deg * Math.PI) / 180),
+    );
+    let count = 0;
+    for (let y = 0; y < a.height; y++) {
+      for (let x = 0; x < a.width; x++) {
+        const r = Math.hypot(x + 0.5 - a.width / 2, y + 0.5 - a.height / 2);
+        if (r < inner || r > outer) continue;
+        const other = b.at(x, y);
+        if (a.at(x, y).some((v, i) => Math.abs(v - other[i]) > by)) count++;
+      }
+    }
+    return count;
+  }
+
+  it("is a disc: volumes within, surfaces without, over the border of two tiles", async () => {
+    const disc = await as("disc");
+    const { volumes, gazed, discRadius_deg } = await stand.viewer.snapshot();
+    expect(discRadius_deg).toBeCloseTo(DISC_DEG, 5);
+    expect(gazed).not.toBeNull();
+    expect(new Set(volumes.map(({ tile }) => tile))).toEqual(new Set(["r0_c0", "r0_c1"]));
+    const [all, off] = [await as("all"), await as("off")];
+    const inner_deg = 0.55 * DISC_DEG;
+    expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25); // else this would show nothing
+    // the same picture as where everything is a volume, so that no box edge shows
+    expect(apart(disc, all, 0, inner_deg)).toBe(0);
+    // a few pixels of silhouettes are multisampled otherwise where surfaces are blended
+    expect(apart(disc, off, 1.04 * DISC_DEG, 40)).toBeLessThan(20);
+    expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the feather
+  });
+
+  it("takes another colour in the same frame, surface and volume", async () => {
+    const { page } = stand.viewer;
+    await addClock(page);
+    await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high`);
+    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Balls");
+    await stand.viewer.recolor("Balls", "#ff0000");
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
+    const count = async (channel: 0 | 1) =>
+      (await takePicture(page)).count((pixel) => pixel[channel] > 40 + pixel[1 - channel]);
+    const red = await count(0);
+    expect(red).toBeGreaterThan(1000);
+    await holdFrames(page);
+    const { frames } = await page.evaluate(() => ({ frames: window.stereocell?.frames }));
+    await page.locator('[data-channel="Balls"] [data-part="color"]').fill("#00ff00");
+    await tick(page, 16);
+    expect(await page.evaluate(() => window.stereocell?.frames)).toBe((frames ?? 0) + 1);
+    expect(await count(0)).toBe(0);
+    expect(Math.abs((await count(1)) - red)).toBeLessThan(red / 20);
+  });
+
+  it("is drawn with less while frames are late, and as well as can be at rest", async () => {
+    const { page } = stand.viewer;
+    await addClock(page);
+    await stand.open(`&mode=all${NEAR}&quality=auto`);
+    await stand.viewer.settled();
+    const settings = async () => (await stand.viewer.snapshot()).settings;
+    const best = await settings();
+    expect(best).toMatchObject({ steps: 100, resolution: 1 });
+    await holdFrames(page);
+    for (let i = 0; i < 60 && (await settings()).resolution === 1; i++) {
+      await page.keyboard.press("ArrowLeft");
+      await tick(page, 150);
+    }
+    const moving = await settings();
+    expect(moving.steps).toBeLessThan(100);
+    expect(moving.resolution).toBeLessThan(1);
+    // what is still being fetched comes when it comes, fades in, and is movement too
+    const isLoading = async () => {
+      await tick(page, 150);
+      return (await stand.viewer.snapshot()).isLoading;
+    };
+    await expect.poll(isLoading).toBe(false);
+    await tick(page, 150, 8);
+    expect(await settings()).toEqual(best);
+  });
+
+  it("stays a surface beyond the switch distance", async () => {
+    await stand.open("&switch=1");
+    await stand.viewer.settled();
+    const before = await stand.viewer.snapshot();
+    expect(before.volumes).toEqual([]);
+    expect(before.discRadius_deg).toBe(0);
+    const asked = stand.host.requests.filter(({ path }) => path.includes("/volumes/"));
+    expect(asked).toEqual([]);
+    const box = await stand.viewer.page.locator(".stage").boundingBox();
+    if (box === null) throw new Error("no stage");
+    await stand.viewer.page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    for (let i = 0; i < 12; i++) await stand.viewer.page.mouse.wheel(0, -120);
+    await stand.viewer.still();
+    const near = await stand.viewer.snapshot();
+    expect(near.volumes.length).toBeGreaterThan(0);
+    expect(near.discRadius_deg).toBeGreaterThan(0);
+  });
+
+  it("is exactly the gazed tile in the paper's mode", async () => {
+    const tile = await as("tile");
+    const { volumes, gazed } = await stand.viewer.snapshot();
+    expect(new Set(volumes.map((each) => each.tile))).toEqual(new Set([gazed]));
+    const [all, off] = [await as("all"), await as("off")];
+    const { specimen } = stand.manifest;
+    const other = gazed === "r0_c0" ? BALLS[0] : BALLS[1];
+    const own = gazed === "r0_c0" ? BALLS[1] : BALLS[0];
+    const at = (picture: Picture, { center }: (typeof BALLS)[number]) => {
+      const { x, y } = project(center, specimen.bounds_um, picture.width, picture.height);
+      return picture.at(x, y);
+    };
+    expect(at(tile, other)).toEqual(at(off, other));
+    expect(at(tile, own)).not.toEqual(at(off, own));
+    at(tile, own).forEach((v, i) => {
+      expect(Math.abs(v - at(all, own)[i])).toBeLessThanOrEqual(8); // steps are shared otherwise
+    });
+  });
+
+  it("uploads one small table for another look, never a volume", async () => {
+    await stand.viewer.page.addInitScript(() => {
+      const uploads: number[] = [];
+      (window as unknown as { uploads: number[] }).uploads = uploads;
+      const { prototype } = WebGL2RenderingContext;
+      for (const name of ["texImage3D", "texSubImage3D", "texSubImage2D", "texImage2D"] as const) {
+        const original = prototype[name] as (...given: unknown[]) => void;
+        Object.assign(prototype, {
+          [name](this: WebGL2RenderingContext, ...given: unknown[]) {
+            const data = given.find((each) => ArrayBuffer.isView(each));
+            uploads.push(ArrayBuffer.isView(data) ? data.byteLength : 0);
+            return original.apply(this, given);
+          },
+        });
+      }
+    });
+    await stand.open(`&mode=all`);
+    await stand.viewer.settled();
+    const take = () =>
+      stand.viewer.page.evaluate(() =>
+        (window as unknown as { uploads: number[] }).uploads.splice(0),
+      );
+    expect(Math.max(...(await take()))).toBeGreaterThan(100_000);
+    await stand.viewer.chooseTransferFunction("Block", "soft");
+    const requests = stand.host.requests.length;
+    const tables = await take();
+    expect(tables.length).toBeGreaterThan(0);
+    // rows of the table, and the table of leaps
+    expect(Math.max(...tables)).toBeLessThanOrEqual(4 * 1024);
+    await stand.viewer.recolor("Block", "#ff00ff");
+    expect((await take()).filter((bytes) => bytes > 0)).toEqual([]);
+    expect(stand.host.requests.length).toBe(requests);
+  });
+
+  it("looks alike at fewer pixels and steps", async () => {
+    const blockAt = async (quality: string) => {
+      await stand.open(`&mode=all&quality=${quality}`);
+      for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Block");
+      return takePicture(stand.viewer.page);
+    };
+    const [high, low] = [await blockAt("high"), await blockAt("low")];
+    const { settings } = await stand.viewer.snapshot();
+    expect(settings.resolution).toBeLessThanOrEqual(0.5);
+    expect(settings.steps).toBeLessThan(100);
+    const pixels = VIEWPORT.width * VIEWPORT.height;
+    expect(apart(high, low, 0, 40)).toBeGreaterThan(0); // it is another picture
+    expect(apart(high, low, 0, 40, 20)).toBeLessThan(0.01 * pixels); // at outlines
+    // nothing is shifted: what is drawn has its middle where it was
+    const middle = (picture: Picture) => {
+      const drawn = picture.where((pixel) => !isBackground(pixel));
+      return [0, 1].map((i) => drawn.reduce((sum, at) => sum + at[i], 0) / drawn.length);
+    };
+    const [a, b] = [middle(high), middle(low)];
+    expect(Math.hypot(a[0] - b[0], a[1] - b[1])).toBeLessThan(0.7);
+  });
+
+  it("cancels what is no longer wanted", async () => {
+    await stand.open(`&mode=tile${NEAR}`);
+    await stand.viewer.settled();
+    stand.host.delay_ms = 2500;
+    const aborted: string[] = [];
+    stand.viewer.page.on("requestfailed", (request) => aborted.push(request.url()));
+    const [one, other] = stand.manifest.tiles.map(({ id }) => id);
+    const { gazed } = await stand.viewer.snapshot();
+    const next = gazed === one ? other : one;
+    await stand.viewer.page.locator(`[data-tile-choice="${next}"]`).click();
+    await stand.viewer.page.waitForTimeout(500);
+    await stand.viewer.page.locator('[data-mode="off"]').setChecked(true, { force: true });
+    await expect.poll(() => aborted.some((url) => url.includes(`/volumes/${next}/`))).toBe(true);
+    expect((await stand.viewer.snapshot()).state.notices).toEqual([]);
+  });
+});

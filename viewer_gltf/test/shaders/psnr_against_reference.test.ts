@@ -1,0 +1,83 @@
+/**
+ * The viewer's picture against the float64 reference renderer, tests/reference_march.py: of the
+ * fixture, and of a real stack where STEREOCELL_REAL_BUNDLE names its bundle. Skipped where the
+ * repository has no .venv (`make setup`).
+ */
+import { execFile } from "node:child_process";
+import { existsSync } from "node:fs";
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { describe, expect, it } from "vitest";
+import { framingDistance, place } from "../../src/render/placement";
+import { withoutMarks } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand, type Stand } from "../support/browser/stand";
+
+const REPOSITORY = new URL("../../../", import.meta.url).pathname;
+const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/python");
+const REAL = process.env.STEREOCELL_REAL_BUNDLE;
+const FIELD_OF_VIEW_DEG = 40;
+const VIEWPORT = { width: 360, height: 240 };
+const LEAST_DB = 40;
+
+function run(script: string, given: readonly string[], input: string): Promise<string> {
+  return new Promise((resolve, reject) => {
+    const child = execFile(PYTHON, [script, ...given], (error, stdout, stderr) =>
+      error ? reject(new Error(stderr)) : resolve(stdout),
+    );
+    child.stdin?.end(input);
+  });
+}
+
+/** Show these channels alone, as volumes everywhere, from the front; how near that comes, in dB. */
+async function hold(stand: Stand, channels: readonly string[]) {
+  await stand.open("&mode=all&quality=high");
+  for (const { id } of stand.manifest.channels) {
+    await stand.viewer.show(id, channels.includes(id));
+  }
+  await stand.viewer.settled();
+  const folder = await mkdtemp(join(tmpdir(), "stereocell-psnr-"));
+  const picture = join(folder, "picture.png");
+  const stage = stand.viewer.page.locator(".stage canvas");
+  const box = await stage.boundingBox();
+  if (box === null) throw new Error("no canvas");
+  await withoutMarks(stand.viewer.page, () => stage.screenshot({ path: picture }));
+  const { scale, center, size } = place(stand.manifest.specimen.bounds_um);
+  const fov_rad = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
+  const away = framingDistance(size, fov_rad, box.width / box.height) / scale;
+  const asked = {
+    channels,
+    eye_um: [center[0], center[1], center[2] + away],
+    target_um: center,
+    fov_deg: FIELD_OF_VIEW_DEG,
+  };
+  const script = join(REPOSITORY, "tests/bundle_picture.py");
+  const said = await run(script, [stand.bundle, picture], JSON.stringify(asked));
+  await rm(folder, { recursive: true });
+  return JSON.parse(said) as { psnr: number; drawn: number };
+}
+
+describe.skipIf(!existsSync(PYTHON))("against the float64 reference", () => {
+  describeInChromium("the picture of the fixture", () => {
+    const stand = prepareStand({ viewport: VIEWPORT });
+    for (const channels of [["Balls"], ["Block"], ["F_x20_body", "Balls", "Block"]]) {
+      it(`is as near as 40 dB: ${channels.join(", ")}`, async () => {
+        const { psnr, drawn } = await hold(stand, channels);
+        expect(drawn).toBeGreaterThan(280);
+        expect(psnr).toBeGreaterThan(LEAST_DB);
+      });
+    }
+  });
+
+  describe.skipIf(REAL === undefined)("of a real stack", () => {
+    describeInChromium("the picture", () => {
+      const stand = prepareStand({ bundle: REAL, viewport: VIEWPORT });
+      it("is as near as 40 dB", async () => {
+        const { psnr, drawn } = await hold(stand, [stand.manifest.channels[0].id]);
+        expect(drawn).toBeGreaterThan(280);
+        expect(psnr).toBeGreaterThan(LEAST_DB);
+      });
+    });
+  });
+});

@@ -1,0 +1,164 @@
+/** Numbers out of the ray-march: how many steps a ray takes, and what its chunks compute. */
+import { expect, it } from "vitest";
+import { MAX_STEPS } from "../../src/volumes/tile_raymarch";
+import { prepareBarePage } from "../support/browser/bare_page";
+import { describeInChromium } from "../support/browser/skip";
+import { readChunks, runProgram } from "../support/shaders/chunk";
+import type { Counts, Harness, Run } from "../support/shaders/harness";
+
+describeInChromium("the ray-march", () => {
+  const bare = prepareBarePage<Harness>(new URL("../support/shaders/harness.ts", import.meta.url));
+
+  async function count(run: Run): Promise<Counts> {
+    const counts = await bare.call("countSteps", run);
+    expect(counts.pixels).toBeGreaterThan(300);
+    return counts;
+  }
+
+  it("takes at most 100 steps, and reaches the end with them", async () => {
+    expect(MAX_STEPS).toBe(100);
+    // The space diagonal is 337 voxels: 481 steps of the shortest length.
+    const { most, covered } = await count({ side: 198, opacity: 1, bricks: "all" });
+    expect(most).toBeLessThanOrEqual(100);
+    expect(most).toBeGreaterThan(90);
+    expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("keeps to the limit where leaps and samples alternate", async () => {
+    const { most, covered } = await count({ side: 198, opacity: 1, bricks: "checkerboard" });
+    expect(most).toBeLessThanOrEqual(100);
+    expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("stops behind an opaque entry", async () => {
+    const { most } = await count({ side: 198, opacity: 255, bricks: "all" });
+    expect(most).toBeLessThanOrEqual(2);
+  });
+
+  it("leaps through what is empty", async () => {
+    const { most, covered } = await count({ side: 198, opacity: 255, bricks: "none" });
+    expect(most).toBeLessThanOrEqual(5);
+    expect(covered).toBeGreaterThan(0.99);
+  });
+
+  it("takes no more steps where a ray goes through several tiles", async () => {
+    for (const cubes of [2, 3, 7]) {
+      const most = await bare.call("countThrough", { side: 51, opacity: 1, bricks: "all" }, cubes);
+      expect(most).toBeLessThanOrEqual(MAX_STEPS);
+      expect(most).toBeGreaterThan(0.8 * MAX_STEPS);
+    }
+  });
+
+  it("shows the same with leaps and without, whatever is drawn", async () => {
+    let drawn = 0;
+    for (let seed = 0; seed < 30; seed++) {
+      const found = await bare.call("compareLeaps", seed);
+      expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
+      drawn += found.drawn;
+    }
+    expect(drawn).toBeGreaterThan(30 * 100);
+  });
+
+  it("makes a ramp as opaque as its integral", async () => {
+    const [side, opacity] = [67, 20];
+    // transmittance is the product of (1 - a)^length: its logarithm is an integral along the ray
+    let log = 0;
+    for (let i = 0; i < 10_000; i++) {
+      log += Math.log(1 - ((opacity / 255) * (i + 0.5)) / 10_000);
+    }
+    const expected = 1 - Math.exp((log / 10_000) * (side - 3));
+    const found = await bare.call("meanOpacity", "ramp", side, opacity);
+    expect(Math.abs(found - expected)).toBeLessThan(2 / 255);
+  });
+
+  it("makes a uniform cube as opaque as its length says, whatever its opacity", async () => {
+    // 64 voxels are a step each; of 200 some are longer than a voxel, and are corrected for it
+    for (const side of [67, 203]) {
+      for (const opacity of [1, 5, 20]) {
+        const expected = 1 - (1 - opacity / 255) ** (side - 3);
+        const found = await bare.call("meanOpacity", "uniform", side, opacity);
+        const ends = expected > 0.99 ? 0.01 : 2 / 255; // rays that are as opaque go no further
+        expect(Math.abs(found - expected), `${side}, ${opacity}`).toBeLessThan(ends);
+      }
+    }
+  });
+
+  it("finds where a ray enters and leaves a box", async () => {
+    const chunks = await readChunks("intersect_box");
+    const intersect = async (eye: string, dir: string) => {
+      const box = "vec3(0.0), vec3(4.0, 2.0, 8.0)";
+      const call = `intersectBox(vec3(${eye}), 1.0 / vec3(${dir}), ${box})`;
+      const head = "#include <chunks/intersect_box>";
+      return (await runProgram(bare.page, chunks, head, `oColor = ${call}.xyxy;`)).slice(0, 2);
+    };
+    // Along z, a hair off the axes, since the reciprocal of 0 is not defined in GLSL.
+    const [near, far] = await intersect("1.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
+    expect(near).toBeCloseTo(5, 4);
+    expect(far).toBeCloseTo(13, 4);
+    // Along the diagonal (1, 1, 1): in by y = 0, out by y = 2.
+    expect(await intersect("0.0, -1.0, 0.0", "1.0, 1.0, 1.0")).toEqual([1, 3]);
+    const [enters, leaves] = await intersect("9.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
+    expect(enters).toBeGreaterThan(leaves); // a miss
+  });
+
+  it("finds the end of the empty block, and of a visible brick", async () => {
+    const chunks = await readChunks("skip_empty_bricks");
+    const head = `uniform sampler3D uOccupancy;
+      const float uVoxel = 1.0;
+      const float uBrickSlack = 0.0;
+      #include <chunks/skip_empty_bricks>`;
+    // 8 bricks in a row, the last one visible
+    const uOccupancy = { size: [8, 1, 1], channels: 1, texels: [7, 6, 5, 4, 3, 2, 1, 0] } as const;
+    const ahead = async (start: number, dir: number, t: number) =>
+      (
+        await runProgram(
+          bare.page,
+          chunks,
+          head,
+          `vec3 dir = vec3(${dir.toFixed(3)}, 1e-9, 1e-9);
+           oColor = blockAhead(vec3(${start.toFixed(3)}, 0.5, 0.5), dir, 1.0 / dir,
+                               ${t.toFixed(3)}).xyxy;`,
+          { uOccupancy: { ...uOccupancy, texels: [...uOccupancy.texels] } },
+        )
+      ).slice(0, 2);
+    const expectBlock = async (found: Promise<readonly number[]>, exit: number, empty: number) => {
+      const [x, y] = await found;
+      expect(x).toBeCloseTo(exit + 1e-3, 4);
+      expect(y).toBe(empty);
+    };
+    await expectBlock(ahead(0.5, 1, 0), 6.5, 1); // from brick 0 to the wall of brick 7
+    await expectBlock(ahead(0.5, 1, 2), 6.5, 1); // t counts from the start
+    await expectBlock(ahead(0.5, 0.5, 0), 13, 1);
+    await expectBlock(ahead(7.5, 1, 0), 0.5, 0); // the visible brick's own end
+    await expectBlock(ahead(6.5, -1, 0), 0.5, 1); // back from brick 6, whose block is that brick
+  });
+
+  it("classifies by the table, with the opacity of the step's length", async () => {
+    const chunks = await readChunks("classify");
+    const head = `uniform sampler2D uLut;
+      #define CHANNELS 2
+      const vec3 uColor[CHANNELS] = vec3[CHANNELS](vec3(1.0, 0.0, 0.0), vec3(0.0, 0.0, 1.0));
+      #include <chunks/classify>`;
+    const row = (top: number) =>
+      Array.from({ length: 256 }, (_, i) => [255, 255, 255, i === 200 ? top : 0]).flat();
+    const uLut = { size: [256, 2], channels: 4, texels: [...row(51), ...row(102)] } as const;
+    const classify = (intensity: string, voxels: string) =>
+      runProgram(
+        bare.page,
+        chunks,
+        head,
+        `oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, vec4(${voxels}));`,
+        { uLut: { ...uLut, texels: [...uLut.texels] } },
+      );
+    const one = await classify("200.0, 0.0", "3.0");
+    [1, 0, 0, 1 - 0.8 ** 3].forEach((v, i) => {
+      expect(one[i]).toBeCloseTo(v, 5);
+    });
+    // Both: absorbed together, the colour shared 0.2 to 0.4.
+    const both = await classify("200.0, 200.0", "1.0");
+    [1 / 3, 0, 2 / 3, 1 - 0.8 * 0.6].forEach((v, i) => {
+      expect(both[i]).toBeCloseTo(v, 5);
+    });
+    expect((await classify("10.0, 0.0", "1.0"))[3]).toBe(0);
+  });
+});

@@ -1,0 +1,493 @@
+/**
+ * Numbers out of the shader's small chunks, each against what can be written down: where rays are
+ * cut and end, how the disc weighs, what a sample is, how it is lit and how far it is shifted.
+ */
+import { readdir, readFile } from "node:fs/promises";
+import { describe, expect, it } from "vitest";
+import { blueNoise, NOISE_SIZE } from "../../src/gpu/blue_noise";
+import { toHex } from "../../src/math/color";
+import { prepareBarePage } from "../support/browser/bare_page";
+import { describeInChromium } from "../support/browser/skip";
+import { readChunks, runProgram, type Texture } from "../support/shaders/chunk";
+
+describeInChromium("the shader's chunks", () => {
+  const bare = prepareBarePage();
+  const { run } = bare;
+
+  const vec = (...v: number[]) => `vec${v.length}(${v.map((n) => n.toExponential(9)).join(", ")})`;
+
+  it("cut a ray's span by box and plane", async () => {
+    const clip = async (plane: number[], dir: number[]) => {
+      const head = `const vec3 uClipLow = vec3(-1.0); const vec3 uClipHigh = vec3(1.0, 1.0, 3.0);
+        const vec4 uClipPlane = ${vec(...plane)};`;
+      const call = `vec3 dir = ${vec(...dir)};
+        oColor = clipSpan(vec2(0.0, 20.0), vec3(0.0, 0.0, -5.0), dir, 1.0 / dir).xyxy;`;
+      return (await run(["intersect_box", "clip_span"], head, call)).slice(0, 2);
+    };
+    const ahead = [1e-9, 1e-9, 1];
+    expect(await clip([0, 0, 0, 1], ahead)).toEqual([4, 8]); // the box alone: z -1 to 3
+    expect(await clip([0, 0, 1, 2], ahead)).toEqual([4, 7]); // kept up to z = 2
+    expect(await clip([0, 0, -1, -2], ahead)).toEqual([7, 8]); // kept from z = 2 on
+    const [from, to] = await clip([1, 0, 0, -0.5], ahead); // beside the ray: all is cut away
+    expect(from).toBeGreaterThan(to);
+    expect(await clip([1, 0, 0, 0.5], ahead)).toEqual([4, 8]); // beside the ray: nothing is
+  });
+
+  it("cut a ray's span by the disc's cone, seen from its apex or from another eye", async () => {
+    const cone = async (eye: number[], dir: number[]) => {
+      const length = Math.hypot(...dir);
+      const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
+        const vec2 uDisc = vec2(0.9, ${Math.SQRT1_2});`; // 45 degrees
+      const unit = vec(...dir.map((v) => v / length));
+      const call = `oColor = coneSpan(vec2(0.0, 10.0), ${vec(...eye)}, ${unit}).xyxy;`;
+      return (await run(["cone_span"], head, call)).slice(0, 2);
+    };
+    expect(await cone([0, 0, 0], [0.5, 0, -1])).toEqual([0, 10]); // within
+    const [a, b] = await cone([0, 0, 0], [1.5, 0, -1]); // beside
+    expect(a).toBeGreaterThanOrEqual(b);
+    // along x, two ahead of the apex: the cone is x = -2 to 2 there
+    const [from, to] = await cone([-5, 0, -2], [1, 0, 0]);
+    expect(from).toBeCloseTo(3, 4);
+    expect(to).toBeCloseTo(7, 4);
+    // parallel to the axis, one aside: in from z = -1 on
+    const [enters, leaves] = await cone([1, 0, 0], [0, 0, -1]);
+    expect(enters).toBeCloseTo(1, 4);
+    expect(leaves).toBe(10);
+    const [behind, none] = await cone([-5, 0, 2], [1, 0, 0]); // behind the apex
+    expect(behind).toBeGreaterThan(none);
+  });
+
+  it("weigh the disc from 1 within its inner radius to 0 beyond its outer one", async () => {
+    const weigh = async (degrees: number) => {
+      const at = (degrees * Math.PI) / 180;
+      const p = vec(3 * Math.sin(at), 0, -3 * Math.cos(at));
+      const [inner, outer] = [10, 20].map((deg) => Math.cos((deg * Math.PI) / 180));
+      const call = `oColor = vec4(discWeight(${p}, vec3(0.0), vec3(0.0, 0.0, -1.0),
+        ${vec(inner, outer)}));`;
+      return (await run(["focus_disc"], "", call))[0];
+    };
+    expect(await weigh(0)).toBe(1);
+    expect(await weigh(9.9)).toBe(1);
+    expect(await weigh(20.1)).toBe(0);
+    const between = [await weigh(12), await weigh(15), await weigh(18)];
+    expect(between).toEqual([...between].sort((a, b) => b - a));
+    expect(between[0]).toBeLessThan(1);
+    expect(between[2]).toBeGreaterThan(0);
+  });
+
+  it("let channels without a disc count everywhere, the others by the cube of their weight", async () => {
+    const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
+      const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5;
+      const bvec4 uInDisc = bvec4(true, false, true, false);`;
+    const far = await run(
+      ["focus_disc", "disc_weights"],
+      head,
+      "oColor = weights(vec3(5.0, 0.0, -1.0));",
+    );
+    expect(far).toEqual([0, 0.5, 0, 0.5]);
+    const near = await run(
+      ["focus_disc", "disc_weights"],
+      head,
+      "oColor = weights(vec3(0.0, 0.0, -1.0));",
+    );
+    expect(near).toEqual([0.5, 0.5, 0.5, 0.5]);
+    // cosine 0.945: half of the way, where the smooth step is a half
+    const at = `vec3(${Math.sqrt(1 - 0.945 ** 2)}, 0.0, -0.945)`;
+    const half = await run(["focus_disc", "disc_weights"], head, `oColor = weights(${at});`);
+    expect(half[0]).toBeCloseTo(0.5 / 8, 4);
+  });
+
+  it("encode colours as sRGB", async () => {
+    const linear = [0.002, 0.2, 0.75] as const;
+    const found = await run(["encode_srgb"], "", `oColor = vec4(encoded(${vec(...linear)}), 1.0);`);
+    const hex = toHex(linear);
+    [1, 3, 5].forEach((at, i) => {
+      expect(255 * found[i]).toBeCloseTo(Number.parseInt(hex.slice(at, at + 2), 16), -0.5);
+    });
+  });
+
+  it("tell by which cut a ray came in", async () => {
+    const cut = async (planes: number[][], body: string) => {
+      const lines = planes.map((plane, i) => `uCutsGiven[${i}] = ${vec(...plane)};`).join("\n");
+      const chunks = await readChunks("clip_planes");
+      const text = chunks["chunks/clip_planes"]
+        .replace("uniform vec4 uCuts[7];", "vec4 uCutsGiven[7];")
+        .replace("uniform int uCutCount;", `const int uCutCount = ${planes.length};`)
+        .replaceAll("uCuts[", "uCutsGiven[");
+      return runProgram(
+        bare.page,
+        { "chunks/clip_planes": text },
+        "#include <chunks/clip_planes>",
+        `${lines}\n${body}`,
+      );
+    };
+    const front = [0, 0, 1, 2]; // gone is z > 2
+    const isCut = (p: string) => cut([front], `oColor = vec4(isCut(${p}) ? 1.0 : 0.0);`);
+    expect((await isCut("vec3(0.0, 0.0, 3.0)"))[0]).toBe(1);
+    expect((await isCut("vec3(0.0, 0.0, 1.0)"))[0]).toBe(0);
+    const right = [1, 0, 0, 1]; // gone is x > 1
+    const normal = (eye: string) =>
+      cut([front, right], `oColor = vec4(cutNormal(${eye}, vec3(0.0)), 1.0);`);
+    expect((await normal("vec3(0.0, 0.0, 9.0)")).slice(0, 3)).toEqual([0, 0, 1]);
+    expect((await normal("vec3(9.0, 0.0, 1.0)")).slice(0, 3)).toEqual([1, 0, 0]);
+    expect((await normal("vec3(0.5, 0.0, 1.0)")).slice(0, 3)).toEqual([0, 0, 0]); // on the kept side
+    // through both: the one that is passed last
+    expect((await normal("vec3(9.0, 0.0, 9.0)")).slice(0, 3)).toEqual([1, 0, 0]);
+  });
+
+  describe("find where the opaque scene ends a ray", () => {
+    const [NEAR, FAR] = [1, 100];
+    /** Of a fragment's point on the ray, as the eye sees it: its distance, and its view z. */
+    const [BACK, VIEW_Z] = [13, -12];
+    const VOXEL = 0.5;
+    type Rect = readonly [number, number, number, number];
+
+    /** Distance along the ray, of a depth as the buffer has it: k of 255. */
+    function distanceOf(k: number): number {
+      const away = (NEAR * FAR) / (FAR - (k / 255) * (FAR - NEAR)); // along the view's axis
+      return (away * BACK) / -VIEW_Z;
+    }
+
+    /** Of a fragment at `at`, in a picture of these depths, row by row from below. */
+    async function ends(
+      depths: readonly (readonly number[])[],
+      at: readonly [number, number],
+      { eye, part }: Readonly<{ eye?: Rect; part?: Rect }> = {},
+    ) {
+      const size = [depths[0].length, depths.length];
+      const whole = [0, 0, ...size];
+      const x = -(FAR + NEAR) / (FAR - NEAR);
+      const y = (-2 * FAR * NEAR) / (FAR - NEAR);
+      const head = `uniform sampler2D uSceneDepth, uPaneDepth;
+        const vec4 uEye = ${vec(...(eye ?? whole))}; const vec4 uPart = ${vec(...(part ?? whole))};
+        const vec2 vDepth = ${vec(x, y)}; const float vViewZ = ${VIEW_Z.toFixed(1)};
+        const float uVoxel = ${VOXEL}; const vec4 place = ${vec(...at, 0, 1)};
+        #include <chunks/scene_distance>`;
+      const chunks = await readChunks("scene_distance");
+      const text = chunks["chunks/scene_distance"].replaceAll("gl_FragCoord", "place");
+      const uSceneDepth = { size, channels: 1, texels: depths.flat() } as const;
+      const uPaneDepth = { size, channels: 1, texels: depths.flat().map((k) => 255 - k) } as const;
+      const back = BACK.toFixed(1);
+      const body = `oColor = vec4(sceneDistances(${back}), paneDistance(${back}));`;
+      const program = { "chunks/scene_distance": text };
+      return runProgram(bare.page, program, head, body, { uSceneDepth, uPaneDepth });
+    }
+
+    const plain = (k: number) => [3, 3, 3].map((n) => new Array<number>(n).fill(k));
+    const expectEnds = (found: readonly number[], near: number, far: number, share: number) => {
+      expect(found[0] / near).toBeCloseTo(1, 4);
+      expect(found[1] / far).toBeCloseTo(1, 4);
+      expect(found[2]).toBe(share);
+    };
+
+    it("by the projection's own depth, along a ray that is no axis", async () => {
+      for (const k of [0, 128, 250, 255]) {
+        const d = distanceOf(k);
+        expectEnds(await ends(plain(k), [1.5, 1.5]), d, d, 0);
+      }
+      expect(distanceOf(255)).toBeCloseTo((FAR * 13) / 12, 6); // where there is nothing: far away
+      expect(distanceOf(0)).toBeCloseTo((NEAR * 13) / 12, 6);
+    });
+
+    it("with a silhouette's other side, and the share of the pixel that sees it", async () => {
+      const picture = (...aside: readonly number[]) => {
+        const [left, right, below, above] = aside;
+        return [
+          [255, below, 255],
+          [left, 200, right],
+          [255, above, 255],
+        ];
+      };
+      const [near, far] = [distanceOf(200), distanceOf(255)];
+      const at = (...aside: readonly number[]) => ends(picture(...aside), [1.5, 1.5]);
+      for (const aside of [
+        [255, 200, 200, 200],
+        [200, 255, 200, 200],
+        [200, 200, 255, 200],
+        [200, 200, 200, 255],
+      ]) {
+        expectEnds(await at(...aside), near, far, 0.5);
+      }
+      expectEnds(await at(255, 200, 255, 200), near, far, 1);
+      expectEnds(await at(255, 255, 255, 255), near, far, 1);
+      expectEnds(await at(200, 240, 255, 200), near, far, 1); // the farthest of them
+      expectEnds(await at(200, 255, 240, 200), near, far, 1);
+      expectEnds(await at(100, 100, 100, 100), near, near, 0); // what is nearer is no matter
+    });
+
+    it("and takes the slope of one surface for no silhouette", async () => {
+      const [k, jump] = [200, 4 * VOXEL];
+      const beside = (other: number) => ends([[k, other]], [0.5, 0.5]);
+      const firstJump = Array.from({ length: 256 }, (_, i) => i).findIndex(
+        (i) => distanceOf(i) >= distanceOf(k) + jump,
+      );
+      expectEnds(await beside(firstJump - 1), distanceOf(k), distanceOf(k), 0);
+      expectEnds(await beside(firstJump), distanceOf(k), distanceOf(firstJump), 0.5);
+    });
+
+    it("not in the other eye's picture", async () => {
+      const row = [200, 200, 200, 200, 255, 255, 255, 255];
+      const left = { eye: [0, 0, 4, 1], part: [0, 0, 4, 1] } as const;
+      expectEnds(await ends([row], [3.5, 0.5], left), distanceOf(200), distanceOf(200), 0);
+      const right = { eye: [4, 0, 4, 1], part: [4, 0, 4, 1] } as const;
+      expectEnds(
+        await ends([row.reverse()], [4.5, 0.5], right),
+        distanceOf(200),
+        distanceOf(200),
+        0,
+      );
+    });
+
+    it("at the eye's own place, where the march has fewer pixels than the picture", async () => {
+      const row = [10, 20, 30, 40, 150, 160, 170, 180];
+      const picture = [row.map((k) => k + 5), row];
+      const right = { eye: [4, 0, 4, 2], part: [2, 0, 2, 1] } as const; // half as many
+      const near = async (x: number) => (await ends(picture, [x, 0.5], right))[0];
+      expect((await near(2.5)) / distanceOf(160)).toBeCloseTo(1, 4);
+      expect((await near(3.5)) / distanceOf(180)).toBeCloseTo(1, 4);
+      const pane = (await ends(picture, [2.5, 0.5], right))[3];
+      expect(pane / distanceOf(255 - 160)).toBeCloseTo(1, 4);
+    });
+  });
+
+  it("sample between voxels as the distances to them say, and mix a fresh level in", async () => {
+    const values = (add: number) =>
+      Array.from({ length: 8 }, (_, i) => [20 * i + add, 255 - 20 * i, i % 2 ? 255 : 0, 7]).flat();
+    const volume = (add: number): Texture => ({
+      size: [2, 2, 2],
+      channels: 4,
+      texels: values(add),
+      isLinear: true,
+    });
+    const sample = (at: readonly number[], fresh: number) =>
+      run(
+        ["sample_intensities"],
+        `uniform sampler3D uVolume; uniform sampler3D uOldVolume;
+         const float uFresh = ${fresh.toFixed(3)};`,
+        // voxels' middles lie at 1/4 and 3/4
+        `oColor = 255.0 * sampleIntensities(${vec(...at.map((v) => 0.25 + v / 2))});`,
+        { uVolume: volume(100), uOldVolume: volume(0) },
+      );
+    for (const at of [
+      [0, 0, 0],
+      [1, 0, 1],
+      [0.25, 0.5, 0.75],
+      [0.5, 0, 0],
+      [-0.5, 2, 0.5], // beyond the last voxel's middle: that voxel's own value
+    ]) {
+      const [x, y, z] = at.map((v) => Math.min(1, Math.max(0, v)));
+      const index = x + 2 * y + 4 * z;
+      const fresh = [100 + 20 * index, 255 - 20 * index, 255 * x, 7];
+      (await sample(at, 1)).forEach((v, i) => {
+        expect(Math.abs(v - fresh[i]), `${at}`).toBeLessThan(1);
+      });
+      (await sample(at, 0.25)).forEach((v, i) => {
+        expect(Math.abs(v - (i === 0 ? fresh[0] - 75 : fresh[i])), `${at}`).toBeLessThan(1);
+      });
+    }
+  });
+
+  describe("light a sample", () => {
+    /**
+     * Of an intensity that rises by `slope` a um, in two channels, on voxels of 0.5 x 0.75 x 2 um
+     * whose rows run against y, as a tile's do.
+     */
+    function lit(slope: readonly number[], dir: readonly number[], light: readonly number[]) {
+      const size = [40, 60, 24]; // um
+      const perUm = [1 / size[0], -1 / size[1], 1 / size[2]];
+      const head = `const float uVoxel = 0.5; const vec3 vLight = ${vec(...unit(light))};
+        vec4 sampleIntensities(vec3 p) {
+          vec3 um = (p - vec3(0.0, 1.0, 0.0)) * ${vec(...perUm.map((v) => 1 / v))};
+          float v = dot(um - vec3(20.0, 30.0, 12.0), ${vec(...slope)});
+          return vec4(0.5 + 0.25 * v, 0.0, 0.5 + 0.75 * v, 0.0);
+        }`;
+      const body = `oColor = vec4(shade(vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}));`;
+      return run(["gradient", "shade"], head, body).then(([found]) => found);
+    }
+
+    const unit = (v: readonly number[]) => v.map((each) => each / Math.hypot(...v));
+    const dot = (a: readonly number[], b: readonly number[]) =>
+      a.reduce((sum, v, i) => sum + v * b[i], 0);
+    const [AMBIENT, DIFFUSE] = [0.4, 0.7];
+
+    it("by the ramp's own direction, whatever the voxels' shape", async () => {
+      const [dir, light] = [
+        [0.1, -0.2, -1],
+        [-0.35, 0.5, 0.8],
+      ];
+      for (const slope of [
+        [0.3, 0, 0],
+        [0, 0.3, 0],
+        [0, 0, 0.3],
+        [0.2, -0.3, 0.1],
+        [-0.2, 0.25, -0.4],
+      ]) {
+        const outwards = unit(slope.map((v) => -v)); // from much to little
+        const normal = dot(outwards, dir) > 0 ? outwards.map((v) => -v) : outwards;
+        const expected = AMBIENT + DIFFUSE * Math.max(0, dot(normal, unit(light)));
+        expect(await lit(slope, dir, light), `${slope}`).toBeCloseTo(expected, 3);
+      }
+    });
+
+    it("as much as the angle says: full in the lamp's way, half at 60 degrees, none beyond", async () => {
+      const facing = (degrees: number) => {
+        const at = (degrees * Math.PI) / 180;
+        return lit([0, 0, -0.5], [0, 0, -1], [Math.sin(at), 0, Math.cos(at)]);
+      };
+      expect(await facing(0)).toBeCloseTo(AMBIENT + DIFFUSE, 4);
+      expect(await facing(60)).toBeCloseTo(AMBIENT + DIFFUSE / 2, 4);
+      expect(await facing(100)).toBeCloseTo(AMBIENT, 4);
+    });
+
+    it("not at all where there is no direction or only noise, and fades in between", async () => {
+      const away = [0, 0, -1]; // of the light: a boundary would be dark
+      const steep = (step: number) => lit([0, 0, -step], [0, 0, -1], away); // over two voxels, 1 um
+      expect(await steep(0)).toBe(1);
+      expect(await steep(0.03)).toBeCloseTo(1, 4);
+      expect(await steep(0.105)).toBeCloseTo((1 + AMBIENT) / 2, 3); // half of the way
+      expect(await steep(0.18)).toBeCloseTo(AMBIENT, 4);
+    });
+
+    it("by the volume's own texels too", async () => {
+      // 8 x 8 x 4 voxels: rises by 16 of 255 a voxel along x, and by half of it along the rows
+      const texels = Array.from({ length: 256 }, (_, i) => 16 * (i % 8) + 8 * ((i >> 3) % 8));
+      const uVolume: Texture = { size: [8, 8, 4], channels: 1, texels, isLinear: true };
+      const light = unit([-1, 1, 1]);
+      const head = `uniform sampler3D uVolume;
+        const float uFresh = 1.0; const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
+        #define uOldVolume uVolume`;
+      // voxels of 1 um each; rows run against y
+      const call = `shade(vec3(0.5), ${vec(1 / 8, -1 / 8, 1 / 4)}, vec3(0.6, -0.8, 0.0))`;
+      const textures = { uVolume };
+      const [found] = await run(
+        ["sample_intensities", "gradient", "shade"],
+        head,
+        `oColor = vec4(${call});`,
+        textures,
+      );
+      const normal = unit([-2, 1, 0]);
+      const steepness = (Math.hypot(16, 8) * 2) / 255;
+      const t = (steepness - 0.03) / 0.15;
+      const share = t * t * (3 - 2 * t);
+      const expected = 1 - share + share * (AMBIENT + DIFFUSE * dot(normal, light));
+      expect(found).toBeCloseTo(expected, 2);
+    });
+  });
+
+  describe("shift samples", () => {
+    const size = [NOISE_SIZE, NOISE_SIZE];
+    const noise: Texture = { size, channels: 1, texels: [...blueNoise()] };
+
+    /** What the march itself asks for, at a place of the picture of which an eye has a part. */
+    async function shiftAt(at: readonly number[], corner: readonly number[], texture = noise) {
+      const march = new URL("../../src/volumes/shaders/raymarch.frag.glsl", import.meta.url);
+      const call = /float shift = (jitter\(.*\));/.exec(await readFile(march, "utf8"))?.[1];
+      if (call === undefined) throw new Error("the march has no shift");
+      const head = `uniform sampler2D uNoise; const vec4 place = ${vec(...at, 0, 1)};
+        const vec4 uPart = ${vec(...corner, 9, 9)};`;
+      const body = `oColor = vec4(${call.replaceAll("gl_FragCoord", "place")});`;
+      return (await run(["jitter"], head, body, { uNoise: texture }))[0];
+    }
+
+    it("by the table's value at the place, which repeats", async () => {
+      for (const [x, y] of [
+        [0, 0],
+        [3, 1],
+        [NOISE_SIZE - 1, 5],
+        [NOISE_SIZE + 2, 3 * NOISE_SIZE + 7],
+      ]) {
+        const value = noise.texels[(y % NOISE_SIZE) * NOISE_SIZE + (x % NOISE_SIZE)];
+        expect(await shiftAt([x + 0.5, y + 0.5], [0, 0])).toBeCloseTo((value + 0.5) / 256, 5);
+      }
+    });
+
+    it("by less than a step, and never by nothing", async () => {
+      const ends: Texture = { size: [2, 1], channels: 1, texels: [0, 255] };
+      expect(await shiftAt([0.5, 0.5], [0, 0], ends)).toBeGreaterThan(0);
+      expect(await shiftAt([1.5, 0.5], [0, 0], ends)).toBeLessThan(1);
+    });
+
+    it("the same for both eyes at the same place", async () => {
+      const found: number[] = [];
+      for (const [x, y] of [
+        [0.5, 0.5],
+        [17.5, 42.5],
+        [100.5, 3.5],
+      ]) {
+        const left = await shiftAt([x, y], [0, 0]);
+        found.push(left);
+        // the right eye's part begins where the left one's ends, at no multiple of the table
+        expect(await shiftAt([x + 213, y], [213, 0])).toBe(left);
+        expect(await shiftAt([x + 213, y + 5], [213, 5])).toBe(left);
+      }
+      expect(new Set(found).size).toBeGreaterThan(1);
+    });
+  });
+
+  it("classify one channel between two entries of its table", async () => {
+    const texels = Array.from({ length: 256 }, (_, i) => [
+      255,
+      255,
+      255,
+      i === 101 ? 51 : 0,
+    ]).flat();
+    const uLut: Texture = { size: [256, 1], channels: 4, texels, isLinear: true };
+    const head = `uniform sampler2D uLut;
+      #define CHANNELS 1
+      const vec3 uColor[1] = vec3[1](vec3(0.2, 0.4, 0.8));`;
+    const at = async (intensity: number, voxels: number) =>
+      run(
+        ["classify"],
+        head,
+        `oColor = classify(${vec(intensity / 255, 0, 0, 0)}, ${vec(voxels, 0, 0, 0)});`,
+        { uLut },
+      );
+    expect((await at(100, 1))[3]).toBeCloseTo(0, 2);
+    for (const [intensity, opacity] of [
+      [101, 0.2],
+      [100.5, 0.1],
+      [101.75, 0.05],
+    ]) {
+      const found = await at(intensity, 3);
+      [0.2, 0.4, 0.8, 1 - (1 - opacity) ** 3].forEach((v, i) => {
+        expect(Math.abs(found[i] - v), `${intensity}`).toBeLessThan(0.01);
+      });
+    }
+  });
+
+  it("end an empty block earlier where a coarse level smears", async () => {
+    const uOccupancy: Texture = { size: [8, 1, 1], channels: 1, texels: [7, 6, 5, 4, 3, 2, 1, 0] };
+    const ahead = (slack: number, start: number) =>
+      run(
+        ["skip_empty_bricks"],
+        `uniform sampler3D uOccupancy; const float uVoxel = 1.0;
+         const float uBrickSlack = ${slack.toFixed(1)};`,
+        `vec3 dir = vec3(1.0, 1e-9, 1e-9);
+         oColor = blockAhead(vec3(${start.toFixed(2)}, 0.5, 0.5), dir, 1.0 / dir, 0.0).xyxy;`,
+        { uOccupancy },
+      );
+    // two bricks earlier than the visible one, which is brick 7; near it all may be smeared
+    for (const [slack, start, exit, isEmpty] of [
+      [0, 2.5, 4.5, 1],
+      [2, 2.5, 2.5, 1],
+      [2, 5.5, 0.5, 0],
+      [1, 6.5, 0.5, 0],
+    ]) {
+      const [found, empty] = await ahead(slack, start);
+      expect(found, `${slack}, ${start}`).toBeCloseTo(exit + 1e-3, 4);
+      expect(empty).toBe(isEmpty);
+    }
+  });
+
+  it("have a test each", async () => {
+    const tests = [
+      "raymarch_chunks.test.ts",
+      "path_trace_chunks.test.ts",
+      "raymarch.test.ts",
+      "transfer_2d.test.ts",
+    ].map((name) => readFile(new URL(name, import.meta.url), "utf8"));
+    const text = (await Promise.all(tests)).join("\n");
+    const names = await readdir(new URL("../../src/gpu/chunks/", import.meta.url));
+    for (const name of names) expect(text).toContain(`"${name.replace(".glsl", "")}"`);
+  });
+});

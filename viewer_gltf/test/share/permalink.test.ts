@@ -1,0 +1,154 @@
+/** The share link in headless Chromium: opening it shows the same view. */
+import { expect, it } from "vitest";
+import type { Snapshot } from "../../src/app/automation_api";
+import { addHeadset } from "../support/browser/chromium";
+import { difference, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const F = "F_x20_body";
+/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+const SAME = 0.002;
+/** In a headset frames are drawn in their budget, some coarser than others. */
+const SAME_IN_HEADSET = 0.008;
+
+describeInChromium("the share link", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 270 }, pixelRatio: 0.5 });
+  const page = () => stand.viewer.page;
+  const hash = () => page().evaluate(() => location.hash);
+  const said = () => page().locator("[data-said]").textContent();
+
+  /** What a view is made of; notices and the order of showing are not. */
+  function viewOf({ state }: Snapshot) {
+    const { notices, channels, ...rest } = state;
+    return { ...rest, channels: channels.map(({ turn, ...channel }) => channel) };
+  }
+
+  it("brings back state and picture in another page", async () => {
+    await stand.open("&mode=tile&disc=20");
+    const { viewer } = stand;
+    await viewer.settled();
+    await viewer.turnLeftSideToFront();
+    await viewer.recolor(F, "#ff00ff");
+    await viewer.show("Balls", false);
+    await viewer.openCard(F);
+    await viewer.slide(`${F}/opacity`, 0.5);
+    await viewer.chooseTile("r0_c0");
+    await viewer.chooseMode("all");
+    for (const key of ["n", "j", "p", "l"]) await page().keyboard.press(key);
+    await viewer.still();
+    await expect.poll(said, { timeout: 10_000 }).toBe(""); // it lies over the picture
+    const [before, picture] = [viewOf(await viewer.snapshot()), await takePicture(page())];
+    const address = page().url();
+    expect(address).toContain("#v=1&");
+    // A setting of the address is part of the view by now.
+    expect(new URL(address).search).toBe("?bundle=..%2Fbundle%2F");
+    expect(address).toContain("&disc=20&");
+    expect(await page().locator('[data-control="link"]').inputValue()).toBe(address);
+
+    await page().goto("about:blank");
+    await viewer.open(address);
+    await viewer.still();
+    expect(viewOf(await viewer.snapshot())).toEqual(before);
+    expect((await viewer.snapshot()).state.notices).toEqual([]);
+    expect(difference(picture, await takePicture(page()))).toBeLessThan(SAME);
+  });
+
+  it("brings a view that was made in a headset to the screen, and to another headset", async () => {
+    const press = async (...keys: readonly string[]) => {
+      for (const key of keys) await page().keyboard.press(key);
+      await stand.viewer.settled();
+    };
+    /** What the link says of eye and specimen. */
+    const written = async (): Promise<readonly number[]> => {
+      await press("l");
+      const parts = new URLSearchParams((await hash()).slice(1));
+      return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
+    };
+    const silent = async () => {
+      await expect.poll(said, { timeout: 10_000 }).toBe(""); // it lies over the picture
+      await expect.poll(told, { timeout: 20_000 }).toEqual([]);
+    };
+    const told = async () => (await stand.viewer.snapshot()).told;
+    const expectSame = (found: readonly number[], wanted: readonly number[]) => {
+      expect(found).toHaveLength(wanted.length);
+      found.forEach((value, i) => {
+        expect(value).toBeCloseTo(wanted[i], 4);
+      });
+    };
+    await addHeadset(page());
+    await stand.open("&mode=off");
+    await press("ArrowRight", "ArrowRight", "ArrowDown", "Shift+ArrowRight", "j");
+    const flat = await written();
+    await stand.viewer.enterStereo();
+    await silent();
+    const unmoved = await takePicture(page());
+    expectSame(await written(), flat); // nobody has moved it there
+    await press("ArrowRight", "+");
+    await silent();
+    const inHeadset = await takePicture(page());
+    expect(difference(unmoved, inHeadset)).toBeGreaterThan(4 * SAME_IN_HEADSET);
+    const moved = await written();
+    expect(moved).toHaveLength(flat.length + 8);
+    expect(moved.slice(0, 6)).toEqual(flat.slice(0, 6));
+    expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2); // and not a headset's metre away
+    const address = page().url();
+
+    await press("V");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+    await stand.viewer.still();
+    expectSame(await written(), moved); // what was done there stays
+    await silent();
+    const left = await takePicture(page());
+
+    await page().goto("about:blank");
+    await stand.viewer.open(address);
+    await stand.viewer.still();
+    expect(difference(left, await takePicture(page()))).toBeLessThan(SAME);
+    await stand.viewer.enterStereo();
+    expect(difference(inHeadset, await takePicture(page()))).toBeLessThan(SAME_IN_HEADSET);
+    expectSame(await written(), moved);
+  });
+
+  it("goes to the clipboard, and says so", async () => {
+    await page().context().grantPermissions(["clipboard-read", "clipboard-write"]);
+    await stand.open();
+    await page().keyboard.press("d");
+    await page().keyboard.press("l");
+    await expect.poll(said).toBe("The link is in the clipboard.");
+    const copied = await page().evaluate(() => navigator.clipboard.readText());
+    expect(copied).toBe(page().url());
+    expect(copied).toContain("disc=11");
+  });
+
+  it("is selected in a field where the browser refuses the clipboard", async () => {
+    await page().addInitScript(() => {
+      Object.defineProperty(navigator, "clipboard", { value: undefined });
+    });
+    await stand.open();
+    await page().keyboard.press("l");
+    await expect.poll(said).toContain("selected");
+    expect(await page().evaluate(() => getSelection()?.toString())).toBe(page().url());
+  });
+
+  it("shows what it can of a link to another bundle, and says what is missing", async () => {
+    await stand.open("#v=1&c=Balls,CD8&tile=r7_c7&disc=9&box=NaN");
+    const { state } = await stand.viewer.snapshot();
+    expect(state.channels.filter(({ shown }) => shown).map(({ id }) => id)).toEqual(["Balls"]);
+    expect(state.discRadius_deg).toBe(9);
+    expect(await page().locator("[data-notices]").textContent()).toMatch(
+      /no channel CD8, tile r7_c7\..*can't be read: box/,
+    );
+  });
+
+  it("opens when pasted over another view of the same page", async () => {
+    await stand.open();
+    expect(await hash()).toBe("");
+    await page().evaluate(() => {
+      location.hash = "#v=1&disc=33";
+    });
+    await expect
+      .poll(async () => (await stand.viewer.snapshot().catch(() => null))?.state.discRadius_deg)
+      .toBe(33);
+  });
+});

@@ -1,0 +1,316 @@
+/** Runs in the page: marks on a specimen of its own, seen by a camera of its own. */
+import {
+  BoxGeometry,
+  Color,
+  DirectionalLight,
+  DoubleSide,
+  HemisphereLight,
+  Mesh,
+  MeshStandardMaterial,
+  PerspectiveCamera,
+  Quaternion,
+  Scene,
+  SphereGeometry,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { Marks } from "../../../src/annotations/annotations";
+import { listenForHandles } from "../../../src/annotations/handle_pointer";
+import type { Label } from "../../../src/annotations/label";
+import type { ShownSurface } from "../../../src/annotations/probe";
+import type { LevelSource } from "../../../src/annotations/texel_cache";
+import type { DecodeAnswer, DecodeRequest } from "../../../src/bundle/decode";
+import type { Manifest } from "../../../src/bundle/generated/bundle";
+import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
+import { rayAhead, rayUnder } from "../../../src/interaction/rays";
+import type { Vec3 } from "../../../src/math/pick";
+import { Specimen } from "../../../src/render/specimen_pose";
+import { type Action, initialState, reduce } from "../../../src/state/viewer_state";
+
+const FILE = { path: "x", bytes: 0, sha256: "" };
+
+export const BOUNDS: Manifest["specimen"]["bounds_um"] = { min: [0, -400, 0], max: [1000, 0, 200] };
+
+const MANIFEST: Manifest = {
+  format: "stereocell-bundle",
+  version: 1,
+  generator: "test",
+  specimen: { name: "test", modality: "", bounds_um: BOUNDS },
+  tiles: [
+    { id: "r0_c0", representation: "mesh", bounds_um: { min: [0, -400, 0], max: [500, 0, 200] } },
+    {
+      id: "r0_c1",
+      representation: "mesh",
+      bounds_um: { min: [500, -400, 0], max: [1000, 0, 200] },
+    },
+  ],
+  channels: [
+    {
+      id: "CD8",
+      name: "CD8 T cells",
+      color: [0.1, 0.5, 0.3],
+      window: [0, 65535],
+      iso_value: null,
+      iso_normalized: null,
+      threshold_normalized: null,
+      surface: "clear",
+      transfer_function: "linear",
+      transfer_functions: ["linear"],
+      transfer_functions_2d: { names: [], file: FILE },
+      lut: FILE,
+      tileset: FILE,
+      triangles: [1],
+      volumes: FILE,
+    },
+  ],
+  files: FILE,
+};
+
+/** Its texels are all TEXEL. */
+const VOLUME: LevelSource = {
+  volume: {
+    tile: "r0_c1",
+    file: FILE,
+    bricks: FILE,
+    size: [8, 8, 8],
+    apron: 1,
+    bounds_um: { min: [500, -400, 0], max: [1000, 0, 200] },
+    matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    levels: [{ size: [8, 8, 8], offset: 0, length: 1, sha256: "" }],
+  },
+  has: () => true,
+  level: async () => new Uint8Array(1),
+};
+const TEXEL = 51;
+
+/** In place of the one that decompresses, which a page without an address can't start. */
+class DecodingWorker extends EventTarget {
+  postMessage({ id, bytes }: DecodeRequest): void {
+    const data: DecodeAnswer = { id, texels: new Uint8Array(bytes).fill(TEXEL) };
+    queueMicrotask(() => this.dispatchEvent(new MessageEvent("message", { data })));
+  }
+}
+Object.assign(window, { Worker: DecodingWorker });
+
+type Place = Readonly<{ x: number; y: number }>;
+type View = Readonly<{
+  position: Vec3;
+  target: Vec3;
+  isStereo?: boolean;
+  isPanelOpen?: boolean;
+  dt_s?: number;
+}>;
+
+class Bench {
+  private readonly renderer = new WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(40, 1, 0.01, 20);
+  private readonly specimen = new Specimen(BOUNDS);
+  private readonly focus = new Vector3();
+  private readonly marks: Marks;
+  private view: View = { position: [0, 0, 2], target: [0, 0, 0] };
+  state = initialState(MANIFEST);
+  /** What would have turned the camera. */
+  leaked = 0;
+  /** The list of volumes comes when it is asked for. */
+  private isKnown = false;
+
+  constructor(private readonly stage: HTMLElement) {
+    const { clientWidth, clientHeight } = stage;
+    const canvas = this.renderer.domElement;
+    this.renderer.setSize(clientWidth, clientHeight);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.scene.background = new Color(0x0b0d12);
+    const lamp = new DirectionalLight(0xffffff, 2);
+    lamp.position.set(-1, 2, 2);
+    this.scene.add(this.specimen.group, lamp, new HemisphereLight(0xe8eefc, 0x2a2c33, 0.9));
+    const surfaces = this.addSurfaces();
+    const dispatch = (action: Action) => {
+      this.state = reduce(this.state, action);
+      this.marks.follow(this.state);
+      this.draw();
+    };
+    const options = {
+      manifest: MANIFEST,
+      base: location.href,
+      surfaces: () => surfaces,
+      volumes: () => [],
+      source: (tile: string) => (this.isKnown && tile === "r0_c1" ? VOLUME : null),
+      sourceOf: async (tile: string) => {
+        this.isKnown = true;
+        return tile === "r0_c1" ? VOLUME : null;
+      },
+      dispatch,
+      onChange: () => this.draw(),
+      onError: (error: unknown) => {
+        throw error;
+      },
+    };
+    this.marks = new Marks(options, this.state);
+    this.specimen.group.add(this.marks.group);
+    stage.append(canvas, ...this.marks.overlayElements);
+    const rayAt = (point: Parameters<typeof rayUnder>[0]) =>
+      rayUnder(point, this.camera, this.specimen.group);
+    listenForHandles(
+      stage,
+      canvas,
+      {
+        pick: (point, pointing) => this.marks.pick(rayAt(point), pointing),
+        drag: (id, point) => this.marks.drag(id, rayAt(point)),
+        mean: (id) => this.marks.mean(id),
+      },
+      new AbortController().signal,
+    );
+    canvas.addEventListener("pointerdown", () => this.leaked++);
+  }
+
+  dispatch(action: Action): void {
+    this.state = reduce(this.state, action);
+    this.marks.follow(this.state);
+    this.draw();
+  }
+
+  look(view: View): void {
+    this.view = view;
+    this.draw();
+  }
+
+  turn(axis: Vec3, angle_rad: number): void {
+    const orientation = new Quaternion().setFromAxisAngle(new Vector3(...axis), angle_rad);
+    this.specimen.moveTo({ ...this.specimen.pose, orientation }, this.camera.position);
+    this.draw();
+  }
+
+  private draw(): void {
+    const { camera, specimen, view } = this;
+    camera.position.set(...view.position);
+    camera.lookAt(this.focus.set(...view.target));
+    camera.updateMatrixWorld();
+    const screen = { camera, height_px: this.stage.clientHeight, focus: this.focus };
+    this.marks.update({
+      head: camera.matrixWorld,
+      specimen: specimen.group.matrixWorld,
+      screen: view.isStereo ? null : screen,
+      gaze: rayAhead(camera.matrixWorld, specimen.group),
+      disc: null,
+      isPanelOpen: view.isPanelOpen ?? false,
+      dt_s: view.dt_s ?? 0,
+    });
+    this.renderer.render(this.scene, camera);
+  }
+
+  /** Where a point, um, is on the page, CSS pixels of the stage. */
+  project(point: Vec3): Place {
+    const room = new Vector3(...point).applyMatrix4(this.specimen.group.matrixWorld);
+    return this.projectRoom(room);
+  }
+
+  private projectRoom(room: Vector3): Place {
+    const { x, y } = room.clone().project(this.camera);
+    const { clientWidth, clientHeight } = this.stage;
+    return { x: ((x + 1) / 2) * clientWidth, y: ((1 - y) / 2) * clientHeight };
+  }
+
+  /** What the scale bar says, its pixels, and those of as much of the specimen at the focus. */
+  scale() {
+    const bar = this.marks.scaleBar.root;
+    const text = bar.textContent ?? "";
+    const [value, unit] = text.split(" ");
+    const length_um = Number(value) * (unit === "mm" ? 1000 : unit === "nm" ? 1e-3 : 1);
+    const shown_px = bar.querySelector(".bar")?.getBoundingClientRect().width ?? 0;
+    const half = new Vector3(1, 0, 0)
+      .transformDirection(this.camera.matrixWorld)
+      .multiplyScalar((length_um * this.specimen.scale) / 2);
+    const [a, b] = [half, half.clone().negate()].map((by) =>
+      this.projectRoom(this.focus.clone().add(by)),
+    );
+    return { text, shown_px, true_px: Math.hypot(a.x - b.x, a.y - b.y) };
+  }
+
+  /** Angle under which the distance's label is seen, its text, and how often it was drawn. */
+  label() {
+    const { distance } = this.marks.measured;
+    return { angle_rad: this.angleOf(distance), text: distance.text, draws: distance.draws };
+  }
+
+  private angleOf({ sprite }: Label): number {
+    const eye = this.camera.position;
+    const middle = new Vector3().setFromMatrixPosition(sprite.matrixWorld);
+    const height_m = sprite.scale.y * this.specimen.scale;
+    return 2 * Math.atan(height_m / 2 / middle.distanceTo(eye));
+  }
+
+  /** What is written at a measured point. */
+  valuesAt(index: 0 | 1): string {
+    return this.marks.measured.valuesAt(index);
+  }
+
+  measure(points: readonly Vec3[]): void {
+    this.dispatch({ type: "measure", points });
+  }
+
+  async measureAt(x: number, y: number): Promise<readonly Vec3[]> {
+    const { clientWidth, clientHeight } = this.stage;
+    const at = { x: (x / clientWidth) * 2 - 1, y: 1 - (y / clientHeight) * 2 };
+    await this.marks.measure(rayUnder(new Vector2(at.x, at.y), this.camera, this.specimen.group));
+    return this.state.measured;
+  }
+
+  /** What the gaze meets among the handles, straight ahead. */
+  meet(): Hit | null {
+    return this.marks.target.meet(gazeOf(this.camera.matrixWorld));
+  }
+
+  /** Carry what was met to where the gaze is now. */
+  carry(key: string): void {
+    this.marks.target.drag(key, gazeOf(this.camera.matrixWorld));
+  }
+
+  ruler(): { length_um: number; isVisible: boolean; hasAxes: boolean } {
+    const { ruler, axes } = this.marks;
+    const { length_um, group } = ruler;
+    return { length_um, isVisible: group.visible, hasAxes: axes.group.visible };
+  }
+
+  name(): string {
+    return this.marks.name.root.hidden ? "" : this.marks.name.text;
+  }
+
+  private addSurfaces(): ShownSurface[] {
+    return MANIFEST.tiles.flatMap((tile) => {
+      const { min, max } = tile.bounds_um;
+      const middle = min.map((v, i) => (v + max[i]) / 2);
+      const material = new MeshStandardMaterial({ color: 0x2f8f6a, side: DoubleSide });
+      const ball = new Mesh(new SphereGeometry(90, 64, 32), material);
+      ball.position.set(middle[0], middle[1], middle[2]);
+      const frame = new Mesh(
+        new BoxGeometry(...max.map((v, i) => v - min[i])),
+        new MeshStandardMaterial({ color: 0x445566, wireframe: true }),
+      );
+      frame.position.copy(ball.position);
+      this.specimen.group.add(ball, frame);
+      this.specimen.group.updateMatrixWorld(true);
+      return [{ mesh: ball, tile: tile.id, channel: "CD8" }];
+    });
+  }
+
+  /** Objects of the GPU that are alive. */
+  memory(): { geometries: number; textures: number } {
+    const { geometries, textures } = this.renderer.info.memory;
+    return { geometries, textures };
+  }
+
+  dispose(): void {
+    this.marks.dispose();
+  }
+}
+
+declare global {
+  interface Window {
+    bench?: Bench;
+    makeBench?: (stage: HTMLElement) => Bench;
+  }
+}
+window.makeBench = (stage) => new Bench(stage);

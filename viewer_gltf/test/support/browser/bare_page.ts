@@ -1,0 +1,66 @@
+/** A page with nothing on it, for numbers out of the GPU: by shaders' chunks, or by a harness. */
+import type { Page } from "playwright-core";
+import { afterAll, beforeAll } from "vitest";
+import { readChunks, runProgram, type Texture } from "../shaders/chunk";
+import { bundled } from "./bundled";
+import { type Browser, launch } from "./chromium";
+
+type Calls = Readonly<Record<string, (...given: never[]) => unknown>>;
+
+export type BarePage<H extends Calls> = Readonly<{
+  page: Page;
+  /** What a function of the harness returns. */
+  call: <K extends keyof H & string>(
+    name: K,
+    ...given: Parameters<H[K]>
+  ) => Promise<ReturnType<H[K]>>;
+  /** `oColor` after `body`, which uses chunks: see runProgram. */
+  run: (
+    chunks: readonly string[],
+    head: string,
+    body: string,
+    textures?: Readonly<Record<string, Texture>>,
+  ) => Promise<readonly number[]>;
+}>;
+
+/**
+ * Set up and cleared away around the tests of one `describe`; to be used inside them.
+ *
+ * @param harness a module that puts its functions on the window, as `harness`
+ */
+export function prepareBarePage<H extends Calls>(harness?: URL): BarePage<H> {
+  let browser: Browser;
+  let page: Page;
+
+  beforeAll(async () => {
+    browser = await launch({ width: 64, height: 64 });
+    page = await browser.context.newPage();
+    if (harness !== undefined) await page.addScriptTag({ content: await bundled(harness) });
+  });
+
+  afterAll(() => browser?.close());
+
+  return {
+    get page() {
+      return page;
+    },
+    async call(name, ...given) {
+      // as text: volumes are long, and what carries them else wraps every number by itself
+      const answer = await page.evaluate(
+        ([name, given]) => {
+          const { harness } = window as {
+            harness?: Record<string, (...each: unknown[]) => unknown>;
+          };
+          return JSON.stringify(harness?.[name]?.(...JSON.parse(given)));
+        },
+        [name, JSON.stringify(given)] as const,
+      );
+      if (answer === undefined) throw new Error(`the page has no harness with ${name}`);
+      return JSON.parse(answer) as ReturnType<H[typeof name]>;
+    },
+    async run(names, head, body, textures = {}) {
+      const includes = names.map((name) => `#include <chunks/${name}>`).join("\n");
+      return runProgram(page, await readChunks(...names), `${head}\n${includes}`, body, textures);
+    },
+  };
+}

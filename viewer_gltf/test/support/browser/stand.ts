@@ -1,0 +1,96 @@
+/** What a browser test stands on: a bundle served beside the built viewer, Chromium, a page. */
+import { mkdtemp, readFile, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { afterAll, afterEach, beforeAll, beforeEach, inject } from "vitest";
+import type { Manifest } from "../../../src/bundle/generated/bundle";
+import { type FixtureOptions, writeFixture } from "../fixture/bundle";
+import { type Browser, launch } from "./chromium";
+import { Host } from "./host";
+import { ViewerPage } from "./page";
+
+export const DIST = new URL("../../../dist/", import.meta.url).pathname;
+/** The bundle that `make test` built of the demo, if it did. */
+export const DEMO_BUNDLE = process.env.STEREOCELL_TEST_BUNDLE;
+
+export type Stand = Readonly<{
+  /** Its folder. */
+  bundle: string;
+  manifest: Manifest;
+  host: Host;
+  /** A page of its own for each test, not opened yet. */
+  viewer: ViewerPage;
+  /** Open the bundle in it; `query` goes behind the bundle's address. */
+  open: (query?: string) => Promise<void>;
+}>;
+
+export type StandOptions = Readonly<{
+  /** A bundle's folder; without one, the synthetic fixture's. */
+  bundle?: string;
+  /** Of a fixture of its own. */
+  fixture?: FixtureOptions;
+  /** CSS pixels; small ones, since software draws them. */
+  viewport: { width: number; height: number };
+  /** Of the device to one of CSS; less where no picture is looked at. */
+  pixelRatio?: number;
+  hasTouch?: boolean;
+  /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
+  mounts?: (bundle: string) => Readonly<Record<string, string>>;
+}>;
+
+/** Set up and cleared away around the tests of one `describe`; to be used inside them. */
+export function prepareStand(options: StandOptions): Stand {
+  const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
+  let folder: string | undefined;
+  let bundle: string;
+  let manifest: Manifest;
+  let host: Host;
+  let browser: Browser;
+  let viewer: ViewerPage;
+
+  beforeAll(async () => {
+    if (fixture !== undefined) {
+      folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
+      await writeFixture(folder, fixture);
+    }
+    bundle = given ?? folder ?? inject("fixture");
+    manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
+    host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
+    // its own requests would be counted with the page's
+    browser = await launch(viewport, { pixelRatio, hasTouch, serviceWorkers: "block" });
+  });
+
+  afterAll(async () => {
+    await browser?.close();
+    await host?.stop();
+    if (folder !== undefined) await rm(folder, { recursive: true, force: true });
+  });
+
+  beforeEach(async () => {
+    viewer = new ViewerPage(await browser.context.newPage());
+  });
+
+  afterEach(async () => {
+    host.reset();
+    await viewer.page.close();
+  });
+
+  return {
+    get bundle() {
+      return bundle;
+    },
+    get manifest() {
+      return manifest;
+    },
+    get host() {
+      return host;
+    },
+    get viewer() {
+      return viewer;
+    },
+    open: (query = "") => {
+      const quality = query.includes("&quality=") ? "" : "&quality=low";
+      return viewer.open(`${host.address}/app/?bundle=../bundle/${query}${quality}`);
+    },
+  };
+}

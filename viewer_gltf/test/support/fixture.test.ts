@@ -1,0 +1,103 @@
+/** Numbers out of the picture, on bodies whose look can be written down. */
+import { beforeEach, expect, it } from "vitest";
+import { project } from "./browser/camera";
+import { isBackground, type Picture, type Pixel, takePicture } from "./browser/picture";
+import { describeInChromium } from "./browser/skip";
+import { prepareStand } from "./browser/stand";
+import { BALLS, BLOCK } from "./fixture/bodies";
+import { BLOCK_OPACITY } from "./fixture/bundle";
+import { FIXTURE_LETTER } from "./fixture/letter";
+import { SPACING } from "./fixture/volumes";
+import { expectLetter } from "./letter";
+
+const F = "F_x20_body";
+
+describeInChromium("the picture of the fixture", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 272 } });
+
+  beforeEach(async () => {
+    await stand.open();
+    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, false);
+  });
+
+  function at(picture: Picture, point: readonly [number, number, number]): Pixel {
+    const { x, y } = project(
+      point,
+      stand.manifest.specimen.bounds_um,
+      picture.width,
+      picture.height,
+    );
+    return picture.at(x, y);
+  }
+
+  const showAsVolume = (id: string) => stand.viewer.showAs(id, "volume");
+
+  for (const as of ["surface", "volume"] as const) {
+    it(`shows the F as a ${as} neither mirrored nor turned`, () =>
+      expectLetter(stand.viewer, stand.manifest, F, as, FIXTURE_LETTER));
+  }
+
+  it("draws a uniform block as opaque as its length says", async () => {
+    await showAsVolume("Block");
+    await stand.viewer.recolor("Block", "#ffffff");
+    const picture = await takePicture(stand.viewer.page);
+    const point = [56, -42, 12] as const;
+    const { cosine } = project(
+      point,
+      stand.manifest.specimen.bounds_um,
+      picture.width,
+      picture.height,
+    );
+    const length = (BLOCK.max[2] - BLOCK.min[2]) / cosine;
+    const voxels = length / Math.min(...SPACING);
+    const expected = 1 - (1 - BLOCK_OPACITY / 255) ** voxels;
+    const [red] = at(picture, point);
+    const background = 11;
+    expect((red - background) / (255 - background)).toBeCloseTo(expected, 1.5);
+  });
+
+  it("lets surfaces hide volumes behind them, and volumes veil surfaces", async () => {
+    await stand.viewer.showAs("Balls", "surface");
+    const inFront = at(await takePicture(stand.viewer.page), BALLS[2].center);
+    const behind = at(await takePicture(stand.viewer.page), BALLS[3].center);
+    await showAsVolume("Block");
+    const veiled = await takePicture(stand.viewer.page);
+    expect(at(veiled, BALLS[2].center)).toEqual(inFront);
+    const [, green, blue] = at(veiled, BALLS[3].center);
+    expect(green).toBeGreaterThan(behind[1] + 20); // the block's green over the ball's blue
+    expect(blue).toBeLessThan(behind[2] - 20);
+  });
+
+  it("keeps the order where a surface is a little translucent", async () => {
+    await stand.viewer.showAs("Balls", "surface");
+    await showAsVolume("Block");
+    const opaque = await takePicture(stand.viewer.page);
+    await stand.viewer.openCard("Balls");
+    await stand.viewer.slide("Balls/opacity", 0.96);
+    const glass = await takePicture(stand.viewer.page);
+    for (const { center } of [BALLS[2], BALLS[3]]) {
+      const [before, after] = [at(opaque, center), at(glass, center)];
+      expect(after).not.toEqual(before);
+      after.forEach((v, i) => {
+        expect(Math.abs(v - before[i])).toBeLessThan(8);
+      });
+    }
+    await stand.viewer.slide("Balls/opacity", 0.5);
+    const half = at(await takePicture(stand.viewer.page), BALLS[2].center);
+    await stand.viewer.show("Balls", false);
+    const behind = at(await takePicture(stand.viewer.page), BALLS[2].center);
+    half.forEach((v, i) => {
+      expect(Math.abs(v - (at(opaque, BALLS[2].center)[i] + behind[i]) / 2)).toBeLessThan(6);
+    });
+  });
+
+  it("shows less through a softer transfer function", async () => {
+    await showAsVolume("Block");
+    const point = [56, -42, 12] as const;
+    const normal = at(await takePicture(stand.viewer.page), point);
+    await stand.viewer.chooseTransferFunction("Block", "soft");
+    const soft = at(await takePicture(stand.viewer.page), point);
+    expect(soft[1]).toBeLessThan(normal[1] - 20);
+    expect(isBackground(soft)).toBe(false);
+  });
+});

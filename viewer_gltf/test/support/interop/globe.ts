@@ -1,0 +1,142 @@
+/** CesiumJS in a page: tilesets of a bundle on the equator, seen from the front as in the viewer. */
+import type * as CesiumModule from "cesium";
+import type { Page } from "playwright-core";
+import type { Host } from "../browser/host";
+
+declare global {
+  interface Window {
+    Cesium: typeof CesiumModule;
+    globe?: { widget: CesiumModule.CesiumWidget; tileset?: CesiumModule.Cesium3DTileset };
+  }
+}
+
+type Vec3 = readonly [number, number, number];
+
+/** What the host has to serve under `/cesium/`. */
+export const CESIUM = new URL("../../../node_modules/cesium/Build/Cesium/", import.meta.url)
+  .pathname;
+
+/**
+ * The specimen is a tenth of a millimetre long. Cesium's clipping planes begin at 0.1 m, so the
+ * tileset is drawn this much larger.
+ */
+const SCALE = 1e5;
+
+const PAGE = `<!doctype html>
+<style>body { margin: 0 } #view, .cesium-widget, canvas { width: 100vw; height: 100vh; display: block }</style>
+<div id="view" class="stage"></div><script>window.CESIUM_BASE_URL = "/cesium/";</script>
+<script src="/cesium/Cesium.js"></script>`;
+
+/** `center`: what the camera looks at, um, world, from +z; `width_um` of the picture there. */
+export type View = Readonly<{ center: Vec3; width_um: number }>;
+/** Tiles that came, and those that did not, in Cesium's words. */
+export type Report = Readonly<{ loaded: number; failed: readonly string[] }>;
+
+export class Globe {
+  private constructor(
+    private readonly page: Page,
+    /** What the page's console says of errors. */
+    readonly errors: readonly string[],
+  ) {}
+
+  static async open(page: Page, host: Host): Promise<Globe> {
+    const errors: string[] = [];
+    page.on("console", (message) => {
+      if (message.type() === "error") errors.push(message.text());
+    });
+    page.on("pageerror", (error) => errors.push(error.message));
+    host.overrides.set("/favicon.ico", { status: 200, body: "" });
+    host.overrides.set("/cesium.html", { status: 200, body: PAGE });
+    await page.goto(`${host.address}/cesium.html`);
+    await page.evaluate(() => {
+      const { Cesium } = window;
+      const widget = new Cesium.CesiumWidget("view", {
+        baseLayer: false,
+        globe: false,
+        skyBox: false,
+        skyAtmosphere: false,
+        creditContainer: document.createElement("div"), // it would lie over the picture
+      });
+      widget.scene.backgroundColor = Cesium.Color.fromBytes(11, 13, 18); // as in the viewer
+      window.globe = { widget };
+    });
+    return new Globe(page, errors);
+  }
+
+  /**
+   * Draw a tileset in place of the one before, and wait until all that the view asks for is there.
+   *
+   * @param error_px Cesium's maximumScreenSpaceError: a large one stays at coarse surfaces
+   */
+  draw(address: string, view: View, error_px: number): Promise<Report> {
+    return this.page.evaluate(
+      async ({ address, view, error_px, SCALE }) => {
+        const { Cesium, globe } = window;
+        if (globe === undefined) throw new Error("no globe");
+        const { scene } = globe.widget;
+        scene.primitives.removeAll();
+        const place = Cesium.Transforms.eastNorthUpToFixedFrame(
+          Cesium.Cartesian3.fromDegrees(0, 0),
+        );
+        const tileset = await Cesium.Cesium3DTileset.fromUrl(address, {
+          modelMatrix: Cesium.Matrix4.multiplyByUniformScale(place, SCALE, new Cesium.Matrix4()),
+          maximumScreenSpaceError: error_px,
+          environmentMapOptions: { enabled: false },
+        });
+        globe.tileset = tileset;
+
+        // tileset.json is in metres and z-up: the world's (x, y, z) is its (x, -z, y).
+        const at = (x: number, y: number, z: number) =>
+          Cesium.Matrix4.multiplyByPoint(
+            tileset.modelMatrix,
+            new Cesium.Cartesian3(x * 1e-6, -z * 1e-6, y * 1e-6),
+            new Cesium.Cartesian3(),
+          );
+        const [x, y, z] = view.center;
+        const { fov } = scene.camera.frustum as CesiumModule.PerspectiveFrustum; // of the width
+        if (fov === undefined) throw new Error("no field of view");
+        const eye = at(x, y, z + view.width_um / 2 / Math.tan(fov / 2));
+        const between = (a: CesiumModule.Cartesian3, b: CesiumModule.Cartesian3) => {
+          const step = Cesium.Cartesian3.subtract(b, a, new Cesium.Cartesian3());
+          return Cesium.Cartesian3.normalize(step, step);
+        };
+        const direction = between(eye, at(x, y, z));
+        const up = between(at(x, y, z), at(x, y + 1, z));
+        scene.camera.setView({ destination: eye, orientation: { direction, up } });
+        scene.light = new Cesium.DirectionalLight({ direction });
+
+        const failed: string[] = [];
+        let loaded = 0;
+        tileset.tileFailed.addEventListener(({ url, message }) =>
+          failed.push(`${url}: ${message}`),
+        );
+        tileset.tileLoad.addEventListener(() => {
+          loaded++;
+        });
+        const isDone = new Promise((resolve) => {
+          tileset.initialTilesLoaded.addEventListener(resolve);
+        });
+        scene.primitives.add(tileset);
+        await isDone;
+        return { loaded, failed };
+      },
+      { address, view, error_px, SCALE },
+    );
+  }
+
+  /** Where the picture shows a point (um, world). */
+  pixelOf(point: Vec3): Promise<{ x: number; y: number }> {
+    return this.page.evaluate(([x, y, z]) => {
+      const { Cesium, globe } = window;
+      if (globe?.tileset === undefined) throw new Error("no tileset");
+      const world = Cesium.Matrix4.multiplyByPoint(
+        globe.tileset.modelMatrix,
+        new Cesium.Cartesian3(x * 1e-6, -z * 1e-6, y * 1e-6),
+        new Cesium.Cartesian3(),
+      );
+      const found = Cesium.SceneTransforms.worldToWindowCoordinates(globe.widget.scene, world);
+      if (found === undefined) throw new Error("the point is out of sight");
+      return { x: found.x, y: found.y };
+    }, point);
+  }
+}

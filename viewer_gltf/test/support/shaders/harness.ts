@@ -1,0 +1,265 @@
+/** Runs in the page: marches a synthetic volume with COUNT_STEPS and reads the numbers back. */
+import {
+  ClampToEdgeWrapping,
+  Data3DTexture,
+  LinearFilter,
+  PerspectiveCamera,
+  RedFormat,
+  Scene,
+  UnsignedByteType,
+  Vector3,
+  WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import type { TileVolume } from "../../../src/bundle/generated/volumes";
+import { Cuts } from "../../../src/gpu/clip_planes";
+import { Eyes } from "../../../src/gpu/eyes";
+import { DepthPass } from "../../../src/render/depth_pass";
+import { brickCounts } from "../../../src/volumes/bricks8";
+import { occupancyDistances } from "../../../src/volumes/empty_space";
+import { makeFrame, TileMarch } from "../../../src/volumes/tile_raymarch";
+import { opacities } from "../../../src/volumes/transfer_luts";
+import type { PlaneTable } from "../../../src/volumes/transfer_table_2d";
+import { makeBricks } from "../fixture/volumes";
+import { seeded } from "../seeded";
+
+export type Run = Readonly<{
+  /** Texels along each edge of the cube. */
+  side: number;
+  /** Opacity of a voxel's length, of 255, where there is anything. */
+  opacity: number;
+  /** Which bricks hold anything: all, none, or every second one along each axis. */
+  bricks: "all" | "none" | "checkerboard";
+}>;
+
+/** Over the pixels that the volume covers. */
+export type Counts = Readonly<{ pixels: number; most: number; least: number; covered: number }>;
+
+export const PIXELS = 64;
+
+/** A cube of `side` texels along each edge; its low corner lies `left_um` along x. */
+export function cube(side: number, left_um = 0): TileVolume {
+  const file = { path: "x", bytes: 0, sha256: "" };
+  const edge = side - 3; // lattice intervals without the apron, one um each
+  return {
+    tile: "r0_c0",
+    file,
+    bricks: file,
+    size: [side, side, side],
+    apron: 1,
+    bounds_um: { min: [left_um, -edge, 0], max: [left_um + edge, 0, edge] },
+    matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    levels: [{ size: [side, side, side], offset: 0, length: 1, sha256: "" }],
+  };
+}
+
+function texture3D(texels: Uint8Array<ArrayBuffer>, side: number): Data3DTexture {
+  const texture = new Data3DTexture(texels, side, side, side);
+  texture.format = RedFormat;
+  texture.type = UnsignedByteType;
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
+  texture.unpackAlignment = 1;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** @param table 256 RGBA entries */
+export function marchOf(
+  volume: TileVolume,
+  texels: Uint8Array<ArrayBuffer>,
+  bricks: Uint8Array,
+  table: Uint8Array,
+  hasLeaps: boolean,
+  depth: DepthPass,
+  plane: PlaneTable | null = null,
+): TileMarch {
+  const [side] = volume.size;
+  const frame = makeFrame(depth.texture);
+  frame.uEye.value.set(0, 0, PIXELS, PIXELS);
+  frame.uPart.value.set(0, 0, PIXELS, PIXELS);
+  const march = new TileMarch(volume, 1, frame);
+  const texture = texture3D(texels, side);
+  march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
+  march.dress([{ color: [1, 1, 1], table, plane, isInDisc: false }]);
+  const count = brickCounts(volume.size);
+  const leaps = { bricks: [bricks], alphas: [opacities(table)], count };
+  if (hasLeaps) march.leapBy(occupancyDistances(leaps));
+  return march;
+}
+
+function makeMarch(
+  { side, opacity, bricks }: Run,
+  volume: TileVolume,
+  depth: DepthPass,
+): TileMarch {
+  const [count] = brickCounts(volume.size);
+  const ranges = new Uint8Array(2 * count ** 3);
+  const holds = (x: number, y: number, z: number) =>
+    bricks === "all" || (bricks === "checkerboard" && (x + y + z) % 2 === 0);
+  for (let i = 0; i < count ** 3; i++) {
+    const at = [i % count, Math.floor(i / count) % count, Math.floor(i / count ** 2)] as const;
+    ranges.fill(holds(...at) ? 255 : 0, 2 * i, 2 * i + 2);
+  }
+  const entries = new Uint8Array(1024).fill(255);
+  for (let i = 0; i < 256; i++) entries[4 * i + 3] = i === 0 ? 0 : opacity;
+  const full = new Uint8Array(side ** 3).fill(255);
+  return marchOf(volume, full, ranges, entries, true, depth);
+}
+
+/** Draw marches, one over the other, as `camera` sees them; the rows of pixels as they come. */
+export function draw(
+  marches: readonly TileMarch[],
+  camera: PerspectiveCamera,
+  depth: DepthPass,
+  renderer: WebGLRenderer,
+): Uint8Array {
+  const scene = new Scene();
+  for (const march of marches) scene.add(march.mesh);
+  camera.updateMatrixWorld();
+  renderer.setSize(PIXELS, PIXELS, false);
+  const eyes = new Eyes();
+  eyes.followScreen(renderer, camera);
+  depth.render(renderer, scene, eyes, [...scene.children]);
+  const target = new WebGLRenderTarget(PIXELS, PIXELS);
+  renderer.setRenderTarget(target);
+  renderer.setClearColor(0, 0);
+  renderer.clear();
+  renderer.render(scene, camera);
+  const rgba = new Uint8Array(4 * PIXELS * PIXELS);
+  renderer.readRenderTargetPixels(target, 0, 0, PIXELS, PIXELS, rgba);
+  target.dispose();
+  scene.clear();
+  return rgba;
+}
+
+/** Along the cube's space diagonal, its longest ray. */
+export function diagonalCamera(edge: number): PerspectiveCamera {
+  const camera = new PerspectiveCamera(10, 1, edge / 10, edge * 40);
+  const away = 6 * edge;
+  camera.position.set(edge / 2 + away, -edge / 2 + away, edge / 2 + away);
+  camera.lookAt(edge / 2, -edge / 2, edge / 2);
+  return camera;
+}
+
+function countsOf(rgba: Uint8Array): number[] {
+  return Array.from({ length: rgba.length / 4 }, (_, i) =>
+    rgba[4 * i + 3] === 0 ? 0 : rgba[4 * i] + 256 * rgba[4 * i + 1],
+  );
+}
+
+function countSteps(run: Run): Counts {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const march = makeMarch(run, cube(run.side), depth);
+  march.mesh.material.defines.COUNT_STEPS = 1;
+  const rgba = draw([march], diagonalCamera(run.side - 3), depth, renderer);
+  renderer.dispose();
+  const counts = countsOf(rgba).filter((count) => count > 0);
+  let covered = 1;
+  for (let i = 0; i < rgba.length; i += 4) {
+    if (rgba[i + 3] > 0) covered = Math.min(covered, rgba[i + 2] / 255);
+  }
+  return {
+    pixels: counts.length,
+    most: Math.max(...counts),
+    least: Math.min(...counts),
+    covered,
+  };
+}
+
+/** Steps of rays through a row of cubes, seen along the row: the most that one ray takes in all. */
+function countThrough(run: Run, cubes: number): number {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const edge = run.side - 3;
+  const camera = new PerspectiveCamera(10, 1, edge / 10, edge * 60);
+  camera.position.set(cubes * edge + 8 * edge, -0.3 * edge, 0.9 * edge);
+  camera.lookAt(0, -edge / 2, edge / 2);
+  const sum = new Array<number>(PIXELS * PIXELS).fill(0);
+  for (let i = 0; i < cubes; i++) {
+    const march = makeMarch(run, cube(run.side, i * edge), depth);
+    march.mesh.material.defines.COUNT_STEPS = 1;
+    march.shareWith(new Vector3(0, -edge, 0), new Vector3(cubes * edge, 0, edge), cubes);
+    countsOf(draw([march], camera, depth, renderer)).forEach((count, k) => {
+      sum[k] += count;
+    });
+  }
+  renderer.dispose();
+  return Math.max(...sum);
+}
+
+/** Blobs of random intensity in a cube, and a random function that shows some intensities. */
+export function randomScene(seed: number, side: number) {
+  const random = seeded(seed);
+  const texels = new Uint8Array(side ** 3);
+  for (let blob = 0; blob < 6; blob++) {
+    const center = [0, 1, 2].map(() => random() * side);
+    const radius = 3 + 9 * random();
+    const top = 40 + 215 * random();
+    for (let i = 0; i < texels.length; i++) {
+      const p = [i % side, Math.floor(i / side) % side, Math.floor(i / side ** 2)];
+      const off = Math.hypot(...p.map((v, k) => v - center[k]));
+      texels[i] = Math.max(texels[i], Math.round(top * Math.max(0, 1 - off / radius)));
+    }
+  }
+  const table = new Uint8Array(1024).fill(255);
+  const [low, high] = [10 + 100 * random(), 130 + 120 * random()];
+  const opacity = 5 + 250 * random();
+  for (let i = 0; i < 256; i++) table[4 * i + 3] = i > low && i < high ? opacity : 0;
+  const bricks = makeBricks({ size: [side, side, side], texels }).texels;
+  return { texels, table, bricks };
+}
+
+/** The picture of a random scene with leaps and without: the largest difference, and what shows. */
+function compareLeaps(seed: number): Readonly<{ apart: number; drawn: number }> {
+  const side = 51; // shorter rays than steps: then samples lie at whole voxels
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const { texels, table, bricks } = randomScene(seed, side);
+  const [leaping, plain] = [true, false].map((hasLeaps) =>
+    draw(
+      [marchOf(cube(side), texels, bricks, table, hasLeaps, depth)],
+      diagonalCamera(side - 3),
+      depth,
+      renderer,
+    ),
+  );
+  renderer.dispose();
+  const drawn = plain.filter((v, i) => i % 4 === 3 && v > 0).length;
+  return { apart: Math.max(...plain.map((v, i) => Math.abs(v - leaping[i]))), drawn };
+}
+
+/** Intensities of a cube from 0 to 255 along x, or 255 everywhere. */
+export type Filling = "ramp" | "uniform";
+
+/** Mean opacity, 0..1, seen along x through a cube. */
+function meanOpacity(filling: Filling, side: number, opacity: number): number {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const edge = side - 3;
+  const texels = new Uint8Array(side ** 3);
+  for (let i = 0; i < texels.length; i++) {
+    const x = Math.min(edge, Math.max(0, (i % side) - 1));
+    texels[i] = filling === "ramp" ? Math.round((255 * x) / edge) : 255;
+  }
+  const table = new Uint8Array(1024).fill(255);
+  for (let i = 0; i < 256; i++) table[4 * i + 3] = Math.round((opacity * i) / 255);
+  const bricks = makeBricks({ size: [side, side, side], texels }).texels;
+  const march = marchOf(cube(side), texels, bricks, table, true, depth);
+  const camera = new PerspectiveCamera(0.2, 1, edge, edge * 1000);
+  camera.position.set(300 * edge, -edge / 2, edge / 2);
+  camera.lookAt(0, -edge / 2, edge / 2);
+  const rgba = draw([march], camera, depth, renderer);
+  renderer.dispose();
+  const inner: number[] = [];
+  for (let y = 24; y < 40; y++) {
+    for (let x = 24; x < 40; x++) inner.push(rgba[4 * (y * PIXELS + x) + 3] / 255);
+  }
+  return inner.reduce((a, b) => a + b, 0) / inner.length;
+}
+
+const harness = { countSteps, countThrough, compareLeaps, meanOpacity };
+export type Harness = typeof harness;
+
+Object.assign(window, { harness });

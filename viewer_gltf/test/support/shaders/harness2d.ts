@@ -1,0 +1,100 @@
+/** Runs in the page: marches synthetic volumes by tables of value and gradient. */
+import { PerspectiveCamera, WebGLRenderer } from "three";
+import { Cuts } from "../../../src/gpu/clip_planes";
+import { DepthPass } from "../../../src/render/depth_pass";
+import { makeShape, type Range } from "../../../src/state/transfer_shapes";
+import { alikeRows, type PlaneTable, planeTable } from "../../../src/volumes/transfer_table_2d";
+import { makeBricks } from "../fixture/volumes";
+import { seeded } from "../seeded";
+import { cube, diagonalCamera, draw, marchOf, PIXELS, randomScene } from "./harness";
+
+const SIDE = 51;
+const EDGE = SIDE - 3;
+/** The slope between 0 and 255: from here, and so long, voxels. */
+const SLOPE = { from: 20, length: 8 };
+
+/** A plane of one shape with hard edges. */
+function onePlane(values: Range, gradients: Range, opacity: number): PlaneTable {
+  const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), values, gradients };
+  return planeTable([{ ...shape, softness: 0, opacity }], 0.5, [0, 1], 1);
+}
+
+/**
+ * Opacity, 0..1, of a slope between two uniform halves, seen along it, in PIXELS columns.
+ *
+ * @param opacity of a voxel's length
+ */
+function showSlope(values: Range, gradients: Range, opacity: number): number[] {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const texels = new Uint8Array(SIDE ** 3);
+  for (let i = 0; i < texels.length; i++) {
+    const x = ((i % SIDE) - 1 - SLOPE.from) / SLOPE.length;
+    texels[i] = Math.round(255 * Math.min(1, Math.max(0, x)));
+  }
+  const bricks = makeBricks({ size: [SIDE, SIDE, SIDE], texels }).texels;
+  const plane = onePlane(values, gradients, opacity);
+  const march = marchOf(cube(SIDE), texels, bricks, plane.envelope, true, depth, plane);
+  const away = 300;
+  const fov_deg = (2 * Math.atan(0.5 / away) * 180) / Math.PI;
+  const camera = new PerspectiveCamera(fov_deg, 1, EDGE, EDGE * 1000);
+  camera.position.set(EDGE / 2, -EDGE / 2, (away + 0.5) * EDGE);
+  camera.lookAt(EDGE / 2, -EDGE / 2, EDGE / 2);
+  const rgba = draw([march], camera, depth, renderer);
+  renderer.dispose();
+  const row = PIXELS / 2;
+  return Array.from({ length: PIXELS }, (_, x) => rgba[4 * (row * PIXELS + x) + 3] / 255);
+}
+
+export type Apart = Readonly<{ apart: number; drawn: number }>;
+
+function compare(one: Uint8Array, other: Uint8Array): Apart {
+  const drawn = one.filter((v, i) => i % 4 === 3 && v > 0).length;
+  return { apart: Math.max(...one.map((v, i) => Math.abs(v - other[i]))), drawn };
+}
+
+/** The picture of a one-dimensional function, and of the same as a table: by how much they differ. */
+function compareAlike(seed: number): Apart {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const { texels, table, bricks } = randomScene(seed, SIDE);
+  const alike = { cells: alikeRows(table), gradientMax: 0.3, envelope: table };
+  const [flat, plane] = [null, alike].map((each) =>
+    draw(
+      [marchOf(cube(SIDE), texels, bricks, table, true, depth, each)],
+      diagonalCamera(EDGE),
+      depth,
+      renderer,
+    ),
+  );
+  renderer.dispose();
+  return compare(flat, plane);
+}
+
+/** The picture of random shapes with leaps and without. */
+function compareLeaps2d(seed: number): Apart {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const { texels, bricks } = randomScene(seed, SIDE);
+  const random = seeded(seed + 1000);
+  const shapes = Array.from({ length: 1 + Math.floor(3 * random()) }, (_, i) => ({
+    ...makeShape(i % 2 ? "rectangle" : "triangle", { value: random(), gradient: random() }),
+    opacity: random(),
+  }));
+  const plane = planeTable(shapes, 0.2, [0, 1], 1);
+  const [leaping, plain] = [true, false].map((hasLeaps) =>
+    draw(
+      [marchOf(cube(SIDE), texels, bricks, plane.envelope, hasLeaps, depth, plane)],
+      diagonalCamera(EDGE),
+      depth,
+      renderer,
+    ),
+  );
+  renderer.dispose();
+  return compare(plain, leaping);
+}
+
+const harness = { showSlope, compareAlike, compareLeaps2d };
+export type Harness2d = typeof harness;
+
+Object.assign(window, { harness });

@@ -1,0 +1,348 @@
+/** Runs in the page: an emulated headset, a specimen of boxes, and the hands, without a viewer. */
+import { metaQuest3, XRDevice } from "iwer";
+import {
+  BoxGeometry,
+  Color,
+  HemisphereLight,
+  Matrix4,
+  Mesh,
+  MeshLambertMaterial,
+  OrthographicCamera,
+  PlaneGeometry,
+  Quaternion,
+  Scene,
+  Vector3,
+  WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import { Cuts } from "../../../src/gpu/clip_planes";
+import { leaveUncut } from "../../../src/gpu/unclipped_material";
+import type { Target } from "../../../src/interaction/ray_pointer";
+import type { Ray } from "../../../src/math/pick";
+import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
+import { XR_DISTANCE_M } from "../../../src/render/placement";
+import { Specimen } from "../../../src/render/specimen_pose";
+import { type Action, initialState, reduce } from "../../../src/state/viewer_state";
+import { depthMaterial } from "../../../src/surfaces/blend_material";
+import { betweenEyes } from "../../../src/xr/head_pose";
+import { Hands } from "../../../src/xr/interaction";
+import { XrSession } from "../../../src/xr/session";
+import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
+
+type At = readonly [number, number, number];
+type Side = "left" | "right";
+
+const FACTS: Facts = {
+  title: "Sample",
+  subtitle: "",
+  shown: SPECIMEN_BOX,
+  ranges: new Map([["c0", [100, 1120]]]),
+  gazed: null,
+  isStereo: true,
+  stereo: { isAvailable: true, reason: "" },
+  split: null,
+  canScan: false,
+  frame_ms: null,
+  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
+  triangles: 123_456,
+  volumeLevel: 1,
+  samples: null,
+  isLoading: false,
+  values: [],
+};
+/** Before the specimen's upper edge. */
+export const HANDLE_m: At = [0, 0.45, -1.2];
+const HANDLE_RADIUS_m = 0.04;
+const HEAD_m: At = [0, 1.6, 0];
+const TINTS = [0x3a6ea5, 0x5b8c5a, 0x8c6a5b, 0x7a5b8c, 0x8c8a5b];
+
+class Stand {
+  readonly device = new XRDevice(metaQuest3, { stereoEnabled: true });
+  readonly actions: Action[] = [];
+  readonly commands: string[] = [];
+  readonly chosen: { ray: Ray; tile: string }[] = [];
+  state = initialState(sampleManifest(6));
+  leaves = 0;
+  /** Where the handle was dragged to. */
+  readonly drags: At[] = [];
+  private readonly handle: Target = {
+    isOnTop: true,
+    meet: ({ origin, direction }) => {
+      const toHandle = new Vector3(...HANDLE_m).sub(origin);
+      const distance_m = toHandle.dot(direction);
+      const beside = Math.sqrt(Math.max(0, toHandle.lengthSq() - distance_m ** 2));
+      if (distance_m < 0 || beside > HANDLE_RADIUS_m) return null;
+      return { key: "handle", distance_m, hold: "carry" };
+    },
+    choose: () => undefined,
+    drag: (_key, { direction }) => this.drags.push(direction.toArray()),
+  };
+  /** Between the hands, as WebXR itself tells it. */
+  apart_m = Number.NaN;
+  changes = 0;
+  private readonly renderer = new WebGLRenderer({ antialias: true });
+  private readonly scene = new Scene();
+  private readonly specimen = new Specimen(sampleManifest(6).specimen.bounds_um);
+  private readonly hands: Hands;
+  private readonly xr: XrSession;
+  /** Time passes only as it is asked to. */
+  private readonly times: number[] = [];
+  private waiting: (() => void) | null = null;
+  private settling = 0;
+
+  constructor(stage: HTMLElement) {
+    this.device.installRuntime({ forceInstall: true });
+    this.device.position.set(...HEAD_m);
+    stage.append(this.renderer.domElement);
+    this.renderer.setSize(stage.clientWidth, stage.clientHeight);
+    this.scene.background = new Color(0x0b0d12);
+    this.scene.add(new HemisphereLight(0xffffff, 0x404040, 2), this.specimen.group);
+    sampleManifest(6).tiles.forEach(({ bounds_um: { min, max } }, i) => {
+      const edge = (axis: 0 | 1 | 2) => 0.98 * (max[axis] - min[axis]);
+      const box = new Mesh(
+        new BoxGeometry(edge(0), edge(1), edge(2)),
+        new MeshLambertMaterial({ color: TINTS[i % TINTS.length] }),
+      );
+      box.position.set((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2);
+      this.specimen.group.add(box);
+    });
+    this.hands = new Hands({
+      xr: this.renderer.xr,
+      scene: this.scene,
+      specimen: this.specimen,
+      tiles: sampleManifest(6).tiles,
+      handles: [this.handle],
+      layOut: (view) => layOut(this.state, FACTS, view),
+      onAction: (action) => this.dispatch(action),
+      onCommand: (command) => this.commands.push(command),
+      onChoose: (ray, tile) => {
+        this.chosen.push({ ray, tile });
+        this.dispatch(chosenTile(this.state, tile));
+      },
+      onLeave: () => this.leaves++,
+    });
+    this.xr = new XrSession(
+      this.renderer,
+      () => {
+        this.specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
+        this.hands.start(this.xr.current);
+      },
+      () => this.hands.stop(),
+    );
+    this.renderer.setAnimationLoop(() => this.frame());
+  }
+
+  async start(): Promise<void> {
+    if (navigator.xr === undefined) throw new Error("no headset");
+    await this.xr.start(navigator.xr);
+    await this.step([0, 0]);
+  }
+
+  end(): Promise<void> {
+    return this.xr.end();
+  }
+
+  /** One frame for each time, then one more without, so that what was pressed has arrived. */
+  step(times_s: readonly number[]): Promise<void> {
+    this.times.push(...times_s, 0);
+    return new Promise((resolve) => {
+      this.waiting = resolve;
+    });
+  }
+
+  /** Look from the head at a point of the room. */
+  lookAt(at: At): Promise<void> {
+    const { quaternion } = this.device;
+    const q = facing(new Vector3(...at));
+    quaternion.set(q.x, q.y, q.z, q.w);
+    return this.step([0]);
+  }
+
+  /** Put a controller at a point of the room, pointing at another. */
+  point(side: Side, from: At, at: At): Promise<void> {
+    const controller = this.device.controllers[side];
+    if (controller === undefined) throw new Error("no controller");
+    const [x, y, z] = from.map((v, i) => v + HEAD_m[i]);
+    controller.position.set(x, y, z);
+    const q = facing(new Vector3(...at).sub(new Vector3(...from)));
+    controller.quaternion.set(q.x, q.y, q.z, q.w);
+    return this.step([0]);
+  }
+
+  /** The right controller becomes one with a trigger alone. */
+  useRemote(): void {
+    const profiles = this.device.controllers.right?.inputSource.profiles;
+    profiles?.splice(0, profiles.length, "oculus-go", "generic-trigger-touchpad");
+  }
+
+  connect(side: Side, isConnected: boolean): Promise<void> {
+    const controller = this.device.controllers[side];
+    if (controller === undefined) throw new Error("no controller");
+    controller.connected = isConnected;
+    return this.step([0, 0]);
+  }
+
+  button(side: Side, id: "trigger" | "squeeze", value: number): Promise<void> {
+    this.device.controllers[side]?.updateButtonValue(id, value);
+    return this.step([0, 0]);
+  }
+
+  /** Degrees from the upper to the lower edge of what an eye sees. */
+  set fieldOfView_deg(degrees: number) {
+    this.device.fovy = (degrees * Math.PI) / 180;
+  }
+
+  stick(side: Side, x: number, y: number): void {
+    this.device.controllers[side]?.updateAxes("thumbstick", x, y);
+  }
+
+  /** The middle of a tile's front face in the room. */
+  tileAt(id: string): At {
+    const tile = sampleManifest(6).tiles.find((each) => each.id === id);
+    if (tile === undefined) throw new Error(`no tile ${id}`);
+    const { min, max } = tile.bounds_um;
+    const front = new Vector3((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]);
+    return front.applyMatrix4(this.specimen.group.matrixWorld).toArray();
+  }
+
+  /** A control of the panel in the room. */
+  controlAt(id: string, across?: number, down?: number): At {
+    const point = this.hands.panel.pointOf(id, across, down);
+    if (point === null) {
+      throw new Error(`no ${id} among ${this.hands.panel.regions.map((region) => region.id)}`);
+    }
+    return point.toArray();
+  }
+
+  tell(text: string): Promise<void> {
+    this.hands.tell(text);
+    return this.step([0]);
+  }
+
+  /** How far the notice's middle is from straight ahead, degrees: to the right, and up. */
+  noticeAt(): readonly [number, number] {
+    const { mesh } = this.hands.notice;
+    const head = betweenEyes(this.renderer.xr.getCamera().cameras).invert();
+    const at = mesh.getWorldPosition(new Vector3()).applyMatrix4(head);
+    const degrees = (radians: number) => (radians * 180) / Math.PI;
+    return [degrees(Math.atan2(at.x, -at.z)), degrees(Math.atan2(at.y, Math.hypot(at.x, at.z)))];
+  }
+
+  tap(): Promise<void> {
+    this.hands.tap();
+    return this.step([0]);
+  }
+
+  dispatch(action: Action): void {
+    this.actions.push(action);
+    this.state = reduce(this.state, action);
+  }
+
+  status() {
+    const { panel, pointed, progress, ring } = this.hands;
+    const { position, scale } = this.specimen.pose;
+    return {
+      pointed,
+      progress,
+      isRingShown: ring.isShown,
+      isOpen: panel.isOpen,
+      paints: panel.plane.paints,
+      position: position.toArray(),
+      scale,
+      regions: panel.regions.map(({ id }) => id),
+      drags: this.drags.length,
+      told: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
+      textures: this.renderer.info.memory.textures,
+      geometries: this.renderer.info.memory.geometries,
+    };
+  }
+
+  dispose(): void {
+    this.hands.dispose();
+  }
+
+  private measureHands(): number {
+    const space = this.renderer.xr.getReferenceSpace();
+    const at = [...(this.xr.current?.inputSources ?? [])].flatMap(({ gripSpace }) => {
+      const pose = gripSpace && space && this.renderer.xr.getFrame().getPose(gripSpace, space);
+      return pose ? [pose.transform.position] : [];
+    });
+    const [left, right] = at.map(({ x, y, z }) => new Vector3(x, y, z));
+    return right === undefined ? Number.NaN : left.distanceTo(right);
+  }
+
+  private frame(): void {
+    if (!this.xr.isRunning || !this.renderer.xr.isPresenting) return;
+    const dt_s = this.times.shift();
+    this.renderer.xr.updateCamera(this.xr.camera);
+    const head = betweenEyes(this.renderer.xr.getCamera().cameras);
+    if (this.hands.update(dt_s ?? 0, head, this.state)) this.changes++;
+    this.renderer.render(this.scene, this.xr.camera);
+    this.apart_m = this.measureHands();
+    if (this.times.length > 0 || this.waiting === null) return;
+    this.settling++;
+    if (this.settling < 2) return; // a button is seen by the frame after the one it was set in
+    this.settling = 0;
+    const resolve = this.waiting;
+    this.waiting = null;
+    resolve();
+  }
+}
+
+/**
+ * Pixels that a material which cuts everything leaves of two planes side by side, the left one
+ * being no part of the specimen. In both orders of drawing.
+ */
+function leftOfTheUncut(): readonly (readonly [number, number])[] {
+  const renderer = new WebGLRenderer();
+  const side_px = 16;
+  renderer.setSize(side_px, side_px, false);
+  const cuts = new Cuts();
+  cuts.follow({ box: null, plane: { normal: [0, 0, 1], offset_um: -1e6 } }, new Matrix4());
+  const material = depthMaterial({ uCuts: cuts.uCuts, uCutCount: cuts.uCutCount });
+  material.colorWrite = true; // it writes zeros
+  const scene = new Scene();
+  scene.overrideMaterial = material;
+  const planes = [-0.5, 0.5].map((x) => {
+    const plane = new Mesh(new PlaneGeometry(1, 2));
+    plane.position.set(x, 0, -0.5);
+    scene.add(plane);
+    return plane;
+  });
+  leaveUncut(planes[0]);
+  const target = new WebGLRenderTarget(side_px, side_px);
+  const rgba = new Uint8Array(4 * side_px ** 2);
+  const counts = [0, 1].map((first) => {
+    planes[first].renderOrder = -1;
+    planes[1 - first].renderOrder = 1;
+    renderer.setRenderTarget(target);
+    renderer.setClearColor(0xff0000, 1);
+    renderer.clear();
+    renderer.render(scene, new OrthographicCamera(-1, 1, 1, -1, 0, 2));
+    renderer.readRenderTargetPixels(target, 0, 0, side_px, side_px, rgba);
+    const isDrawn = (i: number) => rgba[4 * i] === 0;
+    const all = Array.from({ length: side_px ** 2 }, (_, i) => i).filter(isDrawn);
+    const left = all.filter((i) => i % side_px < side_px / 2).length;
+    return [left / (side_px ** 2 / 2), all.length - left] as const;
+  });
+  renderer.dispose();
+  return counts;
+}
+
+/** Turned to look along a direction, the head upright. */
+function facing(direction: Vector3): Quaternion {
+  const turn = new Matrix4().lookAt(new Vector3(), direction, new Vector3(0, 1, 0));
+  return new Quaternion().setFromRotationMatrix(turn);
+}
+
+declare global {
+  interface Window {
+    hands: Stand;
+    leftOfTheUncut: typeof leftOfTheUncut;
+  }
+}
+
+const stage = document.querySelector<HTMLElement>("#stage");
+if (stage === null) throw new Error("the page has no stage");
+window.leftOfTheUncut = leftOfTheUncut;
+window.hands = new Stand(stage);

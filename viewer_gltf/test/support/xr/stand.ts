@@ -1,0 +1,79 @@
+/** Opens the harness of the hands in Chromium, and drives it. */
+import type { Page } from "playwright-core";
+import { afterAll, beforeAll, beforeEach } from "vitest";
+import { bundled } from "../browser/bundled";
+import { type Browser, launch } from "../browser/chromium";
+
+const ADDRESS = "http://localhost/hands";
+const PAGE = `<!doctype html><style>
+  body { margin: 0; background: #000 }
+  #stage { width: 100vw; height: 100vh }
+  [data-webxr_runtime] canvas { width: 100% !important; height: 100% !important }
+</style><body><div id="stage"></div>`;
+
+export type At = readonly [number, number, number];
+export type Side = "left" | "right";
+
+export class HandsStand {
+  constructor(readonly page: Page) {}
+
+  status = () => this.page.evaluate(() => window.hands.status());
+  chosen = () => this.page.evaluate(() => window.hands.chosen);
+  actions = () => this.page.evaluate(() => window.hands.actions);
+  step = (times_s: readonly number[]) =>
+    this.page.evaluate((times) => window.hands.step(times), times_s);
+  lookAt = (at: At) => this.page.evaluate((to) => window.hands.lookAt(to), at);
+  point = (side: Side, from: At, at: At) =>
+    this.page.evaluate(([s, f, a]) => window.hands.point(s, f, a), [side, from, at] as const);
+  connect = (side: Side, isConnected: boolean) =>
+    this.page.evaluate(([s, is]) => window.hands.connect(s, is), [side, isConnected] as const);
+  button = (side: Side, id: "trigger" | "squeeze", value: number) =>
+    this.page.evaluate(([s, i, v]) => window.hands.button(s, i, v), [side, id, value] as const);
+  tileAt = (id: string) => this.page.evaluate((tile) => window.hands.tileAt(tile), id);
+  controlAt = (id: string, across?: number, down?: number) =>
+    this.page.evaluate(([i, a, d]) => window.hands.controlAt(i, a, d), [id, across, down] as const);
+  tap = () => this.page.evaluate(() => window.hands.tap());
+
+  /** Seconds pass, in frames of a tenth at most, as a real frame counts. */
+  async wait(seconds: number): Promise<void> {
+    const frames = Math.floor(seconds * 20 + 1e-9);
+    await this.step(Array.from({ length: frames }, () => 0.05));
+  }
+
+  async press(side: Side): Promise<void> {
+    await this.button(side, "trigger", 1);
+    await this.button(side, "trigger", 0);
+  }
+
+  /** Without controllers, as in a Cardboard. */
+  async gazeOnly(): Promise<void> {
+    await this.connect("left", false);
+    await this.connect("right", false);
+  }
+
+  async openPanel(): Promise<void> {
+    await this.lookAt(await this.controlAt("opener"));
+    await this.tap();
+  }
+}
+
+export function prepareHands(viewport = { width: 640, height: 320 }): () => HandsStand {
+  let browser: Browser;
+  let script: string;
+  let stand: HandsStand;
+
+  beforeAll(async () => {
+    script = await bundled(new URL("./harness.ts", import.meta.url));
+    browser = await launch(viewport);
+    const page = await browser.context.newPage();
+    await page.route(ADDRESS, (route) => route.fulfill({ body: PAGE, contentType: "text/html" }));
+    stand = new HandsStand(page);
+  });
+  beforeEach(async () => {
+    await stand.page.goto(ADDRESS);
+    await stand.page.addScriptTag({ content: script });
+    await stand.page.evaluate(() => window.hands.start());
+  });
+  afterAll(() => browser?.close());
+  return () => stand;
+}

@@ -1,0 +1,100 @@
+/** Stereo that is right: a known point lies where the two eyes' geometry says, drawn either way. */
+import { expect, it } from "vitest";
+import { place, XR_DISTANCE_M } from "../../src/render/placement";
+import { addHeadset } from "../support/browser/chromium";
+import { isBackground, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { BALLS } from "../support/fixture/bodies";
+
+const VIEWPORT = { width: 480, height: 240 };
+/** Of the emulated headset: what iwer gives by default. */
+const PUPILS_M = 0.063;
+const FIELD_OF_VIEW_RAD = Math.PI / 2;
+
+const HALF_PX = VIEWPORT.width / 2;
+const FOCAL_PX = VIEWPORT.height / 2 / Math.tan(FIELD_OF_VIEW_RAD / 2);
+const EYES = [
+  [0, -1],
+  [HALF_PX, 1],
+] as const;
+
+describeInChromium("in stereo", () => {
+  const stand = prepareStand({ viewport: VIEWPORT });
+
+  const pictureOf = (left: number) =>
+    takePicture(stand.viewer.page, { x: left, y: 0, width: HALF_PX, height: VIEWPORT.height });
+
+  it("surfaces hide volumes, and volumes veil surfaces, for both eyes", async () => {
+    await addHeadset(stand.viewer.page);
+    await stand.open("&mode=all&quality=high");
+    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, false);
+    await stand.viewer.showAs("Block", "volume");
+    await stand.viewer.show("Block", false);
+    await stand.viewer.showAs("Balls", "surface");
+    await stand.viewer.enterStereo();
+    const { scale, center } = place(stand.manifest.specimen.bounds_um);
+    const look = async () => {
+      await stand.viewer.settled();
+      const found = [];
+      for (const [left, side] of EYES) {
+        const eye = await pictureOf(left);
+        for (const ball of [BALLS[2], BALLS[3]]) {
+          // the point of the ball that is nearest to the eyes' plane
+          const [x, y, z] = ball.center.map((v, i) => (v - center[i]) * scale);
+          const perMetre = FOCAL_PX / (XR_DISTANCE_M - z - ball.radius * scale);
+          const px = HALF_PX / 2 + perMetre * (x - (side * PUPILS_M) / 2);
+          found.push(eye.at(Math.round(px), Math.round(VIEWPORT.height / 2 - perMetre * y)));
+        }
+      }
+      return found;
+    };
+    const bare = await look();
+    const block = stand.manifest.channels.findIndex(({ id }) => id === "Block");
+    await stand.viewer.page.keyboard.press(String(block + 1));
+    const veiled = await look();
+    for (const eye of [0, 2]) {
+      expect(veiled[eye]).toEqual(bare[eye]);
+      expect(veiled[eye + 1][1]).toBeGreaterThan(bare[eye + 1][1] + 20);
+      expect(veiled[eye + 1][2]).toBeLessThan(bare[eye + 1][2] - 20);
+    }
+  });
+
+  for (const [as, query] of [
+    ["surface", "&mode=off"],
+    ["volume", "&mode=all"],
+    ["disc", "&mode=disc&switch=9&disc=40"],
+  ] as const) {
+    it(`a ball's middle lies where both eyes should see it, as a ${as}`, async () => {
+      await addHeadset(stand.viewer.page);
+      await stand.open(`${query}&quality=high`);
+      for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Balls");
+      await stand.viewer.enterStereo();
+      await stand.viewer.settled();
+
+      const { scale, center } = place(stand.manifest.specimen.bounds_um);
+      const [{ center: ball, radius }] = BALLS;
+      const [x, y, z] = ball.map((v, i) => (v - center[i]) * scale);
+      const depth = XR_DISTANCE_M - z;
+      // the middle of a ball's outline lies a little farther out than its centre's image
+      const perMetre = (FOCAL_PX * depth) / (depth ** 2 - (radius * scale) ** 2);
+      const around_px = (1.3 * radius * scale * FOCAL_PX) / depth;
+
+      const found = [];
+      for (const [left, side] of EYES) {
+        const eye = await pictureOf(left);
+        const wanted_px = HALF_PX / 2 + perMetre * (x - (side * PUPILS_M) / 2);
+        const row_px = VIEWPORT.height / 2 - perMetre * y;
+        const drawn = eye
+          .where((pixel) => !isBackground(pixel))
+          .filter(([px, py]) => Math.hypot(px - wanted_px, py - row_px) < around_px);
+        expect(drawn.length).toBeGreaterThan(100);
+        const middle_px = drawn.reduce((sum, [px]) => sum + px + 0.5, 0) / drawn.length;
+        expect(Math.abs(middle_px - wanted_px)).toBeLessThan(1);
+        found.push(middle_px);
+      }
+      const disparity_px = found[0] - found[1];
+      expect(Math.abs(disparity_px - perMetre * PUPILS_M)).toBeLessThan(1);
+    });
+  }
+});

@@ -1,0 +1,238 @@
+/** Head and hands in stereo: what rays meet, what they choose, and what is held. */
+import { expect, it } from "vitest";
+import { takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { type At, prepareHands } from "../support/xr/stand";
+
+const AWAY: At = [0, 5, -1];
+const RIGHT: At = [0.25, -0.3, -0.3];
+const LEFT: At = [-0.25, -0.3, -0.3];
+/** As in the harness: hovering before the specimen's upper edge. */
+const HANDLE: At = [0, 0.45, -1.2];
+const EYES_APART_M = 0.063;
+const SIZE = { width: 640, height: 320 };
+
+describeInChromium("hands in stereo", () => {
+  const hands = prepareHands();
+
+  async function idle() {
+    await hands().point("left", LEFT, AWAY);
+    await hands().point("right", RIGHT, AWAY);
+  }
+
+  it("point at a tile's box, and the trigger chooses it once", async () => {
+    await idle();
+    await hands().point("right", RIGHT, await hands().tileAt("r1_c3"));
+    expect((await hands().status()).pointed).toBe("tile:r1_c3");
+    await hands().press("right");
+    const chosen = await hands().chosen();
+    expect(chosen.map(({ tile }) => tile)).toEqual(["r1_c3"]);
+    // the ray, in um, meets the middle of the tile's front face
+    const [{ ray }] = chosen;
+    const share = (8 - ray.origin[2]) / ray.direction[2];
+    expect(ray.origin[0] + share * ray.direction[0]).toBeCloseTo(35, 3);
+    expect(ray.origin[1] + share * ray.direction[1]).toBeCloseTo(-15, 3);
+  });
+
+  it("choose what is gazed at where a hand points at nothing", async () => {
+    await idle();
+    await hands().lookAt(await hands().tileAt("r0_c1"));
+    await hands().press("left");
+    expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r0_c1"]);
+  });
+
+  it("carry the specimen by exactly the hand's motion while squeezed", async () => {
+    await idle();
+    const before = (await hands().status()).position;
+    await hands().button("right", "squeeze", 1);
+    const [x, y, z] = RIGHT;
+    const moves: At[] = [
+      [0.02, 0.01, 0],
+      [0.1, 0.05, -0.08],
+      [0.17, -0.04, -0.2],
+    ];
+    for (const [dx, dy, dz] of moves) {
+      await hands().point("right", [x + dx, y + dy, z + dz], [dx, 5 + dy, -1 + dz]);
+      const { position } = await hands().status();
+      [dx, dy, dz].forEach((d, i) => {
+        expect(position[i] - before[i]).toBeCloseTo(d, 5);
+      });
+    }
+    await hands().button("right", "squeeze", 0);
+    const held = (await hands().status()).position;
+    await hands().point("right", RIGHT, AWAY);
+    expect((await hands().status()).position).toEqual(held);
+    expect(await hands().chosen()).toEqual([]);
+  });
+
+  it("scale it by the ratio of their distances, both squeezed", async () => {
+    await idle();
+    const ahead = (x: number): [At, At] => [
+      [x, -0.3, -0.3],
+      [x, 5, -1],
+    ];
+    await hands().point("left", ...ahead(-0.2));
+    await hands().point("right", ...ahead(0.2));
+    await hands().button("left", "squeeze", 1);
+    await hands().button("right", "squeeze", 1);
+    const apart = () => hands().page.evaluate(() => window.hands.apart_m);
+    const before = await apart();
+    for (const half of [0.3, 0.1, 0.4]) {
+      await hands().point("left", ...ahead(-half));
+      await hands().point("right", ...ahead(half));
+      const now = await apart();
+      expect(Math.abs(now - 2 * half)).toBeLessThan(0.02); // a grip is not where the ray begins
+      expect((await hands().status()).scale).toBeCloseTo(now / before, 5);
+    }
+  });
+
+  it("let go of it when they are gone", async () => {
+    await idle();
+    await hands().button("right", "squeeze", 1);
+    await hands().connect("right", false);
+    const before = (await hands().status()).position;
+    await hands().point("right", [0.6, 0, -0.5], AWAY);
+    await hands().connect("right", true);
+    expect((await hands().status()).position).toEqual(before);
+  });
+
+  it("hold it by a trigger that stays down, where there is nothing to squeeze", async () => {
+    await hands().page.evaluate(() => window.hands.useRemote());
+    await idle();
+    const at = await hands().tileAt("r1_c3");
+    await hands().point("right", RIGHT, at);
+    const before = (await hands().status()).position;
+    await hands().button("right", "trigger", 1);
+    await hands().wait(0.5);
+    const [x, y, z] = RIGHT;
+    await hands().point("right", [x + 0.1, y, z], [at[0] + 0.1, at[1], at[2]]);
+    const held = (await hands().status()).position;
+    expect(held[0] - before[0]).toBeCloseTo(0.1, 5);
+    await hands().button("right", "trigger", 0);
+    await idle();
+    expect((await hands().status()).position).toEqual(held);
+  });
+
+  it("drag a handle as long as the trigger is held", async () => {
+    await idle();
+    await hands().point("right", RIGHT, HANDLE);
+    expect((await hands().status()).pointed).toBe("handle");
+    await hands().button("right", "trigger", 1);
+    await hands().point("right", RIGHT, [0.3, 0.3, -1]);
+    const { drags } = await hands().status();
+    expect(drags).toBeGreaterThan(0);
+    await hands().button("right", "trigger", 0);
+    const after = (await hands().status()).drags;
+    await hands().point("right", RIGHT, AWAY);
+    expect((await hands().status()).drags).toBe(after);
+    expect(await hands().chosen()).toEqual([]);
+  });
+
+  it("zoom about the tile pointed at by the stick", async () => {
+    await idle();
+    const at = await hands().tileAt("r0_c4");
+    await hands().point("right", RIGHT, at);
+    await hands().page.evaluate(() => window.hands.stick("right", 0, -1));
+    await hands().wait(0.5);
+    await hands().page.evaluate(() => window.hands.stick("right", 0, 0));
+    const { scale } = await hands().status();
+    expect(scale).toBeCloseTo(2.5 ** 0.5, 2);
+    const after = await hands().tileAt("r0_c4");
+    expect(Math.hypot(...after.map((v, i) => v - at[i]))).toBeLessThan(1e-3);
+  });
+});
+
+describeInChromium("the gaze in stereo", () => {
+  const hands = prepareHands();
+
+  it("chooses at 1.5 s and not at 1.4, once, and its ring fills", async () => {
+    await hands().gazeOnly();
+    await hands().lookAt(await hands().tileAt("r0_c2"));
+    expect((await hands().status()).pointed).toBe("tile:r0_c2");
+    await hands().wait(0.75);
+    expect((await hands().status()).progress).toBeCloseTo(0.5, 6);
+    expect((await hands().status()).isRingShown).toBe(true);
+    await hands().wait(0.65);
+    expect(await hands().chosen()).toEqual([]);
+    await hands().wait(0.1);
+    expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r0_c2"]);
+    await hands().wait(3);
+    expect(await hands().chosen()).toHaveLength(1);
+  });
+
+  it("starts anew after it has left", async () => {
+    await hands().gazeOnly();
+    const at = await hands().tileAt("r0_c2");
+    await hands().lookAt(at);
+    await hands().wait(1.4);
+    await hands().lookAt(AWAY);
+    expect((await hands().status()).isRingShown).toBe(false);
+    await hands().lookAt(at);
+    await hands().wait(1.4);
+    expect(await hands().chosen()).toEqual([]);
+    await hands().wait(0.1);
+    expect(await hands().chosen()).toHaveLength(1);
+  });
+
+  it("chooses nothing with dwell off, but the button does at once", async () => {
+    await hands().gazeOnly();
+    await hands().page.evaluate(() => window.hands.dispatch({ type: "set-dwell", isOn: false }));
+    await hands().lookAt(await hands().tileAt("r1_c0"));
+    await hands().wait(4);
+    expect(await hands().chosen()).toEqual([]);
+    await hands().tap();
+    expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r1_c0"]);
+  });
+
+  it("takes up a handle, carries it, and puts it down where it rests", async () => {
+    await hands().gazeOnly();
+    await hands().lookAt(HANDLE);
+    await hands().wait(1.5);
+    expect((await hands().status()).drags).toBeGreaterThan(0);
+    const tile = await hands().tileAt("r1_c3"); // not chosen: the handle is carried past it
+    await hands().lookAt(tile);
+    const [x, y, z] = await hands().page.evaluate(() => window.hands.drags.at(-1) ?? [0, 0, 0]);
+    expect(Math.hypot(x / z - tile[0] / tile[2], y / z - tile[1] / tile[2])).toBeLessThan(1e-4);
+    await hands().wait(1.6);
+    const { drags } = await hands().status();
+    await hands().wait(0.5);
+    expect((await hands().status()).drags).toBe(drags);
+    expect(await hands().chosen()).toEqual([]);
+  });
+
+  it("has its ring as far away as the tile, for both eyes", async () => {
+    await hands().gazeOnly();
+    const fov_deg = 30;
+    await hands().page.evaluate((degrees) => {
+      window.hands.fieldOfView_deg = degrees;
+    }, fov_deg);
+    const at = await hands().tileAt("r0_c2");
+    await hands().lookAt(at);
+    await hands().wait(1.45);
+    await hands().step([0, 0]);
+    const picture = await takePicture(hands().page, { x: 0, y: 0, ...SIZE });
+    const white = picture.where((pixel) => Math.min(...pixel) > 150);
+    const centre = (eye: 0 | 1) => {
+      const half = SIZE.width / 2;
+      const xs = white.map(([x]) => x - eye * half).filter((x) => x >= 0 && x < half);
+      expect(xs.length).toBeGreaterThan(50);
+      return xs.reduce((sum, x) => sum + x, 0) / xs.length;
+    };
+    const px_per_tangent = SIZE.height / 2 / Math.tan((fov_deg * Math.PI) / 360);
+    const expected = (px_per_tangent * EYES_APART_M) / Math.hypot(...at);
+    expect(Math.abs(centre(0) - centre(1) - expected)).toBeLessThan(1);
+    // the gaze is of neither eye: the ring is as far from the middle in both
+    expect(Math.abs(centre(0) + centre(1) + 1 - SIZE.width / 2)).toBeLessThan(1);
+  });
+
+  it("waits while a hand points at something", async () => {
+    await hands().lookAt(await hands().tileAt("r0_c2"));
+    await hands().point("left", LEFT, AWAY);
+    await hands().point("right", RIGHT, await hands().tileAt("r1_c3"));
+    await hands().wait(3);
+    expect(await hands().chosen()).toEqual([]);
+    await hands().point("right", RIGHT, AWAY);
+    await hands().wait(1.5);
+    expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r0_c2"]);
+  });
+});

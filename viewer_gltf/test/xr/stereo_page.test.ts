@@ -1,0 +1,166 @@
+/** The whole page in stereo: what hands and gaze do to it, and how it ends. */
+import { expect, it } from "vitest";
+import { addHeadset } from "../support/browser/chromium";
+import { isBackground, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+type Headset = import("iwer").XRDevice;
+
+describeInChromium("the page in stereo", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 270 } });
+  const state = async () => (await stand.viewer.snapshot()).state;
+  const notices = async () => (await state()).notices;
+
+  const isFull = () => stand.viewer.page.evaluate(() => document.fullscreenElement !== null);
+
+  /** Controllers away from the specimen: then the gaze alone points at it. */
+  async function open(query: string, hasHands: boolean): Promise<void> {
+    await addHeadset(stand.viewer.page);
+    await stand.open(query);
+    await stand.viewer.enterStereo();
+    await stand.viewer.page.evaluate((areHere) => {
+      const { headset } = window as unknown as { headset: Headset };
+      for (const hand of ["left", "right"] as const) {
+        const controller = headset.controllers[hand];
+        if (controller === undefined) throw new Error(`no ${hand} controller`);
+        controller.position.set(hand === "left" ? -0.2 : 0.2, 1.5, -0.1);
+        // to the floor, or straight ahead
+        if (areHere) controller.quaternion.set(0, 0, 0, 1);
+        else controller.quaternion.set(-Math.SQRT1_2, 0, 0, Math.SQRT1_2);
+      }
+    }, hasHands);
+  }
+
+  it("selects what is looked at for 1.5 s, and nothing where dwell is off", async () => {
+    await open("&mode=off", false);
+    await expect.poll(async () => (await state()).selected, { timeout: 20_000 }).not.toBeNull();
+    expect((await state()).isolated).toBeNull(); // once
+  });
+
+  it.each([
+    ["what was looked at on the screen", false, "r0_c1"],
+    ["the side that was turned to the screen", true, "r0_c0"],
+  ])("shows %s", async (_, isTurned, tile) => {
+    await addHeadset(stand.viewer.page);
+    await stand.open("&mode=tile&switch=9");
+    const press = async (key: string, n: number) => {
+      for (let i = 0; i < n; i++) await stand.viewer.page.keyboard.press(key);
+    };
+    if (isTurned) await press("ArrowRight", 12); // half round: what lay on the left lies on the right
+    await press("Shift+ArrowRight", 4);
+    await stand.viewer.settled();
+    const gazed = async () => (await stand.viewer.snapshot()).gazed;
+    await expect.poll(gazed).toBe(tile);
+    await stand.viewer.enterStereo();
+    await expect.poll(gazed).toBe(tile);
+  });
+
+  it("selects by the trigger, and isolates by the next", async () => {
+    await open("&mode=off", true);
+    const press = async () => {
+      for (const value of [1, 0]) {
+        await stand.viewer.page.evaluate((each) => {
+          const { headset } = window as unknown as { headset: Headset };
+          headset.controllers.right?.updateButtonValue("trigger", each);
+        }, value);
+        await stand.viewer.page.waitForTimeout(300);
+      }
+    };
+    await press();
+    await expect.poll(async () => (await state()).selected).not.toBeNull();
+    await press();
+    await expect.poll(async () => (await state()).isolated).not.toBeNull();
+  });
+
+  it("goes back to the flat screen when the session ends", async () => {
+    await open("&mode=off", false);
+    await stand.viewer.page.evaluate(() =>
+      (window as unknown as { headset: Headset }).headset.activeSession?.end(),
+    );
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+    await stand.viewer.settled();
+    const picture = await takePicture(stand.viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    expect(await notices()).toEqual([]);
+  });
+
+  /** An iPhone's: it lets a page ask in a click's own call only. */
+  async function addIphone(answer: "granted" | "denied"): Promise<void> {
+    await stand.viewer.page.addInitScript((given) => {
+      let isInTap = false;
+      const leaveTap = new MessageChannel();
+      leaveTap.port1.onmessage = () => {
+        isInTap = false;
+      };
+      const enterTap = () => {
+        isInTap = true;
+        leaveTap.port2.postMessage(null);
+      };
+      addEventListener("click", enterTap, { capture: true });
+      const requestPermission = async () => {
+        if (!isInTap) throw new DOMException("not within a tap", "NotAllowedError");
+        return given;
+      };
+      Object.assign(DeviceOrientationEvent, { requestPermission });
+    }, answer);
+    await stand.open("&mode=off");
+    await stand.viewer.unfold("stereo");
+  }
+  const tapSplit = () => stand.viewer.page.locator('[data-action="split"]').click();
+  const isStereo = async () => (await stand.viewer.snapshot()).isStereo;
+
+  it("splits an iPhone's screen by the first tap", async () => {
+    await addIphone("granted");
+    await tapSplit();
+    await expect.poll(isStereo).toBe(true);
+    expect((await notices()).join()).not.toMatch(/not allowed/);
+  });
+
+  it("says what to do where an iPhone's owner refuses", async () => {
+    await addIphone("denied");
+    await tapSplit();
+    await expect
+      .poll(notices)
+      .toEqual([expect.stringMatching(/not allowed to tell.*open the page again, and allow/)]);
+    expect(await isStereo()).toBe(false);
+    await expect.poll(isFull).toBe(false);
+  });
+
+  it("says so where the rest of the page can't be had, and gives the screen back", async () => {
+    await addIphone("granted");
+    await stand.viewer.page.route("**/split_session*", (route) => route.abort());
+    await tapSplit();
+    await expect.poll(notices).toEqual([expect.stringMatching(/could not be loaded.*tap again/)]);
+    expect(await isStereo()).toBe(false);
+    await expect.poll(isFull).toBe(false);
+  });
+
+  it("splits the screen without WebXR, and goes back by Escape", async () => {
+    await stand.viewer.page.addInitScript(() =>
+      Object.defineProperty(Navigator.prototype, "wakeLock", { value: undefined }),
+    );
+    await stand.open("&mode=off");
+    await stand.viewer.page.keyboard.press("t");
+    await stand.viewer.page.keyboard.press("P");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+    // What the browser could not give is said before the eyes: the stage hides the page.
+    const { told } = await stand.viewer.snapshot();
+    expect(told.at(-1)).toMatch(/can't keep the screen on/);
+    expect(told).toEqual(await notices());
+    await stand.viewer.page.keyboard.press("j");
+    expect((await stand.viewer.snapshot()).told.at(-1)).toBe("Choosing by gaze: off");
+    await stand.viewer.page.waitForTimeout(1500);
+    const { width, height } = { width: 480, height: 270 };
+    const half = { y: 0, width: width / 2, height };
+    const isDrawn = (pixel: readonly [number, number, number]) => Math.max(...pixel) > 60;
+    for (const x of [0, width / 2]) {
+      const eye = await takePicture(stand.viewer.page, { x, ...half });
+      expect(eye.count(isDrawn)).toBeGreaterThan(100);
+    }
+    await stand.viewer.page.keyboard.press("Escape");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
+    expect((await stand.viewer.snapshot()).told).toEqual([]);
+    expect((await state()).selected).not.toBeNull(); // Escape has done no more than that
+  });
+});
