@@ -68,7 +68,10 @@ export default defineConfig({
   },
   test: {
     projects: [
-      { extends: true, test: { name: "unit", include: ["src/**/*.test.ts"], environment: "node" } },
+      {
+        extends: true,
+        test: { name: "unit", include: ["{src,scripts}/**/*.test.ts"], environment: "node" },
+      },
       {
         extends: true,
         test: {

@@ -3,8 +3,9 @@
  * measured points, scale bar, orientation, names. And what a ray means among them.
  */
 import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
-import type { Box } from "../math/clip";
-import { type Ray, shownBox } from "../math/pick";
+import type { Box } from "../math/box";
+import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import type { Action, ViewerState } from "../state/viewer_state";
 import { ClipMark } from "./clip_gizmo";
 import {

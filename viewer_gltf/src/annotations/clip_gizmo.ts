@@ -11,9 +11,10 @@ import {
   SphereGeometry,
   Vector3,
 } from "three";
-import type { Box, Clip, ClipPlane } from "../math/clip";
-import type { Vec3 } from "../math/pick";
+import type { Box } from "../math/box";
+import type { Clip, ClipPlane } from "../math/clip";
 import { MOST_CORNERS, planeSection } from "../math/plane_box_section";
+import type { Vec3 } from "../math/vec3";
 import {
   BOX_HANDLES,
   boxWithin,

@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
-import type { Box, Clip } from "../math/clip";
-import type { Ray } from "../math/pick";
+import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
+import type { Ray } from "../math/vec3";
 import { armOf, boxWithin, dragHandle, handlesOf, pickHandle, TOLERANCE_RAD } from "./clip_handles";
 
 const SPECIMEN: Box = { min: [0, -400, 0], max: [1000, 0, 200] };

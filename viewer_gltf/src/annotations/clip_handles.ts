@@ -3,9 +3,8 @@
  * lamps' too, a ray means. Pure.
  */
 import { Vector3 } from "three";
+import type { Box } from "../math/box";
 import {
-  AXES,
-  type Box,
   type BoxHandle,
   boxHandles,
   type Clip,
@@ -16,7 +15,8 @@ import {
   slidePlane,
   turnPlane,
 } from "../math/clip";
-import type { Ray, Vec3 } from "../math/pick";
+import type { Ray, Vec3 } from "../math/vec3";
+import { AXES } from "../math/vec3";
 import type { Action } from "../state/viewer_state";
 import type { LampHandleId } from "./lamp_handles";
 import { HANDLE_RADIUS } from "./style";

@@ -6,7 +6,7 @@
 import { Object3D, Vector3 } from "three";
 import { element } from "../dom/element";
 import { advanceRest, type Rest } from "../interaction/ray_at_rest";
-import type { Ray } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import { Label } from "./label";
 import type { Probed } from "./probe";
 import type { Sight } from "./style";

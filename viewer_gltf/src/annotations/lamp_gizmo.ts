@@ -1,6 +1,6 @@
 /** The lamps of the path-traced picture in the scene, to be taken hold of. um, world. */
 import { Object3D, SphereGeometry, Vector3 } from "three";
-import { type Box, boxSpan } from "../math/clip";
+import { type Box, boxSpan } from "../math/box";
 import type { HandleId } from "./clip_handles";
 import { Label } from "./label";
 import { LAMP_HANDLES, type LampHandleId, type LitState, lampHandles } from "./lamp_handles";

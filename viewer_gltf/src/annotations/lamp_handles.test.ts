@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import type { Box } from "../math/clip";
-import type { Ray, Vec3 } from "../math/pick";
+import type { Box } from "../math/box";
+import type { Ray, Vec3 } from "../math/vec3";
 import { LAMP_REACH, LAMPS } from "../state/path_trace_settings";
 import { type Action, initialState, reduce, type ViewerState } from "../state/viewer_state";
 import {

@@ -3,8 +3,9 @@
  * lamp slides on the sphere round the specimen's middle on which it is. Pure.
  */
 import { Vector3 } from "three";
-import { AXES, type Box } from "../math/clip";
-import type { Ray, Vec3 } from "../math/pick";
+import type { Box } from "../math/box";
+import type { Ray, Vec3 } from "../math/vec3";
+import { AXES } from "../math/vec3";
 import { LAMP_REACH } from "../state/path_trace_settings";
 import { type Action, isTraced, type ViewerState } from "../state/viewer_state";
 

@@ -2,8 +2,8 @@
 import { Matrix4, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
-import type { Vec3 } from "../math/pick";
-import { textureCorners } from "../volumes/tile_raymarch";
+import type { Vec3 } from "../math/vec3";
+import { textureCorners } from "../volumes/texture_space";
 
 /** One mip level: texels along x, y, z and their bytes, x fastest. */
 export type VolumeLevel = Readonly<{

@@ -1,6 +1,6 @@
 /** The measured points, the line between them, their distance, and the channels' values there. */
 import { CylinderGeometry, Object3D, SphereGeometry, Vector3 } from "three";
-import type { Vec3 } from "../math/pick";
+import type { Vec3 } from "../math/vec3";
 import { Label } from "./label";
 import { distanceBetween, distanceText } from "./measure";
 import {

@@ -4,7 +4,7 @@
  * specimen.
  */
 import { ConeGeometry, CylinderGeometry, type Matrix4, Object3D, Quaternion, Vector3 } from "three";
-import type { Box } from "../math/clip";
+import type { Box } from "../math/box";
 import { Label } from "./label";
 import { AXIS_COLORS, disposeMarks, lengthAt, markMesh, type Sight } from "./style";
 

@@ -1,15 +1,16 @@
 import { BoxGeometry, DoubleSide, Matrix4, Mesh, MeshBasicMaterial, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
-import type { Box, Clip } from "../math/clip";
-import type { Ray, Vec3 } from "../math/pick";
+import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
+import type { Ray, Vec3 } from "../math/vec3";
+import type { ShownSurface } from "../state/on_screen";
 import {
   nearestIn,
   type ProbedVolume,
   probeBoxes,
   probeSurfaces,
   probeVolumes,
-  type ShownSurface,
   unitRay,
 } from "./probe";
 

@@ -5,25 +5,19 @@
  * In a volume the place is where half of what is seen along the ray lies in front: the eye sees it
  * there, whether the volume is a wall or a haze.
  */
+
 import { type Intersection, Matrix4, type Mesh, Raycaster, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
-import { AHEAD, boxSpan, type Clip, clipSpan, isKept, type Span } from "../math/clip";
-import { type BoxedTile, pickTile, type Ray, type Vec3 } from "../math/pick";
+import { AHEAD, boxSpan, type Span } from "../math/box";
+import { type Clip, clipSpan, isKept } from "../math/clip";
+import { type BoxedTile, pickTile } from "../math/pick";
+import type { Ray, Vec3 } from "../math/vec3";
+import type { ShownSurface, ShownVolume } from "../state/on_screen";
 import { type VolumeLevel, valueAt } from "./measure";
 
-/** A surface on screen. */
-export type ShownSurface = Readonly<{ mesh: Mesh; tile: string; channel: string }>;
-
 /** A channel of a marched tile, with texels at hand. */
-export type ProbedVolume = Readonly<{
-  tile: string;
-  channel: string;
-  volume: TileVolume;
-  level: VolumeLevel;
-  /** 256 RGBA entries: opacities of a voxel's length. */
-  table: Uint8Array;
-  isInDisc: boolean;
-}>;
+export type ProbedVolume = Omit<ShownVolume, "source"> &
+  Readonly<{ volume: TileVolume; level: VolumeLevel }>;
 
 /** The disc's cone: it shows volumes where the angle's cosine is larger. */
 export type Cone = Readonly<{ apex_um: Vector3; axis_um: Vector3; cosine: number }>;

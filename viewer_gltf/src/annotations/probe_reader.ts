@@ -1,7 +1,10 @@
 /** What the specimen is where a ray meets it: surface, volume or tile, and the channels' values. */
+
 import { Box3, type Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
-import { pickTile, type Ray, shownTiles, type Vec3 } from "../math/pick";
+import { pickTile, shownTiles } from "../math/pick";
+import type { Ray, Vec3 } from "../math/vec3";
+import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
 import { VolumeSource } from "../volumes/volume_source";
 import { valueAt, valueText } from "./measure";
@@ -13,17 +16,12 @@ import {
   probeBoxes,
   probeSurfaces,
   probeVolumes,
-  type ShownSurface,
   unitRay,
 } from "./probe";
-import { type LevelSource, levelAtHand, TexelCache } from "./texel_cache";
+import { levelAtHand, TexelCache } from "./texel_cache";
 
 /** Where a ray meets a volume is looked for in a level of at most so many texels. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
-
-/** A channel of a tile on screen as a volume. */
-export type ShownVolume = Pick<ProbedVolume, "tile" | "channel" | "table" | "isInDisc"> &
-  Readonly<{ source: LevelSource }>;
 
 export type ReadingOptions = Readonly<{
   manifest: Manifest;

@@ -3,7 +3,7 @@
  * grows with it. um, world.
  */
 import { BoxGeometry, Object3D, Vector3 } from "three";
-import type { Box } from "../math/clip";
+import type { Box } from "../math/box";
 import { chooseScaleBar, LONGEST_PX } from "../math/round_length";
 import { Label } from "./label";
 import { DIM, disposeMarks, lengthAt, MARKS_ORDER, markMesh, type Sight } from "./style";

@@ -1,7 +1,8 @@
 import { beforeEach, expect, it, vi } from "vitest";
 import { decodeTexels } from "../bundle/decode";
 import type { TileVolume } from "../bundle/generated/volumes";
-import { type LevelSource, levelAtHand, TexelCache } from "./texel_cache";
+import type { LevelSource } from "../state/on_screen";
+import { levelAtHand, TexelCache } from "./texel_cache";
 
 vi.mock("../bundle/decode", () => ({
   decodeTexels: vi.fn(async (frames: readonly { bytes: Uint8Array }[], bytes: number) =>

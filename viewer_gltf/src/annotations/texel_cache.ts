@@ -5,6 +5,7 @@
 
 import { decodeTexels } from "../bundle/decode";
 import type { TileVolume } from "../bundle/generated/volumes";
+import type { LevelSource } from "../state/on_screen";
 import { levelsToFetch, texels } from "../volumes/mip_levels";
 import type { VolumeLevel } from "./measure";
 
@@ -12,13 +13,6 @@ import type { VolumeLevel } from "./measure";
 const KEPT_BYTES = 64 * 1024 * 1024;
 /** Where no level is at hand, the finest one of so many texels is fetched. */
 const FETCHED_TEXELS = 4 * 1024 * 1024;
-
-/** What of a VolumeSource is needed. */
-export type LevelSource = Readonly<{
-  volume: TileVolume;
-  has(index: number): boolean;
-  level(index: number, signal: AbortSignal): Promise<Uint8Array>;
-}>;
 
 type Kept = Readonly<{ bytes: number; level: Promise<VolumeLevel> }>;
 

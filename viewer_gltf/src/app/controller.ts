@@ -6,7 +6,7 @@
 
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
-import type { Box } from "../math/clip";
+import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import { handleOf } from "../panel/clip_by_key";
 import { changePanel, type Layout, type PanelView, START_VIEW, type Wish } from "../panel/controls";
@@ -22,10 +22,16 @@ import { SETTINGS, settingsOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import { remarkOn } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
+import type { XrSupport } from "../state/stereo";
 import { initialState } from "../state/viewer_state";
-import { canScan } from "../xr/cardboard/scan_qr";
-import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/viewer_profile";
-import type { XrSupport } from "../xr/support";
+import { canScan, scanCode } from "../xr/cardboard/scan_qr";
+import {
+  BUILT_IN,
+  faultOfCode,
+  type Profile,
+  ProfileError,
+  parseProfile,
+} from "../xr/cardboard/viewer_profile";
 import type { Viewer } from "./viewer";
 
 /** What a phone lacks for it, the phone says when it is asked. */
@@ -187,7 +193,7 @@ export class Desk {
 
   private async scan(): Promise<void> {
     try {
-      const text = await scanByCamera(document.body);
+      const text = await scanByCamera(document.body, scanCode);
       if (text !== null) this.perform({ panel: "code", text });
     } catch (error) {
       if (!(error instanceof ProfileError || error instanceof DOMException)) throw error;
@@ -270,6 +276,7 @@ export class Desk {
       stereo,
       split: SPLIT,
       canScan: this.canScan,
+      faultOfCode,
       frame_ms: frame_ms > 0 ? frame_ms : null,
       settings,
       triangles,

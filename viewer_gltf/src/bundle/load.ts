@@ -1,6 +1,5 @@
 /** Load the small files of a bundle: the manifest, a channel's list of volumes and what it has in 2D. */
 
-import { COLUMNS, ROWS } from "../state/transfer_shapes";
 import { bricksAddress } from "./brick_host";
 import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";
 import type { FileRef, Manifest } from "./generated/bundle";
@@ -8,6 +7,7 @@ import type { ChannelTransfer2D } from "./generated/transfer2d";
 import type { TileVolume } from "./generated/volumes";
 import { readLevel, readTexture } from "./ktx2";
 import { checkManifest, checkTransfer2d, checkVolumes } from "./schema_check";
+import { COLUMNS, ROWS } from "./transfer_2d";
 
 export type Bundle = Readonly<{
   base: string;

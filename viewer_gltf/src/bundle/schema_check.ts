@@ -3,11 +3,11 @@ import { type OutputUnit, type Schema, Validator } from "@cfworker/json-schema";
 import bundleSchema from "../../../schemas/bundle.schema.json";
 import transfer2dSchema from "../../../schemas/transfer2d.schema.json";
 import volumesSchema from "../../../schemas/volumes.schema.json";
-import { faultOf, MAX_SHAPES } from "../state/transfer_shapes";
 import { BundleError } from "./errors";
 import type { Manifest } from "./generated/bundle";
 import type { ChannelTransfer2D } from "./generated/transfer2d";
 import type { ChannelVolumes } from "./generated/volumes";
+import { faultOf, MAX_SHAPES } from "./transfer_2d";
 
 export const FORMAT = "stereocell-bundle";
 export const VERSION = 1;

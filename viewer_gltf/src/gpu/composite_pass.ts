@@ -11,9 +11,9 @@ import {
   type Texture,
   Vector4,
 } from "three";
-import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "../volumes/shaders/sources";
 import type { Eyes } from "./eyes";
 import { partOf } from "./offscreen_target";
+import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "./shaders/sources";
 
 /** Order among all that is blended. */
 export const FIRST = -1000;

@@ -1,5 +1,4 @@
 import { describe, expect, it } from "vitest";
-import { RAYMARCH_FRAGMENT } from "../volumes/shaders/sources";
 import { includeChunks } from "./glsl_include";
 
 describe("a shader's chunks", () => {
@@ -9,10 +8,5 @@ describe("a shader's chunks", () => {
 
   it("must exist", () => {
     expect(() => includeChunks("#include <nowhere>", {})).toThrow("no shader chunk nowhere");
-  });
-
-  it("are all in the ray-march", () => {
-    expect(RAYMARCH_FRAGMENT).not.toContain("#include");
-    expect(RAYMARCH_FRAGMENT).toContain("vec2 intersectBox(");
   });
 });

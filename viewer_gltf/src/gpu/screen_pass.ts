@@ -10,7 +10,7 @@ import {
   ShaderMaterial,
   Vector4,
 } from "three";
-import { COMPOSITE_VERTEX } from "../volumes/shaders/sources";
+import { COMPOSITE_VERTEX } from "./shaders/sources";
 
 type Defines = Record<string, number | string>;
 

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import type { Ray } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import { advanceRest, type Rest } from "./ray_at_rest";
 
 const DEGREE = Math.PI / 180;

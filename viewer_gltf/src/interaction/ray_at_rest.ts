@@ -1,6 +1,6 @@
 /** For how long a ray has stayed where it is, apart from a hand's or a head's tremble. Pure. */
 import { Vector3 } from "three";
-import type { Ray } from "../math/pick";
+import type { Ray } from "../math/vec3";
 
 /** A ray that turns by more has moved. */
 const TREMBLE_RAD = (1.2 * Math.PI) / 180;

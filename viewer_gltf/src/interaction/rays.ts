@@ -1,6 +1,6 @@
 /** Rays into the specimen: from a click on the picture, or from the head. */
 import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from "three";
-import type { Ray } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import type { RoomRay } from "./ray_pointer";
 
 /** A pointer that moves less than this between down and up is a click, not an orbit. */

@@ -1,7 +1,8 @@
 /** The specimen's tiles as what a ray meets: the boxes of those that are shown, as far as cut. */
 import { Matrix4, type Object3D } from "three";
 import { type Clip, WHOLE } from "../math/clip";
-import { type BoxedTile, pickTile, type Ray } from "../math/pick";
+import { type BoxedTile, pickTile } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import type { Hit, RoomRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 

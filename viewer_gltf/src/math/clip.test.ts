@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
+import type { Box } from "./box";
 import {
-  type Box,
   boxHandles,
   type Clip,
   clipSpan,
@@ -13,7 +13,7 @@ import {
   slidePlane,
   turnPlane,
 } from "./clip";
-import type { Ray, Vec3 } from "./pick";
+import type { Ray, Vec3 } from "./vec3";
 
 const SPECIMEN: Box = { min: [0, -20, 0], max: [100, 0, 50] };
 const FRONT: Ray = { origin: [50, -10, 200], direction: [0, 0, -1] };

@@ -3,21 +3,16 @@
  * Pure.
  */
 import { Vector3 } from "three";
-import type { Ray, Vec3 } from "./pick";
+import { type Box, boxSpan, centerOf, type Span } from "./box";
+import { AXES, along, dot, type Ray, type Vec3, withPart } from "./vec3";
 
-export type Box = Readonly<{ min: Vec3; max: Vec3 }>;
 /** Kept is where normal · p <= offset_um; the normal, of unit length, leads to what is cut away. */
 export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
 /** What is kept. null: not cut. */
 export type Clip = Readonly<{ box: Box | null; plane: ClipPlane | null }>;
-/** Part of a ray, in lengths of its direction; entry before exit. */
-export type Span = readonly [number, number];
-/** All of a ray. */
-export const AHEAD: Span = [0, Number.POSITIVE_INFINITY];
 /** Nothing is cut. */
 export const WHOLE: Clip = { box: null, plane: null };
 
-export const AXES = [0, 1, 2] as const;
 export type Side = "min" | "max";
 /** One face of the box; `direction` leads out of it. */
 export type BoxHandle = Readonly<{
@@ -33,29 +28,6 @@ export type PlaneHandles = Readonly<{ middle: Vec3; tip: Vec3 }>;
 const THINNEST = 0.01;
 /** Rays so parallel to a handle's axis (sine squared of the angle) say nothing about it. */
 const PARALLEL = 1e-6;
-
-/**
- * What is left of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
- * are the same. Every frame asks for thousands: nothing is made but the answer.
- */
-export function boxSpan(span: Span, { origin, direction }: Ray, { min, max }: Box): Span | null {
-  let from = span[0];
-  let to = span[1];
-  for (let axis = 0; axis < 3; axis++) {
-    const o = origin[axis];
-    const d = direction[axis];
-    if (d === 0) {
-      if (o < min[axis] || o > max[axis]) return null;
-      continue;
-    }
-    const a = (min[axis] - o) / d;
-    const b = (max[axis] - o) / d;
-    from = Math.max(from, Math.min(a, b));
-    to = Math.min(to, Math.max(a, b));
-    if (from > to) return null;
-  }
-  return [from, to];
-}
 
 /** What is left of a ray's span inside box and plane; null: nothing. */
 export function clipSpan(span: Span, ray: Ray, { box, plane }: Clip): Span | null {
@@ -221,20 +193,4 @@ export function closestOnLine(point: Vec3, direction: Vec3, ray: Ray): number | 
   if (!(sine2 > PARALLEL)) return null;
   const onRay = (cosine * line.dot(gap) - toward.dot(gap)) / sine2;
   return line.dot(gap) + Math.max(0, onRay) * cosine;
-}
-
-function dot(a: Vec3, b: Vec3): number {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-function along(p: Vec3, direction: Vec3, by: number): Vec3 {
-  return [p[0] + by * direction[0], p[1] + by * direction[1], p[2] + by * direction[2]];
-}
-
-function centerOf({ min, max }: Box): Vec3 {
-  return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
-}
-
-function withPart(p: Vec3, axis: 0 | 1 | 2, value: number): Vec3 {
-  return [axis === 0 ? value : p[0], axis === 1 ? value : p[1], axis === 2 ? value : p[2]];
 }

@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
 import { type Clip, isKept, WHOLE } from "./clip";
-import { type BoxedTile, pickTile, type Ray, shownTiles, type Vec3 } from "./pick";
+import { type BoxedTile, pickTile, shownTiles } from "./pick";
+import type { Ray, Vec3 } from "./vec3";
 
 const TILES: readonly BoxedTile[] = [
   { id: "left", bounds_um: { min: [0, -10, 0], max: [10, 0, 5] } },

@@ -1,8 +1,7 @@
 /** Which tile a ray meets first. Pure. */
-import { AHEAD, type Box, boxSpan, type Clip, clipSpan } from "./clip";
-
-export type Vec3 = readonly [number, number, number];
-export type Ray = Readonly<{ origin: Vec3; direction: Vec3 }>;
+import { AHEAD, type Box, boxSpan } from "./box";
+import { type Clip, clipSpan } from "./clip";
+import type { Ray } from "./vec3";
 
 export type BoxedTile = Readonly<{ id: string; bounds_um: Box }>;
 type Boxed<B extends Box> = Readonly<{ bounds_um: B }>;

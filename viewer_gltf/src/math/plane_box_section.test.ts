@@ -1,8 +1,8 @@
 import { expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
-import type { Box } from "./clip";
-import type { Vec3 } from "./pick";
+import type { Box } from "./box";
 import { planeSection } from "./plane_box_section";
+import type { Vec3 } from "./vec3";
 
 const CUBE: Box = { min: [0, 0, 0], max: [2, 2, 2] };
 const sub = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];

@@ -1,7 +1,8 @@
 /** The polygon in which a plane cuts a box: what of the clip plane is worth showing. Pure. */
 import { Vector3 } from "three";
-import type { Box, ClipPlane } from "./clip";
-import type { Vec3 } from "./pick";
+import type { Box } from "./box";
+import type { ClipPlane } from "./clip";
+import type { Vec3 } from "./vec3";
 
 /** A plane cuts a box in at most so many corners. */
 export const MOST_CORNERS = 6;

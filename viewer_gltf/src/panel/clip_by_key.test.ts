@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import type { Box, Clip } from "../math/clip";
+import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
 import {
   cutText,
   type Grip,

@@ -11,7 +11,9 @@ import {
   type HandleId,
 } from "../annotations/clip_handles";
 import { distanceText } from "../annotations/measure";
-import { AXES, type Box, type Clip, moveFace, movePlane, spinPlane } from "../math/clip";
+import type { Box } from "../math/box";
+import { type Clip, moveFace, movePlane, spinPlane } from "../math/clip";
+import { AXES } from "../math/vec3";
 import type { Action } from "../state/viewer_state";
 
 const TURNS = ["turn-x", "turn-y", "turn-z"] as const;

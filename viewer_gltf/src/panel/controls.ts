@@ -3,9 +3,11 @@
  * plane in the room, shows the values and hands back the wish that a control's `to` makes of what
  * the user did. Pure.
  */
+
+import type { Shapes } from "../bundle/transfer_2d";
 import type { Rgb } from "../math/color";
 import type { Command } from "../state/commands";
-import type { PlanePoint, Shapes } from "../state/transfer_shapes";
+import type { PlanePoint } from "../state/transfer_shapes";
 import type { Action } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { Grip } from "./clip_by_key";

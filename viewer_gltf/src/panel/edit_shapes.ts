@@ -2,6 +2,8 @@
  * What is done to the shapes of a two-dimensional transfer function: which is meant, what has hold of
  * it, and by which numbers it is told. Plain data and pure functions.
  */
+
+import type { Shape, ShapeKind, Shapes } from "../bundle/transfer_2d";
 import { toHex } from "../math/color";
 import { editedName, type Functions, isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import {
@@ -13,9 +15,6 @@ import {
   type PlanePoint,
   replaceShape,
   resize,
-  type Shape,
-  type ShapeKind,
-  type Shapes,
 } from "../state/transfer_shapes";
 
 /** Which shape is meant, of how many: of another number of shapes it means the one on top. */

@@ -1,9 +1,10 @@
 /** Every key, what it asks for, and the words of the list that `?` opens. Pure but for the listener. */
 
-import type { Box } from "../math/clip";
+import { MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
+import type { Box } from "../math/box";
 import { fromHex, toHex } from "../math/color";
 import { DIALS, shareOf, valueAtShare } from "../state/path_trace_parameters";
-import { MAX_SHAPES, removeShape, replaceShape, type Shape } from "../state/transfer_shapes";
+import { removeShape, replaceShape } from "../state/transfer_shapes";
 import { type ChannelState, isTraced, LIMITS, type ViewerState } from "../state/viewer_state";
 import { gripsOf, meantGrip, moveGrip } from "./clip_by_key";
 import type { PanelView, Wish } from "./controls";

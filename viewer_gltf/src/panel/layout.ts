@@ -1,14 +1,16 @@
 /** What the panel shows of a state: see controls.ts. Pure. */
 import { distanceBetween, distanceText } from "../annotations/measure";
-import type { Box, ClipPlane } from "../math/clip";
+import type { Box } from "../math/box";
+import type { ClipPlane } from "../math/clip";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
+import type { StereoSupport } from "../state/stereo";
 import { LIMITS, MODES, type Mode, type Tool, type ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, inline } from "./control_templates";
 import type { Control, Layout, PanelView, Section, Slider } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
 import { lightItems } from "./sections/path_trace";
-import { type StereoSupport, stereoItems } from "./sections/stereo";
+import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
 
 export { chosenTile } from "./sections/tiles";

@@ -1,7 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
+import { randomShapes, sampled } from "../../test/support/transfer_2d";
 import type { Size3 } from "../bundle/ktx2";
 import { brickCounts } from "../volumes/bricks8";
+import { planeTable } from "../volumes/transfer_table_2d";
 import { brickRanges } from "./assemble_tiles";
 import { coarserMajorants, majorants, mediumTable } from "./extinction";
 
@@ -23,6 +25,23 @@ describe("a medium's table", () => {
       expect(1 - Math.exp(-extinctionOf(made, i) * voxel_um)).toBeCloseTo(i / 255, 5);
     }
     expect(Number.isFinite(extinctionOf(made, 255))).toBe(true); // an opacity of 1, too
+  });
+
+  it("is never denser than its majorants, at any gradient", () => {
+    const random = seeded(3);
+    for (let run = 0; run < 40; run++) {
+      const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
+      const plane = planeTable(randomShapes(random), 0.5, window, random());
+      const medium = mediumTable([{ color: WHITE, table: plane.envelope, plane }], 0.5, 0, 2);
+      const low = Math.floor(256 * random());
+      const high = low + Math.floor((256 - low) * random());
+      const [largest] = majorants(medium, [Uint8Array.of(low, high)]);
+      for (let i = 0; i < 40; i++) {
+        const value = (low + (high - low) * random()) / 255;
+        const extinction = sampled(medium, value, random(), 3);
+        expect(extinction).toBeLessThanOrEqual(largest * (1 + 1e-6));
+      }
+    }
   });
 
   it("is as many times as dense as asked for", () => {

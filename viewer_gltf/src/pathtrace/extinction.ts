@@ -3,7 +3,7 @@
  * extinction in every brick. Pure arrays.
  */
 import type { Size3 } from "../bundle/ktx2";
-import { ROWS } from "../state/transfer_shapes";
+import { ROWS } from "../bundle/transfer_2d";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { envelopeOf, type PlaneTable } from "../volumes/transfer_table_2d";
 

@@ -25,7 +25,7 @@ import { drawWhole, float3D, floatTarget, floatTexture, nothing } from "../gpu/f
 import { drawEyes } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, LAMPS, type TraceSettings } from "../state/path_trace_settings";
-import { brickCounts } from "../volumes/bricks8";
+import { brickCounts, SKIP_BRICK } from "../volumes/bricks8";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { Developer } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
@@ -52,8 +52,6 @@ const MOST_SCATTERS = 512;
 const FEW_SCATTERS = 16;
 /** Exponent of a shiny surface's lobe. */
 const GLOSS = 60;
-/** Texels along an edge of the bricks whose ranges come with the texels. */
-const BRICK = 8;
 
 /** Of the longest edge of the box. */
 const LAMP_RADIUS = 0.08;
@@ -113,12 +111,12 @@ export class Tracer {
   private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
 
   /**
-   * @param brick texels along an edge of a brick of majorants: 8 or a multiple
+   * @param brick texels along an edge of a brick of majorants: SKIP_BRICK or a multiple
    * @param calm standard error of the luminance at which a tile rests more often; 0: none does
    */
   constructor(
     sceneDepth: { value: Texture },
-    private readonly brick = 2 * BRICK,
+    private readonly brick = 2 * SKIP_BRICK,
     private readonly calm = CALM,
   ) {
     this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth), {
@@ -192,7 +190,7 @@ export class Tracer {
     this.medium.needsUpdate = true;
     this.majorantTexture.dispose();
     const fine = majorants(table, bricks);
-    const coarse = coarserMajorants(fine, brickCounts(size), this.brick / BRICK);
+    const coarse = coarserMajorants(fine, brickCounts(size), this.brick / SKIP_BRICK);
     this.majorantTexture = float3D(coarse.majorants, coarse.counts);
     const { uniforms } = this.pathPass;
     this.pathPass.define("TWO_D", rows === 1 ? null : 1);
@@ -443,7 +441,7 @@ function traceUniforms(uSceneDepth: { value: Texture }) {
     uMedium: nothing(),
     uGradientMax: { value: new Vector4(1, 1, 1, 1) },
     uMajorants: nothing(),
-    uBrick: { value: new Vector3(BRICK, BRICK, BRICK) },
+    uBrick: { value: new Vector3(SKIP_BRICK, SKIP_BRICK, SKIP_BRICK) },
     uClipLow: { value: new Vector3() },
     uClipHigh: { value: new Vector3() },
     uClipPlane: { value: new Vector4(0, 0, 0, 1) },

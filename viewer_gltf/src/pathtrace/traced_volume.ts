@@ -1,9 +1,9 @@
 /** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
 import { Group, type Texture, type WebGLRenderer } from "three";
-import type { ShownVolume } from "../annotations/probe_reader";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import { LAST, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
+import type { ShownVolume } from "../state/on_screen";
 import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "../state/path_trace_settings";
 import { isTraced, type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickTile } from "../volumes/bricks/brick_atlas";

@@ -1,7 +1,7 @@
 /** From where the specimen is seen, in an address. Metres of the room. Pure. */
 
 import { LARGEST_SCALE, SMALLEST_SCALE } from "../math/grab";
-import type { Vec3 } from "../math/pick";
+import type { Vec3 } from "../math/vec3";
 import { readNumbers, written } from "./numbers";
 
 /** The specimen's centre, its turn (a quaternion x, y, z, w), a multiple of its usual size. */

@@ -13,9 +13,11 @@
  * have taken, and what can't be read is told and left out.
  */
 
-import { AXES, type Box, type Clip, withinSpecimen } from "../math/clip";
+import type { Box } from "../math/box";
+import { type Clip, withinSpecimen } from "../math/clip";
 import { fromHex, toHex } from "../math/color";
-import type { Vec3 } from "../math/pick";
+import type { Vec3 } from "../math/vec3";
+import { AXES } from "../math/vec3";
 import { OWN } from "../state/transfer_functions_2d";
 import {
   type Action,

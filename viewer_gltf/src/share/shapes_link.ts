@@ -3,9 +3,10 @@
  * upper value, lower and upper gradient, tip, opacity and softness, two digits of base 36 each; the
  * colour, sRGB. Pure.
  */
+
+import { MAX_SHAPES, type Shape, type Shapes } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
 import { onLattice, STEPS } from "../state/transfer_functions_2d";
-import { MAX_SHAPES, type Shape, type Shapes } from "../state/transfer_shapes";
 
 const LENGTH = 21;
 

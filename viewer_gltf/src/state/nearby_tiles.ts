@@ -6,7 +6,8 @@
  */
 import { Matrix4, Vector3 } from "three";
 import type { Clip } from "../math/clip";
-import { type BoxedTile, pickTile, type Ray, type Vec3 } from "../math/pick";
+import { type BoxedTile, pickTile } from "../math/pick";
+import type { Ray, Vec3 } from "../math/vec3";
 import type { Nearby } from "./representation";
 
 /** A tile is left at so much more than the distance at which it was met. */

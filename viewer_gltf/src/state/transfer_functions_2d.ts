@@ -2,16 +2,10 @@
  * A channel's two-dimensional transfer functions as the state has them: what the bundle brought and
  * what a user has made of it. Plain data and pure functions; see docs/transfer-functions.md.
  */
+
+import { faultOf, MAX_SHAPES, type Range, type Shape, type Shapes } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
-import {
-  faultOf,
-  LEAST_HEIGHT,
-  LEAST_WIDTH,
-  MAX_SHAPES,
-  type Range,
-  type Shape,
-  type Shapes,
-} from "./transfer_shapes";
+import { LEAST_HEIGHT, LEAST_WIDTH } from "./transfer_shapes";
 
 /** The function that a user's shapes make of a channel that is shown by a one-dimensional one. */
 export const OWN = "own";

@@ -1,22 +1,18 @@
 import { describe, expect, it } from "vitest";
+import { COLUMNS, faultOf, MAX_SHAPES, ROWS, type Shape } from "../bundle/transfer_2d";
 import {
   addShape,
-  COLUMNS,
-  faultOf,
   hitTest,
   LEAST_HEIGHT,
   LEAST_WIDTH,
-  MAX_SHAPES,
   makeShape,
   move,
   outline,
   type PlanePoint,
-  ROWS,
   rasterise,
   removeShape,
   replaceShape,
   resize,
-  type Shape,
 } from "./transfer_shapes";
 
 const RECTANGLE: Shape = {

@@ -3,28 +3,19 @@
  * that a shader reads, and what an editor does with them. Plain data and pure functions. The table
  * has the bytes that the pipeline's evaluate2d has; docs/transfer-functions.md states the formula.
  */
+import {
+  COLUMNS,
+  MAX_SHAPES,
+  type Range,
+  ROWS,
+  type Shape,
+  type ShapeKind,
+  type Shapes,
+} from "../bundle/transfer_2d";
 
-export const ROWS = 64;
-export const COLUMNS = 256;
-export const MAX_SHAPES = 32;
 /** The least that a shape keeps, of the plane's width and height: a cell of the table. */
 export const LEAST_WIDTH = 1 / (COLUMNS - 1);
 export const LEAST_HEIGHT = 1 / (ROWS - 1);
-
-export type Range = readonly [number, number];
-export type ShapeKind = "rectangle" | "triangle";
-
-/** One shape, as transfer2d.schema.json describes it; all numbers 0..1. */
-export type Shape = Readonly<{
-  kind: ShapeKind;
-  values: Range;
-  gradients: Range;
-  tip: number;
-  color: readonly [number, number, number];
-  opacity: number;
-  softness: number;
-}>;
-export type Shapes = readonly Shape[];
 
 /** A place in the plane: value in the window, gradient magnitude of gradient_max. */
 export type PlanePoint = Readonly<{ value: number; gradient: number }>;
@@ -134,23 +125,6 @@ export function outline(shape: Shape): readonly PlanePoint[] {
     { value: highLeft, gradient: top },
   ];
   return shape.kind === "triangle" && bottom === 0 ? corners.slice(1) : corners;
-}
-
-/** What is wrong with a shape that came from outside; null: nothing. */
-export function faultOf(shape: Shape): string | null {
-  if (shape.kind !== "rectangle" && shape.kind !== "triangle") return `kind is ${shape.kind}`;
-  for (const name of ["values", "gradients"] as const) {
-    const [low, high] = shape[name];
-    if (!(0 <= low && low < high && high <= 1)) {
-      return `${name} are (${low}, ${high}), expected them to rise within 0..1`;
-    }
-  }
-  const numbers = { tip: shape.tip, opacity: shape.opacity, softness: shape.softness };
-  const [r, g, b] = shape.color;
-  for (const [name, number] of Object.entries({ ...numbers, red: r, green: g, blue: b })) {
-    if (!(0 <= number && number <= 1)) return `${name} is ${number}, expected 0..1`;
-  }
-  return null;
 }
 
 /**

@@ -3,9 +3,10 @@
  * state and follows it.
  */
 import type { Manifest } from "../bundle/generated/bundle";
+import type { Shapes } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
 import type { Rgb } from "../math/color";
-import type { Vec3 } from "../math/pick";
+import type { Vec3 } from "../math/vec3";
 import {
   type Lamp,
   START_TRACE,
@@ -15,7 +16,6 @@ import {
 } from "./path_trace_settings";
 import type { QualityLevel } from "./quality_controller";
 import { type Functions, type Plane, withShapes } from "./transfer_functions_2d";
-import type { Shapes } from "./transfer_shapes";
 
 /**
  * So many channels show at once: one march samples as many from one texture. Of more, the one that

@@ -16,8 +16,8 @@ import {
   type Vector4,
 } from "three";
 import type { Cuts } from "../gpu/clip_planes";
+import { CHUNKS } from "../gpu/glsl_chunks";
 import { includeChunks } from "../gpu/glsl_include";
-import { CHUNKS } from "../volumes/shaders/sources";
 
 /** What all surfaces share, by reference: the disc's cone and the cuts in the room, metres. */
 export type SurfaceFrame = Readonly<{

@@ -1,8 +1,8 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
 import { type Camera, Group, Mesh, type Object3D, ShaderMaterial } from "three";
-import type { ShownSurface } from "../annotations/probe";
 import type { Bundle } from "../bundle/load";
 import { surfaceColor } from "../math/color";
+import type { ShownSurface } from "../state/on_screen";
 import {
   isInDisc,
   type Nearby,

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { AHEAD, boxSpan } from "../math/clip";
-import type { Vec3 } from "../math/pick";
+import { AHEAD, boxSpan } from "../math/box";
+import type { Vec3 } from "../math/vec3";
 import { distanceInGrid } from "./blend_order";
 
 const EDGES = [

@@ -1,5 +1,5 @@
 /** In which order boxes that don't overlap are blended. Pure. */
-import type { Vec3 } from "../math/pick";
+import type { Vec3 } from "../math/vec3";
 
 /**
  * The sum over the axes of the distance from the eye to the box. In a grid of boxes along the axes

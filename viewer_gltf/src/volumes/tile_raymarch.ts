@@ -22,13 +22,14 @@ import {
   Vector4,
 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
+import { COLUMNS, ROWS } from "../bundle/transfer_2d";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import type { Rgb } from "../math/color";
-import { COLUMNS, ROWS } from "../state/transfer_shapes";
 import { distanceInGrid } from "./blend_order";
-import { brickCounts } from "./bricks8";
+import { brickCounts, SKIP_BRICK } from "./bricks8";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
+import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
 import { alikeRows, type PlaneTable } from "./transfer_table_2d";
@@ -108,16 +109,6 @@ function emptyPlanes(channels: number): DataArrayTexture {
   return texture;
 }
 
-/** Texture coordinates at the low and high corner of the box; image rows run against world y. */
-export function textureCorners(volume: TileVolume): { low: Vector3; high: Vector3 } {
-  const first = volume.size.map((n) => (volume.apron + 0.5) / n);
-  const last = volume.size.map((n) => (n - volume.apron - 0.5) / n);
-  return {
-    low: new Vector3(first[0], last[1], first[2]),
-    high: new Vector3(last[0], first[1], last[2]),
-  };
-}
-
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
   /** All zero, nothing may be leapt over, until the table has come. */
@@ -155,7 +146,7 @@ export class TileMarch {
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
       fragmentShader: RAYMARCH_FRAGMENT,
-      defines: { CHANNELS: channelCount, MAX_STEPS, OPAQUE },
+      defines: { CHANNELS: channelCount, MAX_STEPS, OPAQUE, SKIP_BRICK },
       side: BackSide,
       transparent: true,
       premultipliedAlpha: true,
@@ -251,7 +242,7 @@ export class TileMarch {
     const coarsest = Math.max(shown.level, old?.level ?? 0);
     // ranges of bricks hold for what is drawn, however coarse
     const isExact = coarsest === 0 || shown.index !== null;
-    uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / 8);
+    uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 

@@ -3,7 +3,8 @@
  * magnitude, and what stands for it where gradients are not asked for. Pure arrays.
  */
 
-import { ROWS, rasterise, type Shapes } from "../state/transfer_shapes";
+import { ROWS, type Shapes } from "../bundle/transfer_2d";
+import { rasterise } from "../state/transfer_shapes";
 import { ENTRIES, lookUpTable } from "./transfer_luts";
 
 const ROW = 4 * ENTRIES;

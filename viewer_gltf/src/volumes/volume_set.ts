@@ -1,13 +1,13 @@
 /** All volumes on screen: follows who is drawn how, loads what is missing, drops what is gone. */
 import { Group, Matrix4, Scene, Vector3 } from "three";
-import type { ShownVolume } from "../annotations/probe_reader";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
+import type { Shapes } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
+import type { ShownVolume } from "../state/on_screen";
 import { isInDisc, type WantedTile } from "../state/representation";
 import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
-import type { Shapes } from "../state/transfer_shapes";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { BrickTile } from "./bricks/brick_atlas";
 import type { BrickService } from "./bricks/brick_service";

@@ -14,7 +14,8 @@ import {
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
 import type { HandPose } from "../math/grab";
-import { type BoxedTile, type Ray, shownTiles } from "../math/pick";
+import { type BoxedTile, shownTiles } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import type { Layout, PanelView } from "../panel/controls";
 import type { Specimen } from "../render/specimen_pose";
 import type { Command } from "../state/commands";

@@ -1,5 +1,5 @@
 /** Whether a headset can be used, and if not, why, in words. */
-export type XrSupport = Readonly<{ isAvailable: boolean; reason: string }>;
+import type { XrSupport } from "../state/stereo";
 
 /** @param xr `navigator.xr`, absent in browsers without WebXR or outside a secure context */
 export async function findXrSupport(

@@ -1,5 +1,5 @@
 /** Histograms as pictures, each made once. */
-import { COLUMNS, ROWS } from "../../state/transfer_shapes";
+import { COLUMNS, ROWS } from "../../bundle/transfer_2d";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 
 /** Of the page's accent, where there are most voxels. */

@@ -17,6 +17,7 @@ const FACTS: Facts = {
   stereo: { isAvailable: true, reason: "" },
   split: null,
   canScan: false,
+  faultOfCode: () => "",
   frame_ms: 12.3,
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 12_345,

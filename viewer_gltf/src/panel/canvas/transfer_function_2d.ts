@@ -1,6 +1,8 @@
 /** The plane of value and gradient with its shapes, on a page's canvas and on the panel's plane. Pure. */
+
+import type { Shape } from "../../bundle/transfer_2d";
 import { type Rgb, toHex } from "../../math/color";
-import { outline, type PlanePoint, type Shape } from "../../state/transfer_shapes";
+import { outline, type PlanePoint } from "../../state/transfer_shapes";
 import type { PlaneEditor } from "../controls";
 import { type Block, type Mark, type Rect, SMALL, text } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";

@@ -1,13 +1,15 @@
 /** A dialog with the camera's picture, until it shows the code of a phone viewer. */
 
 import { element } from "../../dom/element";
-import { scanCode } from "../../xr/cardboard/scan_qr";
+
+/** The text of the first code that the video shows. */
+export type Scan = (video: HTMLVideoElement, signal: AbortSignal) => Promise<string>;
 
 /**
- * The code's text; null: closed without one. Throws ProfileError in words, and DOMException where
- * the camera is refused.
+ * The code's text; null: closed without one. Throws what `scan` throws, and DOMException where the
+ * camera is refused.
  */
-export async function scanByCamera(parent: HTMLElement): Promise<string | null> {
+export async function scanByCamera(parent: HTMLElement, scan: Scan): Promise<string | null> {
   const closed = new AbortController();
   const video = element("video", { muted: true, playsInline: true });
   video.ariaLabel = "What the camera sees";
@@ -27,7 +29,7 @@ export async function scanByCamera(parent: HTMLElement): Promise<string | null> 
     stream = await navigator.mediaDevices.getUserMedia({ video: { facingMode: "environment" } });
     video.srcObject = stream;
     await video.play();
-    return await scanCode(video, closed.signal);
+    return await scan(video, closed.signal);
   } catch (error) {
     if (closed.signal.aborted) return null;
     throw error;

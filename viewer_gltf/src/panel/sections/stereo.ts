@@ -1,16 +1,9 @@
 /** The panel's stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
+
+import type { StereoSupport, XrSupport } from "../../state/stereo";
 import type { ViewerState } from "../../state/viewer_state";
-import { ProfileError, parseProfile } from "../../xr/cardboard/viewer_profile";
-import type { XrSupport } from "../../xr/support";
 import { command, inline } from "../control_templates";
 import type { Button, Control, Lenses, PanelView } from "../controls";
-
-/** `split` null: there is none in this viewer. `canScan`: the browser reads QR codes. */
-export type StereoSupport = Readonly<{
-  stereo: XrSupport;
-  split: XrSupport | null;
-  canScan: boolean;
-}>;
 
 export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
   v1: "Cardboard v1 (2014)",
@@ -30,7 +23,7 @@ export function stereoItems(
 ): readonly Control[] {
   return [
     { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
-    ...(facts.split === null ? [] : splitItems(facts.split, facts.canScan, view)),
+    ...(facts.split === null ? [] : splitItems(facts.split, facts, view)),
     {
       kind: "toggle",
       id: "dwell",
@@ -42,9 +35,13 @@ export function stereoItems(
 }
 
 /** A phone in a viewer of lenses: which, and of another than Google's own what its code says. */
-function splitItems(split: XrSupport, canScan: boolean, view: PanelView): readonly Control[] {
+function splitItems(
+  split: XrSupport,
+  { canScan, faultOfCode }: StereoSupport,
+  view: PanelView,
+): readonly Control[] {
   const { lenses, code } = view;
-  const fault = lenses === "own" ? codeFault(code) : "";
+  const fault = lenses === "own" ? faultOfCode(code) : "";
   const items: Control[] = [
     {
       ...inline("lenses", "Phone viewer", lenses, LENS_NAMES, LENSES, (each) => ({
@@ -66,14 +63,4 @@ function splitItems(split: XrSupport, canScan: boolean, view: PanelView): readon
   }
   const support = split.isAvailable && fault !== "" ? { isAvailable: false, reason: fault } : split;
   return [...items, { ...command("split", "Split screen"), ...onlyIf(support) }];
-}
-
-function codeFault(code: string): string {
-  try {
-    parseProfile(code);
-    return "";
-  } catch (error) {
-    if (!(error instanceof ProfileError)) throw error;
-    return error.message;
-  }
 }

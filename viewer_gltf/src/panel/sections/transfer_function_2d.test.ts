@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
+import { MAX_SHAPES } from "../../bundle/transfer_2d";
 import { OWN, shapesOf } from "../../state/transfer_functions_2d";
-import { MAX_SHAPES, makeShape } from "../../state/transfer_shapes";
+import { makeShape } from "../../state/transfer_shapes";
 import {
   type Action,
   type ChannelState,

@@ -1,14 +1,9 @@
 /** The editor of a channel's two-dimensional transfer function, in its card. Pure. */
+
+import { MAX_SHAPES, type Shape, type Shapes } from "../../bundle/transfer_2d";
 import { fromHex, toHex } from "../../math/color";
 import { editedName } from "../../state/transfer_functions_2d";
-import {
-  MAX_SHAPES,
-  removeShape,
-  replaceShape,
-  resize,
-  type Shape,
-  type Shapes,
-} from "../../state/transfer_shapes";
+import { removeShape, replaceShape, resize } from "../../state/transfer_shapes";
 import type { Action, ChannelState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import type { Control, PanelView } from "../controls";

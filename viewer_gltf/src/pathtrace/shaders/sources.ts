@@ -1,6 +1,7 @@
 /** The text of the path tracer's shaders: apart, as not everybody needs them. */
+
+import { CHUNKS } from "../../gpu/glsl_chunks";
 import { includeChunks } from "../../gpu/glsl_include";
-import { CHUNKS } from "../../volumes/shaders/sources";
 import denoise from "./denoise.frag.glsl?raw";
 import mean from "./mean.frag.glsl?raw";
 import trace from "./path_trace.frag.glsl?raw";

@@ -7,9 +7,9 @@
 import { BundleError } from "../../bundle/errors";
 import type { Size3 } from "../../bundle/ktx2";
 
-export const BRICK = 16;
+export const STREAM_BRICK = 16;
 /** Texels along an edge of what a node stores: with its apron. */
-export const STORED = BRICK + 2;
+export const STORED = STREAM_BRICK + 2;
 export const STORED_BYTES = STORED ** 3;
 const MAGIC = [0x89, 0x53, 0x43, 0x42, 0x56, 0x48, 0x0d, 0x0a];
 const VERSION = 1;
@@ -52,8 +52,10 @@ export function parseTable(bytes: Uint8Array, name: string): Table {
     number,
   ];
   const count = view.getUint32(28, true);
-  if (bytes[12] !== BRICK || bytes[13] !== 1 || bytes[15] !== 1) {
-    throw new BundleError(`${name}: expected bricks of ${BRICK} texels with an apron of 1, zstd`);
+  if (bytes[12] !== STREAM_BRICK || bytes[13] !== 1 || bytes[15] !== 1) {
+    throw new BundleError(
+      `${name}: expected bricks of ${STREAM_BRICK} texels with an apron of 1, zstd`,
+    );
   }
   if (bytes.length !== HEADER + count * RECORD) {
     throw new BundleError(
@@ -77,7 +79,7 @@ export function parseTable(bytes: Uint8Array, name: string): Table {
     next += bitsOf(bytes[at + 2]);
   }
   if (next !== count) throw new BundleError(`${name}: its nodes are no tree`);
-  const cells = size.map((n) => Math.ceil(n / BRICK)) as [number, number, number];
+  const cells = size.map((n) => Math.ceil(n / STREAM_BRICK)) as [number, number, number];
   const threshold = view.getInt16(36, true);
   return { size, cells, threshold, nodes, bricks: view.getUint32(32, true) };
 }

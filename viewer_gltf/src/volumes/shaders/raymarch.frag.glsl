@@ -112,8 +112,8 @@ void main() {
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
   vec3 texStart = uTexLow + start * texPerUm;
   vec3 texDir = dir * texPerUm;
-  vec3 brickStart = texStart * uTexels / 8.0;  // the same ray in bricks
-  vec3 brickDir = texDir * uTexels / 8.0;
+  vec3 brickStart = texStart * uTexels / float(SKIP_BRICK);  // the same ray in bricks
+  vec3 brickDir = texDir * uTexels / float(SKIP_BRICK);
   brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
   vec3 invBrickDir = 1.0 / brickDir;
   vec4 sum = vec4(0.0);

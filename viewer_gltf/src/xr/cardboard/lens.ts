@@ -5,7 +5,21 @@
  * r (1 + k1 r^2 + k2 r^4 + ...). Each eye's picture is drawn undistorted, by these tangents, and
  * put on the screen through the inverse, so that the lens makes it straight again.
  */
-import type { Profile } from "./viewer_profile";
+/** Where the phone rests. */
+export type Alignment = "bottom" | "center" | "top";
+
+/** The two lenses and how they lie before the screen. */
+export type LensModel = Readonly<{
+  screenToLens_m: number;
+  interLens_m: number;
+  /** How far the left lens lets the eye see to each side; the right one mirrors it. */
+  fov_deg: Readonly<{ outer: number; inner: number; bottom: number; top: number }>;
+  alignment: Alignment;
+  /** From where the phone rests to the lenses' centres. */
+  trayToLens_m: number;
+  /** k1, k2, ... of r (1 + k1 r^2 + k2 r^4 + ...), r in tangents of the angle. */
+  distortion: readonly number[];
+}>;
 
 export type Side = "left" | "right";
 
@@ -77,27 +91,27 @@ export function isIncreasing(k: readonly number[], most: number): boolean {
 
 /** Where the axis of an eye's lens meets the screen, in metres from its lower left corner. */
 export function lensCentre(
-  profile: Profile,
+  model: LensModel,
   screen: Screen,
   side: Side,
 ): readonly [number, number] {
   const { width_m, height_m, border_m } = screen;
-  const shift_m = ((side === "left" ? -1 : 1) * profile.interLens_m) / 2;
-  const fromTray_m = profile.trayToLens_m - border_m;
+  const shift_m = ((side === "left" ? -1 : 1) * model.interLens_m) / 2;
+  const fromTray_m = model.trayToLens_m - border_m;
   const y_m = { bottom: fromTray_m, center: height_m / 2, top: height_m - fromTray_m };
   // A window that is too small for the viewer, as on a desktop, still shows both eyes in full.
-  const isWide = width_m > 1.2 * profile.interLens_m;
-  const isHigh = Math.abs(y_m[profile.alignment] / height_m - 0.5) < 0.35;
+  const isWide = width_m > 1.2 * model.interLens_m;
+  const isHigh = Math.abs(y_m[model.alignment] / height_m - 0.5) < 0.35;
   return [
     width_m / 2 + (isWide ? shift_m : (Math.sign(shift_m) * width_m) / 4),
-    isHigh ? y_m[profile.alignment] : height_m / 2,
+    isHigh ? y_m[model.alignment] : height_m / 2,
   ];
 }
 
 /** What an eye can see: less of what its lens lets through and what the screen shows there. */
-export function eyeTangents(profile: Profile, screen: Screen, side: Side): Tangents {
-  const { fov_deg, distortion, screenToLens_m } = profile;
-  const [x_m, y_m] = lensCentre(profile, screen, side);
+export function eyeTangents(model: LensModel, screen: Screen, side: Side): Tangents {
+  const { fov_deg, distortion, screenToLens_m } = model;
+  const [x_m, y_m] = lensCentre(model, screen, side);
   const middle_m = screen.width_m / 2; // an eye's half of the screen ends there
   const [left_m, right_m] =
     side === "left" ? [x_m, middle_m - x_m] : [x_m - middle_m, screen.width_m - x_m];
@@ -118,14 +132,14 @@ export function eyeTangents(profile: Profile, screen: Screen, side: Side): Tange
  * there: shares of the screen's width and height from its lower left corner.
  */
 export function toScreen(
-  profile: Profile,
+  model: LensModel,
   screen: Screen,
   side: Side,
   x: number,
   y: number,
 ): readonly [number, number] {
-  const [x_m, y_m] = lensCentre(profile, screen, side);
+  const [x_m, y_m] = lensCentre(model, screen, side);
   const r = Math.hypot(x, y);
-  const scale_m = profile.screenToLens_m * (r === 0 ? 1 : undistort(profile.distortion, r) / r);
+  const scale_m = model.screenToLens_m * (r === 0 ? 1 : undistort(model.distortion, r) / r);
   return [(x_m + x * scale_m) / screen.width_m, (y_m + y * scale_m) / screen.height_m];
 }

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { CARDBOARD_V1, CARDBOARD_V2, parseProfile } from "./viewer_profile";
+import { CARDBOARD_V1, CARDBOARD_V2, faultOfCode, parseProfile } from "./viewer_profile";
 
 const V2 =
   "CgZHb29nbGUSEkNhcmRib2FyZCBJL08gMjAxNR0rGBU9JQHegj0qEAAASEIAAEhCAABIQgAASEJYADUpXA89OggeZnc-Ej6aPlAAYAM";
@@ -123,6 +123,12 @@ describe("a viewer's code", () => {
   ])("that is bad is told in words: %j", (text, words) => {
     expect(() => parseProfile(text)).toThrow(words);
     expect(() => parseProfile(text)).toThrow(expect.objectContaining({ name: "ProfileError" }));
+  });
+
+  it("that can't be read is told in words", () => {
+    expect(faultOfCode("")).toContain("empty");
+    expect(faultOfCode("https://example.org/")).toContain("not a Cardboard viewer's code");
+    expect(faultOfCode("https://g.co/cardboard")).toBe("");
   });
 
   it("never throws anything else, however it is cut or bent", () => {

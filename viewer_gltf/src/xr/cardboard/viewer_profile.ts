@@ -4,26 +4,12 @@
  * the field numbers of Google's Cardboard SDK (proto/cardboard_device.proto, Apache-2.0).
  */
 import { BundleError } from "../../bundle/errors";
-import { isIncreasing } from "./lens";
+import { type Alignment, isIncreasing, type LensModel } from "./lens";
 import { type Fields, readFields } from "./protobuf";
 
-export type Alignment = "bottom" | "center" | "top";
 export type Button = "none" | "magnet" | "touch" | "indirect-touch";
 
-export type Profile = Readonly<{
-  vendor: string;
-  model: string;
-  screenToLens_m: number;
-  interLens_m: number;
-  /** How far the left lens lets the eye see to each side; the right one mirrors it. */
-  fov_deg: Readonly<{ outer: number; inner: number; bottom: number; top: number }>;
-  /** Where the phone rests, and how far the lenses' centres are from there. */
-  alignment: Alignment;
-  trayToLens_m: number;
-  /** k1, k2, ... of r (1 + k1 r^2 + k2 r^4 + ...), r in tangents of the angle. */
-  distortion: readonly number[];
-  button: Button;
-}>;
+export type Profile = LensModel & Readonly<{ vendor: string; model: string; button: Button }>;
 
 /** What is wrong with a profile's code, in words for the page. */
 export class ProfileError extends BundleError {
@@ -90,6 +76,17 @@ export function parseProfile(text: string): Profile {
   // Viewers of 2014 have no numbers in their code: it is the address of the project alone.
   if (path === "/cardboard") return CARDBOARD_V1;
   throw new ProfileError(`The viewer's code has no parameter p: ${shortened(pasted)}. ${HOW}`);
+}
+
+/** What is wrong with a code's text, in words; "": nothing. */
+export function faultOfCode(code: string): string {
+  try {
+    parseProfile(code);
+    return "";
+  } catch (error) {
+    if (!(error instanceof ProfileError)) throw error;
+    return error.message;
+  }
 }
 
 function readAddress(text: string): URL | null {

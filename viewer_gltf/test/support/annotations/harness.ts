@@ -18,14 +18,13 @@ import {
 import { Marks } from "../../../src/annotations/annotations";
 import { listenForHandles } from "../../../src/annotations/handle_pointer";
 import type { Label } from "../../../src/annotations/label";
-import type { ShownSurface } from "../../../src/annotations/probe";
-import type { LevelSource } from "../../../src/annotations/texel_cache";
 import type { DecodeAnswer, DecodeRequest } from "../../../src/bundle/decode";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
-import type { Vec3 } from "../../../src/math/pick";
+import type { Vec3 } from "../../../src/math/vec3";
 import { Specimen } from "../../../src/render/specimen_pose";
+import type { LevelSource, ShownSurface } from "../../../src/state/on_screen";
 import { type Action, initialState, reduce } from "../../../src/state/viewer_state";
 
 const FILE = { path: "x", bytes: 0, sha256: "" };

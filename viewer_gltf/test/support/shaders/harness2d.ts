@@ -1,8 +1,9 @@
 /** Runs in the page: marches synthetic volumes by tables of value and gradient. */
 import { PerspectiveCamera, WebGLRenderer } from "three";
+import type { Range } from "../../../src/bundle/transfer_2d";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { DepthPass } from "../../../src/render/depth_pass";
-import { makeShape, type Range } from "../../../src/state/transfer_shapes";
+import { makeShape } from "../../../src/state/transfer_shapes";
 import { alikeRows, type PlaneTable, planeTable } from "../../../src/volumes/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";

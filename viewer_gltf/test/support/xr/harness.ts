@@ -18,7 +18,7 @@ import {
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { leaveUncut } from "../../../src/gpu/unclipped_material";
 import type { Target } from "../../../src/interaction/ray_pointer";
-import type { Ray } from "../../../src/math/pick";
+import type { Ray } from "../../../src/math/vec3";
 import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
 import { XR_DISTANCE_M } from "../../../src/render/placement";
 import { Specimen } from "../../../src/render/specimen_pose";
@@ -42,6 +42,7 @@ const FACTS: Facts = {
   stereo: { isAvailable: true, reason: "" },
   split: null,
   canScan: false,
+  faultOfCode: () => "",
   frame_ms: null,
   settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 123_456,

@@ -1,0 +1,50 @@
+import { describe, expect, it } from "vitest";
+import { against, arrowsOf, circles } from "./layers";
+
+const arrow = (from: string, to: string) => ({ from, to });
+
+describe("the layers", () => {
+  it("see imports of every kind, and none from packages or from outside", () => {
+    const text = `
+      import type { Vec3 } from "../math/vec3";
+      import "./panel.css";
+      export { a } from "./b";
+      import {
+        c,
+        d,
+      } from "../app/viewer";
+      import worker from "./sw?worker&url";
+      import { Vector3 } from "three";
+      import { sample } from "../../test/support/sample";
+      const later = import("../xr/session");`;
+    expect(arrowsOf("panel/a.ts", text).map(({ to }) => to)).toEqual([
+      "math/vec3.ts",
+      "panel/panel.css",
+      "panel/b.ts",
+      "app/viewer.ts",
+      "panel/sw.ts",
+      "xr/session.ts",
+    ]);
+  });
+
+  it("let imports go down and sideways, never up", () => {
+    const down = arrow("app/viewer.ts", "math/vec3.ts");
+    const sideways = arrow("xr/stereo.ts", "xr/session.ts");
+    const up = arrow("math/vec3.ts", "state/reduce.ts");
+    expect(against([down, sideways, up])).toEqual([up]);
+  });
+
+  it("refuse a folder that is none of them", () => {
+    const astray = arrow("helpers/all.ts", "math/vec3.ts");
+    const lost = arrow("app/viewer.ts", "helpers/all.ts");
+    expect(against([astray, lost])).toEqual([astray, lost]);
+  });
+
+  it("find circles, each once, and nothing else", () => {
+    const open = [arrow("a/1.ts", "a/2.ts"), arrow("a/2.ts", "a/3.ts")];
+    expect(circles(open)).toEqual([]);
+    expect(circles([...open, arrow("a/3.ts", "a/2.ts"), arrow("a/4.ts", "a/1.ts")])).toEqual([
+      ["a/2.ts", "a/3.ts"],
+    ]);
+  });
+});

@@ -1,0 +1,37 @@
+/** A two-dimensional transfer function as a bundle has it: shapes, and the size of its tables. Pure. */
+
+export const ROWS = 64;
+export const COLUMNS = 256;
+export const MAX_SHAPES = 32;
+
+export type Range = readonly [number, number];
+export type ShapeKind = "rectangle" | "triangle";
+
+/** One shape, as transfer2d.schema.json describes it; all numbers 0..1. */
+export type Shape = Readonly<{
+  kind: ShapeKind;
+  values: Range;
+  gradients: Range;
+  tip: number;
+  color: readonly [number, number, number];
+  opacity: number;
+  softness: number;
+}>;
+export type Shapes = readonly Shape[];
+
+/** What is wrong with a shape that came from outside; null: nothing. */
+export function faultOf(shape: Shape): string | null {
+  if (shape.kind !== "rectangle" && shape.kind !== "triangle") return `kind is ${shape.kind}`;
+  for (const name of ["values", "gradients"] as const) {
+    const [low, high] = shape[name];
+    if (!(0 <= low && low < high && high <= 1)) {
+      return `${name} are (${low}, ${high}), expected them to rise within 0..1`;
+    }
+  }
+  const numbers = { tip: shape.tip, opacity: shape.opacity, softness: shape.softness };
+  const [r, g, b] = shape.color;
+  for (const [name, number] of Object.entries({ ...numbers, red: r, green: g, blue: b })) {
+    if (!(0 <= number && number <= 1)) return `${name} is ${number}, expected 0..1`;
+  }
+  return null;
+}

@@ -1,0 +1,35 @@
+/** Boxes along the axes, and the part of a ray that lies in one. Pure. */
+import type { Ray, Vec3 } from "./vec3";
+
+export type Box = Readonly<{ min: Vec3; max: Vec3 }>;
+/** Part of a ray, in lengths of its direction; entry before exit. */
+export type Span = readonly [number, number];
+/** All of a ray. */
+export const AHEAD: Span = [0, Number.POSITIVE_INFINITY];
+
+export function centerOf({ min, max }: Box): Vec3 {
+  return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
+}
+
+/**
+ * What is left of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
+ * are the same. Every frame asks for thousands: nothing is made but the answer.
+ */
+export function boxSpan(span: Span, { origin, direction }: Ray, { min, max }: Box): Span | null {
+  let from = span[0];
+  let to = span[1];
+  for (let axis = 0; axis < 3; axis++) {
+    const o = origin[axis];
+    const d = direction[axis];
+    if (d === 0) {
+      if (o < min[axis] || o > max[axis]) return null;
+      continue;
+    }
+    const a = (min[axis] - o) / d;
+    const b = (max[axis] - o) / d;
+    from = Math.max(from, Math.min(a, b));
+    to = Math.min(to, Math.max(a, b));
+    if (from > to) return null;
+  }
+  return [from, to];
+}

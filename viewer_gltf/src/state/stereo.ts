@@ -1,0 +1,14 @@
+/** What of stereo can be had here. */
+
+/** Whether it can be used, and if not, why, in words. */
+export type XrSupport = Readonly<{ isAvailable: boolean; reason: string }>;
+
+export type StereoSupport = Readonly<{
+  stereo: XrSupport;
+  /** null: there is none in this viewer. */
+  split: XrSupport | null;
+  /** Whether the browser reads QR codes. */
+  canScan: boolean;
+  /** What is wrong with the text of a phone viewer's code, in words; "": nothing. */
+  faultOfCode: (code: string) => string;
+}>;
