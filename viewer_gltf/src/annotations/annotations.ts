@@ -6,7 +6,8 @@ import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import type { Ray } from "../math/vec3";
-import type { Action, ViewerState } from "../state/viewer_state";
+import type { Action } from "../state/actions";
+import type { ViewerState } from "../state/viewer_state";
 import { ClipMark } from "./clip_gizmo";
 import {
   dragHandle,

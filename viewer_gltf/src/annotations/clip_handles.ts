@@ -17,7 +17,7 @@ import {
 } from "../math/clip";
 import type { Ray, Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
-import type { Action } from "../state/viewer_state";
+import type { Action } from "../state/actions";
 import type { LampHandleId } from "./lamp_handles";
 import { HANDLE_RADIUS } from "./style";
 

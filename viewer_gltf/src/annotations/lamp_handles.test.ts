@@ -2,8 +2,11 @@ import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { Box } from "../math/box";
 import type { Ray, Vec3 } from "../math/vec3";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
 import { LAMP_REACH, LAMPS } from "../state/path_trace_settings";
-import { type Action, initialState, reduce, type ViewerState } from "../state/viewer_state";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
 import {
   dragLamp,
   LAMP_HANDLES,

@@ -6,8 +6,9 @@ import { Vector3 } from "three";
 import type { Box } from "../math/box";
 import type { Ray, Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
+import type { Action } from "../state/actions";
 import { LAMP_REACH } from "../state/path_trace_settings";
-import { type Action, isTraced, type ViewerState } from "../state/viewer_state";
+import { isTraced, type ViewerState } from "../state/viewer_state";
 
 export const LAMP_HANDLES = ["lamp-0", "lamp-1", "lamp-2"] as const;
 export type LampHandleId = (typeof LAMP_HANDLES)[number];

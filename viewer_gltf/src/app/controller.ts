@@ -22,8 +22,8 @@ import { SETTINGS, settingsOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import { remarkOn } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
+import { initialState } from "../state/initial_state";
 import type { XrSupport } from "../state/stereo";
-import { initialState } from "../state/viewer_state";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
   BUILT_IN,

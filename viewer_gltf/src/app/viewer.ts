@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Camera, type Matrix4, Quaternion, type Vector2, Vector3, WebGLRenderer } from "three";
+import { type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
@@ -7,42 +7,32 @@ import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import { Navigation } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
-import type { HandPose, SpecimenPose } from "../math/grab";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Layout, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
-import { type FramePace, Picture } from "../render/frame_renderer";
 import { Hybrid } from "../render/gaze_focus";
-import { Pace } from "../render/pacing/frame_budget";
-import { RestPace } from "../render/pacing/redraw_at_rest";
-import { GatherPace } from "../render/pacing/samples_per_frame";
 import { place, XR_DISTANCE_M } from "../render/placement";
 import { Room } from "../render/scene";
-import { intoRoom, ontoScreen } from "../render/screen_to_room";
 import type { Look } from "../share/camera_link";
+import type { Action } from "../state/actions";
 import { remarkOn } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
-import {
-  type Action,
-  initialState,
-  newNotice,
-  reduce,
-  type ViewerState,
-} from "../state/viewer_state";
-import { ERROR_TARGET_PX } from "../surfaces/surface_set";
+import { initialState } from "../state/initial_state";
+import { newNotice, reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { Profile } from "../xr/cardboard/viewer_profile";
 import { ahead } from "../xr/head_pose";
 import { Stereo } from "../xr/stereo";
 import type { Snapshot } from "./automation_api";
+import { FrameLoop } from "./frame_loop";
 import { Contents } from "./scene_contents";
+import { StereoTransition } from "./stereo_transition";
 
 /** A phone's third pixel in each direction costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
-/** A page that slept has not been looked at for as long. */
-const LONGEST_FRAME_S = 0.1;
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
@@ -51,30 +41,17 @@ export class Viewer {
   readonly stereo: Stereo;
   readonly navigation: Navigation;
   state: ViewerState;
-  frames = 0;
   /** What a panel in the room shows; whoever has the panel says. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
   /** What a change has brought besides what it shows; whoever has the page tells it. */
   onRemark: (text: string) => void = () => undefined;
+  readonly contents: Contents;
   private readonly room: Room;
-  private readonly picture: Picture;
   private readonly hybrid: Hybrid;
-  private pace: Pace;
-  private readonly gathering: GatherPace;
-  private readonly resting: RestPace;
-  private readonly contents: Contents;
+  private readonly loop: FrameLoop;
+  private readonly transition: StereoTransition;
   private readonly size: StageSize;
   private readonly disposed = new AbortController();
-  private last_ms = 0;
-  /** Whether what is looked at, or from where, has changed since the last frame. */
-  private isStale = true;
-  /** Whether something has come for the picture since the last frame, which may be at rest. */
-  private hasCome = false;
-  /** Whether the frame before was one of a moving picture, drawn in its budget. */
-  private wasMoving = false;
-  private waiting: (() => void)[] = [];
-  /** In stereo: where the specimen was when it began, in the room and on the screen. */
-  private entered: Readonly<{ inRoom: SpecimenPose; onScreen: SpecimenPose | null }> | null = null;
 
   /**
    * @param onState called after every change of the state
@@ -84,7 +61,7 @@ export class Viewer {
     readonly bundle: Bundle,
     private readonly stage: HTMLElement,
     private readonly onState: (state: ViewerState) => void,
-    private readonly onFrame: () => void,
+    onFrame: () => void,
   ) {
     const { manifest } = bundle;
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
@@ -96,28 +73,33 @@ export class Viewer {
 
     this.room = new Room(manifest);
     this.hybrid = new Hybrid(manifest);
-    this.picture = new Picture(this.renderer, this.room, this.hybrid);
-    this.pace = new Pace(gl);
-    this.gathering = new GatherPace(gl);
-    this.resting = new RestPace(gl);
+    this.loop = new FrameLoop({
+      renderer: this.renderer,
+      stage,
+      room: this.room,
+      hybrid: this.hybrid,
+      bounds: manifest.specimen.bounds_um,
+      shown: () => this,
+      onFollow: () => this.follow(),
+      onFrame,
+    });
     this.contents = new Contents({
       bundle,
       renderer: this.renderer,
-      picture: this.picture,
+      picture: this.loop.picture,
       state: this.state,
       dispatch: (action) => this.dispatch(action),
-      onChange: () => {
-        this.hasCome = true;
-      },
+      onChange: () => this.loop.come(),
       onError: (error) => this.report(error),
     });
     const { marks, surfaces, volumes } = this.contents;
     stage.append(...marks.overlayElements);
     this.room.specimen.group.add(surfaces.group, marks.group);
 
-    this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), () => {
-      this.isStale = true;
-    });
+    this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), () =>
+      this.loop.change(),
+    );
+    this.transition = new StereoTransition(this.navigation, this.room.specimen);
     this.stereo = new Stereo(this.renderer, {
       scene: this.room.scene,
       specimen: this.room.specimen,
@@ -154,13 +136,12 @@ export class Viewer {
       this.dispatch({ type: "notify", text: lost });
       volumes.forget(); // their texels went with the context
       this.contents.traced.forget();
-      this.gathering.forget();
-      this.resting.forget();
+      this.loop.forget();
     });
     canvas.addEventListener("webglcontextrestored", () => {
       volumes.forget(); // those that have come since
       this.contents.traced.forget();
-      this.pace = new Pace(gl); // the times that were asked for went, too
+      this.loop.renew(); // the times that were asked for went, too
       this.follow();
       this.dispatch({ type: "dismiss", text: lost });
     });
@@ -168,7 +149,7 @@ export class Viewer {
     this.size = new StageSize(stage, () => this.fit());
     this.fit();
     this.follow();
-    this.renderer.setAnimationLoop((time_ms) => this.frame(time_ms));
+    this.loop.start();
   }
 
   dispatch(action: Action): void {
@@ -202,7 +183,7 @@ export class Viewer {
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
-        this.tap(rayAhead(this.head, this.room.specimen.group));
+        this.tap(rayAhead(this.loop.head, this.room.specimen.group));
         break;
       default: {
         const isInRoom = this.stereo.kind !== null;
@@ -212,7 +193,7 @@ export class Viewer {
         if (!isDone) return false;
       }
     }
-    this.isStale = true;
+    this.loop.change();
     return true;
   }
 
@@ -235,27 +216,19 @@ export class Viewer {
     this.contents.marks.mean(handle);
   }
 
-  /** From where the specimen is seen; null: as it opens. */
-  get look(): Look | null {
-    const { navigation, poseOnScreen: pose } = this;
-    const eye = pose === null ? navigation.look : navigation.lookNow;
-    if (eye === null || pose === null) return eye && { ...eye, specimen: null };
-    const { position, orientation, scale } = pose;
-    const specimen = { position: position.toArray(), orientation: orientation.toArray(), scale };
-    return { ...eye, specimen };
+  /** Frames drawn so far. */
+  get frames(): number {
+    return this.loop.frames;
   }
 
-  lookFrom({ position, target, specimen }: Look): void {
-    this.navigation.lookFrom({ position, target });
-    if (specimen !== null) {
-      const pose = {
-        position: new Vector3(...specimen.position),
-        orientation: new Quaternion(...specimen.orientation),
-        scale: specimen.scale,
-      };
-      this.room.specimen.moveTo(pose, this.navigation.camera.position);
-    }
-    this.isStale = true;
+  /** From where the specimen is seen; null: as it opens. */
+  get look(): Look | null {
+    return this.transition.look;
+  }
+
+  lookFrom(look: Look): void {
+    this.transition.lookFrom(look);
+    this.loop.change();
   }
 
   snapshot(): Snapshot {
@@ -271,8 +244,8 @@ export class Viewer {
       traced: this.contents.traced.status(),
       gazed: this.hybrid.nearby.gazed,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
-      frame_ms: this.pace.frame_ms,
-      settings: this.pace.settings,
+      frame_ms: this.loop.frame_ms,
+      settings: this.loop.settings,
       measuredValues: this.contents.marks.values,
       gpuObjects: {
         ...this.renderer.info.memory,
@@ -285,8 +258,7 @@ export class Viewer {
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
-    this.isStale = true;
-    return new Promise((resolve) => this.waiting.push(resolve));
+    return this.loop.settled();
   }
 
   report(error: unknown): void {
@@ -328,112 +300,8 @@ export class Viewer {
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
     this.room.mark(isolated === null ? selected : null);
-    this.pace.setLevel(quality);
-    this.isStale = true;
-  }
-
-  private frame(time_ms: number): void {
-    if (this.renderer.getContext().isContextLost()) return; // there is nothing to draw on
-    const interval_ms = time_ms - this.last_ms;
-    const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
-    this.last_ms = time_ms;
-    const wasLoading = this.contents.isLoading;
-    if (this.contents.hasJustBegun()) this.follow();
-    const inRoom = this.stereo.pose(this.picture.eyes);
-    const isStereo = inRoom !== null;
-    const { contents } = this;
-    const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
-    if (isStereo) this.stereo.hands.update(dt_s, this.head, this.state);
-    const { isChanging, isFading } = this.advance(dt_s);
-    const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
-    const isDue = this.resting.isDue(time_ms) && this.hasCome;
-    const isMoving = isStereo || this.isStale;
-    // a picture that came to rest is drawn once more, as well as can be
-    const isWanted = isMoving || this.wasMoving || isGathering || isDue;
-    if (!isWanted && !wasLoading && !this.hasCome) return;
-    const settings = this.pace.begin(isMoving, interval_ms, this.stereo.headset.rate_hz);
-    this.picture.marchFrame.uSteps.value = settings.steps;
-    this.hybrid.radiusShare = settings.discShare;
-    const [eye] = this.picture.eyes.all; // a headset has none before its first pose
-    if (eye !== undefined) {
-      const { z, w } = eye.viewport;
-      this.contents.stream(
-        this.stereo.seenBy(camera),
-        z,
-        w,
-        ERROR_TARGET_PX * settings.errorFactor,
-      );
-    }
-    if (isWanted) {
-      this.isStale = isChanging;
-      this.hasCome = isFading;
-      contents.surfaces.dressAll();
-      const { passes } = this.gathering;
-      this.draw(camera, { resolution: settings.resolution, isMoving, passes });
-      if (isGathering) this.gathering.submit(time_ms);
-      if (!isMoving) this.resting.submit(time_ms);
-      this.frames++;
-      this.onFrame();
-    }
-    this.pace.end();
-    this.wasMoving = isMoving;
-    const isAtRest = isStereo || (!isMoving && !this.hasCome);
-    if (this.waiting.length > 0 && !this.contents.isLoading && !this.isStale && isAtRest) {
-      for (const resolve of this.waiting.splice(0)) resolve();
-    }
-  }
-
-  private poseMono(dt_s: number): Camera {
-    this.navigation.update(dt_s);
-    this.picture.eyes.followScreen(this.renderer, this.navigation.camera);
-    return this.navigation.camera;
-  }
-
-  /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */
-  private advance(dt_s: number): Readonly<{ isChanging: boolean; isFading: boolean }> {
-    const { hybrid, contents, head, navigation, stage, state } = this;
-    const { specimen } = this.room;
-    const { group } = specimen;
-    const isMoving = specimen.advance(dt_s);
-    const isReady = (tile: string) => contents.volumes.isReady(tile);
-    if (hybrid.look(state, head, group.matrixWorld, isReady, dt_s)) this.follow();
-    const screen = {
-      camera: navigation.camera,
-      height_px: stage.clientHeight,
-      focus: navigation.controls.target,
-    };
-    const isFading = contents.advance({
-      head,
-      specimen: group.matrixWorld,
-      screen: this.stereo.kind === null ? screen : null,
-      gaze: rayAhead(head, group),
-      disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
-      isPanelOpen: this.stereo.hands.panel.isOpen,
-      dt_s,
-    });
-    const isChanging = isMoving || hybrid.isChanging(state);
-    if (isChanging) this.isStale = true;
-    if (isFading) this.hasCome = true;
-    return { isChanging, isFading };
-  }
-
-  private draw(camera: Camera, pace: FramePace): void {
-    const { contents, stereo, head, picture } = this;
-    const { volumes, traced, surfaces, marks } = contents;
-    const drawn = {
-      volumes,
-      traced,
-      panes: surfaces.blended,
-      overlays: [...marks.overlays, ...stereo.hands.overlays],
-      bounds: this.bundle.manifest.specimen.bounds_um,
-      solids: surfaces.triangles,
-    };
-    stereo.present(() => picture.draw(camera, head, drawn, this.state.clip, pace));
-  }
-
-  /** Pose of the head, or of the mono camera. */
-  private get head(): Matrix4 {
-    return this.stereo.head ?? this.navigation.camera.matrixWorld;
+    this.loop.setLevel(quality);
+    this.loop.change();
   }
 
   private fit(): void {
@@ -443,7 +311,7 @@ export class Viewer {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setSize(clientWidth, clientHeight);
     this.navigation.fit(clientWidth / clientHeight);
-    this.isStale = true;
+    this.loop.change();
   }
 
   /** The specimen where it opens: in stereo straight before the head, at its height. */
@@ -454,46 +322,15 @@ export class Viewer {
     else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
   }
 
-  /** The specimen turns the same side to the head as to the screen, what was looked at ahead. */
   private enterStereo(): void {
-    const { navigation, room } = this;
-    const { specimen } = room;
-    navigation.controls.enabled = false;
-    const ahead_m = new Vector3(0, 0, -XR_DISTANCE_M);
-    const onScreen = this.poseOnScreen;
-    const pose = intoRoom(specimen.pose, this.screenHold, ahead_m);
-    specimen.anchorAt(ahead_m);
-    if (navigation.look !== null || onScreen !== null) specimen.moveTo(pose, new Vector3());
-    this.entered = { inRoom: specimen.pose, onScreen };
+    this.transition.enter();
     this.onState(this.state);
   }
 
-  /** What was looked at stays. */
   private leaveStereo(): void {
-    const { navigation, poseOnScreen: pose } = this;
-    const { specimen } = this.room;
-    this.entered = null;
-    navigation.controls.enabled = true;
-    specimen.anchorAt(new Vector3());
-    if (pose !== null) specimen.moveTo(pose, navigation.camera.position);
+    this.transition.leave();
     this.fit();
     this.onState(this.state);
-  }
-
-  /** The flat camera, held as a hand holds a thing: by the point that it is turned about. */
-  private get screenHold(): HandPose {
-    const { target, object } = this.navigation.controls;
-    return { position: target, orientation: object.quaternion };
-  }
-
-  /** Where the specimen is to the flat camera, also while there is stereo; null: where it opens. */
-  private get poseOnScreen(): SpecimenPose | null {
-    const { entered, navigation } = this;
-    const { anchor, home, isMoved, pose } = this.room.specimen;
-    if (entered === null) return isMoved ? pose : null;
-    if (pose === entered.inRoom) return entered.onScreen; // nobody has moved it there
-    if (!isMoved && navigation.look === null) return null;
-    return ontoScreen(isMoved ? pose : home, this.screenHold, anchor);
   }
 
   private tap(ray: Ray): void {
@@ -509,14 +346,13 @@ export class Viewer {
   }
 
   dispose(): void {
-    this.renderer.setAnimationLoop(null);
+    this.loop.stop();
     this.size.dispose();
     this.disposed.abort();
     this.stereo.dispose();
     this.navigation.dispose();
     this.contents.dispose();
-    this.picture.dispose();
-    this.pace.dispose();
+    this.loop.dispose();
     this.renderer.dispose();
     this.renderer.domElement.remove();
   }

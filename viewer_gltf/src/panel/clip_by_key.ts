@@ -14,7 +14,7 @@ import { distanceText } from "../annotations/measure";
 import type { Box } from "../math/box";
 import { type Clip, moveFace, movePlane, spinPlane } from "../math/clip";
 import { AXES } from "../math/vec3";
-import type { Action } from "../state/viewer_state";
+import type { Action } from "../state/actions";
 
 const TURNS = ["turn-x", "turn-y", "turn-z"] as const;
 type Turn = (typeof TURNS)[number];

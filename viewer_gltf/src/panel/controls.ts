@@ -6,9 +6,9 @@
 
 import type { Shapes } from "../bundle/transfer_2d";
 import type { Rgb } from "../math/color";
+import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { PlanePoint } from "../state/transfer_shapes";
-import type { Action } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { Grip } from "./clip_by_key";
 import type { Grasp, Meant } from "./edit_shapes";

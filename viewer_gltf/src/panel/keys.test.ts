@@ -1,8 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
+import { initialState } from "../state/initial_state";
+import { reduce } from "../state/reduce";
 import { makeShape } from "../state/transfer_shapes";
-import { type Action, initialState, reduce } from "../state/viewer_state";
 import { type PanelChange, START_VIEW } from "./controls";
 import { type Focus, firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
 import { told } from "./spoken_feedback";

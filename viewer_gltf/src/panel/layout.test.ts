@@ -1,6 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
-import { type Action, initialState, LIMITS, reduce, type ViewerState } from "../state/viewer_state";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
+import { LIMITS, reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
 import {
   type Control,
   changePanel,

@@ -1,8 +1,11 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import { fromHex } from "../math/color";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
 import { DIALS, dialName } from "../state/path_trace_parameters";
-import { type Action, initialState, reduce, type ViewerState } from "../state/viewer_state";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
 import type { Wish } from "./controls";
 import { told } from "./spoken_feedback";
 

@@ -1,9 +1,10 @@
 /** What a key has done, in words: whoever uses keys may not see the control that it stands for. Pure. */
 
+import type { Action } from "../state/actions";
 import { DIALS, dialName } from "../state/path_trace_parameters";
 import type { TraceSettings } from "../state/path_trace_settings";
 import { shapesOf } from "../state/transfer_functions_2d";
-import type { Action, ViewerState } from "../state/viewer_state";
+import type { ViewerState } from "../state/viewer_state";
 import { cutText, gripName } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";

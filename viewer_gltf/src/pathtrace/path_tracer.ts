@@ -7,32 +7,36 @@ import {
   type Data3DTexture,
   type DataTexture,
   FloatType,
-  Matrix3,
   Matrix4,
   RGBAFormat,
   RGFormat,
   type Texture,
-  Vector2,
-  Vector3,
-  Vector4,
+  type Vector3,
   type WebGLRenderer,
   type WebGLRenderTarget,
 } from "three";
-import type { Bounds } from "../bundle/generated/bundle";
-import { clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import type { Eyes } from "../gpu/eyes";
-import { drawWhole, float3D, floatTarget, floatTexture, nothing } from "../gpu/float_targets";
+import { drawWhole, float3D, floatTarget, floatTexture } from "../gpu/float_targets";
 import { drawEyes } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
-import { ENOUGH_SAMPLES, LAMPS, type TraceSettings } from "../state/path_trace_settings";
+import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
 import { brickCounts, SKIP_BRICK } from "../volumes/bricks8";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { Developer } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import { coarserMajorants, type MediumLook, majorants, mediumTable, rowsOf } from "./extinction";
-import { areNear, areSame, type History, type TraceView, turnOf, viewOf } from "./eye_rays";
+import { areNear, areSame, type History, type TraceView, viewOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import { TRACE_FRAGMENT, TRACE_NOISE } from "./shaders/sources";
+import {
+  lowCorner,
+  sceneInto,
+  sumUniforms,
+  type TraceScene,
+  type TraceUniforms,
+  texelsInto,
+  traceUniforms,
+} from "./uniforms";
 
 /** Pixels along the edge of a tile that rests or is sampled as a whole. */
 export const NOISE_TILE = 16;
@@ -42,30 +46,6 @@ const NOISE_EVERY = 8;
 const CALM = 0.004;
 /** Samples that are kept of a view a little aside. */
 const MOST_ASIDE = 48;
-/** A path that is lit more brightly counts as one that is lit so: halves of floats end at 65504 ... */
-const MOST_LIGHT = 60_000;
-/** ... and a picture of few samples would sparkle. */
-const MOST_LIGHT_MOVING = 200;
-/** More often no path is scattered, in a medium that swallows nothing. */
-const MOST_SCATTERS = 512;
-/** ... in a picture that moves: what the paths would still have met is taken for the room's mean. */
-const FEW_SCATTERS = 16;
-/** Exponent of a shiny surface's lobe. */
-const GLOSS = 60;
-
-/** Of the longest edge of the box. */
-const LAMP_RADIUS = 0.08;
-const OCCLUSION_REACH = 0.06;
-
-export type TraceScene = Readonly<{
-  /** From um of the bundle's world, before tiles' matrices, to the room. */
-  specimen: Matrix4;
-  clip: MarchClip;
-  /** A number that changes with what is opaque in the room. */
-  solids: number;
-  /** The specimen's box, um: where lamps are told. */
-  bounds: Bounds;
-}>;
 
 /** How a frame is gathered. */
 export type Gathering = Readonly<{
@@ -107,7 +87,7 @@ export class Tracer {
   private key = "";
   private gatheredScale = 1;
   private isDraft = false;
-  private readonly pathPass: ScreenPass<ReturnType<typeof traceUniforms>>;
+  private readonly pathPass: ScreenPass<TraceUniforms>;
   private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
 
   /**
@@ -119,7 +99,7 @@ export class Tracer {
     private readonly brick = 2 * SKIP_BRICK,
     private readonly calm = CALM,
   ) {
-    this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth), {
+    this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth, MOST_ASIDE), {
       CHANNELS: 1,
       NOISE_TILE,
     });
@@ -156,25 +136,10 @@ export class Tracer {
     this.texels = texels;
     this.restart();
     if (texels === null) return;
-    const { frame, texture, channels } = texels;
     const { uniforms } = this.pathPass;
-    uniforms.uVolume.value = uniforms.uOldVolume.value = texture;
-    uniforms.uIndex.value = texels.index;
-    uniforms.uTexels.value.set(...texels.size);
+    texelsInto(uniforms, texels);
     this.pathPass.define("BRICKS", texels.index === null ? null : 1);
-    this.pathPass.define("CHANNELS", channels.length);
-    const size = frame.max.map((v, k) => v - frame.min[k]);
-    uniforms.uSize.value.set(size[0], size[1], size[2]);
-    uniforms.uVoxel.value = Math.min(...frame.spacing_um);
-    const first = frame.size.map((n) => (frame.apron + 0.5) / n);
-    const last = frame.size.map((n) => (n - frame.apron - 0.5) / n);
-    uniforms.uTexLow.value.set(first[0], last[1], first[2]); // rows run against y
-    uniforms.uTexPerUm.value.set(
-      (last[0] - first[0]) / Math.max(size[0], 1e-9),
-      (first[1] - last[1]) / Math.max(size[1], 1e-9),
-      (last[2] - first[2]) / Math.max(size[2], 1e-9),
-    );
-    uniforms.uOcclusionReach.value = OCCLUSION_REACH * Math.max(...size);
+    this.pathPass.define("CHANNELS", texels.channels.length);
     this.developer.expect(uniforms.uSize.value);
   }
 
@@ -241,7 +206,9 @@ export class Tracer {
     { scale, passes, mayTremble, isDraft }: Gathering,
   ): void {
     if (this.texels === null) return;
-    this.follow(scene, settings, isDraft);
+    const { frame } = this.texels;
+    const box = this.boxMatrix(scene.specimen);
+    sceneInto(this.pathPass.uniforms, scene, frame, box, settings, isDraft, this.roomLight);
     const key = keyOf(eyes, scene, scale, isDraft);
     if (key !== this.key) this.restart();
     this.key = key;
@@ -351,44 +318,6 @@ export class Tracer {
     );
   }
 
-  private follow(
-    { specimen, clip, bounds }: TraceScene,
-    settings: TraceSettings,
-    isDraft: boolean,
-  ): void {
-    if (this.texels === null) return;
-    const { uniforms } = this.pathPass;
-    const { frame } = this.texels;
-    const toWorld = new Matrix4().fromArray([...frame.matrix]).multiply(lowCorner(frame.min));
-    const toBox = toWorld.clone().invert();
-    clipInto(clip, toWorld, toBox, uniforms);
-    const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);
-    uniforms.uToRoom.value.copy(turnOf(turn.multiply(this.boxMatrix(specimen))));
-    uniforms.uEnvironmentLight.value = settings.environmentLight;
-    uniforms.uMostLight.value = isDraft ? MOST_LIGHT_MOVING : MOST_LIGHT;
-    const most = isDraft ? FEW_SCATTERS : MOST_SCATTERS;
-    uniforms.uScatters.value = settings.isMultiple ? most : 1;
-    const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
-    uniforms.uBeyond.value.set(...this.roomLight).multiplyScalar(beyond);
-    uniforms.uAnisotropy.value = settings.anisotropy;
-    uniforms.uSurface.value = settings.surface;
-    uniforms.uShine.value = settings.shine;
-    const edge = Math.max(...bounds.max.map((v, k) => v - bounds.min[k]));
-    const middle = new Vector3(...bounds.min).add(new Vector3(...bounds.max)).multiplyScalar(0.5);
-    let count = 0;
-    for (const { isOn, x, y, z, color, strength } of settings.lamps.slice(0, LAMPS)) {
-      if (!isOn || strength <= 0) continue;
-      const aside = new Vector3(x, y, z).multiplyScalar(edge);
-      const at = aside.clone().add(middle).applyMatrix4(toBox);
-      uniforms.uLamps.value[count].set(at.x, at.y, at.z, LAMP_RADIUS * edge);
-      // irradiance pi in the middle is what a white room gives
-      const intensity = strength * Math.PI * Math.max(aside.lengthSq(), (edge / 4) ** 2);
-      uniforms.uLampLight.value[count].set(...color).multiplyScalar(intensity);
-      count++;
-    }
-    uniforms.uLampCount.value = count;
-  }
-
   /** From um of the box to the room. */
   private boxMatrix(specimen: Matrix4): Matrix4 {
     if (this.texels === null) throw new Error("there is nothing to trace");
@@ -419,62 +348,4 @@ function keyOf(
   isDraft: boolean,
 ): string {
   return `${width_px} ${height_px} ${scale} ${isDraft} ${solids} ${JSON.stringify(clip)}`;
-}
-
-function sumUniforms() {
-  return { uSums: nothing(), uMoments: nothing() };
-}
-
-function traceUniforms(uSceneDepth: { value: Texture }) {
-  return {
-    ...sumUniforms(),
-    uNoisiness: nothing(),
-    uSize: { value: new Vector3(1, 1, 1) },
-    uTexLow: { value: new Vector3() },
-    uTexPerUm: { value: new Vector3(1, -1, 1) },
-    uVoxel: { value: 1 },
-    uTexels: { value: new Vector3(1, 1, 1) },
-    uVolume: nothing(),
-    uIndex: nothing(),
-    uOldVolume: nothing(),
-    uFresh: { value: 1 },
-    uMedium: nothing(),
-    uGradientMax: { value: new Vector4(1, 1, 1, 1) },
-    uMajorants: nothing(),
-    uBrick: { value: new Vector3(SKIP_BRICK, SKIP_BRICK, SKIP_BRICK) },
-    uClipLow: { value: new Vector3() },
-    uClipHigh: { value: new Vector3() },
-    uClipPlane: { value: new Vector4(0, 0, 0, 1) },
-    uToBox: { value: new Matrix4() },
-    uSceneToBox: { value: new Matrix4() },
-    uEyeAt: { value: new Vector3() },
-    uToRoom: { value: new Matrix3() },
-    uEye: { value: new Vector4(0, 0, 1, 1) },
-    uSceneDepth,
-    uEnvironment: nothing(),
-    uAliases: nothing(),
-    uEnvironmentLight: { value: 1 },
-    uLampCount: { value: 0 },
-    uLamps: { value: Array.from({ length: LAMPS }, () => new Vector4()) },
-    uLampLight: { value: Array.from({ length: LAMPS }, () => new Vector3()) },
-    uScatters: { value: MOST_SCATTERS },
-    uBeyond: { value: new Vector3() },
-    uAnisotropy: { value: 0 },
-    uSurface: { value: 0 },
-    uShine: { value: 0 },
-    uGloss: { value: GLOSS },
-    uOcclusionReach: { value: 1 },
-    uMostLight: { value: MOST_LIGHT },
-    uSample: { value: 0 },
-    uHistory: { value: 0 },
-    uToBefore: { value: new Matrix4() },
-    uEyeBefore: { value: new Vector3() },
-    uMostHistory: { value: MOST_ASIDE },
-    uTurn: { value: new Vector2(0, 1) },
-    uCalm: { value: 0 },
-  };
-}
-
-function lowCorner([x, y, z]: readonly [number, number, number]): Matrix4 {
-  return new Matrix4().makeTranslation(x, y, z);
 }

@@ -15,8 +15,9 @@ import { showsBelow } from "../volumes/volume_set";
 import type { VolumeSource } from "../volumes/volume_source";
 import { loadEnvironment, readEnvironment } from "./environment_file";
 import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium_loader";
-import type { Tracer, TraceScene } from "./path_tracer";
+import type { Tracer } from "./path_tracer";
 import { frameOf } from "./texel_frame";
+import type { TraceScene } from "./uniforms";
 
 const NOT_LOADED = "The part of the page that follows light could not be had.";
 /** More pixels take more memory than a phone's browser gives. */

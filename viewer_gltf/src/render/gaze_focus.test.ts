@@ -1,7 +1,7 @@
 import { Matrix4 } from "three";
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { initialState } from "../state/viewer_state";
+import { initialState } from "../state/initial_state";
 import { Hybrid } from "./gaze_focus";
 
 describe("the disc", () => {

@@ -2,8 +2,10 @@
  * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
  * high), `switch` (metres of the room), `disc` (degrees). Pure.
  */
+
+import type { Action } from "../state/actions";
 import { QUALITY_LEVELS } from "../state/quality_controller";
-import { type Action, MODES } from "../state/viewer_state";
+import { MODES } from "../state/viewer_state";
 
 /** Their names: a link to a view leaves them out, it has them itself. */
 export const SETTINGS = ["mode", "quality", "switch", "disc"] as const;

@@ -2,9 +2,12 @@ import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import { seeded } from "../../test/support/seeded";
 import { fromHex } from "../math/color";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
 import { DIALS, valueAtShare } from "../state/path_trace_parameters";
 import { LAMPS, START_TRACE, TONE_MAPS, type TraceSettings } from "../state/path_trace_settings";
-import { type Action, initialState, reduce, type ViewerState } from "../state/viewer_state";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
 import { readTrace, writeTrace } from "./path_trace_link";
 
 const START = initialState(sampleManifest(1));

@@ -3,9 +3,9 @@
  * from what a bundle opens with. Pure.
  */
 import { fromHex, toHex } from "../math/color";
+import type { Action } from "../state/actions";
 import { DIALS } from "../state/path_trace_parameters";
 import { LAMPS, START_TRACE, TONE_MAPS, type TraceSettings } from "../state/path_trace_settings";
-import type { Action } from "../state/viewer_state";
 import { readNumbers, written } from "./numbers";
 
 /** Light of the user's own file stays with the user. */

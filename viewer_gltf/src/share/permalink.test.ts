@@ -2,13 +2,10 @@ import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
 import { seeded } from "../../test/support/seeded";
 import { fromHex } from "../math/color";
-import {
-  type Action,
-  initialState,
-  MAX_CHANNELS,
-  reduce,
-  type ViewerState,
-} from "../state/viewer_state";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
+import { reduce } from "../state/reduce";
+import { MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
 import type { Look } from "./camera_link";
 import { readLink, writeLink } from "./permalink";
 

@@ -18,14 +18,9 @@ import { type Clip, withinSpecimen } from "../math/clip";
 import { fromHex, toHex } from "../math/color";
 import type { Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
+import type { Action } from "../state/actions";
 import { OWN } from "../state/transfer_functions_2d";
-import {
-  type Action,
-  type ChannelState,
-  MAX_CHANNELS,
-  MODES,
-  type ViewerState,
-} from "../state/viewer_state";
+import { type ChannelState, MAX_CHANNELS, MODES, type ViewerState } from "../state/viewer_state";
 import { type Look, readLook, writeLook } from "./camera_link";
 import { readNumbers, written } from "./numbers";
 import { readTrace, writeTrace } from "./path_trace_link";

@@ -1,9 +1,11 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
 import { MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
+import { reduce } from "../state/reduce";
 import { OWN, shapesOf } from "../state/transfer_functions_2d";
 import { makeShape } from "../state/transfer_shapes";
-import { type Action, initialState, reduce } from "../state/viewer_state";
 import { readLink, writeLink } from "./permalink";
 import { readShapes, writeShapes } from "./shapes_link";
 

@@ -1,7 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import type { Action } from "./actions";
 import { remarkOn } from "./announce_change";
-import { type Action, initialState, reduce, type ViewerState } from "./viewer_state";
+import { initialState } from "./initial_state";
+import { reduce } from "./reduce";
+import type { ViewerState } from "./viewer_state";
 
 const MANIFEST = sampleManifest(6);
 const START = initialState(MANIFEST);

@@ -3,6 +3,7 @@
  * what sets it. Panel, keys and links go by this list. Pure.
  */
 
+import type { Action } from "./actions";
 import {
   LAMP_REACH,
   LAMPS,
@@ -10,7 +11,6 @@ import {
   TRACE_LIMITS,
   type TraceSettings,
 } from "./path_trace_settings";
-import type { Action } from "./viewer_state";
 
 export type Dial = Readonly<{
   id: string;

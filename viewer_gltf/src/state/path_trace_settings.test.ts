@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import { initialState } from "./initial_state";
 import { DIALS, dialName, shareOf, valueAtShare } from "./path_trace_parameters";
 import {
   gathersAnew,
@@ -12,7 +13,7 @@ import {
   withLamp,
   withTrace,
 } from "./path_trace_settings";
-import { initialState, reduce } from "./viewer_state";
+import { reduce } from "./reduce";
 
 const NAMES = Object.keys(TRACE_LIMITS) as TraceNumber[];
 

@@ -1,11 +1,12 @@
 /** Who is drawn how: for each channel and tile, surface or volume. Pure. */
+
+import { VOLUME_TILES_AT_START } from "./initial_state";
 import {
   type ChannelState,
   isTraced,
   type Representation,
   type TileState,
   type ViewerState,
-  VOLUME_TILES_AT_START,
   volumeChannels,
 } from "./viewer_state";
 

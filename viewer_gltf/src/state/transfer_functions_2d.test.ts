@@ -1,9 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import { faultOf, MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
+import type { Action } from "./actions";
+import { initialState } from "./initial_state";
+import { reduce } from "./reduce";
 import { editedName, isTwoD, OWN, STEPS, shapesOf } from "./transfer_functions_2d";
 import { LEAST_HEIGHT, LEAST_WIDTH, makeShape } from "./transfer_shapes";
-import { type Action, type ChannelState, initialState, reduce } from "./viewer_state";
+import type { ChannelState } from "./viewer_state";
 
 const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.4 });
 

@@ -15,6 +15,7 @@ import { brickCounts } from "./bricks8";
 import { OccupancyClient } from "./empty_space_client";
 import { LoadQueue } from "./load_queue";
 import { levelsToFetch } from "./mip_levels";
+import { Residency, type Resident } from "./residency";
 import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_raymarch";
 import { type Packed, TileTexture } from "./tile_texture";
 import {
@@ -28,13 +29,6 @@ import { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
-/** A volume that has come fades in, one that goes fades out. */
-export const PRESENCE_S = 0.25;
-/** So many tiles that are no longer looked at stay for a while: the gaze often comes back. */
-const KEPT_TILES = 2;
-/** Bytes of a level and of the next coarser one, which stays while the finer one fades in. */
-const WITH_OLD_LEVEL = 9 / 8;
-
 type ChannelVolumes = Readonly<{
   sources: ReadonlyMap<string, VolumeSource>;
   transferFunctions: ReadonlyMap<string, TransferFunction>;
@@ -55,18 +49,6 @@ export type VolumeStatus = Readonly<{
   level: number | null;
 }>;
 
-type Resident = {
-  readonly texture: TileTexture | BrickTile;
-  march: TileMarch | null;
-  /** What the march's tables were made of. */
-  packed: Packed | null;
-  wanted: WantedTile | null;
-  /** 0..1 */
-  presence: number;
-  /** When it was last wanted. */
-  turn: number;
-};
-
 export class VolumeSet {
   readonly scene = new Scene();
   private readonly group = new Group();
@@ -75,13 +57,12 @@ export class VolumeSet {
   private readonly channels = new Map<string, ChannelVolumes>();
   private readonly channelsUnderWay = new Map<string, Promise<void>>();
   private readonly failedChannels = new Set<string>();
-  private readonly residents = new Map<string, Resident>();
+  private readonly residents: Residency;
   /** The last table of each channel: all tiles ask for the same. */
   private readonly planes = new Map<string, MadePlane>();
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
-  private turn = 0;
   /** Tables of leaps that are being made. */
   private leapsUnderWay = 0;
   private hasToldLimit = false;
@@ -95,6 +76,7 @@ export class VolumeSet {
     /** From a host that sends bricks by view; null: volumes come as files. */
     private readonly bricks: BrickService | null = null,
   ) {
+    this.residents = new Residency(limits.bytes);
     this.group.matrixAutoUpdate = false;
     this.scene.add(this.group);
   }
@@ -103,7 +85,7 @@ export class VolumeSet {
     return (
       this.leapsUnderWay > 0 ||
       this.channelsUnderWay.size > 0 ||
-      [...this.residents.values()].some(({ texture }) => texture.isLoading)
+      this.residents.all.some(({ texture }) => texture.isLoading)
     );
   }
 
@@ -114,11 +96,11 @@ export class VolumeSet {
 
   /** Bytes on the GPU. */
   get bytes(): number {
-    return [...this.residents.values()].reduce((sum, { texture }) => sum + texture.bytes, 0);
+    return this.residents.bytes;
   }
 
   status(): readonly VolumeStatus[] {
-    return [...this.residents].flatMap(([tile, { texture, wanted }]) =>
+    return this.residents.byTile.flatMap(([tile, { texture, wanted }]) =>
       (wanted?.channels ?? []).map((id) => ({
         tile,
         channel: id,
@@ -129,9 +111,7 @@ export class VolumeSet {
 
   /** How far the volume of a channel in a tile has faded in, 0..1. */
   presence(tile: string, channel: string): number {
-    const resident = this.residents.get(tile);
-    if (resident === undefined || resident.march === null) return 0;
-    return resident.packed?.channels.includes(channel) ? resident.presence : 0;
+    return this.residents.presence(tile, channel);
   }
 
   /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
@@ -154,7 +134,7 @@ export class VolumeSet {
   /** The channels of the tiles that are on screen. */
   shown(): readonly ShownVolume[] {
     const { state } = this;
-    return [...this.residents].flatMap(([tile, { march, packed, texture }]) => {
+    return this.residents.byTile.flatMap(([tile, { march, packed, texture }]) => {
       if (state === null || packed === null || !march?.mesh.visible) return [];
       return packed.channels.flatMap((channel) => {
         const source = texture.kept.get(channel);
@@ -195,18 +175,8 @@ export class VolumeSet {
 
   /** Go on with all fades; whether any is still under way. */
   advance(dt_s: number): boolean {
-    let isFading = false;
-    for (const resident of this.residents.values()) {
-      isFading = resident.texture.advance(dt_s) || isFading;
-      const goal = resident.wanted !== null && resident.march !== null ? 1 : 0;
-      const step = dt_s / PRESENCE_S;
-      const { presence } = resident;
-      resident.presence =
-        goal > presence ? Math.min(1, presence + step) : Math.max(goal, presence - step);
-      if (resident.presence !== goal) isFading = true;
-      else if (presence !== goal && goal === 0) this.evict();
-      this.show(resident);
-    }
+    const isFading = this.residents.advance(dt_s);
+    for (const resident of this.residents.all) this.show(resident);
     return isFading;
   }
 
@@ -217,21 +187,20 @@ export class VolumeSet {
     this.state = state;
     this.wanted = wanted;
     this.mayRefine = mayRefine;
-    this.turn++;
-    for (const resident of this.residents.values()) resident.wanted = null;
+    this.residents.unwantAll();
     for (const each of wanted) this.want(each);
     for (const id of this.failedChannels) {
       const isUsed = wanted.some(({ channels }) => channels.includes(id));
       if (!isUsed) this.failedChannels.delete(id);
     }
-    this.evict();
-    for (const resident of this.residents.values()) this.dress(resident);
+    this.residents.evict();
+    for (const resident of this.residents.all) this.dress(resident);
   }
 
   /** With the next `follow`, what has failed is loaded anew. */
   retryFailed(): void {
     this.failedChannels.clear();
-    for (const { texture } of this.residents.values()) texture.retryFailed();
+    for (const { texture } of this.residents.all) texture.retryFailed();
   }
 
   private want(wanted: WantedTile): void {
@@ -246,8 +215,7 @@ export class VolumeSet {
       if (sources.size === 0) return;
       resident = this.addTile(wanted.tile);
     }
-    resident.wanted = wanted;
-    resident.turn = this.turn;
+    this.residents.want(resident, wanted);
     const [first] = sources.values();
     if (first === undefined) return;
     this.tellLimit(first);
@@ -284,42 +252,20 @@ export class VolumeSet {
     const texture =
       this.bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
       new TileTexture(this.queue, onChange, this.onError);
-    const resident = { texture, march: null, packed: null, wanted: null, presence: 0, turn: 0 };
-    this.residents.set(tile, resident);
-    return resident;
+    return this.residents.add(tile, texture);
   }
 
   /** A tile that can't be had as bricks comes as files. */
   private replace(tile: string): void {
-    const resident = this.residents.get(tile);
-    if (resident === undefined) return;
+    if (this.residents.get(tile) === undefined) return;
     this.bricks?.refuse(tile);
-    resident.march?.dispose();
-    resident.texture.dispose();
-    this.residents.delete(tile);
+    this.residents.drop(tile);
     if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
   }
 
   /** Bytes of the GPU's memory for each tile. */
   private get share(): number {
-    return this.limits.bytes / (WITH_OLD_LEVEL * (this.wanted.length + KEPT_TILES));
-  }
-
-  /** Drop what is no longer wanted and has faded out, but for the few that were wanted last. */
-  private evict(): void {
-    const idle = [...this.residents].filter(
-      ([, { wanted, presence }]) => !wanted && presence === 0,
-    );
-    idle.sort(([, a], [, b]) => b.turn - a.turn);
-    for (const [, resident] of idle) resident.texture.want(new Map(resident.texture.kept), []);
-    const leaving = [...this.residents.values()].filter(
-      ({ wanted, presence }) => !wanted && presence > 0,
-    );
-    for (const [tile, resident] of idle.slice(Math.max(0, KEPT_TILES - leaving.length))) {
-      resident.march?.dispose();
-      resident.texture.dispose();
-      this.residents.delete(tile);
-    }
+    return this.residents.share(this.wanted.length);
   }
 
   private canCome(channel: string, tile: string): boolean {
@@ -464,18 +410,12 @@ export class VolumeSet {
   }
 
   private drawn(): { march: TileMarch }[] {
-    return [...this.residents.values()].flatMap(({ march }) =>
-      march?.mesh.visible ? [{ march }] : [],
-    );
+    return this.residents.all.flatMap(({ march }) => (march?.mesh.visible ? [{ march }] : []));
   }
 
   /** Drop all that is on the GPU; what is wanted comes anew. */
   forget(): void {
-    for (const { march, texture } of this.residents.values()) {
-      march?.dispose();
-      texture.dispose();
-    }
-    this.residents.clear();
+    this.residents.dropAll();
   }
 
   dispose(): void {

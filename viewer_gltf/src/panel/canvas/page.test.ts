@@ -1,6 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
-import { initialState, reduce, type ViewerState } from "../../state/viewer_state";
+import { initialState } from "../../state/initial_state";
+import { reduce } from "../../state/reduce";
+import type { ViewerState } from "../../state/viewer_state";
 import { type PanelView, START_VIEW } from "../controls";
 import { type Facts, layOut } from "../layout";
 import { blocksOf } from "./controls";

@@ -1,8 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../../test/support/fixture/manifest";
+import { initialState } from "../../state/initial_state";
 import { DIALS } from "../../state/path_trace_parameters";
 import { LAMPS } from "../../state/path_trace_settings";
-import { initialState, reduce, type ViewerState } from "../../state/viewer_state";
+import { reduce } from "../../state/reduce";
+import type { ViewerState } from "../../state/viewer_state";
 import { type Control, type Group, START_VIEW, type Wish } from "../controls";
 import { lightItems } from "./path_trace";
 

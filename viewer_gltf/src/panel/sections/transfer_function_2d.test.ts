@@ -1,15 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
 import { MAX_SHAPES } from "../../bundle/transfer_2d";
+import type { Action } from "../../state/actions";
+import { initialState } from "../../state/initial_state";
+import { reduce } from "../../state/reduce";
 import { OWN, shapesOf } from "../../state/transfer_functions_2d";
 import { makeShape } from "../../state/transfer_shapes";
-import {
-  type Action,
-  type ChannelState,
-  initialState,
-  reduce,
-  type ViewerState,
-} from "../../state/viewer_state";
+import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import { blocksOf } from "../canvas/controls";
 import { changePanel, type PanelView, type PlaneEditor, START_VIEW, type Wish } from "../controls";
 import { wishOf } from "../keys";

@@ -2,9 +2,10 @@
 
 import { MAX_SHAPES, type Shape, type Shapes } from "../../bundle/transfer_2d";
 import { fromHex, toHex } from "../../math/color";
+import type { Action } from "../../state/actions";
 import { editedName } from "../../state/transfer_functions_2d";
 import { removeShape, replaceShape, resize } from "../../state/transfer_shapes";
-import type { Action, ChannelState } from "../../state/viewer_state";
+import type { ChannelState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import type { Control, PanelView } from "../controls";
 import { draggedTo, editedShapes, graspAt, meantShape, withNewShape } from "../edit_shapes";

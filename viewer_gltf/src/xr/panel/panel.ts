@@ -15,8 +15,9 @@ import {
   WIDTH,
 } from "../../panel/canvas/page";
 import { changePanel, type Layout, type PanelView, START_VIEW } from "../../panel/controls";
+import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
-import type { Action, ViewerState } from "../../state/viewer_state";
+import type { ViewerState } from "../../state/viewer_state";
 import { Plane, type Spot } from "./canvas_plane";
 import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } from "./placement";
 

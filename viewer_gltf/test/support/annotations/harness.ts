@@ -24,8 +24,10 @@ import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
 import type { Vec3 } from "../../../src/math/vec3";
 import { Specimen } from "../../../src/render/specimen_pose";
+import type { Action } from "../../../src/state/actions";
+import { initialState } from "../../../src/state/initial_state";
 import type { LevelSource, ShownSurface } from "../../../src/state/on_screen";
-import { type Action, initialState, reduce } from "../../../src/state/viewer_state";
+import { reduce } from "../../../src/state/reduce";
 
 const FILE = { path: "x", bytes: 0, sha256: "" };
 

@@ -1,6 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { Manifest } from "../bundle/generated/bundle";
+import { initialState, VOLUME_TILES_AT_START } from "./initial_state";
+import { LIMITS, newNotice, reduce } from "./reduce";
 import {
   drawnAs,
   isInDisc,
@@ -10,16 +12,7 @@ import {
   wantedTiles,
   wantsSurface,
 } from "./representation";
-import {
-  initialState,
-  LIMITS,
-  MAX_CHANNELS,
-  newNotice,
-  type Representation,
-  reduce,
-  type ViewerState,
-  VOLUME_TILES_AT_START,
-} from "./viewer_state";
+import { MAX_CHANNELS, type Representation, type ViewerState } from "./viewer_state";
 
 function unclear(given: Manifest, ...indices: number[]): Manifest {
   const channels = given.channels.map((channel, i) =>

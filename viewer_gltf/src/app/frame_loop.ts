@@ -1,0 +1,225 @@
+/** Draws frames, only when something has changed, each as well as its budget allows. */
+import type { Camera, Matrix4, WebGLRenderer } from "three";
+import type { Bounds } from "../bundle/generated/bundle";
+import type { Navigation } from "../interaction/orbit_camera";
+import { rayAhead } from "../interaction/rays";
+import { type FramePace, Picture } from "../render/frame_renderer";
+import type { Hybrid } from "../render/gaze_focus";
+import { Pace } from "../render/pacing/frame_budget";
+import { RestPace } from "../render/pacing/redraw_at_rest";
+import { GatherPace } from "../render/pacing/samples_per_frame";
+import type { Room } from "../render/scene";
+import type { QualityLevel, QualitySettings } from "../state/quality_controller";
+import type { ViewerState } from "../state/viewer_state";
+import { ERROR_TARGET_PX } from "../surfaces/surface_set";
+import type { Stereo } from "../xr/stereo";
+import type { Contents } from "./scene_contents";
+
+/** A page that slept has not been looked at for as long. */
+const LONGEST_FRAME_S = 0.1;
+
+export type FrameOptions = Readonly<{
+  renderer: WebGLRenderer;
+  stage: HTMLElement;
+  room: Room;
+  hybrid: Hybrid;
+  /** Of the specimen, um. */
+  bounds: Bounds;
+  /** What the frames are of; made after the loop, which gives it what its shaders share. */
+  shown: () => Readonly<{
+    contents: Contents;
+    stereo: Stereo;
+    navigation: Navigation;
+    state: ViewerState;
+  }>;
+  /** Something is shown otherwise by what has come, or by where the gaze went. */
+  onFollow: () => void;
+  /** Called after every frame drawn. */
+  onFrame: () => void;
+}>;
+
+export class FrameLoop {
+  readonly picture: Picture;
+  /** Frames drawn so far. */
+  frames = 0;
+  private readonly gl: WebGL2RenderingContext;
+  private pace: Pace;
+  private readonly gathering: GatherPace;
+  private readonly resting: RestPace;
+  private last_ms = 0;
+  /** Whether what is looked at, or from where, has changed since the last frame. */
+  private isStale = true;
+  /** Whether something has come for the picture since the last frame, which may be at rest. */
+  private hasCome = false;
+  /** Whether the frame before was one of a moving picture, drawn in its budget. */
+  private wasMoving = false;
+  private waiting: (() => void)[] = [];
+
+  constructor(private readonly options: FrameOptions) {
+    const { renderer, room, hybrid } = options;
+    this.gl = renderer.getContext() as WebGL2RenderingContext;
+    this.picture = new Picture(renderer, room, hybrid);
+    this.pace = new Pace(this.gl);
+    this.gathering = new GatherPace(this.gl);
+    this.resting = new RestPace(this.gl);
+  }
+
+  start(): void {
+    this.options.renderer.setAnimationLoop((time_ms) => this.frame(time_ms));
+  }
+
+  /** What is looked at, or from where, is another: the picture has to follow at once. */
+  change(): void {
+    this.isStale = true;
+  }
+
+  /** Something has come for the picture, which may be at rest. */
+  come(): void {
+    this.hasCome = true;
+  }
+
+  setLevel(level: QualityLevel): void {
+    this.pace.setLevel(level);
+  }
+
+  /** Between the last two frames of a moving picture, smoothed. */
+  get frame_ms(): number {
+    return this.pace.frame_ms;
+  }
+
+  /** What the last frame was drawn with. */
+  get settings(): QualitySettings {
+    return this.pace.settings;
+  }
+
+  /** Resolves when nothing loads any more and the picture shows all of it. */
+  settled(): Promise<void> {
+    this.isStale = true;
+    return new Promise((resolve) => this.waiting.push(resolve));
+  }
+
+  /** The graphics context is gone, and the times that were asked of it. */
+  forget(): void {
+    this.gathering.forget();
+    this.resting.forget();
+  }
+
+  /** There is a graphics context again. */
+  renew(): void {
+    this.pace = new Pace(this.gl);
+  }
+
+  /** Pose of the head, or of the mono camera. */
+  get head(): Matrix4 {
+    const { stereo, navigation } = this.options.shown();
+    return stereo.head ?? navigation.camera.matrixWorld;
+  }
+
+  private frame(time_ms: number): void {
+    const { renderer, hybrid, onFollow, onFrame } = this.options;
+    if (renderer.getContext().isContextLost()) return; // there is nothing to draw on
+    const { contents, stereo } = this.options.shown();
+    const interval_ms = time_ms - this.last_ms;
+    const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
+    this.last_ms = time_ms;
+    const wasLoading = contents.isLoading;
+    if (contents.hasJustBegun()) onFollow();
+    const inRoom = stereo.pose(this.picture.eyes);
+    const isStereo = inRoom !== null;
+    const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
+    if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state);
+    const { isChanging, isFading } = this.advance(dt_s);
+    const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
+    const isDue = this.resting.isDue(time_ms) && this.hasCome;
+    const isMoving = isStereo || this.isStale;
+    // a picture that came to rest is drawn once more, as well as can be
+    const isWanted = isMoving || this.wasMoving || isGathering || isDue;
+    if (!isWanted && !wasLoading && !this.hasCome) return;
+    const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
+    this.picture.marchFrame.uSteps.value = settings.steps;
+    hybrid.radiusShare = settings.discShare;
+    const [eye] = this.picture.eyes.all; // a headset has none before its first pose
+    if (eye !== undefined) {
+      const { z, w } = eye.viewport;
+      contents.stream(stereo.seenBy(camera), z, w, ERROR_TARGET_PX * settings.errorFactor);
+    }
+    if (isWanted) {
+      this.isStale = isChanging;
+      this.hasCome = isFading;
+      contents.surfaces.dressAll();
+      const { passes } = this.gathering;
+      this.draw(camera, { resolution: settings.resolution, isMoving, passes });
+      if (isGathering) this.gathering.submit(time_ms);
+      if (!isMoving) this.resting.submit(time_ms);
+      this.frames++;
+      onFrame();
+    }
+    this.pace.end();
+    this.wasMoving = isMoving;
+    const isAtRest = isStereo || (!isMoving && !this.hasCome);
+    if (this.waiting.length > 0 && !contents.isLoading && !this.isStale && isAtRest) {
+      for (const resolve of this.waiting.splice(0)) resolve();
+    }
+  }
+
+  private poseMono(dt_s: number): Camera {
+    const { navigation } = this.options.shown();
+    navigation.update(dt_s);
+    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    return navigation.camera;
+  }
+
+  /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */
+  private advance(dt_s: number): Readonly<{ isChanging: boolean; isFading: boolean }> {
+    const { head } = this;
+    const { hybrid, room, stage, onFollow } = this.options;
+    const { contents, stereo, navigation, state } = this.options.shown();
+    const { specimen } = room;
+    const { group } = specimen;
+    const isMoving = specimen.advance(dt_s);
+    const isReady = (tile: string) => contents.volumes.isReady(tile);
+    if (hybrid.look(state, head, group.matrixWorld, isReady, dt_s)) onFollow();
+    const screen = {
+      camera: navigation.camera,
+      height_px: stage.clientHeight,
+      focus: navigation.controls.target,
+    };
+    const isFading = contents.advance({
+      head,
+      specimen: group.matrixWorld,
+      screen: stereo.kind === null ? screen : null,
+      gaze: rayAhead(head, group),
+      disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
+      isPanelOpen: stereo.hands.panel.isOpen,
+      dt_s,
+    });
+    const isChanging = isMoving || hybrid.isChanging(state);
+    if (isChanging) this.isStale = true;
+    if (isFading) this.hasCome = true;
+    return { isChanging, isFading };
+  }
+
+  private draw(camera: Camera, pace: FramePace): void {
+    const { picture, head } = this;
+    const { contents, stereo, state } = this.options.shown();
+    const { volumes, traced, surfaces, marks } = contents;
+    const drawn = {
+      volumes,
+      traced,
+      panes: surfaces.blended,
+      overlays: [...marks.overlays, ...stereo.hands.overlays],
+      bounds: this.options.bounds,
+      solids: surfaces.triangles,
+    };
+    stereo.present(() => picture.draw(camera, head, drawn, state.clip, pace));
+  }
+
+  stop(): void {
+    this.options.renderer.setAnimationLoop(null);
+  }
+
+  dispose(): void {
+    this.picture.dispose();
+    this.pace.dispose();
+  }
+}

@@ -1,0 +1,168 @@
+/** What the path tracer's shader is told: of the medium, the scene, its light and its paths. */
+import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three";
+import type { Bounds } from "../bundle/generated/bundle";
+import { clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import { nothing } from "../gpu/float_targets";
+import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
+import { SKIP_BRICK } from "../volumes/bricks8";
+import { turnOf } from "./eye_rays";
+import type { MediumTexels } from "./medium_loader";
+import type { BlockFrame } from "./texel_frame";
+
+/** A path that is lit more brightly counts as one that is lit so: halves of floats end at 65504 ... */
+const MOST_LIGHT = 60_000;
+/** ... and a picture of few samples would sparkle. */
+const MOST_LIGHT_MOVING = 200;
+/** More often no path is scattered, in a medium that swallows nothing. */
+const MOST_SCATTERS = 512;
+/** ... in a picture that moves: what the paths would still have met is taken for the room's mean. */
+const FEW_SCATTERS = 16;
+/** Exponent of a shiny surface's lobe. */
+const GLOSS = 60;
+
+/** Of the longest edge of the box. */
+const LAMP_RADIUS = 0.08;
+const OCCLUSION_REACH = 0.06;
+
+export type TraceScene = Readonly<{
+  /** From um of the bundle's world, before tiles' matrices, to the room. */
+  specimen: Matrix4;
+  clip: MarchClip;
+  /** A number that changes with what is opaque in the room. */
+  solids: number;
+  /** The specimen's box, um: where lamps are told. */
+  bounds: Bounds;
+}>;
+
+export type TraceUniforms = ReturnType<typeof traceUniforms>;
+
+export function sumUniforms() {
+  return { uSums: nothing(), uMoments: nothing() };
+}
+
+export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: number) {
+  return {
+    ...sumUniforms(),
+    uNoisiness: nothing(),
+    uSize: { value: new Vector3(1, 1, 1) },
+    uTexLow: { value: new Vector3() },
+    uTexPerUm: { value: new Vector3(1, -1, 1) },
+    uVoxel: { value: 1 },
+    uTexels: { value: new Vector3(1, 1, 1) },
+    uVolume: nothing(),
+    uIndex: nothing(),
+    uOldVolume: nothing(),
+    uFresh: { value: 1 },
+    uMedium: nothing(),
+    uGradientMax: { value: new Vector4(1, 1, 1, 1) },
+    uMajorants: nothing(),
+    uBrick: { value: new Vector3(SKIP_BRICK, SKIP_BRICK, SKIP_BRICK) },
+    uClipLow: { value: new Vector3() },
+    uClipHigh: { value: new Vector3() },
+    uClipPlane: { value: new Vector4(0, 0, 0, 1) },
+    uToBox: { value: new Matrix4() },
+    uSceneToBox: { value: new Matrix4() },
+    uEyeAt: { value: new Vector3() },
+    uToRoom: { value: new Matrix3() },
+    uEye: { value: new Vector4(0, 0, 1, 1) },
+    uSceneDepth,
+    uEnvironment: nothing(),
+    uAliases: nothing(),
+    uEnvironmentLight: { value: 1 },
+    uLampCount: { value: 0 },
+    uLamps: { value: Array.from({ length: LAMPS }, () => new Vector4()) },
+    uLampLight: { value: Array.from({ length: LAMPS }, () => new Vector3()) },
+    uScatters: { value: MOST_SCATTERS },
+    uBeyond: { value: new Vector3() },
+    uAnisotropy: { value: 0 },
+    uSurface: { value: 0 },
+    uShine: { value: 0 },
+    uGloss: { value: GLOSS },
+    uOcclusionReach: { value: 1 },
+    uMostLight: { value: MOST_LIGHT },
+    uSample: { value: 0 },
+    uHistory: { value: 0 },
+    uToBefore: { value: new Matrix4() },
+    uEyeBefore: { value: new Vector3() },
+    uMostHistory: { value: mostHistory },
+    uTurn: { value: new Vector2(0, 1) },
+    uCalm: { value: 0 },
+  };
+}
+
+/** From um of the box's low corner to the bundle's world. */
+export function lowCorner([x, y, z]: readonly [number, number, number]): Matrix4 {
+  return new Matrix4().makeTranslation(x, y, z);
+}
+
+/** The block of texels, its box and where that lies in them. */
+export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, size }: MediumTexels) {
+  uniforms.uVolume.value = uniforms.uOldVolume.value = texture;
+  uniforms.uIndex.value = index;
+  uniforms.uTexels.value.set(...size);
+  const edges = frame.max.map((v, k) => v - frame.min[k]);
+  uniforms.uSize.value.set(edges[0], edges[1], edges[2]);
+  uniforms.uVoxel.value = Math.min(...frame.spacing_um);
+  const first = frame.size.map((n) => (frame.apron + 0.5) / n);
+  const last = frame.size.map((n) => (n - frame.apron - 0.5) / n);
+  uniforms.uTexLow.value.set(first[0], last[1], first[2]); // rows run against y
+  uniforms.uTexPerUm.value.set(
+    (last[0] - first[0]) / Math.max(edges[0], 1e-9),
+    (first[1] - last[1]) / Math.max(edges[1], 1e-9),
+    (last[2] - first[2]) / Math.max(edges[2], 1e-9),
+  );
+  uniforms.uOcclusionReach.value = OCCLUSION_REACH * Math.max(...edges);
+}
+
+/**
+ * @param box from um of the box to the room
+ * @param roomLight mean radiance of the environment
+ */
+export function sceneInto(
+  uniforms: TraceUniforms,
+  { clip, bounds }: TraceScene,
+  frame: BlockFrame,
+  box: Matrix4,
+  settings: TraceSettings,
+  isDraft: boolean,
+  roomLight: readonly [number, number, number],
+): void {
+  const toWorld = new Matrix4().fromArray([...frame.matrix]).multiply(lowCorner(frame.min));
+  const toBox = toWorld.clone().invert();
+  clipInto(clip, toWorld, toBox, uniforms);
+  const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);
+  uniforms.uToRoom.value.copy(turnOf(turn.multiply(box)));
+  uniforms.uEnvironmentLight.value = settings.environmentLight;
+  uniforms.uMostLight.value = isDraft ? MOST_LIGHT_MOVING : MOST_LIGHT;
+  const most = isDraft ? FEW_SCATTERS : MOST_SCATTERS;
+  uniforms.uScatters.value = settings.isMultiple ? most : 1;
+  const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
+  uniforms.uBeyond.value.set(...roomLight).multiplyScalar(beyond);
+  uniforms.uAnisotropy.value = settings.anisotropy;
+  uniforms.uSurface.value = settings.surface;
+  uniforms.uShine.value = settings.shine;
+  lampsInto(uniforms, settings.lamps, bounds, toBox);
+}
+
+/** @param toBox from the bundle's world to um of the box */
+function lampsInto(
+  uniforms: TraceUniforms,
+  lamps: TraceSettings["lamps"],
+  bounds: Bounds,
+  toBox: Matrix4,
+): void {
+  const edge = Math.max(...bounds.max.map((v, k) => v - bounds.min[k]));
+  const middle = new Vector3(...bounds.min).add(new Vector3(...bounds.max)).multiplyScalar(0.5);
+  let count = 0;
+  for (const { isOn, x, y, z, color, strength } of lamps.slice(0, LAMPS)) {
+    if (!isOn || strength <= 0) continue;
+    const aside = new Vector3(x, y, z).multiplyScalar(edge);
+    const at = aside.clone().add(middle).applyMatrix4(toBox);
+    uniforms.uLamps.value[count].set(at.x, at.y, at.z, LAMP_RADIUS * edge);
+    // irradiance pi in the middle is what a white room gives
+    const intensity = strength * Math.PI * Math.max(aside.lengthSq(), (edge / 4) ** 2);
+    uniforms.uLampLight.value[count].set(...color).multiplyScalar(intensity);
+    count++;
+  }
+  uniforms.uLampCount.value = count;
+}

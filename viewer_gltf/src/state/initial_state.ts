@@ -1,0 +1,85 @@
+/** The state in which a bundle opens. Pure. */
+import type { Manifest } from "../bundle/generated/bundle";
+import { START_TRACE } from "./path_trace_settings";
+import { MAX_CHANNELS, type Mode, type ViewerState } from "./viewer_state";
+
+/** So many tiles can open as volumes; of a larger specimen the chosen tile does. */
+export const VOLUME_TILES_AT_START = 16;
+/** Metres of the room: nearer than a headset's specimen is at the start. */
+export const SWITCH_DISTANCE_M = 1.25;
+export const DISC_RADIUS_DEG = 12;
+/** DICOM's terms for scans of whole bodies, which are best seen as light passes through them. */
+const TRACED_MODALITIES: readonly string[] = ["MR", "CT"];
+
+/** The tiles, those first whose centres are nearest to the specimen's. */
+function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number][] {
+  const centerOf = ({ min, max }: Manifest["specimen"]["bounds_um"]) =>
+    min.map((v, i) => (v + max[i]) / 2);
+  const center = centerOf(specimen.bounds_um);
+  const distance = (tile: Manifest["tiles"][number]) =>
+    Math.hypot(...centerOf(tile.bounds_um).map((v, i) => v - center[i]));
+  return [...tiles].sort((a, b) => distance(a) - distance(b));
+}
+
+/**
+ * The state in which a bundle opens: the first channels, as surfaces from afar and as volumes in
+ * the disc when near; in the tiles that the stage draws as volumes, as those.
+ */
+export function initialState(manifest: Manifest, canTrace = true): ViewerState {
+  const ordered = fromTheMiddle(manifest);
+  const staged = ordered.filter((tile) => tile.representation !== "mesh");
+  const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
+  const shown = new Set(manifest.channels.slice(0, MAX_CHANNELS).map(({ id }) => id));
+  return {
+    channels: manifest.channels.map((channel, index) => ({
+      id: channel.id,
+      name: channel.name,
+      shown: shown.has(channel.id),
+      turn: index - manifest.channels.length, // before all that is shown later
+      color: channel.color,
+      original: channel.color,
+      opacity: 1,
+      window: [0, 1],
+      volume: true,
+      transferFunction: channel.transfer_function,
+      transferFunctions: channel.transfer_functions,
+      transferFunctions2d: channel.transfer_functions_2d.names,
+      plane: null,
+      shapes: {},
+      hasSurface: channel.tileset !== null,
+      prefersVolume: channel.surface === "unclear",
+    })),
+    tiles: manifest.tiles.map((tile) => ({
+      id: tile.id,
+      representation: asStaged.has(tile) ? tile.representation : "mesh",
+    })),
+    middle: ordered[0].id,
+    mode: startMode(manifest, canTrace, staged.length > 0),
+    selected: null,
+    isolated: null,
+    switchDistance_m: SWITCH_DISTANCE_M,
+    discRadius_deg: DISC_RADIUS_DEG,
+    clip: { box: null, plane: null },
+    tool: "select",
+    measured: [],
+    isDwellOn: true,
+    quality: "auto",
+    canTrace,
+    trace: START_TRACE,
+    areLampsShown: false,
+    notices:
+      staged.length > VOLUME_TILES_AT_START
+        ? [
+            `The stage draws ${staged.length} tiles as volumes: ` +
+              `the ${VOLUME_TILES_AT_START} in the middle are, "All" draws the rest.`,
+          ]
+        : [],
+    mendable: [],
+  };
+}
+
+/** Scans of bodies open by paths of light; an artist's choice goes before the disc. */
+function startMode({ specimen }: Manifest, canTrace: boolean, isStaged: boolean): Mode {
+  if (TRACED_MODALITIES.includes(specimen.modality)) return canTrace ? "traced" : "all";
+  return isStaged ? "stage" : "disc";
+}

@@ -1,0 +1,132 @@
+/** What an action makes of the state. Pure. */
+import type { Action } from "./actions";
+import { withLamp, withTrace } from "./path_trace_settings";
+import { withShapes } from "./transfer_functions_2d";
+import { type ChannelState, MAX_CHANNELS, type ViewerState } from "./viewer_state";
+
+const NO_FLOATS = "This device can't draw into textures of floats: light can't be gathered here.";
+function withChannel(
+  state: ViewerState,
+  id: string,
+  change: (channel: ChannelState) => ChannelState,
+): ViewerState {
+  return { ...state, channels: state.channels.map((c) => (c.id === id ? change(c) : c)) };
+}
+
+function withNotice(state: ViewerState, text: string): ViewerState {
+  return { ...state, notices: [...state.notices.filter((n) => n !== text), text] };
+}
+
+function withMendable(state: ViewerState, text: string, isMendable: boolean): ViewerState {
+  const others = state.mendable.filter((n) => n !== text);
+  return { ...state, mendable: isMendable ? [...others, text] : others };
+}
+
+/** Show a channel; if there is no room, the one that has been shown longest leaves: see announce_change.ts. */
+function withShown(state: ViewerState, id: string): ViewerState {
+  const channel = state.channels.find((c) => c.id === id);
+  if (channel === undefined || channel.shown) return state;
+  const turn = Math.max(0, ...state.channels.map((c) => c.turn + 1));
+  const shown = state.channels.filter((c) => c.shown).sort((a, b) => a.turn - b.turn);
+  const next = withChannel(state, id, (c) => ({ ...c, shown: true, turn }));
+  const [leaves] = shown;
+  if (shown.length < MAX_CHANNELS) return next;
+  return withChannel(next, leaves.id, (c) => ({ ...c, shown: false }));
+}
+
+const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
+
+/** The limits of what a user can set. */
+export const LIMITS = {
+  switchDistance_m: [0.1, 10],
+  discRadius_deg: [2, 40],
+} as const;
+/** Narrower, a window would be one step of the 8 bits. */
+const NARROWEST_WINDOW = 1 / 128;
+
+/** The next state. Returns the same object if the action changes nothing. */
+export function reduce(state: ViewerState, action: Action): ViewerState {
+  switch (action.type) {
+    case "show":
+      if (action.shown) return withShown(state, action.channel);
+      return withChannel(state, action.channel, (c) => ({ ...c, shown: false }));
+    case "recolor":
+      return withChannel(state, action.channel, (c) => ({ ...c, color: action.color }));
+    case "fade":
+      return withChannel(state, action.channel, (c) => ({
+        ...c,
+        opacity: clamp(action.opacity, 0, 1),
+      }));
+    case "window": {
+      const low = clamp(action.window[0], 0, 1 - NARROWEST_WINDOW);
+      const high = clamp(action.window[1], low + NARROWEST_WINDOW, 1);
+      return withChannel(state, action.channel, (c) => ({ ...c, window: [low, high] }));
+    }
+    case "draw-volume":
+      return withChannel(state, action.channel, (c) => ({ ...c, volume: action.volume }));
+    case "choose-transfer-function":
+      return withChannel(state, action.channel, (c) =>
+        c.transferFunctions.includes(action.name) ? { ...c, transferFunction: action.name } : c,
+      );
+    case "set-shapes":
+      return withChannel(state, action.channel, (c) => withShapes(c, action.name, action.shapes));
+    case "learn-plane":
+      return withChannel(state, action.channel, (c) => ({ ...c, plane: action.plane }));
+    case "select":
+      return withTile(state, "selected", action.tile);
+    case "isolate":
+      // the isolated tile is the selected one: `back` leads from one to the other
+      return withTile(
+        action.tile === null ? state : withTile(state, "selected", action.tile),
+        "isolated",
+        action.tile,
+      );
+    case "choose-mode":
+      if (action.mode === "traced" && !state.canTrace) return withNotice(state, NO_FLOATS);
+      return action.mode === state.mode ? state : { ...state, mode: action.mode };
+    case "set-switch-distance":
+      return { ...state, switchDistance_m: clamp(action.distance_m, ...LIMITS.switchDistance_m) };
+    case "set-disc-radius":
+      return { ...state, discRadius_deg: clamp(action.radius_deg, ...LIMITS.discRadius_deg) };
+    case "set-clip":
+      return { ...state, clip: action.clip };
+    case "choose-tool":
+      return action.tool === state.tool ? state : { ...state, tool: action.tool };
+    case "measure":
+      return { ...state, measured: action.points.slice(-2) };
+    case "set-dwell":
+      return action.isOn === state.isDwellOn ? state : { ...state, isDwellOn: action.isOn };
+    case "choose-quality":
+      return action.level === state.quality ? state : { ...state, quality: action.level };
+    case "trace":
+      return { ...state, trace: withTrace(state.trace, action.change) };
+    case "move-lamp":
+      return { ...state, trace: withLamp(state.trace, action.lamp, action.change) };
+    case "show-lamps":
+      if (action.areShown === state.areLampsShown) return state;
+      return { ...state, areLampsShown: action.areShown };
+    case "notify":
+      return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
+    case "dismiss": {
+      const notices = state.notices.filter((n) => n !== action.text);
+      if (notices.length === state.notices.length) return state;
+      return withMendable({ ...state, notices }, action.text, false);
+    }
+  }
+}
+
+function withTile(
+  state: ViewerState,
+  key: "selected" | "isolated",
+  tile: string | null,
+): ViewerState {
+  const isThere = tile === null || state.tiles.some(({ id }) => id === tile);
+  if (!isThere || state[key] === tile) return state;
+  return { ...state, [key]: tile };
+}
+
+/** The notice that a change has brought, also if it was there before; null: none. */
+export function newNotice(before: ViewerState, after: ViewerState): string | null {
+  const isNew = after.notices !== before.notices && after.notices.length >= before.notices.length;
+  return (isNew && after.notices.at(-1)) || null;
+}

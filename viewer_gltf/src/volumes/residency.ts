@@ -1,0 +1,114 @@
+/** Which tiles have volumes on the GPU: how much each may take, how far it has faded in, which leave. */
+import type { WantedTile } from "../state/representation";
+import type { BrickTile } from "./bricks/brick_atlas";
+import type { TileMarch } from "./tile_raymarch";
+import type { Packed, TileTexture } from "./tile_texture";
+
+/** A volume that has come fades in, one that goes fades out. */
+export const PRESENCE_S = 0.25;
+/** So many tiles that are no longer looked at stay for a while: the gaze often comes back. */
+const KEPT_TILES = 2;
+/** Bytes of a level and of the next coarser one, which stays while the finer one fades in. */
+const WITH_OLD_LEVEL = 9 / 8;
+
+export type Resident = {
+  readonly texture: TileTexture | BrickTile;
+  march: TileMarch | null;
+  /** What the march's tables were made of. */
+  packed: Packed | null;
+  wanted: WantedTile | null;
+  /** 0..1 */
+  presence: number;
+  /** When it was last wanted. */
+  turn: number;
+};
+
+export class Residency {
+  private readonly residents = new Map<string, Resident>();
+  private turn = 0;
+
+  /** @param budget bytes of the GPU's memory for all tiles */
+  constructor(private readonly budget: number) {}
+
+  get all(): readonly Resident[] {
+    return [...this.residents.values()];
+  }
+
+  get byTile(): readonly (readonly [string, Resident])[] {
+    return [...this.residents];
+  }
+
+  /** Bytes on the GPU. */
+  get bytes(): number {
+    return this.all.reduce((sum, { texture }) => sum + texture.bytes, 0);
+  }
+
+  get(tile: string): Resident | undefined {
+    return this.residents.get(tile);
+  }
+
+  add(tile: string, texture: Resident["texture"]): Resident {
+    const resident = { texture, march: null, packed: null, wanted: null, presence: 0, turn: 0 };
+    this.residents.set(tile, resident);
+    return resident;
+  }
+
+  /** Bytes for each tile, where so many are wanted. */
+  share(wanted: number): number {
+    return this.budget / (WITH_OLD_LEVEL * (wanted + KEPT_TILES));
+  }
+
+  /** From now on none is wanted, until it is said again. */
+  unwantAll(): void {
+    this.turn++;
+    for (const resident of this.residents.values()) resident.wanted = null;
+  }
+
+  want(resident: Resident, wanted: WantedTile): void {
+    resident.wanted = wanted;
+    resident.turn = this.turn;
+  }
+
+  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  presence(tile: string, channel: string): number {
+    const resident = this.residents.get(tile);
+    if (resident === undefined || resident.march === null) return 0;
+    return resident.packed?.channels.includes(channel) ? resident.presence : 0;
+  }
+
+  /** Go on with all fades, those between levels too; whether any is still under way. */
+  advance(dt_s: number): boolean {
+    let isFading = false;
+    for (const resident of this.residents.values()) {
+      isFading = resident.texture.advance(dt_s) || isFading;
+      const goal = resident.wanted !== null && resident.march !== null ? 1 : 0;
+      const step = dt_s / PRESENCE_S;
+      const { presence } = resident;
+      resident.presence =
+        goal > presence ? Math.min(1, presence + step) : Math.max(goal, presence - step);
+      if (resident.presence !== goal) isFading = true;
+      else if (presence !== goal && goal === 0) this.evict();
+    }
+    return isFading;
+  }
+
+  /** Drop what is no longer wanted and has faded out, but for the few that were wanted last. */
+  evict(): void {
+    const idle = this.byTile.filter(([, { wanted, presence }]) => !wanted && presence === 0);
+    idle.sort(([, a], [, b]) => b.turn - a.turn);
+    for (const [, resident] of idle) resident.texture.want(new Map(resident.texture.kept), []);
+    const leaving = this.all.filter(({ wanted, presence }) => !wanted && presence > 0);
+    for (const [tile] of idle.slice(Math.max(0, KEPT_TILES - leaving.length))) this.drop(tile);
+  }
+
+  drop(tile: string): void {
+    const resident = this.residents.get(tile);
+    resident?.march?.dispose();
+    resident?.texture.dispose();
+    this.residents.delete(tile);
+  }
+
+  dropAll(): void {
+    for (const tile of [...this.residents.keys()]) this.drop(tile);
+  }
+}
