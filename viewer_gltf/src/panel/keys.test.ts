@@ -6,7 +6,8 @@ import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
-import { type Focus, firesOn, KEYS, type KeyContext, keyName, wishOf } from "./keys";
+import type { KeyContext } from "./key";
+import { KEYS, wishOf } from "./keys";
 import { told } from "./spoken_feedback";
 
 const ALL = KEYS.flatMap(({ keys }) => keys);
@@ -149,16 +150,6 @@ describe("the keys", () => {
     expect(wishOf("N", { ...CONTEXT, state: whole })).toBeNull();
   });
 
-  it("have a name on every keyboard", () => {
-    const named = (key: string, code: string, shiftKey = false) => keyName({ key, code, shiftKey });
-    expect(named("a", "KeyQ")).toBe("a"); // as a French keyboard has it
-    expect(named("ф", "KeyA")).toBe("a");
-    expect(named("Ф", "KeyA", true)).toBe("A");
-    expect(named("?", "Minus", true)).toBe("?");
-    expect(named("ArrowLeft", "ArrowLeft")).toBe("ArrowLeft");
-    expect(named("ArrowLeft", "ArrowLeft", true)).toBe("Shift+ArrowLeft");
-  });
-
   it("mean the channel whose card is open, or the first one shown", () => {
     expect(wishOf("o", CONTEXT)).toEqual({ type: "fade", channel: "c0", opacity: 0.95 });
     const view = { ...START_VIEW, picked: "c2" };
@@ -196,21 +187,6 @@ describe("the keys", () => {
     const state = reduce(CONTEXT.state, { type: "isolate", tile: "r1_c4" });
     expect(wishOf("t", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: "r0_c0" });
     expect(wishOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
-  });
-
-  it("rest while something is typed, and leave a control what it is worked by", () => {
-    const press = ["Enter", " ", "Shift+Enter"];
-    const goThrough = ["ArrowLeft", "Shift+ArrowUp", "Home", "End", "PageUp", "PageDown"];
-    const others = ["o", "?", "+", "-", "=", "Escape", "Delete", "Backspace"];
-    const fire = (focus: Focus) =>
-      [press, goThrough, others].map((names) => {
-        const fired = names.filter((name) => firesOn(name, focus)).length;
-        return fired === 0 ? "none" : fired === names.length ? "all" : "some";
-      });
-    expect(fire("field")).toEqual(["none", "none", "none"]);
-    expect(fire("list")).toEqual(["none", "none", "all"]);
-    expect(fire("button")).toEqual(["none", "all", "all"]);
-    expect(fire("page")).toEqual(["all", "all", "all"]);
   });
 
   it("cut what is shown, also of a tile that is shown alone", () => {

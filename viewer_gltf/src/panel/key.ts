@@ -1,0 +1,55 @@
+/** What a key is: its names, the words for it, and what it asks for. Pure. */
+import type { Box } from "../math/box";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
+import type { PanelView, Wish } from "./controls";
+
+export type KeyContext = Readonly<{
+  state: ViewerState;
+  view: PanelView;
+  /** The specimen, or the isolated tile; um, world. */
+  shown: Box;
+  gazed: string | null;
+}>;
+
+export type Key = Readonly<{
+  /** As `keyName` has them; several mean the same. */
+  keys: readonly string[];
+  label: string;
+  /** null: there is nothing to do now. `name`: which of its keys it was. */
+  to: (context: KeyContext, name: string) => Wish | null;
+}>;
+export type KeyGroup = Readonly<{ name: string; keys: readonly Key[] }>;
+
+/** The item after (or before) the present one, round the end. */
+export function neighbour<T>(items: readonly T[], present: T | undefined, by: number): T | null {
+  if (items.length === 0) return null;
+  const at = present === undefined ? -1 : items.indexOf(present);
+  if (at === -1) return by > 0 ? items[0] : items[items.length - 1];
+  return items[(at + by + items.length) % items.length];
+}
+
+/** The channel that the channel keys mean: the open card's, or the first one shown. */
+export function meantChannel({ state, view }: KeyContext): ChannelState | undefined {
+  const shown = state.channels.filter((channel) => channel.shown);
+  return shown.find(({ id }) => id === view.picked) ?? shown[0];
+}
+
+export function key(keys: string | readonly string[], label: string, to: Wish | Key["to"]): Key {
+  return {
+    keys: typeof keys === "string" ? [keys] : keys,
+    label,
+    to: typeof to === "function" ? to : () => to,
+  };
+}
+
+/** A key of the meant channel. */
+export function ofChannel(
+  name: string,
+  label: string,
+  to: (channel: ChannelState) => Wish | null,
+): Key {
+  return key(name, label, (context) => {
+    const channel = meantChannel(context);
+    return channel === undefined ? null : to(channel);
+  });
+}

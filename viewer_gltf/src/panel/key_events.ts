@@ -1,0 +1,71 @@
+/** Keys as the browser tells of them: their names, and who else wants them. */
+
+/**
+ * The name of a key that was pressed: as `KeyboardEvent.key` has it, with Shift where that leaves no
+ * mark on it. Where a keyboard writes other letters than Latin ones, their place counts.
+ */
+export function keyName({
+  key: written,
+  code,
+  shiftKey,
+}: Pick<KeyboardEvent, "key" | "code" | "shiftKey">): string {
+  if (written.length > 1) return shiftKey ? `Shift+${written}` : written;
+  const [, letter] = /^Key([A-Z])$/.exec(code) ?? [];
+  if (letter === undefined || written <= "~") return written;
+  return shiftKey ? letter : letter.toLowerCase();
+}
+
+/**
+ * What has the keyboard. A text field takes every key; a control those that it is worked by: a
+ * button is pressed, a list (or a slider, or radio buttons) is gone through as well.
+ */
+export type Focus = "field" | "list" | "button" | "page";
+
+const PRESS = ["Enter", " "];
+const GO_THROUGH = [
+  ...["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"],
+  ...["Home", "End", "PageUp", "PageDown"],
+];
+
+export function firesOn(name: string, focus: Focus): boolean {
+  if (focus === "page") return true;
+  if (focus === "field") return false;
+  const plain = name.replace(/^Shift\+/, ""); // which changes nothing to a control
+  return !PRESS.includes(plain) && !(focus === "list" && GO_THROUGH.includes(plain));
+}
+
+const TEXT_INPUTS = ["text", "search", "url", "number", "email", "password", "tel"];
+
+/** Groups of buttons with one stop of the Tab key take their arrows themselves: see roving_tabindex.ts. */
+export function focusOf(target: EventTarget | null): Focus {
+  if (!(target instanceof HTMLElement)) return "page";
+  if (target.isContentEditable || target instanceof HTMLTextAreaElement) return "field";
+  if (target instanceof HTMLSelectElement) return "list";
+  if (target instanceof HTMLInputElement) {
+    if (TEXT_INPUTS.includes(target.type)) return "field";
+    return target.type === "range" || target.type === "radio" ? "list" : "button";
+  }
+  return target instanceof HTMLButtonElement ? "button" : "page";
+}
+
+/** @param onKey returns whether the key did something: then the browser does nothing with it */
+export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSignal): void {
+  addEventListener(
+    "keydown",
+    (event) => {
+      if (event.defaultPrevented || event.isComposing) return;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (document.querySelector("dialog[open]") !== null) return;
+      const { target } = event;
+      const name = keyName(event);
+      const focus = focusOf(target);
+      if (firesOn(name, focus)) {
+        if (onKey(name)) event.preventDefault();
+      } else if (focus === "field" && name === "Escape" && target instanceof HTMLElement) {
+        target.blur(); // what was typed stays
+        event.preventDefault();
+      }
+    },
+    { signal },
+  );
+}

@@ -1,0 +1,72 @@
+/** The keys of the channels: which one is meant, and how it looks. Pure. */
+import { fromHex, toHex } from "../../math/color";
+import type { ChannelState } from "../../state/viewer_state";
+import type { Wish } from "../controls";
+import { type Key, key, neighbour, ofChannel } from "../key";
+import { nextColour } from "../palettes";
+import { pagesOf } from "./channels";
+
+const OPACITY_STEP = 0.05;
+const WINDOW_STEP = 1 / 64;
+
+function pick(by: number): Key["to"] {
+  return ({ state, view }) => {
+    const shown = state.channels.filter((each) => each.shown).map(({ id }) => id);
+    const channel = neighbour(shown, view.picked ?? undefined, by);
+    return channel === null ? null : { panel: "pick", channel };
+  };
+}
+
+function fade(by: number) {
+  return ({ id, opacity }: ChannelState): Wish => ({
+    type: "fade",
+    channel: id,
+    opacity: Math.round(100 * (opacity + by)) / 100,
+  });
+}
+
+function shift(low: number, high: number) {
+  return ({ id, window }: ChannelState): Wish => ({
+    type: "window",
+    channel: id,
+    window: [window[0] + low, window[1] + high],
+  });
+}
+
+const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
+
+export const CHANNEL_KEYS: readonly Key[] = [
+  key(DIGITS, "Show or hide this channel of the bundle", ({ state }, name) => {
+    const channel = state.channels[Number(name) - 1];
+    if (channel === undefined) return null;
+    return { type: "show", channel: channel.id, shown: !channel.shown };
+  }),
+  key("/", "Find a channel that is not shown", "find"),
+  key("A", "Next page of the channels that are not shown", ({ state, view }) => {
+    const pages = pagesOf(state, view.search);
+    return pages === 1 ? null : { panel: "page", page: (view.page + 1) % pages };
+  }),
+  key("c", "Next channel: the keys below mean it", pick(1)),
+  key("C", "Previous channel", pick(-1)),
+  ofChannel("x", "Hide the channel", ({ id }) => ({ type: "show", channel: id, shown: false })),
+  ofChannel("v", "Volume on or off", ({ id, volume }) => ({
+    type: "draw-volume",
+    channel: id,
+    volume: !volume,
+  })),
+  ofChannel("f", "Next transfer function", ({ id, transferFunction, transferFunctions }) => {
+    const name = neighbour(transferFunctions, transferFunction, 1);
+    return name === null ? null : { type: "choose-transfer-function", channel: id, name };
+  }),
+  ofChannel("k", "Next colour of the palettes", ({ id, color }) => ({
+    type: "recolor",
+    channel: id,
+    color: fromHex(nextColour(toHex(color))),
+  })),
+  ofChannel("o", "Less opacity", fade(-OPACITY_STEP)),
+  ofChannel("O", "More opacity", fade(OPACITY_STEP)),
+  ofChannel("w", "Window: lower end down", shift(-WINDOW_STEP, 0)),
+  ofChannel("W", "Window: lower end up", shift(WINDOW_STEP, 0)),
+  ofChannel("e", "Window: upper end down", shift(0, -WINDOW_STEP)),
+  ofChannel("E", "Window: upper end up", shift(0, WINDOW_STEP)),
+];

@@ -1,0 +1,27 @@
+/** The keys of the tiles. Pure. */
+import { type Key, key, neighbour } from "../key";
+import { chosenTile } from "./tiles";
+
+function nextTile(by: number): Key["to"] {
+  return ({ state }) => {
+    const ids = state.tiles.map(({ id }) => id);
+    const tile = neighbour(ids, state.isolated ?? state.selected ?? undefined, by);
+    if (tile === null) return null;
+    return state.isolated === null ? { type: "select", tile } : { type: "isolate", tile };
+  };
+}
+
+export const TILE_KEYS: readonly Key[] = [
+  key("t", "Next tile", nextTile(1)),
+  key("T", "Previous tile", nextTile(-1)),
+  key("i", "Show only the tile that is chosen or looked at; again: all", (context) => {
+    const { state, gazed } = context;
+    if (state.isolated !== null) return { type: "isolate", tile: null };
+    const tile = state.selected ?? gazed;
+    return tile === null ? null : { type: "isolate", tile };
+  }),
+  key("g", "Choose the tile that is looked at", ({ state, gazed }) =>
+    gazed === null ? null : chosenTile(state, gazed),
+  ),
+  key(["Escape", "Backspace"], "Back: all tiles, then none chosen", "back"),
+];

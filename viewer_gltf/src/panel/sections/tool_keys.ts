@@ -1,0 +1,51 @@
+/** The keys of measuring, cutting open, sharing and of the panel itself. Pure. */
+import { gripsOf, meantGrip, moveGrip } from "../clip_by_key";
+import { type Key, key, neighbour } from "../key";
+import { middleBox, middlePlane } from "../layout";
+
+function nextGrip(by: number): Key["to"] {
+  return ({ state: { clip }, view }) => {
+    const grip = neighbour(gripsOf(clip), view.grip ?? undefined, by);
+    return grip === null ? null : { panel: "grip", grip };
+  };
+}
+
+function push(steps: number): Key["to"] {
+  return ({ state: { clip }, view, shown }) => {
+    const grip = meantGrip(clip, view.grip);
+    return grip === undefined ? null : moveGrip(grip, steps, clip, shown);
+  };
+}
+
+export const TOOL_KEYS: readonly Key[] = [
+  key("p", "A tap selects or measures", ({ state }) => ({
+    type: "choose-tool",
+    tool: state.tool === "select" ? "measure" : "select",
+  })),
+  key("Enter", "Tap in the middle of the view", "press"),
+  key("u", "Clear what was measured", ({ state }) =>
+    state.measured.length === 0 ? null : { type: "measure", points: [] },
+  ),
+  key("b", "Cut by a box: on or off", ({ state: { clip }, shown }) => ({
+    type: "set-clip",
+    clip: { ...clip, box: clip.box === null ? middleBox(shown) : null },
+  })),
+  key("n", "Cut by a plane: on or off", ({ state: { clip }, shown }) => ({
+    type: "set-clip",
+    clip: { ...clip, plane: clip.plane === null ? middlePlane(shown) : null },
+  })),
+  key("N", "Next part of the cuts: a face, the plane, its turn", nextGrip(1)),
+  key("B", "The part before", nextGrip(-1)),
+  key(",", "Move or turn that part back", push(-1)),
+  key(".", "Move or turn that part on", push(1)),
+  key("l", "Copy a link to this view", "share"),
+  key("Delete", "Dismiss the newest notice", ({ state }) => {
+    const text = state.notices.at(-1);
+    return text === undefined ? null : { type: "dismiss", text };
+  }),
+  key("R", "Try again what the network failed to bring", ({ state }) =>
+    state.mendable.length === 0 ? null : "retry",
+  ),
+  key("h", "Hide or show the panel", { panel: "hide" }),
+  key("?", "This list", { panel: "help" }),
+];

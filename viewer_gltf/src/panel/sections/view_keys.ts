@@ -1,0 +1,31 @@
+/** The keys of the view, on the screen and in stereo. Pure. */
+import { type Key, key, neighbour } from "../key";
+import { LENSES } from "./stereo";
+
+export const VIEW_KEYS: readonly Key[] = [
+  key("ArrowLeft", "Turn left", "turn-left"),
+  key("ArrowRight", "Turn right", "turn-right"),
+  key("ArrowUp", "Turn up", "turn-up"),
+  key("ArrowDown", "Turn down", "turn-down"),
+  key("Shift+ArrowLeft", "Move left", "pan-left"),
+  key("Shift+ArrowRight", "Move right", "pan-right"),
+  key("Shift+ArrowUp", "Move up", "pan-up"),
+  key("Shift+ArrowDown", "Move down", "pan-down"),
+  key(["+", "="], "Zoom in", "zoom-in"),
+  key("-", "Zoom out", "zoom-out"),
+  key("z", "From the front (along z)", "front"),
+  key("a", "From the side (along x)", "side"),
+  key("y", "From the top (along y)", "top"),
+  key("r", "Reset the view", "reset"),
+  key("V", "Enter stereo (VR), or leave it", "stereo"),
+  key("L", "Next phone viewer", ({ view }) => {
+    const lenses = neighbour(LENSES, view.lenses, 1);
+    return lenses === null ? null : { panel: "lenses", lenses };
+  }),
+  key("P", "Split screen for a phone viewer", "split"),
+  key("K", "Scan the phone viewer's code", "scan"),
+  key("j", "Choosing by gaze on or off", ({ state }) => ({
+    type: "set-dwell",
+    isOn: !state.isDwellOn,
+  })),
+];
