@@ -19,12 +19,12 @@ import {
 /** Its middle is at 500, -200, 100, its longest edge 1000. */
 const SPECIMEN: Box = { min: [0, -400, 0], max: [1000, 0, 200] };
 const after = (...actions: Action[]) => actions.reduce(reduce, initialState(sampleManifest(1)));
-const TRACED: Action = { type: "choose-mode", mode: "traced" };
-const SHOWN: Action = { type: "show-lamps", areShown: true };
+const TRACED: Action = { type: "set", id: "mode", value: "traced" };
+const SHOWN: Action = { type: "set", id: "trace/lamps", value: true };
 const put = (lamp: number, x: number, y: number, z: number): Action => ({
   type: "move-lamp",
   lamp,
-  change: { x, y, z },
+  place: [x, y, z],
 });
 const length = (v: Vec3) => Math.hypot(...v);
 const towards = (origin: Vec3, to: Vec3): Ray => ({
@@ -45,7 +45,7 @@ describe("the lamps' handles", () => {
     expect(idsOf(after(SHOWN))).toEqual([]);
     expect(idsOf(after(TRACED))).toEqual([]);
     expect(idsOf(after(TRACED, SHOWN))).toEqual(["lamp-0"]);
-    const lit: Action = { type: "move-lamp", lamp: 2, change: { isOn: true } };
+    const lit: Action = { type: "set", id: "lamp-2/on", value: true };
     expect(idsOf(after(TRACED, SHOWN, lit))).toEqual(["lamp-0", "lamp-2"]);
   });
 
@@ -136,14 +136,13 @@ describe("a lamp that is dragged", () => {
     const drag = dragLamp("lamp-0", ray, state, SPECIMEN, false);
     if (drag?.action?.type !== "move-lamp") throw new Error("no drag");
     expect(drag.action.lamp).toBe(0);
-    const { x = 0, y = 0, z = 0 } = drag.action.change;
-    expectAt([x, y, z], [0.6, 0, 0.8]);
+    expectAt(drag.action.place, [0.6, 0, 0.8]);
     const moved = reduce(state, drag.action);
     expect(moved.trace.lamps.slice(1)).toEqual(state.trace.lamps.slice(1));
     const again = dragLamp("lamp-0", ray, moved, SPECIMEN, false);
     expect(again).toEqual({ action: null, isBeside: false }); // it begins no picture anew
     expect(dragLamp("lamp-1", ray, state, SPECIMEN, false)).toBeNull(); // off
-    const hidden = reduce(state, { type: "show-lamps", areShown: false });
+    const hidden = reduce(state, { type: "set", id: "trace/lamps", value: false });
     expect(dragLamp("lamp-0", ray, hidden, SPECIMEN, false)).toBeNull();
   });
 });

@@ -7,8 +7,9 @@ import type { Box } from "../math/box";
 import type { Ray, Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
 import type { Action } from "../state/actions";
+import { isTraced } from "../state/parameters/volumes";
 import { LAMP_REACH } from "../state/path_trace_settings";
-import { isTraced, type ViewerState } from "../state/viewer_state";
+import type { ViewerState } from "../state/viewer_state";
 
 export const LAMP_HANDLES = ["lamp-0", "lamp-1", "lamp-2"] as const;
 export type LampHandleId = (typeof LAMP_HANDLES)[number];
@@ -67,10 +68,9 @@ export function dragLamp(
   const origin = new Vector3(...ray.origin).sub(middle).divideScalar(edge_um).toArray();
   const slid = slideOnSphere([x, y, z], { origin, direction: ray.direction }, wasBeside);
   if (slid === null) return null;
-  const [toX, toY, toZ] = withinReach(slid.place);
-  const isSame = Math.hypot(toX - x, toY - y, toZ - z) < SAME;
-  const change = { x: toX, y: toY, z: toZ };
-  const action: Action | null = isSame ? null : { type: "move-lamp", lamp, change };
+  const place = withinReach(slid.place);
+  const isSame = Math.hypot(place[0] - x, place[1] - y, place[2] - z) < SAME;
+  const action: Action | null = isSame ? null : { type: "move-lamp", lamp, place };
   return { action, isBeside: slid.isBeside };
 }
 

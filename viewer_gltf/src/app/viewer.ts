@@ -20,6 +20,8 @@ import type { Action } from "../state/actions";
 import { remarkOn } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { setTo } from "../state/parameters/kinds";
+import { ENVIRONMENT } from "../state/parameters/light";
 import { newNotice, reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
@@ -273,7 +275,7 @@ export class Viewer {
   /** Light the traced picture by a file of the user's. Throws BundleError. */
   async lightBy(file: File): Promise<void> {
     await this.contents.traced.lightBy(file);
-    this.dispatch({ type: "trace", change: { environment: "own" } });
+    this.dispatch(setTo(ENVIRONMENT, "own"));
   }
 
   /** Voxels of a channel by value and gradient; null: not yet, it is being fetched. */

@@ -24,7 +24,7 @@ export type PanelChange =
   | Readonly<{ panel: "pick"; channel: string | null }>
   /** The part of the cuts that the keys move. */
   | Readonly<{ panel: "grip"; grip: Grip }>
-  /** The number of the light that the keys turn: see path_trace_parameters.ts. */
+  /** The number of the light that the keys turn: see state/parameters/light.ts. */
   | Readonly<{ panel: "dial"; dial: string }>
   /** Open or close the plane of value and gradient in a channel's card, which it opens. */
   | Readonly<{ panel: "plane"; channel: string }>

@@ -1,5 +1,6 @@
 /** What a key is: its names, the words for it, and what it asks for. Pure. */
 import type { Box } from "../math/box";
+import { optionsOf, type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import type { PanelView, Wish } from "./controls";
 
@@ -51,5 +52,60 @@ export function ofChannel(
   return key(name, label, (context) => {
     const channel = meantChannel(context);
     return channel === undefined ? null : to(channel);
+  });
+}
+
+/** What keys do to a parameter; `find` gives what it is of, null: there is none now. */
+function keysFor<On>(
+  row: Parameter<On>,
+  find: (context: KeyContext) => Readonly<{ on: On; channel?: string }> | null,
+): readonly Key[] {
+  const toValue = (next: (on: On) => Value | null): Key["to"] => {
+    return (context) => {
+      const found = find(context);
+      if (found === null || !(row.isShown?.(found.on) ?? true)) return null;
+      const value = next(found.on);
+      return value === null ? null : setTo<Value>(row, value, found.channel);
+    };
+  };
+  switch (row.kind) {
+    case "number": {
+      if (row.keys === undefined) return [];
+      const { less, more, next } = row.keys;
+      const by = (direction: -1 | 1) => (on: On) => next(row.get(on), direction);
+      return [key(...less, toValue(by(-1))), key(...more, toValue(by(1)))];
+    }
+    case "switch":
+      return row.key === undefined
+        ? []
+        : [
+            key(
+              ...row.key,
+              toValue((on) => !row.get(on)),
+            ),
+          ];
+    case "choice": {
+      if (row.key === undefined) return [];
+      const next = (on: On) => {
+        const options = optionsOf(row, on).filter((value) => value !== row.ownValue);
+        return neighbour(options, row.get(on), 1);
+      };
+      return [key(...row.key, toValue(next))];
+    }
+    case "colour":
+      return [];
+  }
+}
+
+/** The keys of a parameter that is no channel's. */
+export function keysOf(row: Parameter<ViewerState>): readonly Key[] {
+  return keysFor(row, ({ state }) => ({ on: state }));
+}
+
+/** The keys of a parameter of the meant channel. */
+export function keysOfChannel(row: Parameter<ChannelState>): readonly Key[] {
+  return keysFor(row, (context) => {
+    const channel = meantChannel(context);
+    return channel === undefined ? null : { on: channel, channel: channel.id };
   });
 }

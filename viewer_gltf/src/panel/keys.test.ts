@@ -3,6 +3,9 @@ import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifes
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { CHANNEL } from "../state/parameters/channel";
+import { LIGHT_NUMBERS } from "../state/parameters/light";
+import { PARAMETERS } from "../state/parameters/table";
 import { reduce } from "../state/reduce";
 import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
@@ -27,7 +30,7 @@ const CONTEXT: KeyContext = {
       channel: "c0",
       plane: { gradientMax: 0.5, functions: {} },
     } as const,
-    { type: "choose-mode", mode: "traced" } as const,
+    { type: "set", id: "mode", value: "traced" } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,
   shown: SPECIMEN_BOX,
@@ -49,27 +52,17 @@ describe("the keys", () => {
       ),
     );
     const wanted: Readonly<Record<Action["type"], boolean>> = {
+      set: true,
       show: true,
-      recolor: true,
-      fade: true,
       window: true,
-      "draw-volume": true,
       "choose-transfer-function": true,
       "set-shapes": true,
       "learn-plane": false, // the bundle's
       select: true,
       isolate: true,
-      "choose-mode": true,
-      "set-switch-distance": true,
-      "set-disc-radius": true,
       "set-clip": true,
-      "choose-tool": true,
       measure: true,
-      "set-dwell": true,
-      "choose-quality": true,
-      trace: true,
-      "move-lamp": true,
-      "show-lamps": true,
+      "move-lamp": false, // a drag
       dismiss: true,
       notify: false, // the viewer's own
     };
@@ -103,6 +96,21 @@ describe("the keys", () => {
     };
     const asked = wishes.filter((wish) => typeof wish === "string");
     expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));
+  });
+
+  it("reach every parameter, the light's numbers by three keys", () => {
+    const wishes = ALL.flatMap(({ to, keys }) => keys.map((name) => to(CONTEXT, name)));
+    const set = new Set(
+      wishes.flatMap((wish) =>
+        wish !== null && typeof wish !== "string" && "id" in wish ? [wish.id] : [],
+      ),
+    );
+    const turned = new Set<string>(LIGHT_NUMBERS.map(({ id }) => id));
+    // the choice of a tone map and lamps' colours are the panel's alone
+    const others = PARAMETERS.filter(
+      ({ id, kind }) => !turned.has(id) && kind !== "colour" && id !== "trace-tone-map",
+    );
+    for (const { id } of [...others, ...CHANNEL]) expect(set, id).toContain(id);
   });
 
   it("reach what the panel keeps for itself, but for what is typed and what is folded", () => {
@@ -151,12 +159,18 @@ describe("the keys", () => {
   });
 
   it("mean the channel whose card is open, or the first one shown", () => {
-    expect(wishOf("o", CONTEXT)).toEqual({ type: "fade", channel: "c0", opacity: 0.95 });
+    expect(wishOf("o", CONTEXT)).toEqual({
+      type: "set",
+      id: "opacity",
+      channel: "c0",
+      value: 0.95,
+    });
     const view = { ...START_VIEW, picked: "c2" };
     expect(wishOf("o", { ...CONTEXT, view })).toEqual({
-      type: "fade",
+      type: "set",
+      id: "opacity",
       channel: "c2",
-      opacity: 0.95,
+      value: 0.95,
     });
     expect(wishOf("c", { ...CONTEXT, view })).toEqual({ panel: "pick", channel: "c3" });
     expect(wishOf("C", { ...CONTEXT, view: { ...view, picked: "c0" } })).toEqual({
@@ -166,13 +180,14 @@ describe("the keys", () => {
   });
 
   it("show the lamps where they light something", () => {
-    expect(wishOf("$", CONTEXT)).toEqual({ type: "show-lamps", areShown: true });
-    const shown = reduce(CONTEXT.state, { type: "show-lamps", areShown: true });
+    expect(wishOf("$", CONTEXT)).toEqual({ type: "set", id: "trace/lamps", value: true });
+    const shown = reduce(CONTEXT.state, { type: "set", id: "trace/lamps", value: true });
     expect(wishOf("$", { ...CONTEXT, state: shown })).toEqual({
-      type: "show-lamps",
-      areShown: false,
+      type: "set",
+      id: "trace/lamps",
+      value: false,
     });
-    const marched = reduce(shown, { type: "choose-mode", mode: "all" });
+    const marched = reduce(shown, { type: "set", id: "mode", value: "all" });
     expect(wishOf("$", { ...CONTEXT, state: marched })).toBeNull();
   });
 

@@ -2,7 +2,8 @@ import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
-import { LIMITS, reduce } from "../state/reduce";
+import { DISC_RADIUS, SWITCH_DISTANCE } from "../state/parameters/volumes";
+import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 import {
   type Control,
@@ -130,12 +131,13 @@ describe("the panel's layout", () => {
   it("brings a slider's ends to the limits, and each step back to itself", () => {
     const state = start();
     const layout = laid(state);
-    for (const [id, key] of [
-      ["switch-distance", "switchDistance_m"],
-      ["disc-radius", "discRadius_deg"],
+    for (const [row, key] of [
+      [SWITCH_DISTANCE, "switchDistance_m"],
+      [DISC_RADIUS, "discRadius_deg"],
     ] as const) {
+      const { id, limits } = row;
       const slider = find(layout, "slider", id);
-      const [least, most] = LIMITS[key];
+      const [least, most] = limits;
       expect(granted(state, slider.to(0))[key]).toBe(least);
       expect(granted(state, slider.to(1))[key]).toBe(most);
       for (let step = 0; step <= slider.steps; step++) {

@@ -2,13 +2,14 @@
 import { distanceBetween, distanceText } from "../annotations/measure";
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
-import type { QualityLevel, QualitySettings } from "../state/quality_controller";
-import { LIMITS } from "../state/reduce";
+import { MEASURE_PARAMETERS, QUALITY_PARAMETERS } from "../state/parameters/tools";
+import { VOLUMES } from "../state/parameters/volumes";
+import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
-import { MODES, type Mode, type Tool, type ViewerState } from "../state/viewer_state";
+import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
-import { command, inline } from "./control_templates";
-import type { Control, Layout, PanelView, Section, Slider } from "./controls";
+import { command, controlsOf } from "./control_templates";
+import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
 import { lightItems } from "./sections/path_trace";
 import { stereoItems } from "./sections/stereo";
@@ -45,30 +46,7 @@ export type Facts = StereoSupport &
 /** The newest few say what is wrong. */
 const MOST_NOTICES = 3;
 
-const MODE_NAMES: Readonly<Record<Mode, string>> = {
-  disc: "Disc",
-  tile: "Tile",
-  all: "All",
-  stage: "Staged",
-  traced: "Traced",
-  off: "Off",
-};
-const QUALITY_NAMES: Readonly<Record<QualityLevel, string>> = {
-  auto: "Auto",
-  low: "Low",
-  high: "High",
-};
-const TOOL_NAMES: Readonly<Record<Tool, string>> = { select: "Select", measure: "Measure" };
 const POINT_NAMES = ["First point", "Second point"] as const;
-const SLIDER_STEPS = 100;
-
-/** The modes that can be chosen: as staged only where an artist has staged something. */
-export function modesOf(state: ViewerState): readonly Mode[] {
-  const isStaged = state.tiles.some(({ representation }) => representation !== "mesh");
-  return MODES.filter((mode) =>
-    mode === "stage" ? isStaged : mode !== "traced" || state.canTrace,
-  );
-}
 
 /** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
 export function middleBox({ min, max }: Box): Box {
@@ -101,7 +79,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         ? [section("notices", "Notices", noticeItems(state))]
         : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
-      section("volumes", "Volumes", volumeItems(state)),
+      section("volumes", "Volumes", controlsOf(VOLUMES, state)),
       section("light", "Light", lightItems(state, view, facts.isStereo)),
       section("tiles", "Tiles", tileItems(state, facts.gazed)),
       section("view", "View", [
@@ -140,55 +118,6 @@ function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
   return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
 }
 
-function volumeItems(state: ViewerState): readonly Control[] {
-  const [least, most] = LIMITS.switchDistance_m;
-  const [narrowest, widest] = LIMITS.discRadius_deg;
-  const distance: Slider = {
-    kind: "slider",
-    id: "switch-distance",
-    label: "Switch distance",
-    name: "Switch distance: volumes show within",
-    value: Math.log(state.switchDistance_m / least) / Math.log(most / least),
-    steps: SLIDER_STEPS,
-    text: `${state.switchDistance_m.toPrecision(2)} m`,
-    // As many digits as a step needs; more would only lengthen a link.
-    to: (value) => ({
-      type: "set-switch-distance",
-      distance_m: Number((least * (most / least) ** value).toPrecision(3)),
-    }),
-  };
-  const radius: Slider = {
-    kind: "slider",
-    id: "disc-radius",
-    label: "Disc radius",
-    value: (state.discRadius_deg - narrowest) / (widest - narrowest),
-    steps: 2 * (widest - narrowest),
-    text: `${Number(state.discRadius_deg.toFixed(1))}°`,
-    refusal: state.mode === "disc" ? "" : "Only the mode Disc has one.",
-    to: (value) => ({
-      type: "set-disc-radius",
-      radius_deg: Number((narrowest + (widest - narrowest) * value).toFixed(2)),
-    }),
-  };
-  const isNear = state.mode === "disc" || state.mode === "tile";
-  const mode = inline(
-    "mode",
-    "Where volumes show",
-    state.mode,
-    MODE_NAMES,
-    modesOf(state),
-    (each) => ({
-      type: "choose-mode",
-      mode: each,
-    }),
-  );
-  return [
-    mode,
-    { ...distance, refusal: isNear ? "" : "Only the modes Disc and Tile have one." },
-    radius,
-  ];
-}
-
 /** `12.3 µm`, or what is missing to it. */
 export function measuredText({ tool, measured }: ViewerState): string {
   const [from, to] = measured;
@@ -199,10 +128,7 @@ export function measuredText({ tool, measured }: ViewerState): string {
 
 function measureItems(state: ViewerState, values: Facts["values"]): readonly Control[] {
   return [
-    inline("tool", "A tap", state.tool, TOOL_NAMES, ["select", "measure"], (tool) => ({
-      type: "choose-tool",
-      tool,
-    })),
+    ...controlsOf(MEASURE_PARAMETERS, state),
     { kind: "text", id: "distance", label: "Distance", value: measuredText(state) },
     ...POINT_NAMES.map((label, i): Control => {
       const value = (values[i] ?? []).join(" · ");
@@ -246,13 +172,8 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
 }
 
 function qualityItems(state: ViewerState, { settings, frame_ms }: Facts): readonly Control[] {
-  const levels = ["auto", "low", "high"] as const;
-  const level = inline("quality", "Quality", state.quality, QUALITY_NAMES, levels, (each) => ({
-    type: "choose-quality",
-    level: each,
-  }));
   const items: Control[] = [
-    level,
+    ...controlsOf(QUALITY_PARAMETERS, state),
     {
       kind: "text",
       id: "frame-time",

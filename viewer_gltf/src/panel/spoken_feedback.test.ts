@@ -1,68 +1,85 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { fromHex } from "../math/color";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
-import { DIALS, dialName } from "../state/path_trace_parameters";
+import { setTo } from "../state/parameters/kinds";
+import { LAMP, LIGHT_NUMBERS } from "../state/parameters/light";
 import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 import type { Wish } from "./controls";
 import { told } from "./spoken_feedback";
 
 const START = [
-  { type: "choose-mode", mode: "traced" } as const,
-  { type: "move-lamp", lamp: 1, change: { isOn: true } } as const,
+  { type: "set", id: "mode", value: "traced" } as const,
+  setTo(LAMP[1].isOn, true),
 ].reduce<ViewerState>(reduce, initialState(sampleManifest(2)));
 const after = (action: Action, before = START) =>
   told(action, before, reduce(before, action), new Map());
 
 describe("what is told of the light", () => {
   it("names the part of a lamp that has changed", () => {
-    const lamp = (change: Extract<Action, { type: "move-lamp" }>["change"]) =>
-      after({ type: "move-lamp", lamp: 0, change });
-    expect(lamp({ isOn: false })).toBe("Lamp 1: off");
-    expect(lamp({ isOn: true })).toBe("Lamp 1: on");
-    expect(lamp({ color: fromHex("#ff8000") })).toBe("Lamp 1: another colour");
-    expect(lamp({ x: 1.25 })).toBe("Lamp 1, left to right: 1.25");
-    expect(lamp({ strength: 2 })).toBe("Lamp 1, strength: 2 x");
+    const { isOn, color, place, numbers } = LAMP[0];
+    expect(after(setTo(isOn, false))).toBe("Lamp 1: off");
+    expect(after(setTo(isOn, true))).toBe("Lamp 1: on");
+    expect(after(setTo(color, [1, 0.5, 0]))).toBe("Lamp 1: another colour");
+    expect(after(setTo(place[0], 1.25))).toBe("Lamp 1, left to right: 1.25");
+    expect(after(setTo(numbers[3], 2))).toBe("Lamp 1, strength: 2 x");
   });
 
   it("says of a lamp that was dragged that it has moved, not where along one axis", () => {
-    expect(after({ type: "move-lamp", lamp: 2, change: { x: 1, y: 0, z: -1 } })).toBe(
-      "Lamp 3: moved",
-    );
+    expect(after({ type: "move-lamp", lamp: 2, place: [1, 0, -1] })).toBe("Lamp 3: moved");
   });
 
   it("says whether there are lamps to be dragged", () => {
     const show = (areShown: boolean, before = START) =>
-      after({ type: "show-lamps", areShown }, before);
+      after({ type: "set", id: "trace/lamps", value: areShown }, before);
     expect(show(true)).toBe("Lamps shown: drag them");
     expect(show(false)).toBe("Lamps hidden");
     const dark = [0, 1].reduce(
-      (state, lamp) => reduce(state, { type: "move-lamp", lamp, change: { isOn: false } }),
+      (state, lamp) => reduce(state, setTo(LAMP[lamp].isOn, false)),
       START,
     );
     expect(show(true, dark)).toBe("No lamp is on");
   });
 
   it("names every number of the light, and its value", () => {
-    for (const dial of DIALS) {
-      const [, high] = dial.limits;
-      expect(after(dial.to(high)), dial.id).toBe(`${dialName(dial)}: ${dial.text(high)}`);
-      const meant: Wish = { panel: "dial", dial: dial.id };
-      const now = `${dialName(dial)}: ${dial.text(dial.of(START.trace))}`;
-      expect(told(meant, START, START, new Map()), dial.id).toBe(now);
+    const names = new Set<string>();
+    for (const row of LIGHT_NUMBERS) {
+      const [, high] = row.limits;
+      const said = after(setTo(row, high));
+      expect(said).toContain(row.text(high));
+      expect(said.toLowerCase()).toContain(row.label.toLowerCase());
+      names.add(said.slice(0, said.indexOf(":")));
+      const meant: Wish = { panel: "dial", dial: row.id };
+      expect(told(meant, START, START, new Map()), row.id).toBe(row.told(START));
     }
+    expect(names.size).toBe(LIGHT_NUMBERS.length);
   });
 
   it("tells of the room, of scatterings and of what comes after", () => {
-    const trace = (change: Extract<Action, { type: "trace" }>["change"]) =>
-      after({ type: "trace", change });
-    expect(trace({ environment: "sky" })).toBe("Room: sky");
-    expect(trace({ isMultiple: false })).toBe("Scattered once");
-    expect(trace({ isMultiple: true })).toBe("Scattered many times");
-    expect(trace({ isPostOn: false })).toBe("Before");
-    expect(trace({ toneMap: "none" })).toBe("Tone map: none");
+    const set = (id: string, value: string | boolean) => after({ type: "set", id, value });
+    expect(set("trace-room", "sky")).toBe("Room: sky");
+    expect(set("trace/multiple", false)).toBe("Scattered once");
+    expect(set("trace/multiple", true)).toBe("Scattered many times");
+    expect(set("trace/post", false)).toBe("Before");
+    expect(set("trace-tone-map", "none")).toBe("Tone map: none");
+  });
+
+  it("names what a parameter of the view or of a channel is now", () => {
+    const set = (id: string, value: string | number | boolean, channel?: string) =>
+      after(
+        channel === undefined ? { type: "set", id, value } : { type: "set", id, value, channel },
+      );
+    expect(set("mode", "off")).toBe("Volumes: off");
+    expect(set("switch-distance", 2.5)).toBe("Volumes within 2.5 m");
+    expect(set("disc-radius", 17.26)).toBe("Disc 17.3°");
+    expect(set("dwell", false)).toBe("Choosing by gaze: off");
+    expect(set("quality", "low")).toBe("Quality: low");
+    expect(set("tool", "select")).toBe("A tap selects");
+    expect(set("tool", "measure")).toBe("Choose two points of the specimen.");
+    const [{ id, name }] = START.channels;
+    expect(set("opacity", 0.35, id)).toBe(`${name}: opacity 35 %`);
+    expect(set("volume", false, id)).toBe(`${name}: volume off`);
   });
 
   it("is nothing where the picture says it all", () => {

@@ -4,10 +4,10 @@ import { settingsOf } from "./page_parameters";
 describe("the page's address", () => {
   it("sets mode, switch distance and disc", () => {
     expect(settingsOf("?bundle=x&mode=tile&quality=high&switch=2.5&disc=20")).toEqual([
-      { type: "choose-mode", mode: "tile" },
-      { type: "choose-quality", level: "high" },
-      { type: "set-switch-distance", distance_m: 2.5 },
-      { type: "set-disc-radius", radius_deg: 20 },
+      { type: "set", id: "mode", value: "tile" },
+      { type: "set", id: "quality", value: "high" },
+      { type: "set", id: "switch-distance", value: 2.5 },
+      { type: "set", id: "disc-radius", value: 20 },
     ]);
     expect(settingsOf("?bundle=x")).toEqual([]);
   });

@@ -4,66 +4,70 @@ import { seeded } from "../../test/support/seeded";
 import { fromHex } from "../math/color";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
-import { DIALS, valueAtShare } from "../state/path_trace_parameters";
-import { LAMPS, START_TRACE, TONE_MAPS, type TraceSettings } from "../state/path_trace_settings";
+import { setTo, valueAtShare } from "../state/parameters/kinds";
+import { LAMP, LIGHT_NUMBERS } from "../state/parameters/light";
+import { TONE_MAPS } from "../state/path_trace_settings";
 import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
-import { readTrace, writeTrace } from "./path_trace_link";
+import { readLight, writeLight } from "./path_trace_link";
 
 const START = initialState(sampleManifest(1));
 
-function read(text: string): TraceSettings {
-  const actions = readTrace(text);
+const write = (state: ViewerState) => writeLight(state, START);
+
+function read(text: string): ViewerState {
+  const actions = readLight(text);
   expect(actions).not.toContain(null);
-  return (actions as Action[]).reduce<ViewerState>(reduce, START).trace;
+  return (actions as Action[]).reduce<ViewerState>(reduce, START);
 }
 
 /** Any settings that a panel can make. */
-function anySettings(random: () => number): TraceSettings {
-  const actions: Action[] = [];
-  for (const dial of DIALS) {
-    if (random() < 0.5) actions.push(dial.to(valueAtShare(dial, Math.round(100 * random()) / 100)));
+function anySettings(random: () => number): ViewerState {
+  const actions: Action[] = [
+    { type: "set", id: "trace-room", value: random() < 0.5 ? "sky" : "studio" },
+    { type: "set", id: "trace-tone-map", value: TONE_MAPS[random() < 0.5 ? 0 : 1] },
+    { type: "set", id: "trace/multiple", value: random() < 0.5 },
+    { type: "set", id: "trace/post", value: random() < 0.5 },
+  ];
+  for (const row of LIGHT_NUMBERS) {
+    const share = Math.round(100 * random()) / 100;
+    if (random() < 0.5) actions.push(setTo(row, valueAtShare(row, share)));
   }
-  for (let lamp = 0; lamp < LAMPS; lamp++) {
+  for (const { color, isOn } of LAMP) {
     const hex = `#${Math.floor(random() * 0x1000000)
       .toString(16)
       .padStart(6, "0")}`;
-    if (random() < 0.5) actions.push({ type: "move-lamp", lamp, change: { color: fromHex(hex) } });
-    if (random() < 0.5) actions.push({ type: "move-lamp", lamp, change: { isOn: random() < 0.5 } });
+    if (random() < 0.5) actions.push(setTo(color, fromHex(hex)));
+    if (random() < 0.5) actions.push(setTo(isOn, random() < 0.5));
   }
-  const change = {
-    environment: random() < 0.5 ? "sky" : "studio",
-    toneMap: TONE_MAPS[random() < 0.5 ? 0 : 1],
-    isMultiple: random() < 0.5,
-    isPostOn: random() < 0.5,
-  } as const;
-  return [...actions, { type: "trace", change } as const].reduce<ViewerState>(reduce, START).trace;
+  return actions.reduce<ViewerState>(reduce, START);
 }
 
 describe("the light in a link", () => {
   it("is nothing where it is what a bundle opens with", () => {
-    expect(writeTrace(START_TRACE)).toBe("");
+    expect(write(START)).toBe("");
   });
 
   it("comes back as it was, whatever was set", () => {
     const random = seeded(4);
     for (let i = 0; i < 200; i++) {
-      const trace = anySettings(random);
-      const text = writeTrace(trace);
+      const state = anySettings(random);
+      const { trace } = state;
+      const text = write(state);
       expect(text).toMatch(/^[-a-zA-Z0-9_:,./+]*$/); // nothing that an address would change
-      const back = text === "" ? START_TRACE : read(text);
-      for (const dial of DIALS) {
-        expect(dial.of(back), dial.id).toBeCloseTo(dial.of(trace), 4);
+      const back = text === "" ? START : read(text);
+      for (const row of LIGHT_NUMBERS) {
+        expect(row.get(back), row.id).toBeCloseTo(row.get(state), 4);
       }
-      expect(writeTrace(back)).toBe(text);
-      const { environment, toneMap, isMultiple, isPostOn } = back;
+      expect(write(back)).toBe(text);
+      const { environment, toneMap, isMultiple, isPostOn, lamps } = back.trace;
       expect({ environment, toneMap, isMultiple, isPostOn }).toEqual({
         environment: trace.environment,
         toneMap: trace.toneMap,
         isMultiple: trace.isMultiple,
         isPostOn: trace.isPostOn,
       });
-      back.lamps.forEach(({ isOn, color }, k) => {
+      lamps.forEach(({ isOn, color }, k) => {
         expect(isOn).toBe(trace.lamps[k].isOn);
         color.forEach((v, c) => {
           expect(v).toBeCloseTo(trace.lamps[k].color[c], 2);
@@ -72,9 +76,18 @@ describe("the light in a link", () => {
     }
   });
 
+  it("written by an earlier version, in another order, reads the same", () => {
+    const { trace } = read(
+      "bias:0.25,lamp-1/x:2.5,exposure:1.5,room:sky,tone:none,many:false,after:false,lamp-1:true,lamp-1/color:ff8800",
+    );
+    expect(trace).toMatchObject({ bias: 0.25, exposure: 1.5, environment: "sky", toneMap: "none" });
+    expect(trace).toMatchObject({ isMultiple: false, isPostOn: false });
+    expect(trace.lamps[1]).toMatchObject({ x: 2.5, isOn: true, color: fromHex("#ff8800") });
+  });
+
   it("leaves the user's own picture of light with the user", () => {
-    expect(writeTrace({ ...START_TRACE, environment: "own" })).toBe("");
-    expect(readTrace("room:own")).toEqual([null]);
+    expect(write({ ...START, trace: { ...START.trace, environment: "own" } })).toBe("");
+    expect(readLight("room:own")).toEqual([null]);
   });
 
   it("that can't be read is told of, part by part", () => {
@@ -100,16 +113,16 @@ describe("the light in a link", () => {
       "constructor:1",
       "__proto__:1",
     ]) {
-      expect(readTrace(part), part).toEqual([null]);
+      expect(readLight(part), part).toEqual([null]);
     }
-    const [one, none, other] = readTrace("hue:20,what,sharpness:1");
+    const [one, none, other] = readLight("hue:20,what,sharpness:1");
     expect([one, none, other].map((action) => action !== null)).toEqual([true, false, true]);
   });
 
   it("never leads beyond the limits, nor throws, whatever it says", () => {
     const random = seeded(9);
     const pieces = [
-      ...DIALS.map(({ id }) => id),
+      ...LIGHT_NUMBERS.map(({ link }) => link),
       "room",
       "tone",
       ":",
@@ -127,10 +140,10 @@ describe("the light in a link", () => {
       const text = Array.from({ length }, () => pieces[Math.floor(random() * pieces.length)]).join(
         "",
       );
-      const actions = readTrace(text).filter((action) => action !== null);
-      const { trace } = actions.reduce<ViewerState>(reduce, START);
-      for (const { id, of, limits } of DIALS) {
-        const value = of(trace);
+      const actions = readLight(text).filter((action) => action !== null);
+      const state = actions.reduce<ViewerState>(reduce, START);
+      for (const { id, get, limits } of LIGHT_NUMBERS) {
+        const value = get(state);
         expect(value >= limits[0] && value <= limits[1], `${id} of ${text}`).toBe(true);
       }
     }

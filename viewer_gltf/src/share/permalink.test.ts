@@ -18,15 +18,15 @@ const noticesOf = (hash: string) => opened(hash).notices;
 const CHANGES: readonly Action[] = [
   { type: "show", channel: "c1", shown: false },
   { type: "show", channel: "c5", shown: true },
-  { type: "recolor", channel: "c5", color: fromHex("#12ab9f") },
-  { type: "recolor", channel: "c4", color: fromHex("#0000ff") }, // hidden, and yet of the state
-  { type: "fade", channel: "c0", opacity: 0.35 },
+  { type: "set", id: "color", channel: "c5", value: fromHex("#12ab9f") },
+  { type: "set", id: "color", channel: "c4", value: fromHex("#0000ff") }, // hidden, and yet of the state
+  { type: "set", id: "opacity", channel: "c0", value: 0.35 },
   { type: "window", channel: "c0", window: [0.125, 0.75] },
-  { type: "draw-volume", channel: "c2", volume: false },
+  { type: "set", id: "volume", channel: "c2", value: false },
   { type: "choose-transfer-function", channel: "c3", name: "soft" },
-  { type: "choose-mode", mode: "tile" },
-  { type: "set-switch-distance", distance_m: 2.34 },
-  { type: "set-disc-radius", radius_deg: 17.5 },
+  { type: "set", id: "mode", value: "tile" },
+  { type: "set", id: "switch-distance", value: 2.34 },
+  { type: "set", id: "disc-radius", value: 17.5 },
   { type: "select", tile: "r1_c3" },
   { type: "isolate", tile: "r0_c2" },
   {
@@ -43,10 +43,10 @@ const CHANGES: readonly Action[] = [
       [40.5, -17, 0],
     ],
   },
-  { type: "choose-tool", tool: "measure" },
-  { type: "set-dwell", isOn: false },
-  { type: "choose-quality", level: "low" },
-  { type: "show-lamps", areShown: true },
+  { type: "set", id: "tool", value: "measure" },
+  { type: "set", id: "dwell", value: false },
+  { type: "set", id: "quality", value: "low" },
+  { type: "set", id: "trace/lamps", value: true },
 ];
 const LOOK: Look = {
   position: [0.5, -0.25, 1.75],

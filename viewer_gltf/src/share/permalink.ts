@@ -15,22 +15,32 @@
 
 import type { Box } from "../math/box";
 import { type Clip, withinSpecimen } from "../math/clip";
-import { fromHex, toHex } from "../math/color";
 import type { Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
 import type { Action } from "../state/actions";
+import { CHANNEL, START_CHANNEL } from "../state/parameters/channel";
+import type { Parameter } from "../state/parameters/kinds";
+import { LIGHT } from "../state/parameters/light";
+import { PARAMETERS } from "../state/parameters/table";
+import { VOLUMES } from "../state/parameters/volumes";
 import { OWN } from "../state/transfer_functions_2d";
-import { type ChannelState, MAX_CHANNELS, MODES, type ViewerState } from "../state/viewer_state";
+import { type ChannelState, MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
 import { type Look, readLook, writeLook } from "./camera_link";
 import { readNumbers, written } from "./numbers";
-import { readTrace, writeTrace } from "./path_trace_link";
+import { readWord, type SwitchWords, writeWords } from "./parameter_words";
+import { readLight, writeLight } from "./path_trace_link";
 import { readShapes, writeShapes } from "./shapes_link";
 
 const VERSION = "1";
 /** Seventy channels that all look different take less. */
 const LONGEST = 8000;
-const QUALITIES = ["auto", "low", "high"] as const;
-const TOOLS = ["select", "measure"] as const;
+const WORDS: SwitchWords = ["off", "on"];
+/** A channel's letter alone says that a switch is off. */
+const CHANNEL_WORDS: SwitchWords = ["", "on"];
+/** Besides where volumes show, and the light, which has a part of its own. */
+const others = new Set(PARAMETERS);
+for (const row of [...VOLUMES, ...LIGHT]) others.delete(row);
+const OTHERS = [...others];
 
 export type Shared = Readonly<{ actions: readonly Action[]; look: Look | null }>;
 
@@ -61,23 +71,16 @@ function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: 
     writeChannel(channel, start.channels[i], has),
   );
   if (looks.length > 0) parts.l = looks.join(",");
-  if (state.mode !== start.mode) parts.mode = state.mode;
-  if (state.switchDistance_m !== start.switchDistance_m) {
-    parts.switch = written([state.switchDistance_m]);
-  }
-  if (state.discRadius_deg !== start.discRadius_deg) parts.disc = written([state.discRadius_deg]);
+  Object.assign(parts, Object.fromEntries(writeWords(VOLUMES, state, start, WORDS)));
   if (state.selected !== null) parts.tile = encodeURIComponent(state.selected);
   if (state.isolated !== null) parts.only = encodeURIComponent(state.isolated);
   const { box, plane } = state.clip;
   if (box !== null) parts.box = written([...box.min, ...box.max]);
   if (plane !== null) parts.cut = written([...plane.normal, plane.offset_um]);
   if (state.measured.length > 0) parts.points = written(state.measured.flat());
-  if (state.tool !== start.tool) parts.tool = state.tool;
-  if (state.isDwellOn !== start.isDwellOn) parts.dwell = state.isDwellOn ? "on" : "off";
-  if (state.quality !== start.quality) parts.quality = state.quality;
-  const light = writeTrace(state.trace);
+  Object.assign(parts, Object.fromEntries(writeWords(OTHERS, state, start, WORDS)));
+  const light = writeLight(state, start);
   if (light !== "") parts.light = light;
-  if (state.areLampsShown !== start.areLampsShown) parts.lamps = state.areLampsShown ? "on" : "off";
   Object.assign(parts, look === null ? {} : writeLook(look));
   return `#${Object.entries(parts)
     .map(([name, text]) => `${name}=${text}`)
@@ -90,10 +93,15 @@ function writeChannel(
   start: ChannelState | undefined,
   has: HasShapes,
 ): string[] {
-  const parts: string[] = [];
-  const color = toHex(channel.color);
-  if (color !== toHex(channel.original)) parts.push(`c${color.slice(1)}`);
-  if (channel.opacity !== 1) parts.push(`o${written([channel.opacity])}`);
+  const opened = { ...channel, ...START_CHANNEL, color: channel.original };
+  const wordsOf = (areSwitches: boolean) =>
+    writeWords(
+      CHANNEL.filter(({ kind }) => (kind === "switch") === areSwitches),
+      channel,
+      opened,
+      CHANNEL_WORDS,
+    ).map(([letter, word]) => `${letter}${word}`);
+  const parts = wordsOf(false);
   const [low, high] = channel.window;
   if (low !== 0 || high !== 1) parts.push(`w${written([low])}_${written([high])}`);
   const shaped = Object.entries(channel.shapes).filter(([name]) => has(channel, name));
@@ -104,7 +112,7 @@ function writeChannel(
   if (shaped.length > 0 || channel.transferFunction !== start?.transferFunction) {
     parts.push(`t${encodeURIComponent(channel.transferFunction)}`);
   }
-  if (!channel.volume) parts.push("n");
+  parts.push(...wordsOf(true));
   return parts.length > 0 ? [[encodeURIComponent(channel.id), ...parts].join(":")] : [];
 }
 
@@ -151,9 +159,6 @@ function decoded(text: string): string | null {
   }
 }
 
-const isOneOf = <T extends string>(values: readonly T[], text: string): text is T =>
-  (values as readonly string[]).includes(text);
-
 class LinkReader {
   private readonly actions: Action[] = [];
   private readonly unread: string[] = [];
@@ -168,18 +173,13 @@ class LinkReader {
   read(): Shared {
     this.readShown();
     this.readLooks();
-    this.number("switch", (distance_m) => ({ type: "set-switch-distance", distance_m }));
-    this.number("disc", (radius_deg) => ({ type: "set-disc-radius", radius_deg }));
-    this.word("mode", MODES, (mode) => ({ type: "choose-mode", mode }));
+    this.readParameters(VOLUMES);
     this.tile("tile", "select");
     this.tile("only", "isolate");
     this.readClip();
     this.readPoints();
-    this.word("tool", TOOLS, (tool) => ({ type: "choose-tool", tool }));
-    this.word("dwell", ["on", "off"], (word) => ({ type: "set-dwell", isOn: word === "on" }));
-    this.word("quality", QUALITIES, (level) => ({ type: "choose-quality", level }));
+    this.readParameters(OTHERS);
     this.readLight();
-    this.word("lamps", ["on", "off"], (word) => ({ type: "show-lamps", areShown: word === "on" }));
     const eye = this.parts.get("eye");
     const look = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
     if (eye !== undefined && look === null) this.unread.push("eye");
@@ -222,7 +222,7 @@ class LinkReader {
   private readLight(): void {
     const text = this.parts.get("light");
     if (text === undefined) return;
-    readTrace(text).forEach((action, i) => {
+    readLight(text).forEach((action, i) => {
       if (action !== null) this.actions.push(action);
       else this.unread.push(`light ${shortened(text.split(",")[i])}`);
     });
@@ -243,23 +243,14 @@ class LinkReader {
     }
   }
 
-  private number(name: string, action: (value: number) => Action): void {
-    const text = this.parts.get(name);
-    if (text === undefined) return;
-    const values = readNumbers(text, 1);
-    if (values === null) this.unread.push(name);
-    else this.actions.push(action(values[0]));
-  }
-
-  private word<T extends string>(
-    name: string,
-    values: readonly T[],
-    action: (value: T) => Action,
-  ): void {
-    const text = this.parts.get(name);
-    if (text === undefined) return;
-    if (isOneOf(values, text)) this.actions.push(action(text));
-    else this.unread.push(name);
+  private readParameters(rows: readonly Parameter<ViewerState>[]): void {
+    for (const row of rows) {
+      const text = row.link === undefined ? undefined : this.parts.get(row.link);
+      if (row.link === undefined || text === undefined) continue;
+      const action = readWord(row, text, WORDS);
+      if (action === null) this.unread.push(row.link);
+      else this.actions.push(action);
+    }
   }
 
   private tile(name: string, type: "select" | "isolate"): void {
@@ -320,15 +311,10 @@ class LinkReader {
 }
 
 function lookAction({ id, transferFunctions }: ChannelState, look: string): Action | null {
-  const value = look.slice(1);
-  switch (look[0]) {
-    case "c":
-      if (!/^[0-9a-f]{6}$/i.test(value)) return null;
-      return { type: "recolor", channel: id, color: fromHex(`#${value}`) };
-    case "o": {
-      const opacity = readNumbers(value, 1);
-      return opacity && { type: "fade", channel: id, opacity: opacity[0] };
-    }
+  const [letter, value] = [look.slice(0, 1), look.slice(1)];
+  const row = CHANNEL.find(({ link }) => link === letter);
+  if (row !== undefined) return readWord(row, value, CHANNEL_WORDS, id);
+  switch (letter) {
     case "w": {
       const ends = readNumbers(value.replace("_", ","), 2);
       return ends && { type: "window", channel: id, window: [ends[0], ends[1]] };
@@ -346,8 +332,6 @@ function lookAction({ id, transferFunctions }: ChannelState, look: string): Acti
       if (name === null || (name !== OWN && !transferFunctions.includes(name))) return null;
       return { type: "choose-transfer-function", channel: id, name };
     }
-    case "n":
-      return value === "" ? { type: "draw-volume", channel: id, volume: false } : null;
     default:
       return null;
   }

@@ -32,7 +32,7 @@ describe("a remark", () => {
     const alone = reduce(START, { type: "isolate", tile: far });
     expect(remark(alone, cutTo)).toBe(words);
     const empty = reduce(alone, cutTo);
-    expect(remark(empty, { type: "fade", channel: "c0", opacity: 0.5 })).toBeNull();
+    expect(remark(empty, { type: "set", id: "opacity", channel: "c0", value: 0.5 })).toBeNull();
     expect(remark(empty, { type: "set-clip", clip: { ...empty.clip } })).toBeNull(); // it is known
     expect(remark(empty, { type: "isolate", tile: null })).toBeNull();
   });

@@ -1,13 +1,13 @@
 /** The state in which a bundle opens. Pure. */
 import type { Manifest } from "../bundle/generated/bundle";
-import { START_TRACE } from "./path_trace_settings";
-import { MAX_CHANNELS, type Mode, type ViewerState } from "./viewer_state";
+import { START_CHANNEL } from "./parameters/channel";
+import { START_LIGHT } from "./parameters/light";
+import { START_TOOLS } from "./parameters/tools";
+import { type Mode, START_VOLUMES } from "./parameters/volumes";
+import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /** So many tiles can open as volumes; of a larger specimen the chosen tile does. */
 export const VOLUME_TILES_AT_START = 16;
-/** Metres of the room: nearer than a headset's specimen is at the start. */
-export const SWITCH_DISTANCE_M = 1.25;
-export const DISC_RADIUS_DEG = 12;
 /** DICOM's terms for scans of whole bodies, which are best seen as light passes through them. */
 const TRACED_MODALITIES: readonly string[] = ["MR", "CT"];
 
@@ -31,16 +31,18 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
   const shown = new Set(manifest.channels.slice(0, MAX_CHANNELS).map(({ id }) => id));
   return {
+    ...START_VOLUMES,
+    ...START_TOOLS,
+    ...START_LIGHT,
     channels: manifest.channels.map((channel, index) => ({
       id: channel.id,
       name: channel.name,
       shown: shown.has(channel.id),
       turn: index - manifest.channels.length, // before all that is shown later
+      ...START_CHANNEL,
       color: channel.color,
       original: channel.color,
-      opacity: 1,
       window: [0, 1],
-      volume: true,
       transferFunction: channel.transfer_function,
       transferFunctions: channel.transfer_functions,
       transferFunctions2d: channel.transfer_functions_2d.names,
@@ -57,16 +59,9 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     mode: startMode(manifest, canTrace, staged.length > 0),
     selected: null,
     isolated: null,
-    switchDistance_m: SWITCH_DISTANCE_M,
-    discRadius_deg: DISC_RADIUS_DEG,
     clip: { box: null, plane: null },
-    tool: "select",
     measured: [],
-    isDwellOn: true,
-    quality: "auto",
     canTrace,
-    trace: START_TRACE,
-    areLampsShown: false,
     notices:
       staged.length > VOLUME_TILES_AT_START
         ? [

@@ -1,6 +1,8 @@
-/** What a path-traced picture is made with. Plain data, and pure functions on it. */
-
-export type Vec3 = readonly [number, number, number];
+/**
+ * What a path-traced picture is made with. Plain data, and pure functions on it. A row of the numbers
+ * below is all that a new one takes besides its use: panel, keys and links go by it.
+ */
+import type { Rgb } from "../math/color";
 
 /** Linear colour; x, y, z in longest edges of the specimen's box, from its middle, y up. */
 export type Lamp = Readonly<{
@@ -8,7 +10,7 @@ export type Lamp = Readonly<{
   x: number;
   y: number;
   z: number;
-  color: Vec3;
+  color: Rgb;
   /** 1: as much light on the specimen's middle as a white room gives. */
   strength: number;
 }>;
@@ -18,45 +20,83 @@ export type EnvironmentName = (typeof ENVIRONMENTS)[number];
 
 export const TONE_MAPS = ["filmic", "none"] as const;
 
-export type TraceSettings = Readonly<{
-  /** Added to the intensities before the transfer function, -1..1. */
-  bias: number;
-  /** Factor to the extinction. */
-  density: number;
-  /** Paths are scattered once, or until they leave. */
-  isMultiple: boolean;
-  /** Henyey-Greenstein g. */
-  anisotropy: number;
-  /** 0..1: how readily a gradient makes a surface. */
-  surface: number;
-  /** 0..1: a surface's shine. */
-  shine: number;
-  environment: EnvironmentName;
-  /** Factor to the environment's light, and by how many degrees it is turned. */
-  environmentLight: number;
-  environmentTurn_deg: number;
-  lamps: readonly Lamp[];
-  /** What comes after the light; off: as it was gathered. */
-  isPostOn: boolean;
-  /** Stops. */
-  exposure: number;
-  toneMap: (typeof TONE_MAPS)[number];
-  /** Degrees. */
-  hue: number;
-  /** Factor. */
-  saturation: number;
-  /** Added, -1..1. */
-  lightness: number;
-  /** 0..1 */
-  occlusion: number;
-  /** 0..2 */
-  sharpness: number;
-}>;
-
 /** A picture with so many samples of each pixel is done. */
 export const ENOUGH_SAMPLES = 1024;
 
-export const LAMPS = 3;
+type TraceNumber = Readonly<{
+  label: string;
+  /** What a bundle opens with. */
+  start: number;
+  limits: readonly [number, number];
+  /** Equal steps are equal factors. */
+  isLogarithmic?: boolean;
+  text: (value: number) => string;
+}>;
+type TraceNumbers = Readonly<Record<string, TraceNumber>>;
+
+const plain = (value: number) => Number(value.toFixed(2)).toString();
+const factor = (value: number) => `${plain(value)} x`;
+const percent = (value: number) => `${Math.round(100 * value)} %`;
+const degrees = (value: number) => `${Math.round(value)}°`;
+const stops = (value: number) => `${value >= 0 ? "+" : ""}${value.toFixed(1)} stops`;
+
+/** What light goes through. */
+export const MEDIUM_NUMBERS = {
+  /** Added to the intensities before the transfer function. */
+  bias: { label: "Bias", start: 0, limits: [-1, 1], text: plain },
+  /** Factor to the extinction. */
+  density: { label: "Density", start: 1, limits: [0.05, 20], isLogarithmic: true, text: factor },
+  /** How readily a gradient makes a surface. */
+  surface: { label: "Surfaces", start: 0.6, limits: [0, 1], text: percent },
+  /** A surface's shine. */
+  shine: { label: "Shine", start: 0.5, limits: [0, 1], text: percent },
+  /** Henyey-Greenstein g. */
+  anisotropy: { label: "Scatters forward", start: 0, limits: [-0.95, 0.95], text: plain },
+} as const satisfies TraceNumbers;
+
+/** Factor to the environment's light, and by how much it is turned. */
+export const ROOM_NUMBERS = {
+  environmentLight: { label: "Light of the room", start: 1, limits: [0, 4], text: factor },
+  environmentTurn_deg: { label: "Room turned", start: 0, limits: [-180, 180], text: degrees },
+} as const satisfies TraceNumbers;
+
+/** What comes after the light. */
+export const POST_NUMBERS = {
+  exposure: { label: "Exposure", start: 0, limits: [-4, 4], text: stops },
+  hue: { label: "Hue", start: 0, limits: [-180, 180], text: degrees },
+  /** Factor. */
+  saturation: { label: "Saturation", start: 1, limits: [0, 3], text: percent },
+  /** Added. */
+  lightness: { label: "Lightness", start: 0, limits: [-0.5, 0.5], text: percent },
+  occlusion: { label: "Ambient occlusion", start: 0.3, limits: [0, 1], text: percent },
+  sharpness: { label: "Sharpness", start: 0.2, limits: [0, 2], text: percent },
+} as const satisfies TraceNumbers;
+
+/** Lamps stay within reach of a hand round the specimen. */
+export const LAMP_REACH = 3;
+
+/** Of one lamp: where it is, and how strong. */
+export const LAMP_NUMBERS = {
+  x: { label: "Left to right", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
+  y: { label: "Down to up", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
+  z: { label: "Back to front", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
+  strength: { label: "Strength", limits: [0, 10], steps: 100, text: factor },
+} as const;
+
+type NumbersOf<T extends TraceNumbers> = { readonly [K in keyof T]: number };
+
+export type TraceSettings = NumbersOf<typeof MEDIUM_NUMBERS> &
+  NumbersOf<typeof ROOM_NUMBERS> &
+  NumbersOf<typeof POST_NUMBERS> &
+  Readonly<{
+    /** Paths are scattered once, or until they leave. */
+    isMultiple: boolean;
+    environment: EnvironmentName;
+    lamps: readonly Lamp[];
+    /** What comes after the light; off: as it was gathered. */
+    isPostOn: boolean;
+    toneMap: (typeof TONE_MAPS)[number];
+  }>;
 
 /** From the left above, from the right, from behind: the key, the fill, the rim. */
 const START_LAMPS: readonly Lamp[] = [
@@ -64,95 +104,43 @@ const START_LAMPS: readonly Lamp[] = [
   { isOn: false, x: 1.2, y: 0.3, z: 0.8, color: [0.8, 0.88, 1], strength: 0.6 },
   { isOn: false, x: 0.3, y: 0.9, z: -1.2, color: [1, 1, 1], strength: 1 },
 ];
+export const LAMPS = START_LAMPS.length;
 
-export const START_TRACE: TraceSettings = {
-  bias: 0,
-  density: 1,
-  isMultiple: true,
-  anisotropy: 0,
-  surface: 0.6,
-  shine: 0.5,
-  environment: "studio",
-  environmentLight: 1,
-  environmentTurn_deg: 0,
-  lamps: START_LAMPS,
-  isPostOn: true,
-  exposure: 0,
-  toneMap: "filmic",
-  hue: 0,
-  saturation: 1,
-  lightness: 0,
-  occlusion: 0.3,
-  sharpness: 0.2,
-};
-
-/** The limits of what a user can set. */
-export const TRACE_LIMITS = {
-  bias: [-1, 1],
-  density: [0.05, 20],
-  anisotropy: [-0.95, 0.95],
-  surface: [0, 1],
-  shine: [0, 1],
-  environmentLight: [0, 4],
-  environmentTurn_deg: [-180, 180],
-  exposure: [-4, 4],
-  hue: [-180, 180],
-  saturation: [0, 3],
-  lightness: [-0.5, 0.5],
-  occlusion: [0, 1],
-  sharpness: [0, 2],
-} as const;
-
-export type TraceNumber = keyof typeof TRACE_LIMITS;
-
-/** Lamps stay within reach of a hand round the specimen. */
-export const LAMP_REACH = 3;
-const REACHES = [-LAMP_REACH, LAMP_REACH] as const;
-export const MOST_STRENGTH = 10;
-
-const clamp = (value: number, [low, high]: readonly [number, number]) =>
-  Math.min(high, Math.max(low, value));
-
-/** The settings with what is given put in, within its limits. */
-export function withTrace(trace: TraceSettings, change: Partial<TraceSettings>): TraceSettings {
-  const next = { ...trace, ...change };
-  for (const name of Object.keys(TRACE_LIMITS) as TraceNumber[]) {
-    const value = next[name];
-    next[name] = Number.isFinite(value) ? clamp(value, TRACE_LIMITS[name]) : trace[name];
-  }
-  return next;
+function startsOf<T extends TraceNumbers>(numbers: T): NumbersOf<T> {
+  const starts = Object.entries(numbers).map(([name, { start }]) => [name, start]);
+  return Object.fromEntries(starts) as NumbersOf<T>;
 }
 
-/** One lamp changed, within its limits. */
+export const START_TRACE: TraceSettings = {
+  ...startsOf(MEDIUM_NUMBERS),
+  isMultiple: true,
+  ...startsOf(ROOM_NUMBERS),
+  environment: "studio",
+  lamps: START_LAMPS,
+  ...startsOf(POST_NUMBERS),
+  isPostOn: true,
+  toneMap: "filmic",
+};
+
+/** One lamp changed. */
 export function withLamp(
   trace: TraceSettings,
   index: number,
   change: Partial<Lamp>,
 ): TraceSettings {
-  const lamps = trace.lamps.map((lamp, i) => {
-    if (i !== index) return lamp;
-    const next = { ...lamp, ...change };
-    const within = (name: "x" | "y" | "z" | "strength", limits: readonly [number, number]) =>
-      Number.isFinite(next[name]) ? clamp(next[name], limits) : lamp[name];
-    const [x, y, z] = (["x", "y", "z"] as const).map((axis) => within(axis, REACHES));
-    return { ...next, x, y, z, strength: within("strength", [0, MOST_STRENGTH]) };
-  });
+  const lamps = trace.lamps.map((lamp, i) => (i === index ? { ...lamp, ...change } : lamp));
   return { ...trace, lamps };
 }
 
+const GATHERED: readonly (keyof TraceSettings)[] = [
+  ...(Object.keys(MEDIUM_NUMBERS) as (keyof typeof MEDIUM_NUMBERS)[]),
+  ...(Object.keys(ROOM_NUMBERS) as (keyof typeof ROOM_NUMBERS)[]),
+  "isMultiple",
+  "environment",
+  "lamps",
+];
+
 /** Whether what paths gather differs between two settings, and not only what is made of it. */
 export function gathersAnew(a: TraceSettings, b: TraceSettings): boolean {
-  const GATHERED = [
-    "bias",
-    "density",
-    "isMultiple",
-    "anisotropy",
-    "surface",
-    "shine",
-    "environment",
-    "environmentLight",
-    "environmentTurn_deg",
-    "lamps",
-  ] as const;
   return GATHERED.some((name) => a[name] !== b[name]);
 }

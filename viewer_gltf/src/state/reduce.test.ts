@@ -2,7 +2,8 @@ import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { Manifest } from "../bundle/generated/bundle";
 import { initialState, VOLUME_TILES_AT_START } from "./initial_state";
-import { LIMITS, newNotice, reduce } from "./reduce";
+import { DISC_RADIUS, SWITCH_DISTANCE } from "./parameters/volumes";
+import { newNotice, reduce } from "./reduce";
 import {
   drawnAs,
   isInDisc,
@@ -108,9 +109,9 @@ describe("the viewer's state", () => {
     expect(isInDisc(state, state.channels[0])).toBe(false);
     expect(isInDisc(state, state.channels[2])).toBe(true);
     expect(wantsSurface(state, state.channels[2])).toBe(true);
-    const asked = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
+    const asked = reduce(state, { type: "set", id: "volume", channel: "c0", value: false });
     expect(looks(asked, "c0", "r0_c0")).toBe("surface");
-    const off = reduce(state, { type: "choose-mode", mode: "off" });
+    const off = reduce(state, { type: "set", id: "mode", value: "off" });
     expect(looks(off, "c0", "r0_c0")).toBe("surface");
     expect(wantsSurface(off, off.channels[0])).toBe(true);
   });
@@ -125,16 +126,20 @@ describe("the viewer's state", () => {
 
   it("shows a volume in the gazed tile, the selected one, or in all", () => {
     const gaze = near("r0_c1", "r0_c0", "r0_c2");
-    const state = reduce(initialState(sampleManifest(2)), { type: "choose-mode", mode: "tile" });
+    const state = reduce(initialState(sampleManifest(2)), {
+      type: "set",
+      id: "mode",
+      value: "tile",
+    });
     expect(marched(state)).toEqual([]);
     expect(marched(state, gaze)).toEqual(["r0_c1"]);
     const selected = reduce(state, { type: "select", tile: "r0_c2" });
     expect(marched(selected, gaze)).toEqual(["r0_c2"]);
     expect(marched(selected, near("r0_c1"))).toEqual([]); // it is too far away
-    expect(marched(reduce(state, { type: "choose-mode", mode: "all" }))).toHaveLength(
+    expect(marched(reduce(state, { type: "set", id: "mode", value: "all" }))).toHaveLength(
       state.tiles.length,
     );
-    expect(marched(reduce(state, { type: "choose-mode", mode: "off" }), gaze)).toEqual([]);
+    expect(marched(reduce(state, { type: "set", id: "mode", value: "off" }), gaze)).toEqual([]);
     const none = after(
       state,
       { type: "show", channel: "c0", shown: false },
@@ -147,7 +152,7 @@ describe("the viewer's state", () => {
     const state = reduce(initialState(sampleManifest(2)), { type: "isolate", tile: "r0_c0" });
     expect(looks(state, "c0", "r0_c0")).toBe("surface");
     expect(looks(state, "c0", "r0_c1")).toBe("");
-    const all = reduce(state, { type: "choose-mode", mode: "all" });
+    const all = reduce(state, { type: "set", id: "mode", value: "all" });
     expect(marched(all)).toEqual(["r0_c0"]);
   });
 
@@ -165,13 +170,13 @@ describe("the viewer's state", () => {
 
   it("keeps what is set within its limits", () => {
     const state = initialState(sampleManifest(1));
-    const far = reduce(state, { type: "set-switch-distance", distance_m: 1e9 });
-    expect(far.switchDistance_m).toBe(LIMITS.switchDistance_m[1]);
-    const wide = reduce(state, { type: "set-disc-radius", radius_deg: -3 });
-    expect(wide.discRadius_deg).toBe(LIMITS.discRadius_deg[0]);
+    const far = reduce(state, { type: "set", id: "switch-distance", value: 1e9 });
+    expect(far.switchDistance_m).toBe(SWITCH_DISTANCE.limits[1]);
+    const wide = reduce(state, { type: "set", id: "disc-radius", value: -3 });
+    expect(wide.discRadius_deg).toBe(DISC_RADIUS.limits[0]);
     const set = after(
       state,
-      { type: "fade", channel: "c0", opacity: 3 },
+      { type: "set", id: "opacity", channel: "c0", value: 3 },
       { type: "window", channel: "c0", window: [0.9, 0.2] },
     );
     const [{ opacity, window }] = set.channels;
@@ -230,7 +235,7 @@ describe("the viewer's state", () => {
     expect(brought(faulty, { type: "notify", text: "b" })).toBe("b");
     expect(brought(faulty, { type: "show", channel: "c4", shown: true })).toBeNull();
     expect(brought(faulty, { type: "dismiss", text: "a" })).toBeNull();
-    expect(brought(faulty, { type: "fade", channel: "c0", opacity: 0.5 })).toBeNull();
+    expect(brought(faulty, { type: "set", id: "opacity", channel: "c0", value: 0.5 })).toBeNull();
   });
 });
 
@@ -262,13 +267,13 @@ describe("what the stage draws in a tile", () => {
 
   it("gives way to what the user chooses", () => {
     const state = initialState(staged(sampleManifest(3), MIXED));
-    const off = reduce(state, { type: "draw-volume", channel: "c0", volume: false });
+    const off = reduce(state, { type: "set", id: "volume", channel: "c0", value: false });
     expect(looks(off, "c0", "r0_c0")).toBe("surface");
     expect(looks(off, "c2", "r0_c0")).toBe("volume");
 
-    const all = reduce(state, { type: "choose-mode", mode: "all" });
+    const all = reduce(state, { type: "set", id: "mode", value: "all" });
     for (const { id } of state.tiles) expect(looks(all, "c0", id)).toBe("volume");
-    const back = reduce(all, { type: "choose-mode", mode: "stage" });
+    const back = reduce(all, { type: "set", id: "mode", value: "stage" });
     expect(back).toEqual(state);
   });
 
@@ -294,10 +299,10 @@ describe("the lamps", () => {
   it("are shown when they are asked for, whatever becomes of the mode", () => {
     const start = initialState(sampleManifest(3));
     expect(start.areLampsShown).toBe(false);
-    const shown = reduce(start, { type: "show-lamps", areShown: true });
+    const shown = reduce(start, { type: "set", id: "trace/lamps", value: true });
     expect(shown).toEqual({ ...start, areLampsShown: true });
-    expect(reduce(shown, { type: "show-lamps", areShown: true })).toBe(shown);
-    expect(reduce(shown, { type: "choose-mode", mode: "off" }).areLampsShown).toBe(true);
-    expect(reduce(shown, { type: "show-lamps", areShown: false })).toEqual(start);
+    expect(reduce(shown, { type: "set", id: "trace/lamps", value: true })).toBe(shown);
+    expect(reduce(shown, { type: "set", id: "mode", value: "off" }).areLampsShown).toBe(true);
+    expect(reduce(shown, { type: "set", id: "trace/lamps", value: false })).toEqual(start);
   });
 });

@@ -1,10 +1,11 @@
 /** What an action makes of the state. Pure. */
 import type { Action } from "./actions";
-import { withLamp, withTrace } from "./path_trace_settings";
+import { withValue } from "./parameters/kinds";
+import { LAMP } from "./parameters/light";
+import { faultOfValue, withParameter } from "./parameters/table";
 import { withShapes } from "./transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
-const NO_FLOATS = "This device can't draw into textures of floats: light can't be gathered here.";
 function withChannel(
   state: ViewerState,
   id: string,
@@ -36,34 +37,30 @@ function withShown(state: ViewerState, id: string): ViewerState {
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
 
-/** The limits of what a user can set. */
-export const LIMITS = {
-  switchDistance_m: [0.1, 10],
-  discRadius_deg: [2, 40],
-} as const;
 /** Narrower, a window would be one step of the 8 bits. */
 const NARROWEST_WINDOW = 1 / 128;
 
 /** The next state. Returns the same object if the action changes nothing. */
 export function reduce(state: ViewerState, action: Action): ViewerState {
   switch (action.type) {
+    case "set": {
+      const { id, value, channel } = action;
+      const fault = channel === undefined ? faultOfValue(state, id, value) : null;
+      return fault === null ? withParameter(state, action) : withNotice(state, fault);
+    }
+    case "move-lamp":
+      return (LAMP[action.lamp]?.place ?? []).reduce(
+        (moved, axis, i) => withValue(axis, moved, action.place[i]),
+        state,
+      );
     case "show":
       if (action.shown) return withShown(state, action.channel);
       return withChannel(state, action.channel, (c) => ({ ...c, shown: false }));
-    case "recolor":
-      return withChannel(state, action.channel, (c) => ({ ...c, color: action.color }));
-    case "fade":
-      return withChannel(state, action.channel, (c) => ({
-        ...c,
-        opacity: clamp(action.opacity, 0, 1),
-      }));
     case "window": {
       const low = clamp(action.window[0], 0, 1 - NARROWEST_WINDOW);
       const high = clamp(action.window[1], low + NARROWEST_WINDOW, 1);
       return withChannel(state, action.channel, (c) => ({ ...c, window: [low, high] }));
     }
-    case "draw-volume":
-      return withChannel(state, action.channel, (c) => ({ ...c, volume: action.volume }));
     case "choose-transfer-function":
       return withChannel(state, action.channel, (c) =>
         c.transferFunctions.includes(action.name) ? { ...c, transferFunction: action.name } : c,
@@ -81,30 +78,10 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
         "isolated",
         action.tile,
       );
-    case "choose-mode":
-      if (action.mode === "traced" && !state.canTrace) return withNotice(state, NO_FLOATS);
-      return action.mode === state.mode ? state : { ...state, mode: action.mode };
-    case "set-switch-distance":
-      return { ...state, switchDistance_m: clamp(action.distance_m, ...LIMITS.switchDistance_m) };
-    case "set-disc-radius":
-      return { ...state, discRadius_deg: clamp(action.radius_deg, ...LIMITS.discRadius_deg) };
     case "set-clip":
       return { ...state, clip: action.clip };
-    case "choose-tool":
-      return action.tool === state.tool ? state : { ...state, tool: action.tool };
     case "measure":
       return { ...state, measured: action.points.slice(-2) };
-    case "set-dwell":
-      return action.isOn === state.isDwellOn ? state : { ...state, isDwellOn: action.isOn };
-    case "choose-quality":
-      return action.level === state.quality ? state : { ...state, quality: action.level };
-    case "trace":
-      return { ...state, trace: withTrace(state.trace, action.change) };
-    case "move-lamp":
-      return { ...state, trace: withLamp(state.trace, action.lamp, action.change) };
-    case "show-lamps":
-      if (action.areShown === state.areLampsShown) return state;
-      return { ...state, areLampsShown: action.areShown };
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {

@@ -1,9 +1,9 @@
 /** Who is drawn how: for each channel and tile, surface or volume. Pure. */
 
 import { VOLUME_TILES_AT_START } from "./initial_state";
+import { isTraced } from "./parameters/volumes";
 import {
   type ChannelState,
-  isTraced,
   type Representation,
   type TileState,
   type ViewerState,

@@ -89,7 +89,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
 
   const all = () => manifest.tiles.map(({ id }) => id);
   const opened = (mode: ViewerState["mode"]) =>
-    reduce(initialState(manifest), { type: "choose-mode", mode });
+    reduce(initialState(manifest), { type: "set", id: "mode", value: mode });
   const levelsNow = () => new Set(set.status().map(({ level }) => level));
   const coarsestNow = () => Math.max(...set.status().map(({ level }) => level ?? 0));
   const bytesOf = (level: number, channels: number) =>

@@ -59,7 +59,7 @@ describeInChromium("the panel in the room", () => {
     expect((await hands().status()).pointed).toBe("panel:c0/volume");
     await hands().press("right");
     expect((await hands().actions()).slice(1)).toEqual([
-      { type: "draw-volume", channel: "c0", volume: false },
+      { type: "set", id: "volume", channel: "c0", value: false },
     ]);
     await hands().point("right", RIGHT, AWAY);
     await gazeAt("tab=tiles");
@@ -85,7 +85,7 @@ describeInChromium("the panel in the room", () => {
     await hands().wait(0.5);
     await hands().button("right", "trigger", 0);
     const opacities = (await hands().actions()).flatMap((action) =>
-      action.type === "fade" ? [action.opacity] : [],
+      action.type === "set" && action.id === "opacity" ? [action.value] : [],
     );
     expect(new Set(opacities)).toEqual(new Set([0.5, 1]));
     expect(opacities.length).toBeLessThan(5); // not one for each frame
@@ -212,15 +212,15 @@ describeInChromium("the panel in the room", () => {
     await hands().wait(0.5);
     expect(await paints()).toBe(before);
     await hands().page.evaluate(() =>
-      window.hands.dispatch({ type: "choose-quality", level: "low" }),
+      window.hands.dispatch({ type: "set", id: "quality", value: "low" }),
     );
     await hands().step([0.05]);
     expect(await paints()).toBe(before); // the section that is open does not show it
     await hands().page.evaluate(() =>
-      window.hands.dispatch({ type: "fade", channel: "c0", opacity: 0.5 }),
+      window.hands.dispatch({ type: "set", id: "opacity", channel: "c0", value: 0.5 }),
     );
     await hands().page.evaluate(() =>
-      window.hands.dispatch({ type: "draw-volume", channel: "c0", volume: false }),
+      window.hands.dispatch({ type: "set", id: "volume", channel: "c0", value: false }),
     );
     await hands().step([0.05]);
     expect(await paints()).toBe(before + 1);

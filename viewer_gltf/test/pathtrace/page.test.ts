@@ -5,7 +5,7 @@
 import { expect, it } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
 import { place } from "../../src/render/placement";
-import { DIALS } from "../../src/state/path_trace_parameters";
+import { LIGHT_NUMBERS } from "../../src/state/parameters/light";
 import { project } from "../support/browser/camera";
 import { addHeadset } from "../support/browser/chromium";
 import {
@@ -129,7 +129,7 @@ describeInChromium("the path-traced page", () => {
     expect(off(again)).toBeLessThan(off(plain) / 2);
 
     // a lamp elsewhere
-    const keys = DIALS.findIndex(({ id }) => id === "lamp-0/x") + 1;
+    const keys = LIGHT_NUMBERS.findIndex(({ link }) => link === "lamp-0/x") + 1;
     await press(...new Array<string>(keys).fill("F"));
     const many = await samples();
     await press(...new Array<string>(20).fill("]")); // each a sixtieth of the way

@@ -5,7 +5,7 @@
  */
 import { expect, it } from "vitest";
 import { place, XR_DISTANCE_M } from "../../src/render/placement";
-import type { Mode } from "../../src/state/viewer_state";
+import type { Mode } from "../../src/state/parameters/volumes";
 import { addHeadset } from "../support/browser/chromium";
 import { isBackground, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";

@@ -1,6 +1,6 @@
 /** Who is drawn how: surfaces from afar, volumes round the gaze, in one tile, or everywhere. */
 import { expect, it } from "vitest";
-import type { Mode } from "../../src/state/viewer_state";
+import type { Mode } from "../../src/state/parameters/volumes";
 import { project } from "../support/browser/camera";
 import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { isBackground, type Picture, takePicture } from "../support/browser/picture";

@@ -176,7 +176,9 @@ describeInChromium("the gaze in stereo", () => {
 
   it("chooses nothing with dwell off, but the button does at once", async () => {
     await hands().gazeOnly();
-    await hands().page.evaluate(() => window.hands.dispatch({ type: "set-dwell", isOn: false }));
+    await hands().page.evaluate(() =>
+      window.hands.dispatch({ type: "set", id: "dwell", value: false }),
+    );
     await hands().lookAt(await hands().tileAt("r1_c0"));
     await hands().wait(4);
     expect(await hands().chosen()).toEqual([]);

@@ -110,12 +110,12 @@ describe("the panel on a plane", () => {
   });
 
   it("says why where something is refused", () => {
-    const off = reduce(start(), { type: "choose-mode", mode: "off" });
+    const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
     const radius = find(page, "disc-radius");
     expect(radius.isSlide).toBe(false);
     expect(radius.to(0.3)).toEqual({ plane: "tell", text: "Only the mode Disc has one." });
-    expect(find(page, "mode=disc").to(0)).toEqual({ type: "choose-mode", mode: "disc" });
+    expect(find(page, "mode=disc").to(0)).toEqual({ type: "set", id: "mode", value: "disc" });
   });
 });
 
@@ -135,7 +135,9 @@ describe("its controls", () => {
     const opacity = find(page, "c0/opacity");
     const at = (across: number) => {
       const wish = opacity.to(across);
-      return typeof wish === "object" && wish !== null && "opacity" in wish ? wish.opacity : null;
+      return typeof wish === "object" && wish !== null && "value" in wish
+        ? Number(wish.value)
+        : null;
     };
     expect([at(0), at(0.5), at(1)]).toEqual([0, 0.5, 1]);
     expect(at(0.04)).toBe(0);

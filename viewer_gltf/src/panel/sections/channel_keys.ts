@@ -1,12 +1,13 @@
 /** The keys of the channels: which one is meant, and how it looks. Pure. */
 import { fromHex, toHex } from "../../math/color";
+import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
+import { setTo } from "../../state/parameters/kinds";
 import type { ChannelState } from "../../state/viewer_state";
 import type { Wish } from "../controls";
-import { type Key, key, neighbour, ofChannel } from "../key";
+import { type Key, key, keysOfChannel, neighbour, ofChannel } from "../key";
 import { nextColour } from "../palettes";
 import { pagesOf } from "./channels";
 
-const OPACITY_STEP = 0.05;
 const WINDOW_STEP = 1 / 64;
 
 function pick(by: number): Key["to"] {
@@ -15,14 +16,6 @@ function pick(by: number): Key["to"] {
     const channel = neighbour(shown, view.picked ?? undefined, by);
     return channel === null ? null : { panel: "pick", channel };
   };
-}
-
-function fade(by: number) {
-  return ({ id, opacity }: ChannelState): Wish => ({
-    type: "fade",
-    channel: id,
-    opacity: Math.round(100 * (opacity + by)) / 100,
-  });
 }
 
 function shift(low: number, high: number) {
@@ -49,22 +42,15 @@ export const CHANNEL_KEYS: readonly Key[] = [
   key("c", "Next channel: the keys below mean it", pick(1)),
   key("C", "Previous channel", pick(-1)),
   ofChannel("x", "Hide the channel", ({ id }) => ({ type: "show", channel: id, shown: false })),
-  ofChannel("v", "Volume on or off", ({ id, volume }) => ({
-    type: "draw-volume",
-    channel: id,
-    volume: !volume,
-  })),
+  ...keysOfChannel(VOLUME),
   ofChannel("f", "Next transfer function", ({ id, transferFunction, transferFunctions }) => {
     const name = neighbour(transferFunctions, transferFunction, 1);
     return name === null ? null : { type: "choose-transfer-function", channel: id, name };
   }),
-  ofChannel("k", "Next colour of the palettes", ({ id, color }) => ({
-    type: "recolor",
-    channel: id,
-    color: fromHex(nextColour(toHex(color))),
-  })),
-  ofChannel("o", "Less opacity", fade(-OPACITY_STEP)),
-  ofChannel("O", "More opacity", fade(OPACITY_STEP)),
+  ofChannel("k", "Next colour of the palettes", ({ id, color }) =>
+    setTo(COLOR, fromHex(nextColour(toHex(color))), id),
+  ),
+  ...CHANNEL.filter((row) => row !== VOLUME).flatMap(keysOfChannel),
   ofChannel("w", "Window: lower end down", shift(-WINDOW_STEP, 0)),
   ofChannel("W", "Window: lower end up", shift(WINDOW_STEP, 0)),
   ofChannel("e", "Window: upper end down", shift(0, -WINDOW_STEP)),

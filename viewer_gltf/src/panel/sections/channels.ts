@@ -4,17 +4,16 @@
  */
 
 import { valueText } from "../../annotations/measure";
-import { fromHex, toHex } from "../../math/color";
+import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
 import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
+import { controlOf, paletteOf } from "../control_templates";
 import type { Control, Group, PanelView, Section } from "../controls";
-import { PALETTES } from "../palettes";
 import { planeItems } from "./transfer_function_2d";
 
 /** Channels of a page that are not shown; fewer need no search. */
 export const PAGE = 6;
-const PERCENT_STEPS = 100;
 /** The volumes have 8 bits. */
 const WINDOW_STEPS = 255;
 
@@ -53,8 +52,6 @@ function cardOf(
   const isOpen = view.picked === id;
   const toWindow = (window: readonly [number, number]) =>
     ({ type: "window", channel: id, window }) as const;
-  const recolor = (hex: string) => ({ type: "recolor", channel: id, color: fromHex(hex) }) as const;
-  const value = toHex(channel.color);
   const range = ranges.get(id);
   return {
     kind: "group",
@@ -64,24 +61,9 @@ function cardOf(
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
     controls: [
-      {
-        kind: "colour",
-        id: `${id}/color`,
-        label: "Any colour",
-        name: `Colour of ${name}`,
-        value,
-        palettes: [],
-        to: recolor,
-      },
+      controlOf(COLOR, channel, id),
       shownToggle(channel),
-      {
-        kind: "toggle",
-        id: `${id}/volume`,
-        label: "Volume",
-        name: `Draw ${name} as a volume`,
-        value: channel.volume,
-        to: (volume) => ({ type: "draw-volume", channel: id, volume }),
-      },
+      controlOf(VOLUME, channel, id),
       {
         kind: "choice",
         id: `${id}/transfer-function`,
@@ -98,16 +80,9 @@ function cardOf(
       },
     ],
     more: [
-      {
-        kind: "slider",
-        id: `${id}/opacity`,
-        label: "Opacity",
-        name: `Opacity of ${name}`,
-        value: channel.opacity,
-        steps: PERCENT_STEPS,
-        text: `${Math.round(100 * channel.opacity)} %`,
-        to: (opacity) => ({ type: "fade", channel: id, opacity }),
-      },
+      ...CHANNEL.filter((row) => row !== COLOR && row !== VOLUME).map((row) =>
+        controlOf(row, channel, id),
+      ),
       {
         kind: "window",
         id: `${id}/window`,
@@ -118,15 +93,7 @@ function cardOf(
         texts: [intensityText(channel.window[0], range), intensityText(channel.window[1], range)],
         to: toWindow,
       },
-      {
-        kind: "colour",
-        id: `${id}/palette`,
-        label: "Colour",
-        name: `Colour of ${name}`,
-        value,
-        palettes: PALETTES,
-        to: recolor,
-      },
+      paletteOf(COLOR, channel, `${id}/palette`, id),
       ...planeItems(channel, view, histogram, (share) => intensityText(share, range)),
     ],
   };

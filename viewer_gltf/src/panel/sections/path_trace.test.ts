@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../../test/support/fixture/manifest";
 import { initialState } from "../../state/initial_state";
-import { DIALS } from "../../state/path_trace_parameters";
+import { LIGHT_NUMBERS } from "../../state/parameters/light";
 import { LAMPS } from "../../state/path_trace_settings";
 import { reduce } from "../../state/reduce";
 import type { ViewerState } from "../../state/viewer_state";
@@ -9,7 +9,7 @@ import { type Control, type Group, START_VIEW, type Wish } from "../controls";
 import { lightItems } from "./path_trace";
 
 const CLOSED = initialState(sampleManifest(2));
-const TRACED = reduce(CLOSED, { type: "choose-mode", mode: "traced" });
+const TRACED = reduce(CLOSED, { type: "set", id: "mode", value: "traced" });
 
 const itemsOf = (state: ViewerState, isStereo = false) => lightItems(state, START_VIEW, isStereo);
 function controlsOf(state: ViewerState, isStereo = false): readonly Control[] {
@@ -44,12 +44,12 @@ describe("the panel's light", () => {
 
   it("has a slider for every number, which sets it from end to end", () => {
     const sliders = controlsOf(TRACED).filter(({ kind }) => kind === "slider");
-    expect(sliders.map(({ id }) => id)).toEqual(DIALS.map(({ id }) => `trace/${id}`));
-    for (const dial of DIALS) {
-      const slider = find(TRACED, "slider", `trace/${dial.id}`);
+    expect(sliders.map(({ id }) => id)).toEqual(LIGHT_NUMBERS.map(({ id }) => id));
+    for (const row of LIGHT_NUMBERS) {
+      const slider = find(TRACED, "slider", row.id);
       for (const end of [0, 1] as const) {
-        const { trace } = granted(TRACED, slider.to(end));
-        expect(dial.of(trace), dial.id).toBeCloseTo(dial.limits[end], 6);
+        const set = granted(TRACED, slider.to(end));
+        expect(row.get(set), row.id).toBeCloseTo(row.limits[end], 6);
       }
     }
   });

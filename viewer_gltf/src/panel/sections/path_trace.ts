@@ -1,52 +1,21 @@
 /** The panel's part for the path-traced picture: its light, its medium, and what comes after. Pure. */
-import { fromHex, toHex } from "../../math/color";
+import { setTo } from "../../state/parameters/kinds";
 import {
-  type Dial,
-  lampDials,
-  MEDIUM_DIALS,
-  POST_DIALS,
-  ROOM_DIALS,
-  shareOf,
-  valueAtShare,
-} from "../../state/path_trace_parameters";
-import {
-  ENVIRONMENTS,
-  type EnvironmentName,
-  TONE_MAPS,
-  type TraceSettings,
-} from "../../state/path_trace_settings";
-import { isTraced, type ViewerState } from "../../state/viewer_state";
-import { command, inline } from "../control_templates";
-import type { Control, Group, PanelView, Section } from "../controls";
-import { PALETTES } from "../palettes";
+  AFTER,
+  LAMP,
+  LAMPS_SHOWN,
+  type LampParameters,
+  MEDIUM,
+  ROOM,
+} from "../../state/parameters/light";
+import { isTraced, MODE } from "../../state/parameters/volumes";
+import type { ViewerState } from "../../state/viewer_state";
+import { command, controlOf, controlsOf, paletteOf } from "../control_templates";
+import type { Group, PanelView, Section } from "../controls";
 
-const ROOM_NAMES: Readonly<Record<EnvironmentName, string>> = {
-  studio: "Studio",
-  sky: "Sky",
-  own: "Own",
-};
-const TONE_NAMES = { filmic: "Film", none: "None" } as const;
-
-function slider(dial: Dial, trace: TraceSettings): Control {
-  const value = dial.of(trace);
-  return {
-    kind: "slider",
-    id: `trace/${dial.id}`,
-    label: dial.name,
-    value: shareOf(dial, value),
-    steps: dial.steps,
-    text: dial.text(value),
-    to: (share) => dial.to(valueAtShare(dial, share)),
-  };
-}
-
-function lampGroup(lamp: number, { trace }: ViewerState, { picked }: PanelView): Group {
-  const { isOn, color } = trace.lamps[lamp];
-  const id = `lamp-${lamp}`;
-  const name = `Lamp ${lamp + 1}`;
+function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelView): Group {
+  const { id, name, color, isOn, numbers } = lamp;
   const isOpen = picked === id;
-  const recolor = (hex: string) =>
-    ({ type: "move-lamp", lamp, change: { color: fromHex(hex) } }) as const;
   return {
     kind: "group",
     id,
@@ -54,37 +23,8 @@ function lampGroup(lamp: number, { trace }: ViewerState, { picked }: PanelView):
     tags: [],
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
-    controls: [
-      {
-        kind: "colour",
-        id: `${id}/color`,
-        label: "Any colour",
-        name: `Colour of ${name}`,
-        value: toHex(color),
-        palettes: [],
-        to: recolor,
-      },
-      {
-        kind: "toggle",
-        id: `${id}/on`,
-        label: "On",
-        name: `${name} on`,
-        value: isOn,
-        to: (value) => ({ type: "move-lamp", lamp, change: { isOn: value } }),
-      },
-    ],
-    more: [
-      ...lampDials(lamp).map((dial) => slider(dial, trace)),
-      {
-        kind: "colour",
-        id: `${id}/palette`,
-        label: "Colour",
-        name: `Colour of ${name}`,
-        value: toHex(color),
-        palettes: PALETTES,
-        to: recolor,
-      },
-    ],
+    controls: [controlOf(color, state), controlOf(isOn, state)],
+    more: [...controlsOf(numbers, state), paletteOf(color, state, `${id}/palette`)],
   };
 }
 
@@ -100,55 +40,16 @@ export function lightItems(
         kind: "button",
         id: "trace",
         label: "Trace paths of light",
-        to: () => ({ type: "choose-mode", mode: "traced" }),
+        to: () => setTo(MODE, "traced"),
       },
     ];
   }
-  const { trace } = state;
-  const rooms = ENVIRONMENTS.filter((name) => name !== "own" || trace.environment === "own");
   return [
-    ...MEDIUM_DIALS.map((dial) => slider(dial, trace)),
-    {
-      kind: "toggle",
-      id: "trace/multiple",
-      label: "Scattered many times",
-      value: trace.isMultiple,
-      to: (isMultiple) => ({ type: "trace", change: { isMultiple } }),
-    },
-    inline("trace-room", "Room", trace.environment, ROOM_NAMES, rooms, (environment) => ({
-      type: "trace",
-      change: { environment },
-    })),
+    ...controlsOf(MEDIUM, state),
     ...(isStereo ? [] : [command("own-light", "Light of a .hdr or .exr file")]),
-    ...ROOM_DIALS.map((dial) => slider(dial, trace)),
-    {
-      kind: "toggle",
-      id: "trace/lamps",
-      label: "Show lamps",
-      name: "Show the lamps, to be dragged",
-      value: state.areLampsShown,
-      to: (areShown) => ({ type: "show-lamps", areShown }),
-    },
-    ...trace.lamps.map((_, lamp) => lampGroup(lamp, state, view)),
-    ...postItems(trace),
-  ];
-}
-
-/** What comes after the light. */
-function postItems(trace: TraceSettings): Section["items"] {
-  return [
-    {
-      kind: "toggle",
-      id: "trace/post",
-      label: "After (off: before)",
-      name: "Show the picture after these changes",
-      value: trace.isPostOn,
-      to: (isPostOn) => ({ type: "trace", change: { isPostOn } }),
-    },
-    ...POST_DIALS.map((dial) => slider(dial, trace)),
-    inline("trace-tone-map", "Tone map", trace.toneMap, TONE_NAMES, TONE_MAPS, (toneMap) => ({
-      type: "trace",
-      change: { toneMap },
-    })),
+    ...controlsOf(ROOM, state),
+    controlOf(LAMPS_SHOWN, state),
+    ...LAMP.map((lamp) => lampGroup(lamp, state, view)),
+    ...controlsOf(AFTER, state),
   ];
 }

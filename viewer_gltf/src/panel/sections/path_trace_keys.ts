@@ -1,51 +1,49 @@
 /** The keys of the path-traced picture. Pure. */
-import { DIALS, shareOf, valueAtShare } from "../../state/path_trace_parameters";
-import { isTraced } from "../../state/viewer_state";
-import { type Key, key, neighbour } from "../key";
+import { setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
+import {
+  AFTER,
+  LAMP,
+  LAMPS_SHOWN,
+  LIGHT_NUMBERS,
+  MEDIUM,
+  ROOM,
+} from "../../state/parameters/light";
+import { isTraced, MODE } from "../../state/parameters/volumes";
+import { type Key, key, keysOf, neighbour } from "../key";
 
-function nextDial(by: number): Key["to"] {
+/** The keys that switch the lamps. */
+const LAMP_KEYS: readonly string[] = ["!", "@", "#"];
+
+function nextNumber(by: number): Key["to"] {
   return ({ view }) => {
-    const ids = DIALS.map(({ id }) => id);
+    const ids = LIGHT_NUMBERS.map(({ id }) => id);
     const dial = neighbour(ids, view.dial ?? undefined, by);
     return dial === null ? null : { panel: "dial", dial };
   };
 }
 
 function turn(steps: number): Key["to"] {
-  return ({ state: { trace }, view }) => {
-    const dial = DIALS.find(({ id }) => id === view.dial) ?? DIALS[0];
-    const at = shareOf(dial, dial.of(trace)) + (2 * steps) / dial.steps;
-    return dial.to(valueAtShare(dial, Math.min(1, Math.max(0, at))));
+  return ({ state, view }) => {
+    const row = LIGHT_NUMBERS.find(({ id }) => id === view.dial) ?? LIGHT_NUMBERS[0];
+    const at = shareOf(row, row.get(state)) + (2 * steps) / row.steps;
+    return setTo(row, valueAtShare(row, Math.min(1, Math.max(0, at))));
   };
 }
 
 export const LIGHT_KEYS: readonly Key[] = [
-  key("G", "Paths of light on or off", ({ state }) => ({
-    type: "choose-mode",
-    mode: isTraced(state) ? "all" : "traced",
-  })),
-  key("F", "Next number of the light: the two keys below mean it", nextDial(1)),
-  key("X", "The number before", nextDial(-1)),
+  key("G", "Paths of light on or off", ({ state }) =>
+    setTo(MODE, isTraced(state) ? "all" : "traced"),
+  ),
+  key("F", "Next number of the light: the two keys below mean it", nextNumber(1)),
+  key("X", "The number before", nextNumber(-1)),
   key("[", "Less of it", turn(-1)),
   key("]", "More of it", turn(1)),
-  key("M", "Scattered once or many times", ({ state: { trace } }) => ({
-    type: "trace",
-    change: { isMultiple: !trace.isMultiple },
-  })),
-  key("I", "Next room", ({ state: { trace } }) => ({
-    type: "trace",
-    change: { environment: trace.environment === "studio" ? "sky" : "studio" },
-  })),
+  ...[...MEDIUM, ...ROOM].flatMap(keysOf),
   key("U", "Light of a .hdr or .exr file", "own-light"),
-  key(["!", "@", "#"], "Lamp 1, 2 or 3 on or off", ({ state: { trace } }, name) => {
-    const lamp = ["!", "@", "#"].indexOf(name);
-    return { type: "move-lamp", lamp, change: { isOn: !trace.lamps[lamp].isOn } };
+  key(LAMP_KEYS, "Lamp 1, 2 or 3 on or off", ({ state }, name) => {
+    const { isOn } = LAMP[LAMP_KEYS.indexOf(name)];
+    return setTo(isOn, !isOn.get(state));
   }),
-  key("$", "Show or hide the lamps, to be dragged", ({ state }) =>
-    isTraced(state) ? { type: "show-lamps", areShown: !state.areLampsShown } : null,
-  ),
-  key("Z", "Before or after what comes after the light", ({ state: { trace } }) => ({
-    type: "trace",
-    change: { isPostOn: !trace.isPostOn },
-  })),
+  ...keysOf(LAMPS_SHOWN),
+  ...AFTER.flatMap(keysOf),
 ];

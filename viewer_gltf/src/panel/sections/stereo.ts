@@ -1,8 +1,9 @@
 /** The panel's stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
 
+import { STEREO_PARAMETERS } from "../../state/parameters/tools";
 import type { StereoSupport, XrSupport } from "../../state/stereo";
 import type { ViewerState } from "../../state/viewer_state";
-import { command, inline } from "../control_templates";
+import { command, controlsOf, inline } from "../control_templates";
 import type { Button, Control, Lenses, PanelView } from "../controls";
 
 export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
@@ -24,13 +25,7 @@ export function stereoItems(
   return [
     { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
     ...(facts.split === null ? [] : splitItems(facts.split, facts, view)),
-    {
-      kind: "toggle",
-      id: "dwell",
-      label: "Gaze for 1.5 s chooses",
-      value: state.isDwellOn,
-      to: (isOn) => ({ type: "set-dwell", isOn }),
-    },
+    ...controlsOf(STEREO_PARAMETERS, state),
   ];
 }
 

@@ -1,6 +1,7 @@
 /** The keys of measuring, cutting open, sharing and of the panel itself. Pure. */
+import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
 import { gripsOf, meantGrip, moveGrip } from "../clip_by_key";
-import { type Key, key, neighbour } from "../key";
+import { type Key, key, keysOf, neighbour } from "../key";
 import { middleBox, middlePlane } from "../layout";
 
 function nextGrip(by: number): Key["to"] {
@@ -18,10 +19,7 @@ function push(steps: number): Key["to"] {
 }
 
 export const TOOL_KEYS: readonly Key[] = [
-  key("p", "A tap selects or measures", ({ state }) => ({
-    type: "choose-tool",
-    tool: state.tool === "select" ? "measure" : "select",
-  })),
+  ...MEASURE_PARAMETERS.flatMap(keysOf),
   key("Enter", "Tap in the middle of the view", "press"),
   key("u", "Clear what was measured", ({ state }) =>
     state.measured.length === 0 ? null : { type: "measure", points: [] },

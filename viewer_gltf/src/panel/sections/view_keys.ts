@@ -1,5 +1,6 @@
 /** The keys of the view, on the screen and in stereo. Pure. */
-import { type Key, key, neighbour } from "../key";
+import { STEREO_PARAMETERS } from "../../state/parameters/tools";
+import { type Key, key, keysOf, neighbour } from "../key";
 import { LENSES } from "./stereo";
 
 export const VIEW_KEYS: readonly Key[] = [
@@ -24,8 +25,5 @@ export const VIEW_KEYS: readonly Key[] = [
   }),
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),
-  key("j", "Choosing by gaze on or off", ({ state }) => ({
-    type: "set-dwell",
-    isOn: !state.isDwellOn,
-  })),
+  ...STEREO_PARAMETERS.flatMap(keysOf),
 ];

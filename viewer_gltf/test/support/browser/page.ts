@@ -1,7 +1,7 @@
 /** Drive the viewer's page as a person does: by its controls. */
 import type { Page } from "playwright-core";
 import type { Snapshot } from "../../../src/app/automation_api";
-import type { Mode } from "../../../src/state/viewer_state";
+import type { Mode } from "../../../src/state/parameters/volumes";
 
 export class ViewerPage {
   constructor(readonly page: Page) {}

@@ -1,0 +1,118 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../../test/support/fixture/manifest";
+import { initialState } from "../initial_state";
+import { reduce } from "../reduce";
+import { CHANNEL } from "./channel";
+import { type NumberParameter, setTo, shareOf, valueAtShare } from "./kinds";
+import { LIGHT_NUMBERS } from "./light";
+import { IN_ADDRESS, PARAMETERS } from "./table";
+import { MODE } from "./volumes";
+
+const START = initialState(sampleManifest(2));
+const NUMBERS = PARAMETERS.filter((row) => row.kind === "number");
+
+function isUnique(names: readonly (string | undefined)[]): boolean {
+  const given = names.filter((name) => name !== undefined);
+  return new Set(given).size === given.length;
+}
+
+describe("the parameters", () => {
+  it("have an id of their own, and a name of their own in a link", () => {
+    expect(isUnique(PARAMETERS.map(({ id }) => id))).toBe(true);
+    expect(isUnique(PARAMETERS.map(({ link }) => link))).toBe(true);
+    expect(isUnique(CHANNEL.map(({ link }) => link))).toBe(true);
+    expect(IN_ADDRESS.every(({ link }) => link !== undefined)).toBe(true);
+    // of a channel's look, a letter says which
+    expect(CHANNEL.every(({ link }) => link?.length === 1 && !"wst".includes(link))).toBe(true);
+  });
+
+  it("set what they show, and nothing else", () => {
+    for (const row of NUMBERS) {
+      for (const share of [0, 0.3, 1]) {
+        const value = valueAtShare(row, share);
+        const set = reduce(START, setTo(row, value));
+        expect(row.get(set), row.id).toBeCloseTo(value, 9);
+        for (const other of PARAMETERS) {
+          if (other !== row) expect(other.get(set), other.id).toEqual(other.get(START));
+        }
+      }
+    }
+  });
+
+  it("stay within their limits, whatever is asked for", () => {
+    for (const row of NUMBERS) {
+      const [low, high] = row.limits;
+      const set = (value: number) => row.get(reduce(START, setTo(row, value)));
+      expect(set(low - 1), row.id).toBe(low);
+      expect(set(high + 1e6), row.id).toBe(high);
+      expect(set((low + high) / 2), row.id).toBe((low + high) / 2);
+      for (const none of [Number.NaN, Number.POSITIVE_INFINITY]) {
+        expect(set(none), row.id).toBe(row.get(START));
+      }
+    }
+  });
+
+  it("take no value of another kind", () => {
+    for (const { id, kind } of PARAMETERS) {
+      for (const value of ["cube", 7, true, [1, 0, 0]] as const) {
+        if (kind === "number" && value === 7) continue;
+        if (kind === "switch" && value === true) continue;
+        if (kind === "colour" && typeof value === "object") continue;
+        expect(reduce(START, { type: "set", id, value }), id).toBe(START);
+      }
+    }
+  });
+
+  it("leave the state as it is where it has the value", () => {
+    for (const row of PARAMETERS) {
+      const value = row.get(START);
+      expect(reduce(START, { type: "set", id: row.id, value }), row.id).toBe(START);
+    }
+    const [{ id: channel }] = START.channels;
+    expect(reduce(START, { type: "set", id: "opacity", value: 1, channel })).toBe(START);
+  });
+
+  it("of a channel leave the other channels", () => {
+    const [first, second] = START.channels;
+    const set = reduce(START, { type: "set", id: "opacity", value: 0.25, channel: second.id });
+    expect(set.channels).toEqual([first, { ...second, opacity: 0.25 }]);
+  });
+
+  it("say in a notice what this device can't do", () => {
+    const poor = initialState(sampleManifest(1), false);
+    const asked = reduce(poor, setTo(MODE, "traced"));
+    expect(asked.mode).toBe(poor.mode);
+    expect(asked.notices).toHaveLength(1);
+  });
+
+  it("are a bug where nobody knows them", () => {
+    expect(() => reduce(START, { type: "set", id: "size", value: 1 })).toThrow("no parameter size");
+  });
+});
+
+describe("a number's slider", () => {
+  const sliders: readonly NumberParameter<typeof START>[] = NUMBERS;
+
+  it("goes from one limit to the other, and back to where it stood", () => {
+    for (const row of sliders) {
+      const [low, high] = row.limits;
+      expect(valueAtShare(row, 0), row.id).toBeCloseTo(low, 9);
+      expect(valueAtShare(row, 1), row.id).toBeCloseTo(high, 9);
+      const value = row.get(START);
+      expect(valueAtShare(row, shareOf(row, value)), row.id).toBeCloseTo(value, 5);
+    }
+    for (const row of LIGHT_NUMBERS) {
+      for (const share of [0, 0.11, 0.5, 0.93, 1]) {
+        expect(shareOf(row, valueAtShare(row, share)), row.id).toBeCloseTo(share, 4);
+      }
+    }
+  });
+
+  it("of factors: equal steps are equal factors", () => {
+    const density = LIGHT_NUMBERS.find(({ link }) => link === "density");
+    if (density === undefined) throw new Error("no number of the density");
+    const at = (share: number) => valueAtShare(density, share);
+    expect(at(0.5) / at(0.25)).toBeCloseTo(at(0.75) / at(0.5), 4);
+    expect(at(0.5)).toBeCloseTo(1, 4); // between a twentieth and twenty
+  });
+});

@@ -1,0 +1,57 @@
+/** All parameters, and the action that sets one. Pure. */
+import type { ChannelState, ViewerState } from "../viewer_state";
+import { CHANNEL } from "./channel";
+import { type Parameter, type SetAction, type Value, withValue } from "./kinds";
+import { LAMPS_SHOWN, LIGHT } from "./light";
+import { MEASURE_PARAMETERS, QUALITY, QUALITY_PARAMETERS, STEREO_PARAMETERS } from "./tools";
+import { DISC_RADIUS, MODE, SWITCH_DISTANCE, VOLUMES } from "./volumes";
+
+/** Besides those of the channels. */
+export const PARAMETERS: readonly Parameter<ViewerState>[] = [
+  ...VOLUMES,
+  ...MEASURE_PARAMETERS,
+  ...STEREO_PARAMETERS,
+  ...QUALITY_PARAMETERS,
+  ...LIGHT,
+  LAMPS_SHOWN,
+];
+
+/** What the page's address may ask for, by the names that links have. */
+export const IN_ADDRESS: readonly Parameter<ViewerState>[] = [
+  MODE,
+  QUALITY,
+  SWITCH_DISTANCE,
+  DISC_RADIUS,
+];
+
+const byId = new Map(PARAMETERS.map((row) => [row.id, row]));
+const channelById = new Map(CHANNEL.map((row) => [row.id, row]));
+
+/** The parameter of an id. Throws Error where there is none: ids come from tables. */
+export function parameterOf(id: string): Parameter<ViewerState> {
+  const row = byId.get(id);
+  if (row === undefined) throw new Error(`no parameter ${id}`);
+  return row;
+}
+
+export function channelParameterOf(id: string): Parameter<ChannelState> {
+  const row = channelById.get(id);
+  if (row === undefined) throw new Error(`no parameter ${id} of a channel`);
+  return row;
+}
+
+/** Why a value can't be had on this device; null: it can. */
+export function faultOfValue(state: ViewerState, id: string, value: Value): string | null {
+  const row = parameterOf(id);
+  return row.kind === "choice" ? (row.fault?.(state, String(value)) ?? null) : null;
+}
+
+/** The state with a parameter set. Returns the same object if that changes nothing. */
+export function withParameter(state: ViewerState, { id, value, channel }: SetAction): ViewerState {
+  if (channel === undefined) return withValue(parameterOf(id), state, value);
+  const row = channelParameterOf(id);
+  const channels = state.channels.map((each) =>
+    each.id === channel ? withValue(row, each, value) : each,
+  );
+  return channels.every((each, i) => each === state.channels[i]) ? state : { ...state, channels };
+}

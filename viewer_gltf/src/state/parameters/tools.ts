@@ -1,0 +1,59 @@
+/** The parameters of what a tap and a gaze do, and of how finely is drawn. Pure. */
+import { QUALITY_LEVELS, type QualityLevel } from "../quality_controller";
+import { type ChoiceParameter, lensesOf, type Parameter, type SwitchParameter } from "./kinds";
+
+const TOOLS = ["select", "measure"] as const;
+/** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
+export type Tool = (typeof TOOLS)[number];
+
+/** What a bundle opens with. */
+export const START_TOOLS = {
+  /** What a tap or a dwell on the specimen does. */
+  tool: "select" as Tool,
+  /** Whether looking at something for long is as good as pressing the button. */
+  isDwellOn: true,
+  quality: "auto" as QualityLevel,
+};
+
+export type ToolSettings = Readonly<typeof START_TOOLS>;
+
+const lens = lensesOf<ToolSettings>();
+
+export const TOOL: ChoiceParameter<ToolSettings, Tool> = {
+  kind: "choice",
+  id: "tool",
+  label: "A tap",
+  link: "tool",
+  ...lens("tool"),
+  values: TOOLS,
+  names: { select: "Select", measure: "Measure" },
+  key: ["p", "A tap selects or measures"],
+  told: ({ tool }) => `A tap ${tool}s`,
+};
+
+export const DWELL: SwitchParameter<ToolSettings> = {
+  kind: "switch",
+  id: "dwell",
+  label: "Gaze for 1.5 s chooses",
+  link: "dwell",
+  ...lens("isDwellOn"),
+  key: ["j", "Choosing by gaze on or off"],
+  told: ({ isDwellOn }) => `Choosing by gaze: ${isDwellOn ? "on" : "off"}`,
+};
+
+export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
+  kind: "choice",
+  id: "quality",
+  label: "Quality",
+  link: "quality",
+  ...lens("quality"),
+  values: QUALITY_LEVELS,
+  names: { auto: "Auto", low: "Low", high: "High" },
+  key: ["q", "Next quality"],
+  told: ({ quality }) => `Quality: ${quality}`,
+};
+
+/** By the panel's section that lists them. */
+export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL];
+export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL];
+export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

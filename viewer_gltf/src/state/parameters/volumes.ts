@@ -1,0 +1,111 @@
+/** The parameters of where volumes show. Pure. */
+import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } from "./kinds";
+
+/**
+ * Where volumes are drawn. `disc`: round the gaze, across tiles. `tile`: in the gazed tile. `all`:
+ * in all tiles. `stage`: as the stage has it; there are none of these unless an artist chose it.
+ * `traced`: in all tiles, by paths of light. `off`: nowhere. The first two hold within the switch distance.
+ */
+export const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
+export type Mode = (typeof MODES)[number];
+
+/** What a bundle opens with. */
+export const START_VOLUMES = {
+  mode: "disc" as Mode,
+  /** Metres of the room: nearer than a headset's specimen is at the start. */
+  switchDistance_m: 1.25,
+  /** Angle between the gaze and the disc's rim. */
+  discRadius_deg: 12,
+};
+
+export type VolumeSettings = Readonly<typeof START_VOLUMES>;
+
+/** With what else decides which modes there are. */
+type Volumes = VolumeSettings &
+  Readonly<{ canTrace: boolean; tiles: readonly Readonly<{ representation: string }>[] }>;
+
+const NO_FLOATS = "This device can't draw into textures of floats: light can't be gathered here.";
+/** Of a distance, so that near and far feel alike. */
+const DISTANCE_FACTOR = 1.1;
+
+const lens = lensesOf<Volumes>();
+
+/** The modes that can be chosen: as staged only where an artist has staged something. */
+function modesOf({ tiles, canTrace }: Volumes): readonly Mode[] {
+  const isStaged = tiles.some(({ representation }) => representation !== "mesh");
+  return MODES.filter((mode) => (mode === "stage" ? isStaged : mode !== "traced" || canTrace));
+}
+
+export const MODE: ChoiceParameter<Volumes, Mode> = {
+  kind: "choice",
+  id: "mode",
+  label: "Where volumes show",
+  link: "mode",
+  ...lens("mode"),
+  values: MODES,
+  names: {
+    disc: "Disc",
+    tile: "Tile",
+    all: "All",
+    stage: "Staged",
+    traced: "Traced",
+    off: "Off",
+  },
+  options: modesOf,
+  fault: ({ canTrace }, mode) => (mode === "traced" && !canTrace ? NO_FLOATS : null),
+  key: ["m", "Next mode: where volumes show"],
+  told: ({ mode }) => `Volumes: ${mode}`,
+};
+
+const metres = (value: number) => `${value.toPrecision(2)} m`;
+
+export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
+  kind: "number",
+  id: "switch-distance",
+  label: "Switch distance",
+  name: () => "Switch distance: volumes show within",
+  link: "switch",
+  ...lens("switchDistance_m"),
+  limits: [0.1, 10],
+  steps: 100,
+  isLogarithmic: true,
+  rounded: (value) => Number(value.toPrecision(3)),
+  text: metres,
+  refusal: ({ mode }) =>
+    mode === "disc" || mode === "tile" ? "" : "Only the modes Disc and Tile have one.",
+  keys: {
+    less: ["s", "Smaller switch distance"],
+    more: ["S", "Larger switch distance"],
+    next: (value, direction) => Number((value * DISTANCE_FACTOR ** direction).toPrecision(3)),
+  },
+  told: ({ switchDistance_m }) => `Volumes within ${metres(switchDistance_m)}`,
+};
+
+const degrees = (value: number) => `${Number(value.toFixed(1))}°`;
+
+export const DISC_RADIUS: NumberParameter<Volumes> = {
+  kind: "number",
+  id: "disc-radius",
+  label: "Disc radius",
+  link: "disc",
+  ...lens("discRadius_deg"),
+  limits: [2, 40],
+  steps: 76,
+  rounded: (value) => Number(value.toFixed(2)),
+  text: degrees,
+  refusal: ({ mode }) => (mode === "disc" ? "" : "Only the mode Disc has one."),
+  keys: {
+    less: ["d", "Smaller disc"],
+    more: ["D", "Larger disc"],
+    next: (value, direction) => value + direction,
+  },
+  told: ({ discRadius_deg }) => `Disc ${degrees(discRadius_deg)}`,
+};
+
+/** In the panel's order. */
+export const VOLUMES: readonly Parameter<Volumes>[] = [MODE, SWITCH_DISTANCE, DISC_RADIUS];
+
+/** Whether volumes are drawn by paths of light. */
+export function isTraced({ mode }: Pick<VolumeSettings, "mode">): boolean {
+  return mode === "traced";
+}
