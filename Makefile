@@ -170,12 +170,12 @@ test-viewer: setup browser
 	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
 	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
-	rm -rf out/f && $(BIN)/python tests/phantoms.py out/f
-	$(BIN)/python tests/assets.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
-	rm -rf out/edit && $(BIN)/python tests/edits.py volume out/edit
+	rm -rf out/f && $(BIN)/python tests/support/phantoms.py out/f
+	$(BIN)/python tests/support/validators.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
+	rm -rf out/edit && $(BIN)/python tests/support/stage_edits.py volume out/edit
 	$(MAKE) --no-print-directory bundle INPUT=out/edit/balls.ome.tif OUT=out/edit/built ARGS="--grid 3x2" WORKERS=0
 	cp -r out/edit/built/bundle out/edit/before
-	$(BIN)/python tests/edits.py layer out/edit
+	$(BIN)/python tests/support/stage_edits.py layer out/edit
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/demo/bundle" \
 	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
@@ -192,14 +192,14 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 	       && $(BLENDER)/bin/pip install --quiet --disable-pip-version-check bpy==5.0.1 'numpy<2'; } \
 	  || echo "test-blender: bpy 5.0.1 can't be installed here (it wants $$BLENDER_BASE and 350 MB)" >&2
 	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
-	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/test_blender.py; \
+	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/blender/test_blender.py; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
 
 object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
 	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest
 
 torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs
-	$(BIN)/python tests/torture.py 50
+	$(BIN)/python tests/support/torture.py 50
 	$(BIN)/python tests/malformed
 
 bench: setup ## Ratios of two things in one run, medians

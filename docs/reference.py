@@ -227,7 +227,7 @@ def _plain(value: Any) -> Any:
 
 def commands_page() -> str:
     """Return the page of every command's help."""
-    from stereocell import cli
+    from stereocell.cli import __main__ as cli
 
     (commands,) = (
         action.choices
@@ -243,15 +243,15 @@ def commands_page() -> str:
 
 def settings_page() -> str:
     """Return the page of every setting, and of what each preset changes."""
-    from stereocell import config
+    from stereocell.building import settings as settings_module
 
     parts = [
         "# Settings",
         "What `stereocell settings` prints. A file of these, or of some of them, goes to "
         "`--config`; flags go before the file, and the file before the preset.",
-        f"```toml\n{config.to_toml(config.Settings(), config.TEMPLATE)}```",
+        f"```toml\n{settings_module.to_toml(settings_module.Settings(), settings_module.TEMPLATE)}```",
     ]
-    for path in sorted(config.PRESETS.glob("*.toml")):
+    for path in sorted(settings_module.PRESETS.glob("*.toml")):
         parts += [f"## Preset {path.stem}", f"```toml\n{path.read_text()}```"]
     return "\n\n".join(parts) + "\n"
 
@@ -292,9 +292,9 @@ def on_files(files: Any, config: Any) -> Any:
     """Add the pages that are made to those that are written: MkDocs calls this."""
     from mkdocs.structure.files import File
 
-    notebook, pictures = run_notebook(Path(config.docs_dir) / NOTEBOOK)
+    notebook, pictures = run_notebook(Path(settings_module.docs_dir) / NOTEBOOK)
     for path, text in (pages() | {"notebook.md": notebook}).items():
-        files.append(File.generated(config, path, content=text))
+        files.append(File.generated(settings_module, path, content=text))
     for path, content in pictures.items():
-        files.append(File.generated(config, path, content=content))
+        files.append(File.generated(settings_module, path, content=content))
     return files

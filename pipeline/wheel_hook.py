@@ -16,7 +16,7 @@ TOOL_PACKAGES = ("gltf-validator", "ktx-parse", "meshoptimizer", "zstddec")
 
 
 class WheelHook(BuildHookInterface[Any]):
-    """Adds parts of viewer_gltf/ to the wheel, where `stereocell.assets` looks for them."""
+    """Adds parts of viewer_gltf/ to the wheel, where `stereocell.storage.assets` looks for them."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "editable":

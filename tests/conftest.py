@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import phantoms
-from object_store import VERSITYGW
+from support import phantoms
+from support.object_store import VERSITYGW
 
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
 

@@ -5,6 +5,6 @@ way are plain functions on numpy arrays, each in a module of its own (docs/pytho
 """
 
 from stereocell.api import Built, build, open_volume
-from stereocell.errors import StereoCellError
+from stereocell.model.errors import StereoCellError
 
 __all__ = ["Built", "StereoCellError", "build", "open_volume"]

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any
 
-from stereocell.errors import UsageError
+from stereocell.model.errors import UsageError
 
 if TYPE_CHECKING:
     from stereocell.read import Dataset
@@ -44,12 +44,12 @@ def build(
 
     Progress goes to stderr. Raises StereoCellError, one line that says what and where.
     """
-    from stereocell import phases
-    from stereocell.config import load
-    from stereocell.engine import Engine
-    from stereocell.lock import LOCK, alone_in
-    from stereocell.mirror import opened
-    from stereocell.read.location import Location, require_apart
+    from stereocell.building import phases
+    from stereocell.building.settings import load
+    from stereocell.engine.run import Engine
+    from stereocell.storage.location import Location, require_apart
+    from stereocell.storage.lock import LOCK, alone_in
+    from stereocell.storage.object_store import opened
 
     if not isinstance(workers, int) or workers < 0:
         raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")

@@ -16,12 +16,17 @@ from scipy import ndimage
 from skimage import measure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from phantoms import blurred_ball, write_ome_tiff
-from stereocell import config, denoise, lod, phases, repair, surface
-from stereocell.engine import Engine
-from stereocell.tiling import Box
-from stereocell.volume import Volume
 from test_usd_scale import CHANNELS, COLUMNS, ROWS, open_unloaded, write_many
+
+from stereocell.building import phases
+from stereocell.building import settings as settings_module
+from stereocell.engine.run import Engine
+from stereocell.filters import denoise
+from stereocell.isosurface import extract, repair
+from stereocell.meshes import simplify
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+from support.phantoms import blurred_ball, write_ome_tiff
 
 SPACING = (0.28, 0.14, 0.14)
 ROUNDS = 5
@@ -58,11 +63,11 @@ def main() -> None:
     volume = Volume(voxels, SPACING)
     region = Box((0, 0, 0), shape)
     field = denoise.smooth(volume, 0.14)
-    distance = surface.signed_distance(field, np.float32(700), SPACING, 1000.0)
+    distance = extract.signed_distance(field, np.float32(700), SPACING, 1000.0)
     print(f"phantom {shape}, {voxels.size / 1e6:.1f} M voxels; medians of {ROUNDS}")
     compare(
         "extract_surface",
-        lambda: surface.extract_surface(distance, region, region, region, SPACING, (0, 0, 0)),
+        lambda: extract.extract_surface(distance, region, region, region, SPACING, (0, 0, 0)),
         lambda: measure.marching_cubes(distance, 0.0, spacing=SPACING),
         "scikit-image's marching cubes",
     )
@@ -80,17 +85,17 @@ def main() -> None:
         close_by_morphology,
         "a binary closing alone",
     )
-    fine = surface.extract_surface(distance, region, region, region, SPACING, (0, 0, 0))
+    fine = extract.extract_surface(distance, region, region, region, SPACING, (0, 0, 0))
 
     def chain() -> None:
         mesh = fine
         for error in (0.05, 0.3, 1.0, 2.5):
-            mesh = lod.simplify(mesh, error * 0.28)
+            mesh = simplify.simplify(mesh, error * 0.28)
 
     compare(
         "four LODs, one from the other",
         chain,
-        lambda: [lod.simplify(fine, error * 0.28) for error in (0.05, 0.3, 1.0, 2.5)],
+        lambda: [simplify.simplify(fine, error * 0.28) for error in (0.05, 0.3, 1.0, 2.5)],
         "each from the finest",
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -99,7 +104,9 @@ def main() -> None:
         seconds = {}
         for workers in (1, 2):
             out = Path(folder) / str(workers)
-            phases.make(str(source), out, config.load("cycif", None, {"plan": {"grid": "4x2"}}))
+            phases.make(
+                str(source), out, settings_module.load("cycif", None, {"plan": {"grid": "4x2"}})
+            )
             engine = Engine(workers)
             engine.run("warm-up", abs, [("a", -1), ("b", -2)])
             start = time.perf_counter()

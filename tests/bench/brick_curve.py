@@ -7,7 +7,7 @@ with its own surface and transfer functions (minutes). The first channel's large
 
 Also: what building the tree takes, its size, and that it gives the volume back; its size for each
 of the channel's functions. PSNR is that of the volume as a client would sample it
-(tests/brick_client.py), against the volume, all in sight.
+(tests/support/server/brick_client.py), against the volume, all in sight.
 """
 
 import json
@@ -24,14 +24,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from websockets.sync.client import connect
 
-from brick_client import BrickClient, look_at, psnr, reconstruct
-from stereocell.brick_stream import encode_tree
-from stereocell.bricks import mip_levels
-from stereocell.cli import main as stereocell
-from stereocell.read.ktx2 import decode_finest
-from stereocell.serve import BundleServer
-from stereocell.serve_library import BrickLibrary, Volume, invisible_below
-from stereocell.voxel_bvh import build, reassemble
+from stereocell.cli.__main__ import main as stereocell
+from stereocell.filters.min_max_bricks import mip_levels
+from stereocell.formats.brick_stream import encode_tree
+from stereocell.formats.ktx2_read import decode_finest
+from stereocell.formats.voxel_bvh import build, reassemble
+from stereocell.serve.brick_library import BrickLibrary, Volume, invisible_below
+from stereocell.serve.server import BundleServer
+from support.server.brick_client import BrickClient, look_at, psnr, reconstruct
 
 DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")) / "mri_t1_7t" / "dicoms"
 SHARES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)

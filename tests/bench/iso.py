@@ -16,12 +16,12 @@ from skimage import filters
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from iso_family import SPACING, Mask, Member, boundary_distance_um, dice, family, make
-from stereocell.background import find_background
-from stereocell.denoise import denoise, smooth
-from stereocell.isovalue import CRITERIA, IsoValueOptions, find_iso_value
-from stereocell.tiling import Box
-from stereocell.volume import Volume
+from stereocell.filters.background import find_background
+from stereocell.filters.denoise import denoise, smooth
+from stereocell.isosurface.isovalue import CRITERIA, IsoValueOptions, find_iso_value
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+from support.iso_value_family import SPACING, Mask, Member, boundary_distance_um, dice, family, make
 
 SIGMA_UM = 0.14  # as `auto` has it: the finest spacing
 BLOCK_UM = 64 * 0.14

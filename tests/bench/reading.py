@@ -22,12 +22,12 @@ import zarr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
-from phantoms import write_ome_zarr
-from stereocell.histogram2d import sample_boxes
-from stereocell.rounds import display_task, iso_task
-from stereocell.store import Store
-from stereocell.tasks import JOINT_VOXELS, SURVEY_VOXELS, read_iso_field, run_display
-from stereocell.tiling import Box, cut
+from stereocell.building.out_folder import Store
+from stereocell.building.rounds import display_task, iso_task
+from stereocell.building.tasks import JOINT_VOXELS, SURVEY_VOXELS, read_iso_field, run_display
+from stereocell.model.tiling import Box, cut
+from stereocell.transfer.joint_histogram import sample_boxes
+from support.phantoms import write_ome_zarr
 
 REAL = (194, 512, 512)
 REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # the dataset

@@ -40,9 +40,9 @@ from reading import (
     stored,
 )
 
-from phantoms import write_ome_zarr
-from stereocell.store import Store
-from stereocell.tiling import cut
+from stereocell.building.out_folder import Store
+from stereocell.model.tiling import cut
+from support.phantoms import write_ome_zarr
 
 COUNTS = ((2, 2), (4, 2), (4, 4), (8, 4))  # columns x rows: 4 to 32 units
 MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512
@@ -55,7 +55,7 @@ MOST_BYTES = 3.5e9  # of the process that builds a unit of REAL
 # Run in a process of its own, which builds one unit and looks at itself meanwhile
 WATCHED = """
 import collections, json, sys, threading, time
-from stereocell.cli import main
+from stereocell.cli.__main__ import main
 
 def rss():
     return int(open("/proc/self/statm").read().split()[1]) * 4096

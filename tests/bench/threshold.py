@@ -14,12 +14,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import stereocell.read
-from iso_family import dice
-from stereocell.config import WindowOptions
+from stereocell.building.settings import WindowOptions
+from stereocell.model.tiling import Box
 from stereocell.report.thresholds import describe, find_peers
 from stereocell.samples.head import BACKGROUND, GREY, WHITE, make_head
-from stereocell.survey import find_display
-from stereocell.tiling import Box
+from stereocell.transfer.channel_statistics import find_display
+from support.iso_value_family import dice
 
 WINDOW = WindowOptions(1.0, 99.8)  # the preset mri's
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skimage.filters import threshold_multiotsu
 
 from stereocell.samples.head import make_head
-from stereocell.tissue import TissueOptions, learn_tissue
+from stereocell.tissue.classify import TissueOptions, learn_tissue
 
 NAMES = ("CSF", "grey", "white")
 FULL = (112, 96, 96)

@@ -23,21 +23,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.background import find_background
-from stereocell.certify import bodies, certify
-from stereocell.denoise import denoise
-from stereocell.distance import Nearest, measure_enclosure, measure_spread
-from stereocell.isovalue import IsoValueOptions, find_iso_value
-from stereocell.lod import compact
-from stereocell.mend import simplify_soundly
-from stereocell.mesh import Mesh
-from stereocell.repair import RepairOptions, repair
-from stereocell.samples.fluorescence import SPACING_UM, STAINS, record
-from stereocell.samples.tissue import grow_tissue
-from stereocell.solids import find_solids
-from stereocell.surface import extract_surface, signed_distance
-from stereocell.tiling import Box
-from stereocell.volume import Volume
+from stereocell.filters.background import find_background
+from stereocell.filters.denoise import denoise
+from stereocell.isosurface.components import find_solids
+from stereocell.isosurface.extract import extract_surface, signed_distance
+from stereocell.isosurface.isovalue import IsoValueOptions, find_iso_value
+from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
+from stereocell.meshes.simplify import compact
+from stereocell.meshes.simplify_valid import simplify_soundly
+from stereocell.meshes.validity import bodies, certify
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+from stereocell.samples.cycif_geometry import grow_tissue
+from stereocell.samples.microscope import SPACING_UM, STAINS, record
 
 ROUNDS = 5
 SHAPE = (194, 512, 512)

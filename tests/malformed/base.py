@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dicom_series import grid, write_enhanced, write_f_nifti, write_series
-from phantoms import f_phantom, write_ome_tiff, write_ome_zarr
+from support.dicom_series import grid, write_enhanced, write_f_nifti, write_series
+from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
 
 SHAPE = (16, 48, 36)
 DICOM_SHAPE = (6, 30, 26)

@@ -29,8 +29,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import ctrl_c
 from malformed.cases import Case
+from support import ctrl_c
 
 CPU_S, WALL_S = 10.0, 40.0  # the second for what waits; other processes may have the cores
 PEAK_MB = 1000
@@ -62,10 +62,11 @@ def import_all() -> None:
     for module in pkgutil.walk_packages(stereocell.__path__, "stereocell."):
         if not module.name.endswith(_LEFT_OUT):
             importlib.import_module(module.name)
-    from stereocell import lineage, staging, tasks
+    from stereocell.building import stage_tasks, tasks
+    from stereocell.storage import cache_key
 
-    for maker in (tasks, staging):  # looked up once a process, at the cost of seconds
-        lineage.libraries_of(maker)
+    for maker in (tasks, stage_tasks):  # looked up once a process, at the cost of seconds
+        cache_key.libraries_of(maker)
 
 
 def run_in_child(function: Any, *arguments: Any) -> None:
@@ -84,7 +85,7 @@ def run_in_child(function: Any, *arguments: Any) -> None:
 
 def run_command(arguments: list[str]) -> int:
     """Run a command as a shell would: return its exit code, let bugs through."""
-    from stereocell.cli import main
+    from stereocell.cli.__main__ import main
 
     try:
         return main(arguments)
@@ -253,7 +254,7 @@ def _find_fault(case: Case, arguments: list[str], code: int, stdout: str, stderr
 
 def _find_unsound(arguments: list[str]) -> str:
     """Return what is wrong with the result of a command that says it is done."""
-    from stereocell.documents import read_json
+    from stereocell.storage.json_files import read_json
 
     if arguments[0] in ("plan", "build") and "list" not in arguments:
         out = Path(arguments[arguments.index("-o") + 1])

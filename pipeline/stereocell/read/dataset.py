@@ -10,13 +10,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.errors import SourceError, UsageError
-from stereocell.placement import IDENTITY, Matrix
-from stereocell.read.faults import one_line
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
 from stereocell.read.fingerprint import fingerprint_of
 from stereocell.read.spacing import Level
-from stereocell.tiling import Box
-from stereocell.volume import Volume
+from stereocell.storage.library_errors import one_line
 
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stereocell.tiling import Box
+from stereocell.model.tiling import Box
 
 if TYPE_CHECKING:
     from stereocell.read.dataset import Dataset

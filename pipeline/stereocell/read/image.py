@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stereocell.placement import IDENTITY, Matrix
+from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 

@@ -18,15 +18,15 @@ from nibabel.fileslice import fileslice
 from nibabel.openers import ImageOpener
 from numpy.typing import NDArray
 
-from stereocell.errors import SourceError
-from stereocell.read.anatomy import Canonical, canonical_of
+from stereocell.model.errors import SourceError
+from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Image
-from stereocell.read.location import Location
-from stereocell.read.resampling import orthogonal_grid, resample_sheared
+from stereocell.read.resample import orthogonal_grid, resample_sheared
+from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.spacing import Grid
-from stereocell.read.stored_values import dtype_for, rescale
-from stereocell.read.whole import WholeArray
+from stereocell.read.whole_array import WholeArray
+from stereocell.storage.location import Location
 
 NAME = "NIfTI"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])

@@ -21,12 +21,12 @@ import zarr
 from bioio_ome_tiff import Reader
 from tifffile import TiffFile, TiffFrame, TiffPage, TiffPageSeries
 
-from stereocell.errors import SourceError
+from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.faults import collected_log, one_line
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
-from stereocell.read.location import Location, require_own
 from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.storage.library_errors import collected_log, one_line
+from stereocell.storage.location import Location, require_own
 
 # What the OME-XML and the tags may claim: the libraries make lists of that length at once.
 _MAX_PLANES = 1_000_000

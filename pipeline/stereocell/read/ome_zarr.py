@@ -18,13 +18,13 @@ import zarr
 from zarr.abc.store import Store
 from zarr.storage import FsspecStore, LocalStore
 
-from stereocell.errors import SourceError
+from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.faults import one_line
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
-from stereocell.read.location import Location
 from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.read.zarr_store import GuardedStore, codec_name
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
 # Groups that hold images, or belong to one, by the attribute that they have in place of one's own

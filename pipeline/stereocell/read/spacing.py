@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
-from stereocell.errors import SourceError, UsageError
-from stereocell.tiling import Box
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.tiling import Box
 
 Triple = tuple[float, float, float]
 

@@ -19,7 +19,7 @@ from zarr.abc.store import ByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import WrapperStore
 
-from stereocell.read.location import Location, require_own, require_own_key
+from stereocell.storage.location import Location, require_own, require_own_key
 
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
 _METADATA_BYTES = 64 << 20

@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
-from stereocell.specimen import OpacityPoints
+from stereocell.model.channel import OpacityPoints
 
 WIDTH, HEIGHT = 320.0, 120.0
 _BINS = 128

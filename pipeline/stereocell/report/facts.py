@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.documents import read_json
-from stereocell.mirror import sizes_below
-from stereocell.plan import Channel, Plan
-from stereocell.store import Store
-from stereocell.tiling import Tile
-from stereocell.unit_files import find_seconds, load_record, lod_file
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Channel, Plan
+from stereocell.building.unit_files import find_seconds, load_record, lod_file
+from stereocell.model.tiling import Tile
+from stereocell.storage.json_files import read_json
+from stereocell.storage.object_store import sizes_below
 
 PHASES = ("plan", "units", "stage", "bundle")
 

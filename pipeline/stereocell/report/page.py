@@ -15,28 +15,28 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from stereocell.calm import plan_for
-from stereocell.latticefield import LatticeField, make_iso_field
-from stereocell.names import from_identifier
+from stereocell.building.calm import plan_for
+from stereocell.building.out_folder import Store
+from stereocell.building.unit_files import load_lods, load_volume, lod_file
+from stereocell.model.channel import APRON
+from stereocell.model.identifiers import from_identifier
+from stereocell.model.lattice_field import LatticeField, make_iso_field
+from stereocell.model.tiling import Box, Tile
+from stereocell.model.version import GENERATOR
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.preview.draw_slices import cut_unit, draw_slices
 from stereocell.report import charts
-from stereocell.report.choice import choose_level, choose_units, thin_out
+from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scenes
 from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
-from stereocell.report.likeness import CLOSE_PX, ERROR_PX
-from stereocell.report.maps import compare, sum_up_maps
 from stereocell.report.remarks import find_remarks
-from stereocell.report.scene import Picture, Scene, Surface, draw_scenes
-from stereocell.report.slices import cut_unit, draw_slices
+from stereocell.report.select_units import choose_level, choose_units, thin_out
+from stereocell.report.texture_facts import compare, sum_up_maps
+from stereocell.report.texture_similarity import CLOSE_PX, ERROR_PX
 from stereocell.report.thresholds import draw_cut, draw_threshold
 from stereocell.report.tissue import TissueFacts, find_tissue
-from stereocell.specimen import APRON
-from stereocell.store import Store
-from stereocell.survey import display_from_json, look_from
-from stereocell.tiling import Box, Tile
-from stereocell.unit_files import load_lods, load_volume, lod_file
-from stereocell.unwrap import mip_levels_apart
-from stereocell.volume import zyx_to_xyz
-from stereocell.write.atomic import write_bytes
-from stereocell.write.generator import GENERATOR
+from stereocell.storage.atomic_write import write_bytes
+from stereocell.textures.unwrap import mip_levels_apart
+from stereocell.transfer.channel_statistics import display_from_json, look_from
 
 TEMPLATE = Path(__file__).parents[1] / "templates" / "report.html.j2"
 MOST_PICTURED = 60  # units

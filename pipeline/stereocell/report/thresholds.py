@@ -12,11 +12,11 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from skimage import filters
 
+from stereocell.preview.draw_slices import VIEWS, Slice, draw_slices
 from stereocell.report import charts
-from stereocell.report.scene import Picture
-from stereocell.report.slices import VIEWS, Slice, draw_slices
-from stereocell.survey import Display
-from stereocell.threshold import Histogram, Threshold
+from stereocell.report.draw_scenes import Picture
+from stereocell.transfer.adaptive_threshold import Histogram, Threshold
+from stereocell.transfer.channel_statistics import Display
 
 READINGS = {  # of the levels of Threshold.between
     "two peaks": "between the second-highest peak, at {1:.5g}, and the peak before it, at {0:.5g}",

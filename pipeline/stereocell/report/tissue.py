@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.as_planned import require_added
-from stereocell.plan import Plan
-from stereocell.report.slices import VIEWS, encode
-from stereocell.sources import open_source, source_of
-from stereocell.specimen import to_srgb8
-from stereocell.tiling import Box
-from stereocell.tissue_files import FOLDER, read_record
+from stereocell.building.input_unchanged import require_added
+from stereocell.building.open_source import open_source, source_of
+from stereocell.building.plan import Plan
+from stereocell.building.tissue_files import FOLDER, read_record
+from stereocell.model.channel import to_srgb8
+from stereocell.model.tiling import Box
+from stereocell.preview.draw_slices import VIEWS, encode
 
 SHOWN_PX = 330  # the longest side of a plane
 _GAP_PX = 6

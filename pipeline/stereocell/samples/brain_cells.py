@@ -4,8 +4,8 @@ from contextlib import ExitStack
 from importlib.resources import files
 from pathlib import Path
 
-from stereocell.errors import OutputError, UsageError
-from stereocell.write.atomic import replacing
+from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.atomic_write import replacing
 
 SUFFIX = ".ome.tif"
 _FOLDER = files("stereocell.samples") / "brain-cells"

@@ -12,12 +12,12 @@ from zarr.abc.buffer import Buffer
 from zarr.codecs import ZstdCodec
 from zarr.storage import MemoryStore
 
-from stereocell.errors import OutputError, UsageError
-from stereocell.samples import fluorescence
-from stereocell.samples.fluorescence import BLUR_UM, SPACING_UM, STAINS
-from stereocell.samples.tissue import Tissue, grow_tissue
-from stereocell.tiling import Box
-from stereocell.write.atomic import replacing, replacing_folder
+from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.tiling import Box
+from stereocell.samples import microscope
+from stereocell.samples.cycif_geometry import Tissue, grow_tissue
+from stereocell.samples.microscope import BLUR_UM, SPACING_UM, STAINS
+from stereocell.storage.atomic_write import replacing, replacing_folder
 
 SUFFIX = ".ome.zarr"
 _CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
@@ -178,7 +178,7 @@ def _write_zarr(
             # A whole row of tiles at a time, so that few chunks are written twice.
             row = np.concatenate(
                 [
-                    fluorescence.record(tissue, stain, box, seed)
+                    microscope.record(tissue, stain, box, seed)
                     for x in range(0, shape[2], width)
                     for box in [Box((0, y, x), (shape[0], y + height, x + width))]
                 ],
@@ -205,12 +205,11 @@ def _halve(finer: zarr.Array[Any], coarser: zarr.Array[Any]) -> None:
 def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[str, Any]:
     """Return what the voxels were made from. Lengths in um, positions (z, y, x)."""
     waves = [
-        fluorescence.waves_of(index, tissue.size_um, settings["seed"])
-        for index in range(len(STAINS))
+        microscope.waves_of(index, tissue.size_um, settings["seed"]) for index in range(len(STAINS))
     ]
     centers = np.array([nucleus.center_um for nucleus in tissue.nuclei]).reshape(-1, 3)
     z, y, x = centers.T
-    levels = fluorescence.background(STAINS[0], waves[0], (z, y, x))
+    levels = microscope.background(STAINS[0], waves[0], (z, y, x))
     return {
         "sample": {"name": "cycif", **settings},
         "note": "positions are (z, y, x) in um; the centre of voxel (0, 0, 0) is the origin. "
@@ -219,16 +218,16 @@ def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]
         "spacing_um": list(SPACING_UM),
         "blur_sigma_um": list(BLUR_UM),
         "noise": {
-            "offset": fluorescence.OFFSET,
-            "counts_per_electron": fluorescence.GAIN,
-            "read_sigma": fluorescence.READ_NOISE,
+            "offset": microscope.OFFSET,
+            "counts_per_electron": microscope.GAIN,
+            "read_sigma": microscope.READ_NOISE,
         },
         "channels": [
             {
                 "name": stain.name,
                 "amplitude": stain.amplitude,
                 "background": {
-                    "offset": fluorescence.OFFSET,
+                    "offset": microscope.OFFSET,
                     "mean": stain.background,
                     "waves": [
                         {"k_per_um": list(wave.k), "phase": wave.phase, "weight": wave.weight}
@@ -248,8 +247,8 @@ def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]
             }
             for nucleus, level in zip(tissue.nuclei, levels, strict=True)
         ],
-        "membrane_um": fluorescence.MEMBRANE_UM,
-        "cytoplasm": fluorescence.CYTOPLASM,
+        "membrane_um": microscope.MEMBRANE_UM,
+        "cytoplasm": microscope.CYTOPLASM,
         "cells": [
             {
                 "center_um": list(cell.center_um),
@@ -259,7 +258,7 @@ def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]
             for cell in tissue.nuclei
             if cell.cell_um > 0.0
         ],
-        "vessel_wall_um": fluorescence.WALL_UM,
+        "vessel_wall_um": microscope.WALL_UM,
         "vessels": [
             {
                 "start_um": list(tube.start_um),

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.errors import UsageError
+from stereocell.model.errors import UsageError
 
 Triple = tuple[float, float, float]
 Field = NDArray[np.float32]

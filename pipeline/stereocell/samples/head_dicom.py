@@ -17,9 +17,9 @@ from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.filewriter import dcmwrite
 from pydicom.uid import UID, ExplicitVRLittleEndian, MRImageStorage
 
-from stereocell.errors import OutputError, UsageError
+from stereocell.model.errors import OutputError, UsageError
 from stereocell.samples.head import HeadPhantom, make_head
-from stereocell.write.atomic import replacing_folder
+from stereocell.storage.atomic_write import replacing_folder
 
 _UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # the namespace of this sample's UIDs
 PATIENT = "Ovoidsen^Emmeline"

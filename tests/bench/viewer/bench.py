@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from scene import SIZE_PX, Scene, brain_cells, head, nuclei, reference
 
-from reference_march import encode, path_voxels, psnr
+from support.reference_raymarch import encode, path_voxels, psnr
 
 HERE = Path(__file__).parent
 ROUNDS = int(os.environ.get("ROUNDS", "15"))

@@ -19,14 +19,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-import reference_march
-from reference_march import Block, Camera, Values, render
 from stereocell import read
-from stereocell.bricks import min_max_bricks
-from stereocell.samples.fluorescence import SPACING_UM, record
-from stereocell.samples.tissue import grow_tissue
-from stereocell.tiling import Box
-from stereocell.transfer import make_transfer_functions
+from stereocell.filters.min_max_bricks import min_max_bricks
+from stereocell.model.tiling import Box
+from stereocell.samples.cycif_geometry import grow_tissue
+from stereocell.samples.microscope import SPACING_UM, record
+from stereocell.transfer.opacity import make_transfer_functions
+from support import reference_raymarch
+from support.reference_raymarch import Block, Camera, Values, render
 
 SHAPE = (97, 256, 256)
 SPACING = SPACING_UM[0]  # um, of the cubes
@@ -166,7 +166,7 @@ def windowed(values: Values) -> NDArray[np.uint8]:
 def reference(scene: Scene, camera: str, shading: bool, cache: Path) -> Values:
     """Return what `render` makes of a scene; it is kept in `cache` and made once."""
     block = scene.block
-    key = hashlib.sha256(Path(reference_march.__file__).read_bytes())
+    key = hashlib.sha256(Path(reference_raymarch.__file__).read_bytes())
     for part in (*block.channels, block.tables, block.colors):
         key.update(np.ascontiguousarray(part).tobytes())
     key.update(repr((block.low_um, block.high_um, scene.cameras[camera], shading)).encode())

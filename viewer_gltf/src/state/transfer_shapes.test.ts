@@ -44,7 +44,7 @@ function component(table: Uint8Array, i: number): number[][] {
 }
 
 describe("the table of shapes", () => {
-  // worked out by hand, as in tests/test_transfer2d.py: values and gradients 0, 1/4, 1/2, 3/4, 1
+  // worked out by hand, as in tests/transfer/test_shapes2d.py: values and gradients 0, 1/4, 1/2, 3/4, 1
   it("of a rectangle fades to its edges, but not to the plane's", () => {
     const table = rasterise([RECTANGLE], 5, 5);
     expect(component(table, 3)).toEqual([

@@ -1,6 +1,6 @@
 /**
  * The pipeline's own letter F, from voxels to the picture. STEREOCELL_F_BUNDLES holds the bundles
- * built from what tests/phantoms.py writes, joined by ":"; without it these tests are skipped.
+ * built from what tests/support/phantoms.py writes, joined by ":"; without it these tests are skipped.
  */
 import { describe, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";

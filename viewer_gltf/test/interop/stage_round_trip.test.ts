@@ -1,5 +1,5 @@
 /**
- * What an artist changed in a layer over the stage is what the viewer shows. tests/edits.py makes the
+ * What an artist changed in a layer over the stage is what the viewer shows. tests/support/stage_edits.py makes the
  * volume and the layer; STEREOCELL_EDIT_BUNDLES holds the bundle of the stage as it was built and
  * that of the layer, joined by ":". Without it these tests are skipped.
  */
@@ -15,7 +15,7 @@ import { prepareStand, type Stand } from "../support/browser/stand";
 
 const [BUILT, EDITED] = (process.env.STEREOCELL_EDIT_BUNDLES ?? "").split(":");
 
-// as in tests/edits.py
+// as in tests/support/stage_edits.py
 const SPACING_UM = 0.5;
 const RADIUS_UM = 4;
 const SLAB_VOXELS = 16;

@@ -1,6 +1,6 @@
 /**
  * The path tracer against what is known: a medium that swallows nothing vanishes in a white room,
- * light fades as Beer and Lambert have it, and another path tracer, tests/reference_tracer.py,
+ * light fades as Beer and Lambert have it, and another path tracer, tests/support/reference_path_tracer.py,
  * gathers the same. Whatever the bricks' size, and however the samples are spread. What comes after
  * the light is in denoise_and_tone.test.ts.
  */
@@ -61,7 +61,7 @@ const samplesOf = ({ moments }: Gathered) => moments.filter((_, i) => i % 4 === 
 
 function reference(run: Run, paths: number): Promise<{ mean: number[]; error: number[] }> {
   return new Promise((resolve, reject) => {
-    const script = join(REPOSITORY, "tests/reference_tracer.py");
+    const script = join(REPOSITORY, "tests/support/reference_path_tracer.py");
     const child = execFile(PYTHON, [script], (error, stdout, stderr) =>
       error ? reject(new Error(stderr)) : resolve(JSON.parse(stdout)),
     );

@@ -1,5 +1,5 @@
 /**
- * The viewer's picture against the float64 reference renderer, tests/reference_march.py: of the
+ * The viewer's picture against the float64 reference renderer, tests/support/reference_raymarch.py: of the
  * fixture, and of a real stack where STEREOCELL_REAL_BUNDLE names its bundle. Skipped where the
  * repository has no .venv (`make setup`).
  */
@@ -52,7 +52,7 @@ async function hold(stand: Stand, channels: readonly string[]) {
     target_um: center,
     fov_deg: FIELD_OF_VIEW_DEG,
   };
-  const script = join(REPOSITORY, "tests/bundle_picture.py");
+  const script = join(REPOSITORY, "tests/support/bundle_picture.py");
   const said = await run(script, [stand.bundle, picture], JSON.stringify(asked));
   await rm(folder, { recursive: true });
   return JSON.parse(said) as { psnr: number; drawn: number };

@@ -1,0 +1,45 @@
+"""How a worker opens the source again: by its address, once a process."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from stereocell import read
+from stereocell.building.plan import Channel, Plan
+from stereocell.storage.object_store import bring
+
+
+@dataclass(frozen=True, slots=True)
+class SourceRef:
+    """An address and what was asked of it.
+
+    spacing_um   (z, y, x), or empty for the file's own
+    series       of DICOM, from 1; 0: the largest
+    fingerprint  that was planned: another volume may lie there by now; empty: whatever lies there
+    """
+
+    source: str
+    time: int
+    spacing_um: tuple[float, ...]
+    series: int = 0
+    fingerprint: str = ""
+
+
+@lru_cache(maxsize=2)
+def open_source(ref: SourceRef) -> read.Dataset:
+    """Return the dataset, opened once for all calls with the same reference."""
+    bring(Path(ref.source))  # an added channel's lies in OUT
+    if not ref.spacing_um:
+        return read.open(ref.source, time=ref.time, series=ref.series)
+    z, y, x = ref.spacing_um
+    return read.open(ref.source, time=ref.time, spacing_um=(z, y, x), series=ref.series)
+
+
+def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
+    """Return the reference to a plan's source, or to that of one of its channels."""
+    if channel is not None and channel.source:
+        return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
+    options = plan.settings.plan
+    return SourceRef(
+        plan.source, options.time, options.spacing_um, options.series, plan.fingerprint
+    )

@@ -1,0 +1,195 @@
+"""OUT: where everything lies, and how it is found again.
+
+Results are named by a hash of all that they depend on (input, settings of the step, its code), are
+written under a temporary name and renamed: a killed run resumes, a finished one is a no-op.
+"""
+
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from stereocell.building import plan as plan_module
+from stereocell.building.plan import Plan
+from stereocell.building.plan_file import from_json, to_json
+from stereocell.model.errors import OutputError
+from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.cache_key import key_of
+from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.object_store import remove, sizes_below
+
+_PLAN = "plan.schema.json"
+_PHASES = "units.schema.json#Phases"
+_RUN_UNITS = "run `stereocell units OUT` first"
+
+
+class Store:
+    """One OUT folder."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.plan_file = out / "plan.json"
+        self.settings_file = out / "stereocell.toml"
+        self.survey_file = out / "units" / "survey.json"
+        self.index_file = out / "units" / "done.json"
+        self.units_plan_file = out / "units" / "plan.key"
+        self.phases_file = out / "phases.json"
+        self.stage_dir = out / "stage"
+        self.stage_file = self.stage_dir / "stage.usda"
+        self.stage_list = self.stage_dir / "files.json"
+        self.bundle_dir = out / "bundle"
+        self.parts_dir = out / "bundle_parts"  # its finished tiles, until it is whole
+        self.report_file = out / "report" / "index.html"
+
+    def require_writable(self) -> None:
+        """Make OUT. Raises OutputError if it can't be made or written."""
+        try:
+            self.out.mkdir(parents=True, exist_ok=True)
+            probe = self.out / f".writable.{secrets.token_hex(4)}"
+            probe.write_bytes(b"")
+            probe.unlink()
+        except OSError as error:
+            raise OutputError(
+                f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
+            ) from None
+
+    # --- the plan
+
+    def save_plan(self, plan: Plan) -> bool:
+        """Write plan.json; return whether it changed.
+
+        Raises OutputError if OUT holds a build of another input.
+        """
+        there = self.plan() if self.plan_file.exists() else None
+        if there == plan:
+            return False
+        if there is not None and there.fingerprint != plan.fingerprint:
+            raise OutputError(
+                f"{self.out} holds a build of {_what_differs(there, plan)}: "
+                "choose another OUT or remove that folder"
+            )
+        write_json(self.plan_file, to_json(self._without_place(plan)))
+        return True
+
+    def plan(self) -> Plan:
+        """Return the plan. Raises OutputError if there is none or it breaks its schema."""
+        remedy = "run `stereocell plan INPUT -o OUT` first"
+        if self.plan_file.exists():
+            remedy = f"remove it and {remedy}"
+        return self._in_place(from_json(read_json(self.plan_file, _PLAN, remedy)))
+
+    def _without_place(self, plan: Plan) -> Plan:
+        """Return a plan whose channels' own sources, where they lie in OUT, are told from there."""
+        root = self.out.resolve()
+
+        def told(source: str) -> str:
+            inside = source and Path(source).is_relative_to(root)
+            return Path(source).relative_to(root).as_posix() if inside else source
+
+        return _with_sources(plan, told)
+
+    def _in_place(self, plan: Plan) -> Plan:
+        root = self.out.resolve()
+        return _with_sources(plan, lambda source: str(root / source) if source else source)
+
+    # --- results of the units' two rounds
+
+    def display_file(self, channel_id: str, key: str) -> Path:
+        return self.out / "units" / f"window-{channel_id}-{key}.json"
+
+    def iso_file(self, tile_id: str, channel_id: str, key: str) -> Path:
+        return self.out / "units" / tile_id / channel_id / f"iso-{key}.json"
+
+    def unit_dir(self, tile_id: str, channel_id: str, key: str) -> Path:
+        return self.out / "units" / tile_id / channel_id / key
+
+    def tile_file(self, tile_id: str) -> Path:
+        return self.out / "units" / tile_id / "stage.json"
+
+    def survey(self) -> dict[str, Any]:
+        """Return each channel's display, iso-values by tile, and look, by channel id."""
+        return dict(read_json(self.survey_file, "units.schema.json#Survey", _RUN_UNITS))
+
+    def index(self) -> dict[str, str]:
+        """Return the key of each finished unit, by `<tile>/<channel>`."""
+        return dict(read_json(self.index_file, "units.schema.json#Index", _RUN_UNITS))
+
+    def save_units(self, plan: Plan, keys: Mapping[str, str]) -> None:
+        """Keep the units' keys, and which plan they were built for."""
+        write_json(self.index_file, dict(keys))
+        write_bytes(self.units_plan_file, self._key(plan).encode())
+
+    def _key(self, plan: Plan) -> str:
+        return key_of(to_json(self._without_place(plan)), plan_module)
+
+    def require_units_of(self, plan: Plan) -> None:
+        """Raise OutputError unless all units of the plan are known to be there."""
+        signed = self.units_plan_file
+        if not signed.is_file() or signed.read_bytes() != self._key(plan).encode():
+            raise OutputError(
+                f"{self.out / 'units'}: not built for the plan in {self.plan_file.name}: "
+                f"{_RUN_UNITS}"
+            )
+        survey, index = self.survey(), self.index()
+        for tile in plan.tiles:
+            for channel in plan.channels:
+                name = f"{tile.id}/{channel.id}"
+                if tile.id not in survey.get(channel.id, {"iso": {}})["iso"]:
+                    raise OutputError(f"{self.survey_file}: {name} is not in it: {_RUN_UNITS}")
+                if name not in index:
+                    raise OutputError(f"{self.index_file}: {name} is not in it: {_RUN_UNITS}")
+
+    def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
+        """Remove the folders in `parent` that an earlier plan left."""
+        names = {file.relative_to(parent).parts for file in sizes_below(parent)}
+        for name in {parts[0] for parts in names if len(parts) > 1} - keep:
+            remove(parent / name)
+
+    # --- the phases
+
+    def phases(self) -> dict[str, dict[str, Any]]:
+        """Return what is known of each phase; damaged, nothing counts as done."""
+        return dict(find_json(self.phases_file, _PHASES) or {})
+
+    def is_begun(self, name: str) -> bool:
+        """Return whether a phase was begun and never came to its end."""
+        return not self.phases().get(name, {"key": "done"})["key"]
+
+    def require_finished(self, name: str) -> None:
+        """Raise OutputError if a phase was begun and never came to its end."""
+        if self.is_begun(name):
+            raise OutputError(
+                f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
+            )
+
+    def save_phase(self, name: str, key: str, results: str, seconds: float, about: str) -> None:
+        """Keep what a phase was made from and left; an empty key: it isn't finished."""
+        entry = {"key": key, "results": results, "seconds": round(seconds, 2), "about": about}
+        write_json(self.phases_file, {**self.phases(), name: entry})
+
+
+def _with_sources(plan: Plan, change: Callable[[str], str]) -> Plan:
+    channels = (replace(one, source=change(one.source)) for one in plan.channels)
+    return replace(plan, channels=tuple(channels))
+
+
+def _what_differs(there: Plan, plan: Plan) -> str:
+    """Return what OUT holds, not what was asked for: what tells the two inputs apart."""
+    old, new = there.settings.plan, plan.settings.plan
+    if there.source == plan.source and old.time != new.time:
+        return f"{there.name!r} with --time {old.time}, not {new.time}"
+    if there.source == plan.source and old.series != new.series:
+        return f"{there.name!r} with --series {old.series}, not {new.series}"
+    if there.source == plan.source and old.spacing_um != new.spacing_um:
+        return f"{there.name!r} with {_spacing(old.spacing_um)}, not {_spacing(new.spacing_um)}"
+    return (
+        f"{there.name!r} (fingerprint {there.fingerprint[:12]}), "
+        f"not of {plan.name!r} ({plan.fingerprint[:12]})"
+    )
+
+
+def _spacing(spacing_um: tuple[float, ...]) -> str:
+    if not spacing_um:
+        return "the file's own voxel spacing"
+    return "--spacing-um " + ",".join(f"{length:g}" for length in spacing_um)

@@ -1,0 +1,292 @@
+"""The phases of a build, each a function on OUT: plan -> units -> stage -> bundle (-> report).
+
+Every phase skips what is done already: results are named by what they depend on.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from stereocell.building import stage_tasks, tasks
+from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
+from stereocell.building.rounds import run_rounds
+from stereocell.building.settings import Settings, to_dict, to_toml
+from stereocell.building.stage_tasks import run_tile, tile_task
+from stereocell.bundle import write as bundle_writer
+from stereocell.engine.run import Engine, console
+from stereocell.meshes.alpha_wrap import find_wrapper
+from stereocell.model.errors import OutputError
+from stereocell.model.version import GENERATOR
+from stereocell.storage.assets import viewer_dist
+from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.cache_key import key_of, libraries_of
+from stereocell.storage.file_list import find_faults, read_list
+from stereocell.storage.json_files import write_json
+from stereocell.storage.location import Location, require_apart
+from stereocell.storage.object_store import is_file, objects_below, remove, sizes_below
+from stereocell.transfer.channel_statistics import look_from
+from stereocell.usd import write_stage as stage_writer
+from stereocell.usd import write_usdz as usdz_writer
+from stereocell.usd import written_files
+from stereocell.usd.read_stage import dependencies
+from stereocell.usd.written_files import AsWritten
+
+
+def make(source: str, out: Path, settings: Settings) -> Plan:
+    """Write OUT/plan.json (and the settings used, as TOML). The same plan again changes nothing.
+
+    Raises StereoCellError; OUT is left as it was.
+    """
+    require_apart(source, out)
+    store = Store(out)
+    with _phase(store, "plan") as phase:
+        plan = settle(source, settings)
+        store.require_writable()
+        phase.is_up_to_date = not store.save_plan(plan)
+        write_bytes(store.settings_file, to_toml(plan.settings).encode())
+        write_json(out / "provenance.json", provenance(plan))
+    shape = " x ".join(str(n) for n in plan.region.shape)
+    console.print(
+        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
+        f"{len(plan.tiles)} tiles x {len(plan.channels)} channels"
+    )
+    return plan
+
+
+def settle(source: str, settings: Settings) -> Plan:
+    """Return the plan of a build, and tell what is odd about the source. Nothing is written.
+
+    Raises StereoCellError.
+    """
+    location = Location.of(source).source
+    options = settings.plan
+    if settings.surface.wrap == "alpha-wrap":
+        find_wrapper()
+    dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
+    for note in dataset.notes:
+        console.print(f"plan: {note}", markup=False)
+    modality = dataset.modality or options.modality
+    indices = dataset.find_channels(options.channels) if options.channels else None
+    chosen = range(len(dataset.channels)) if indices is None else indices
+    channels = [
+        Channel(
+            index,
+            dataset.channels[index].name,
+            dataset.channels[index].color or choose_color(place, modality),
+        )
+        for place, index in enumerate(chosen)
+    ]
+    level = choose_level(dataset.levels, len(channels), settings)
+    origin = dataset.levels[level[0]].origin_um
+    return make_plan(
+        location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
+        settings, modality=modality, placement=dataset.placement,
+    )  # fmt: skip
+
+
+def provenance(plan: Plan) -> dict[str, Any]:
+    """Return what a reader of the results may know of their making: no paths, no identities."""
+    settings = to_dict(plan.settings)
+    return {
+        "generator": GENERATOR,
+        "fingerprint": plan.fingerprint,
+        "level": plan.level,
+        "spacing_um": list(plan.spacing_um),
+        "settings": settings,
+        "libraries": {**libraries_of(tasks), **libraries_of(stage_tasks)},
+        **_added(plan),
+    }
+
+
+def _added(plan: Plan) -> dict[str, Any]:
+    """Return the channels that have a source of their own, and its fingerprint."""
+    added = {c.name: c.fingerprint for c in plan.channels if c.source}
+    return {"added_channels": added} if added else {}
+
+
+def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
+    """Find windows and iso-values for all units, then build the units (or `only` one of them)."""
+    store = Store(out)
+    plan = store.plan()
+    with _phase(store, "units") as phase:
+        built, missing = run_rounds(store, plan, engine, only)
+        phase.is_up_to_date = not built
+        units = len(plan.tiles) * len(plan.channels)
+        phase.about = "" if built == units else f"{built} of {units} units"
+        if missing:
+            console.print(f"units: {missing} of {units} are still to be built")
+
+
+def run_stage(out: Path, engine: Engine) -> None:
+    """Write OUT/stage from the units: stage.usda, looks/, tiles/ and, where there is a surface,
+    specimen.usdz; last the list of all these, files.json. Other files are left alone.
+    """
+    store = Store(out)
+    plan = store.plan()
+    with _phase(store, "stage") as phase:
+        store.require_units_of(plan)
+        index, content = store.index(), store.survey()
+        looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
+        tiles = [(tile.id, tile_task(store, plan, index, tile)) for tile in plan.tiles]
+        about = provenance(plan)
+        names = [plan.name, plan.modality]
+        depends = [index, [asdict(look) for look in looks], about, names, list(plan.placement)]
+        key = key_of(key_of(depends, stage_tasks), usdz_writer)
+        if phase.is_done(key, partial(_digest_of_stage, store)):
+            return
+        remove(store.stage_list)  # of what was
+        engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
+        extents = [
+            stage_writer.TileExtent(
+                t.content.id, t.content.first_um, t.content.last_um, plan.spacing_um
+            )
+            for _, t in tiles
+        ]
+        stage_writer.write_stage(
+            store.stage_dir,
+            plan.name,
+            looks,
+            extents,
+            about,
+            modality=plan.modality,
+            placement=plan.placement,
+        )
+        store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
+        files = {path: entry for _, tile in tiles for path, entry in tile.listed().items()}
+        small = store.stage_dir / usdz_writer.USDZ_NAME
+        usdz_writer.write_usdz(
+            store.stage_file, small, AsWritten({store.stage_dir.resolve(): files})
+        )
+        looks_dir = store.stage_dir / "looks"
+        written_files.write_list(store.stage_dir, files, looks_dir, store.stage_file, small)
+
+
+def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
+    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it."""
+    store = Store(out)
+    with _phase(store, "bundle") as phase:
+        store.require_finished("stage")
+        path = stage if stage is not None else store.stage_file
+        if not is_file(path):
+            remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
+            raise OutputError(f"{path} is missing: {remedy}")
+        viewer = viewer_dist()
+        kept = objects_below(path.parent)
+        files = dependencies(path, store.stage_dir)  # first: it refuses those of others
+        made_of = [str(path.absolute()), _states(files)] if kept is None else kept
+        page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
+        key = key_of([made_of, page], bundle_writer)
+        if kept is not None and store.is_begun("bundle"):
+            bundle_writer.remove_half(store.bundle_dir)
+        bundle_writer.require_bundle(
+            store.bundle_dir
+        )  # before it is written down that it was begun
+        if not phase.is_done(key, partial(_digest_of_bundle, store)):
+            store.remove_other_folders(store.parts_dir, {key})
+            parts = store.parts_dir / key
+            bundle_writer.write_bundle(path, store.bundle_dir, viewer, engine, parts, _tell)
+    remove(store.parts_dir)
+    if viewer is None and not phase.is_up_to_date:
+        console.print(
+            "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
+        )
+
+
+def _tell(line: str) -> None:
+    console.print(f"bundle: {line}", markup=False, soft_wrap=True)
+
+
+def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
+    """Return each file's name, size and time of change: what an edit alters."""
+    found = [(file, file.stat()) for file in files]
+    return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
+
+
+def run_report(out: Path) -> None:
+    """Write OUT/report/index.html: pictures, sizes, times."""
+    from stereocell import report  # what draws takes a while to import, and no other phase wants it
+
+    store = Store(out)
+    with _phase(store, "report") as phase:
+        plan = store.plan()
+        store.require_units_of(plan)
+        others = {name: entry for name, entry in store.phases().items() if name != "report"}
+        content = [store.index(), store.survey(), provenance(plan), others]
+        key = key_of([content, report.TEMPLATE.read_text()], report)
+        if phase.is_done(key, partial(_digest_of, [store.report_file])):
+            return
+        report.write_report(out)
+
+
+def _digest_of(results: Iterable[Path]) -> str:
+    """Return a digest of all files' names and sizes: what a damage alters."""
+    digest = hashlib.sha256()
+    for result in results:
+        for file, size in (sizes_below(result) or {result: -1}).items():
+            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
+    return digest.hexdigest()[:20]
+
+
+def _digest_of_bundle(store: Store) -> str:
+    """Return a digest of the bundle, whose files stand whole; empty: one does not."""
+    path = store.bundle_dir / bundle_writer.FILES
+    try:
+        listed = read_list(path, "")
+    except OutputError:
+        return ""
+    faults = find_faults(store.bundle_dir, listed, since=path)
+    return "" if faults else _digest_of([store.bundle_dir])
+
+
+def _digest_of_stage(store: Store) -> str:
+    """Return a digest of the stage's list, whose files stand whole; empty: one does not."""
+    try:
+        listed = written_files.read_stage_list(store.stage_dir)
+    except OutputError:
+        return ""
+    if not written_files.is_kept(store.stage_dir, listed, since=store.stage_list):
+        return ""
+    return written_files.digest_of(listed)
+
+
+class _Phase:
+    """One phase at work: does it have anything to do, and how long does it take."""
+
+    def __init__(self, store: Store, name: str) -> None:
+        self.store, self.name = store, name
+        self.key, self.about = "done", ""
+        self.results: Callable[[], str] = str
+        self.is_up_to_date = False
+
+    def is_done(self, key: str, results: Callable[[], str]) -> bool:
+        """Return whether what the phase leaves stands whole and comes from the same things.
+
+        results  returns a digest of it
+        """
+        self.key, self.results = key, results
+        entry = self.store.phases().get(self.name, {})
+        self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
+        if not self.is_up_to_date:
+            self.store.save_phase(self.name, "", "", 0.0, "")  # killed half-way, it is not done
+        return self.is_up_to_date
+
+
+@contextmanager
+def _phase(store: Store, name: str) -> Iterator[_Phase]:
+    """Tell how long a phase took and keep it for the report; one with nothing to do says so."""
+    start = time.perf_counter()
+    phase = _Phase(store, name)
+    yield phase
+    seconds = time.perf_counter() - start
+    if phase.is_up_to_date:
+        console.print(f"{name}: up to date")
+    else:
+        store.save_phase(name, phase.key, phase.results(), seconds, phase.about)
+        console.print(f"{name}: {seconds:.1f} s")

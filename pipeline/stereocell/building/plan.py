@@ -1,0 +1,381 @@
+"""The plan of a build: which voxels, cut how, into which units. It is pure: nothing is read or run.
+
+Everything later phases need is in it, with every `auto` resolved; plan.json is its file
+(schemas/plan.schema.json).
+"""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Protocol, TypeVar
+
+from stereocell.building.settings import Settings
+from stereocell.filters.denoise import SMOOTHING_REACH
+from stereocell.isosurface.repair import RepairOptions
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.identifiers import to_identifier
+from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.model.settings import AUTO
+from stereocell.model.tiling import Box, Tile, cut, cut_evenly
+
+T = TypeVar("T")
+
+# What a unit may work on, about 30 bytes a voxel: so many voxels, or so many times its tile.
+UNIT_VOXELS = 1 << 27
+UNIT_TILES = 8
+LEAST_PLANES = 4  # of voxels that carry the surface, along each axis of a tile: fewer hold no body
+
+# Colours for channels whose file names none (linear RGB), told apart on a dark ground; the first
+# ones are the usual blue, magenta and green of microscopy.
+PALETTE = (
+    (0.07, 0.22, 1.0),
+    (1.0, 0.05, 0.45),
+    (0.05, 0.8, 0.15),
+    (1.0, 0.45, 0.02),
+    (0.05, 0.75, 0.85),
+    (0.9, 0.8, 0.05),
+    (0.45, 0.12, 0.95),
+    (0.8, 0.8, 0.8),
+)
+
+
+# of MR and CT: warm and neutral, as bone and tissue are drawn; a blue head is none
+FLESH = (0.78, 0.66, 0.55)
+BODY_MODALITIES = ("MR", "CT")
+
+
+def choose_color(place: int, modality: str) -> tuple[float, float, float]:
+    """Return the colour (linear RGB) of the channel at `place` of those built, if it has none."""
+    if place == 0 and modality in BODY_MODALITIES:
+        return FLESH
+    return PALETTE[place % len(PALETTE)]
+
+
+class LevelLike(Protocol):
+    """One resolution level of a dataset."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+    @property
+    def spacing_um(self) -> tuple[float, float, float]: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1.
+
+    source       of this channel alone, with one level, the planned one, and 8 bits that are shown
+                 as they are (0..255): what a command added to a plan; empty: the plan's
+    fingerprint  of that source
+    """
+
+    index: int
+    name: str
+    color: tuple[float, float, float]
+    source: str = ""
+    fingerprint: str = ""
+
+    @property
+    def id(self) -> str:
+        return to_identifier(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A build, settled. Boxes are voxels (z, y, x) of `level`; voxel (0, 0, 0) lies at the origin.
+
+    halo       voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
+    modality   what took the volume, as DICOM calls it: `MR`, `CT`, ...; empty: not known
+    placement  from the world of the voxels, um (volume.zyx_to_xyz), to where the specimen stands
+    """
+
+    source: str
+    name: str
+    fingerprint: str
+    level: int
+    level_reason: str
+    spacing_um: tuple[float, float, float]
+    origin_um: tuple[float, float, float]
+    region: Box
+    halo: tuple[int, int, int]
+    tiles: tuple[Tile, ...]
+    channels: tuple[Channel, ...]
+    settings: Settings
+    modality: str = ""
+    placement: Matrix = IDENTITY
+
+    @property
+    def repair(self) -> RepairOptions:
+        """The most that is cleaned, which the halo covers; a channel's own is in wrap.py."""
+        return _repair_options(self.settings)
+
+    @property
+    def step(self) -> tuple[int, int, int]:
+        """Every so many planes of voxels (z, y, x) carry the surface."""
+        return _step(self.settings, self.spacing_um)
+
+    def level_of(self, channel: Channel) -> int:
+        """Return the level of its source that a channel is read at."""
+        return 0 if channel.source else self.level
+
+    def painter(self, channel: Channel) -> Channel | None:
+        """Return the channel that is painted on a channel's surface; None: none is."""
+        painted = self.settings.paint.get(channel.name)
+        return next((other for other in self.channels if other.name == painted), None)
+
+    def tile(self, tile_id: str) -> Tile:
+        return next(tile for tile in self.tiles if tile.id == tile_id)
+
+    def position_um(self, index_zyx: Sequence[float]) -> tuple[float, float, float]:
+        """Return where a voxel's centre lies, (z, y, x) in um."""
+        z, y, x = (
+            float(o + i * s)
+            for o, i, s in zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
+        )
+        return z, y, x
+
+
+def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings) -> tuple[int, str]:
+    """Return the level to build and why: the one asked for, else the finest within the limit.
+
+    The region counts voxels of the level that is built; a level too small to hold it is none to
+    build. Raises UsageError if there is no such level.
+    """
+    wanted = settings.plan.level
+    if wanted != AUTO:
+        if not isinstance(wanted, int) or not 0 <= wanted < len(levels):
+            raise UsageError(
+                f"--level is {wanted}, expected 0 to {len(levels) - 1} (the source's levels)"
+            )
+        return wanted, "asked for"
+    region, limit = settings.plan.region, settings.plan.max_voxels
+    for index, level in enumerate(levels):
+        whole = Box((0, 0, 0), level.shape)
+        try:
+            box = parse_region(region, whole)
+        except UsageError:
+            if index == 0:
+                raise
+            break
+        voxels = channels * math.prod(box.shape)
+        if voxels <= limit:
+            what = "the finest" if index == 0 else "the finest within the limit"
+            return index, f"{what}: {voxels:,} of at most {limit:,} voxels (plan.max_voxels)"
+    what = f"--region {region}" if region else "the coarsest level"
+    remedy = "a smaller --region" if region else "a --level"
+    raise UsageError(
+        f"{what} holds {voxels:,} voxels, more than plan.max_voxels = {limit:,}: "
+        f"name {remedy}, or fewer --channels"
+    )
+
+
+def make_plan(
+    source: str,
+    name: str,
+    fingerprint: str,
+    levels: Sequence[LevelLike],
+    origin_um: tuple[float, float, float],
+    channels: Sequence[Channel],
+    level: tuple[int, str],
+    settings: Settings,
+    *,
+    modality: str = "",
+    placement: Matrix = IDENTITY,
+) -> Plan:
+    """Return the plan for these channels at this level (index and reason).
+
+    Raises UsageError for settings that don't fit the data, SourceError for data that can't be cut.
+    """
+    chosen = levels[level[0]]
+    whole = Box((0, 0, 0), chosen.shape)
+    region = parse_region(settings.plan.region, whole)
+    if min(region.shape) < 2:
+        raise SourceError(
+            f"{source}: {_by(region.shape)} voxels (z, y, x) to build, expected at least 2 each way"
+        )
+    tile_size, tiles = _tiles(settings, region)
+    if settings.surface.wrap == "alpha-wrap" and len(tiles) > 1:
+        raise UsageError(
+            f"surface.wrap is 'alpha-wrap', which closes each tile by itself, and there are "
+            f"{len(tiles)} tiles: expected one (--grid 1x1, or a --region of one tile)"
+        )
+    settings = replace(
+        settings,
+        surface=settings.surface.resolved(chosen.spacing_um),
+        unwrap=settings.unwrap.resolved(chosen.spacing_um),
+        plan=replace(settings.plan, level=level[0], tile_size=tile_size),
+        iso_values=_by_name("--iso-value", settings.iso_values, channels),
+        paint=_painted(settings.paint, channels),
+    )
+    _require_planes(settings, chosen.spacing_um)
+    return Plan(
+        source=source,
+        name=name,
+        fingerprint=fingerprint,
+        level=level[0],
+        level_reason=level[1],
+        spacing_um=chosen.spacing_um,
+        origin_um=origin_um,
+        region=region,
+        halo=_halo(settings, chosen.spacing_um, region),
+        tiles=tiles,
+        channels=tuple(channels),
+        settings=settings,
+        modality=modality,
+        placement=placement,
+    )
+
+
+def parse_region(text: str, whole: Box) -> Box:
+    """Return the box that `z0:z1,y0:y1,x0:x1` names; an empty end means the data's own."""
+    if not text:
+        return whole
+    match = re.fullmatch(r"(\d*):(\d*),(\d*):(\d*),(\d*):(\d*)", text.replace(" ", ""))
+    if not match:
+        raise UsageError(f"--region is {text!r}, expected z0:z1,y0:y1,x0:x1 in voxels")
+    ends = [int(e) if e else None for e in match.groups()]
+    z0, y0, x0 = (e if e is not None else 0 for e in ends[::2])
+    z1, y1, x1 = (e if e is not None else n for e, n in zip(ends[1::2], whole.stop, strict=True))
+    box = Box((z0, y0, x0), (z1, y1, x1))
+    inside = all(a < b <= n for a, b, n in zip(box.start, box.stop, whole.stop, strict=True))
+    if not inside:
+        raise UsageError(f"--region is {text!r}, expected a box inside {_by(whole.stop)} (z, y, x)")
+    return box
+
+
+def _tiles(settings: Settings, region: Box) -> tuple[tuple[int, int, int], tuple[Tile, ...]]:
+    """Return the tiles and their size, that of the largest where a grid is asked for."""
+    options = settings.plan
+    if options.grid:
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", options.grid)
+        if not match:
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+        columns, rows = int(match[1]), int(match[2])
+        depth, height, width = region.shape
+        if height < 2 * rows or width < 2 * columns:
+            raise UsageError(
+                f"--grid {options.grid} makes more tiles than {_by((height, width))} voxels (y, x) "
+                "can fill, expected at least 2 voxels a tile each way"
+            )
+        size = (depth, -(-height // rows), -(-width // columns))
+        return size, cut_evenly(region, columns, rows)
+    if len(options.tile_size) != 3 or min(options.tile_size) < 2:
+        raise UsageError(
+            f"--tile-size is {list(options.tile_size)}, expected three numbers z,y,x of at least 2"
+        )
+    z, y, x = (min(a, b) for a, b in zip(options.tile_size, region.shape, strict=True))
+    return (z, y, x), cut(region, (z, y, x))
+
+
+def _halo(
+    settings: Settings,
+    spacing_um: tuple[float, float, float],
+    region: Box,
+) -> tuple[int, int, int]:
+    """Return the voxels (z, y, x) that a unit reads around its tile, at most the region's.
+
+    Raises UsageError where that, and what closing and smoothing add at the ends of what is read,
+    is out of proportion to the tile: such lengths are meant for other voxels.
+    """
+    surface = settings.surface
+    smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
+    every = _step(settings, spacing_um)
+    z, y, x = (step * n for step, n in zip(spacing_um, every, strict=True))
+    repair = _repair_options(settings)
+    reach = repair.reach_um((z, y, x)) + smoothing
+    padding = max(repair.alpha_um, smoothing)
+    tile_size = settings.plan.tile_size
+    limit = max(UNIT_VOXELS, UNIT_TILES * math.prod(tile_size))
+    z, y, x = (
+        min(size + 2 * (reach / step + 4 * k), n) + 2 * padding / step
+        for size, n, step, k in zip(tile_size, region.shape, spacing_um, every, strict=True)
+    )
+    if z * y * x > limit:
+        lengths = {f.name: getattr(surface, f.name) for f in fields(surface)}
+        found = ", ".join(
+            f"{name} = {length:g} um ({length / min(spacing_um):,.0f} voxels)"
+            for name, length in lengths.items()
+            if name.endswith("_um") and length != AUTO
+        )
+        raise UsageError(
+            f"the surface's lengths don't suit voxels of {_by(spacing_um)} um (z, y, x): {found} "
+            f"make a unit work on {z * y * x:.3g} voxels for a tile of "
+            f"{_by(tile_size)}, expected at most {limit:,}: "
+            "choose another --preset, smaller lengths or larger tiles"
+        )
+    # four more: one voxel for the median, one for the gradient, one because the tile's last plane
+    # is its neighbour's, one past the plane (surface._least_on_plane)
+    depth, height, width = (
+        math.ceil(min(reach / step, n)) + 4 * k
+        for n, step, k in zip(region.shape, spacing_um, every, strict=True)
+    )
+    return depth, height, width
+
+
+def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
+    """Return what is given by the channels' names; an index stands for one without that name."""
+    found: dict[str, T] = {}
+    for key, value in given.items():
+        name = _name(flag, key, channels)
+        if name in found:
+            raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
+        found[name] = value
+    return found
+
+
+def _painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
+    """Return, by the name of a channel, that of the channel that is painted on its surface."""
+    by_name = _by_name("--paint", paint, channels)
+    found = {name: _name("--paint", key, channels) for name, key in by_name.items()}
+    for name, painted in found.items():
+        if name == painted:
+            raise UsageError(f"--paint {name}={painted}: expected another channel than its own")
+    return found
+
+
+def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
+    by_index = {str(channel.index): channel.name for channel in channels}
+    name = key if key in by_index.values() else by_index.get(key)
+    if name is None:
+        raise UsageError(
+            f"{flag} names channel {key!r}, expected one of "
+            f"{', '.join(by_index.values())}, or an index of {', '.join(by_index)}"
+        )
+    return name
+
+
+def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, int]:
+    # a hair more: .42 um are three times .14 um
+    z, y, x = (max(1, int(settings.surface.grid_um / h + 0.01)) for h in spacing_um)
+    return z, y, x
+
+
+def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
+    """Raise UsageError where planes lie so far apart that a tile keeps hardly any."""
+    size = settings.plan.tile_size
+    steps = _step(settings, spacing_um)
+    for axis, n, k, h in zip("zyx", size, steps, spacing_um, strict=True):
+        planes = -(-n // k)
+        if k > 1 and planes < LEAST_PLANES:
+            raise UsageError(
+                f"surface.grid_um is {settings.surface.grid_um:g}, which leaves {planes} of the "
+                f"{n} planes along {axis} of a tile, {h:g} um apart: expected {LEAST_PLANES} or "
+                "more of them: choose another --preset, or a smaller surface.grid_um"
+            )
+
+
+def _repair_options(settings: Settings) -> RepairOptions:
+    surface = settings.surface
+    alpha = surface.max_alpha_um if surface.alpha_um == AUTO else surface.alpha_um
+    return RepairOptions(
+        alpha_um=float(alpha),
+        min_diagonal_um=float(surface.min_diagonal_um),
+        max_cavity_um=float(surface.max_cavity_um),
+        max_fragment_um=float(surface.max_fragment_um),
+        offset_um=0.0 if surface.offset_um == AUTO else float(surface.offset_um),
+    )
+
+
+def _by(numbers: Sequence[float]) -> str:
+    return " x ".join(f"{n:.15g}" for n in numbers)

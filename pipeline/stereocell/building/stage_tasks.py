@@ -1,0 +1,98 @@
+"""What a worker is given and does to write one tile of the stage from its units. Picklable.
+
+The keys of the stage and of its tiles hold this module's whole lineage: see lineage.py.
+"""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Plan
+from stereocell.building.unit_files import find_closed, is_whole, load_lods, load_volume
+from stereocell.model.channel import ChannelContent, PaintColors, TileContent
+from stereocell.model.tiling import Tile
+from stereocell.storage.cache_key import key_of
+from stereocell.storage.file_list import FileList
+from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.object_store import at_hand, remove
+from stereocell.usd import write_stage as stage_writer
+from stereocell.usd import written_files
+
+_RECORD = "units.schema.json#StageTile"
+
+
+@dataclass(frozen=True, slots=True)
+class TileTask:
+    """One tile of the stage.
+
+    content  the tile without its channels
+    units    id, unit folder and paint of each channel
+    record   where is kept from what the tile was made, and its files: units/<tile>/stage.json
+    key      from what it is to be made
+    """
+
+    stage_dir: Path
+    content: TileContent
+    units: tuple[tuple[str, Path, PaintColors | None], ...]
+    record: Path
+    key: str
+
+    @property
+    def folder(self) -> Path:
+        return self.stage_dir / "tiles" / self.content.id
+
+    def is_done(self) -> bool:
+        """Return whether the tile stands whole and comes from the same things, whole as well."""
+        found: dict[str, Any] | None = find_json(self.record, _RECORD)
+        if found is None or found["key"] != self.key:
+            return False
+        are_whole = all(is_whole(folder) for _, folder, _ in self.units)
+        return are_whole and written_files.is_kept(self.folder, found["files"], since=self.record)
+
+    def listed(self) -> FileList:
+        """Return the files of the tile, which is done, by their paths from the stage's folder."""
+        found = read_json(self.record, _RECORD, written_files.REMEDY)
+        return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
+
+
+def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) -> TileTask:
+    """Return the task of one tile; `index` holds the units' keys, by `<tile>/<channel>`."""
+    units = tuple(
+        (
+            channel.id,
+            store.unit_dir(tile.id, channel.id, index[f"{tile.id}/{channel.id}"]),
+            None if painter is None else PaintColors(channel.color, painter.color),
+        )
+        for channel in plan.channels
+        for painter in [plan.painter(channel)]
+    )
+    lattice = tile.lattice(plan.region)
+    content = TileContent(
+        id=tile.id,
+        spacing_um=plan.spacing_um,
+        first_um=plan.position_um(lattice.start),
+        last_um=plan.position_um([end - 1 for end in lattice.stop]),
+        own_shape=tile.box.shape,
+        channels=(),
+    )
+    made_of = [(channel_id, folder.name, paint) for channel_id, folder, paint in units]
+    depends = [asdict(content), [(*one, paint and asdict(paint)) for *one, paint in made_of]]
+    key = key_of(depends, sys.modules[__name__])
+    return TileTask(store.stage_dir, content, units, store.tile_file(tile.id), key)
+
+
+def run_tile(task: TileTask) -> None:
+    """Write one tile of the stage from its units. Raises OutputError."""
+    remove(task.record)
+    with at_hand(*(folder for _, folder, _ in task.units)):
+        channels = tuple(
+            ChannelContent(
+                channel_id, load_lods(folder), load_volume(folder), paint, find_closed(folder)
+            )
+            for channel_id, folder, paint in task.units
+        )
+        files = stage_writer.write_tile(task.stage_dir, replace(task.content, channels=channels))
+    write_json(task.record, {"key": task.key, "files": files})

@@ -1,0 +1,261 @@
+"""Tissue classes as channels of a build: learned in the planned region, kept in OUT/tissue.
+
+Each class becomes a channel whose voxels are probabilities of 8 bits: OUT/tissue/classes.ome.zarr,
+a second source in the plan. The window is 0..255, the surface lies where the probability is a half.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.input_unchanged import require_input
+from stereocell.building.open_source import SourceRef, open_source, source_of
+from stereocell.building.out_folder import Store
+from stereocell.building.phases import provenance
+from stereocell.building.plan import PALETTE, Channel, Plan
+from stereocell.building.tissue_files import (
+    FOLDER,
+    RECORD,
+    VOXELS,
+    digests_of,
+    read_whole,
+)
+from stereocell.engine.run import console
+from stereocell.formats.ome_zarr_write import write_probabilities
+from stereocell.model.errors import OutputError, SourceError, UsageError
+from stereocell.model.version import GENERATOR
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.cache_key import key_of, libraries_of
+from stereocell.storage.json_files import write_json
+from stereocell.tissue import classify as tissue_module
+from stereocell.tissue import onnx_classifier as network_module
+from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
+from stereocell.tissue.onnx_classifier import Network, apply_network
+
+LEVEL = 127.5  # of 255: probability 1/2
+MOST_VOXELS = 250_000_000  # about 40 bytes each while learning
+# of three classes in a head, by rising T1 intensity; linear RGB
+HEAD = (
+    ("CSF", (0.03, 0.3, 1.0)),
+    ("grey matter", (1.0, 0.22, 0.1)),
+    ("white matter", (0.95, 0.85, 0.45)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TissueRequest:
+    """What is asked for.
+
+    classes     how many; None: auto, or what the model has
+    channel     of the input, by name or index; empty: the first
+    model       an ONNX file of the user's own; None: they are learned
+    everywhere  learn in all that isn't background; else in MR inside the brain
+    """
+
+    classes: int | Literal["auto"] | None = None
+    channel: str = ""
+    model: Path | None = None
+    everywhere: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Class:
+    name: str
+    color: tuple[float, float, float]
+    intensity: float | None  # mean, bias removed; None: a network doesn't say
+    probabilities: NDArray[np.uint8]
+
+
+def parse_classes(text: str) -> int | Literal["auto"]:
+    """Return `--classes`. Raises UsageError."""
+    if text == "auto":
+        return "auto"
+    if not text.isdecimal() or int(text) not in AUTO_CLASSES:
+        ends = AUTO_CLASSES[0], AUTO_CLASSES[-1]
+        raise UsageError(f"--classes is {text!r}, expected {ends[0]} to {ends[1]}, or auto")
+    return int(text)
+
+
+def add_tissue(out: Path, request: TissueRequest) -> Plan:
+    """Learn the classes, write OUT/tissue, and put them into the plan in place of earlier ones.
+
+    Nothing is learned anew where OUT/tissue comes from the same voxels, options and code and is
+    whole. Raises StereoCellError; plan and OUT/tissue are then as they were.
+    """
+    store = Store(out)
+    plan = without_tissue(store.plan())
+    channel = _find_channel(plan, request.channel)
+    voxels = math.prod(plan.region.shape)
+    if voxels > MOST_VOXELS:
+        raise UsageError(
+            f"tissue: the region holds {voxels:,} voxels, expected at most {MOST_VOXELS:,}: plan a "
+            "coarser --level or a smaller --region"
+        )
+    network = None if request.model is None else Network.load(request.model)
+    if network is not None and request.classes not in (None, "auto", network.count):
+        raise UsageError(
+            f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
+            "same, or no --classes"
+        )
+    is_brain = plan.modality == "MR" and not request.everywhere
+    options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
+    settings = asdict(options) if network is None else network.settings()
+    source = [plan.fingerprint, plan.level, plan.spacing_um, plan.settings.plan.time]
+    region = [plan.region.start, plan.region.stop]
+    depends = [source, region, channel.index, channel.name, settings]
+    key = key_of(key_of(depends, tissue_module), network_module)
+    record = _find_learned(out / FOLDER, key)
+    if record is None:
+        record = _learn(store, plan, channel, options, network, settings, key)
+    plan = with_tissue(plan, out, record)
+    store.save_plan(plan)
+    write_json(out / "provenance.json", provenance(plan))
+    return plan
+
+
+def without_tissue(plan: Plan) -> Plan:
+    """Return the plan of the input's own channels."""
+    own = tuple(channel for channel in plan.channels if not channel.source)
+    added = {channel.name for channel in plan.channels if channel.source}
+    values = {name: v for name, v in plan.settings.iso_values.items() if name not in added}
+    return replace(plan, channels=own, settings=replace(plan.settings, iso_values=values))
+
+
+def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
+    """Return the plan with a channel for each class of OUT/tissue."""
+    source = str((out / FOLDER / VOXELS).resolve())
+    fingerprint = open_source(SourceRef(source, 0, ())).fingerprint
+    _require_free([one["name"] for one in record["classes"]], plan)
+    added = []
+    for index, one in enumerate(record["classes"]):
+        red, green, blue = one["color"]
+        added.append(Channel(index, one["name"], (red, green, blue), source, fingerprint))
+    values = {**plan.settings.iso_values, **{channel.name: LEVEL for channel in added}}
+    settings = replace(plan.settings, iso_values=values)
+    return replace(plan, channels=(*plan.channels, *added), settings=settings)
+
+
+def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
+    """Return the record of OUT/tissue if it is what `key` names, and whole; say what it is."""
+    if not folder.exists():
+        return None
+    try:
+        record = read_whole(folder)
+    except OutputError as fault:
+        console.print(f"tissue: {fault}", markup=False)
+        return None
+    if record["key"] != key:
+        return None
+    console.print("tissue: up to date")
+    return record
+
+
+def _learn(
+    store: Store,
+    plan: Plan,
+    channel: Channel,
+    options: TissueOptions,
+    network: Network | None,
+    settings: dict[str, Any],
+    key: str,
+) -> dict[str, Any]:
+    require_input(plan)
+    dataset = open_source(source_of(plan))
+    volume = dataset.read(channel.index, plan.region, plan.level)
+    if network is None:
+        learned = learn_tissue(volume.voxels, plan.spacing_um, options)
+        names = _names(plan, len(learned.means), options.brain)
+        bic = {str(count): value for count, value in learned.bic.items()}
+        intensities: Sequence[float | None] = [float(mean) for mean in learned.means[:, 0]]
+        found = learned.probabilities
+    else:
+        shown = apply_network(network, volume.voxels)
+        names = [name for name in network.classes if name]
+        found = shown[[k for k, name in enumerate(network.classes) if name]]
+        bic, intensities = {}, [None] * len(names)
+    classes = [
+        _Class(name, color, intensity, np.rint(255 * part).astype(np.uint8))
+        for (name, color), intensity, part in zip(
+            _colored(names, plan), intensities, found, strict=True
+        )
+    ]
+    _require_free([one.name for one in classes], plan)
+    voxel_mm3 = math.prod(length / 1000 for length in plan.spacing_um)
+    record: dict[str, Any] = {
+        "format": "stereocell-tissue",
+        "version": 1,
+        "generator": GENERATOR,
+        "key": key,
+        "fingerprint": plan.fingerprint,
+        "channel": channel.name,
+        "settings": settings,
+        "bic": bic,
+        "classes": [
+            {
+                "name": one.name,
+                "color": list(one.color),
+                "intensity": one.intensity,
+                "volume_mm3": float(one.probabilities.sum(dtype=np.float64) / 255 * voxel_mm3),
+            }
+            for one in classes
+        ],
+        "libraries": {**libraries_of(tissue_module), **libraries_of(network_module)},
+    }
+    shape = dataset.levels[plan.level].shape
+    with replacing_folder(store.out / FOLDER) as folder:
+        write_probabilities(
+            folder / VOXELS,
+            [one.probabilities for one in classes],
+            [(one.name, one.color) for one in classes],
+            plan.region.start,
+            shape,
+            plan.spacing_um,
+            plan.origin_um,
+        )
+        write_json(folder / RECORD, {**record, "files": digests_of(folder)})
+    open_source.cache_clear()  # another volume lies at the same address now
+    return record
+
+
+def _find_channel(plan: Plan, wanted: str) -> Channel:
+    if not wanted:
+        return plan.channels[0]
+    for channel in plan.channels:
+        if wanted in (channel.name, channel.id):
+            return channel
+    for channel in plan.channels:
+        if wanted == str(channel.index):
+            return channel
+    raise UsageError(
+        f"--channel is {wanted!r}, expected one of {', '.join(c.name for c in plan.channels)}, or "
+        f"an index of {', '.join(str(c.index) for c in plan.channels)}"
+    )
+
+
+def _require_free(names: Sequence[str], plan: Plan) -> None:
+    """Raise SourceError if a class has the name of one of the input's channels."""
+    taken = {channel.name for channel in plan.channels}
+    for name in names:
+        if name in taken:
+            raise SourceError(
+                f"{plan.name}: has a channel {name!r} of its own, expected none of that name"
+            )
+
+
+def _names(plan: Plan, count: int, is_brain: bool) -> list[str]:
+    if is_brain and count == len(HEAD):
+        return [name for name, _ in HEAD]
+    return [f"tissue {k + 1}" for k in range(count)]
+
+
+def _colored(names: Sequence[str], plan: Plan) -> list[tuple[str, tuple[float, float, float]]]:
+    """Return each name with a colour that no other class and no channel of the input has."""
+    known = dict(HEAD)
+    taken = {channel.color for channel in plan.channels}
+    free = [color for color in PALETTE if color not in taken] or list(PALETTE)
+    return [(name, known.get(name, free[k % len(free)])) for k, name in enumerate(names)]

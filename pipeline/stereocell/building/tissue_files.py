@@ -1,0 +1,48 @@
+"""OUT/tissue: probabilities of the classes and their record, and whether both are still whole.
+
+The record lists the SHA-256 of every file, as a build's voxels are sampled only: Zarr takes a chunk
+that was lost for zeros, and zstd decodes some damage to other voxels without a word.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from stereocell.model.errors import OutputError
+from stereocell.storage.file_list import measure
+from stereocell.storage.json_files import read_json
+from stereocell.storage.object_store import bring
+
+FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
+_SCHEMA = "tissue.schema.json"
+_AGAIN = "run `stereocell tissue OUT` again"
+
+
+def digests_of(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file of the probabilities in `folder`, by its path there."""
+    return {
+        file.relative_to(folder).as_posix(): measure(file)["sha256"]
+        for file in sorted((folder / VOXELS).rglob("*"))
+        if file.is_file()
+    }
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """Return the record in OUT/tissue. Raises OutputError, which names file and remedy."""
+    return dict(read_json(folder / RECORD, _SCHEMA, _AGAIN))
+
+
+def read_whole(folder: Path) -> dict[str, Any]:
+    """Return the record in OUT/tissue, all of whose files are as they were written.
+
+    Raises OutputError, which names the first file that is not, and the remedy.
+    """
+    record = read_record(folder)
+    bring(folder)
+    found, written = digests_of(folder), record["files"]
+    for name in sorted(written.keys() | found.keys()):
+        if found.get(name) != written.get(name):
+            fault = "missing" if name not in found else "damaged"
+            if name not in written:
+                fault = "not of this build"
+            raise OutputError(f"{folder / name}: {fault}: {_AGAIN}")
+    return record

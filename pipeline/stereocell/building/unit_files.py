@@ -1,0 +1,225 @@
+"""A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail.
+
+Same input, same bytes; but for seconds.json, which lies beside them and which nothing is built of.
+unit.json lists the others with their hashes, and holds one of itself: each file is held against its
+own before it is read.
+"""
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.closed_copy import Closed
+from stereocell.building.unit import Unit
+from stereocell.formats.stl import write_stl
+from stereocell.model.errors import OutputError
+from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
+from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.object_store import bring, is_file
+
+SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
+_RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
+_OWN = "sha256"
+
+
+def save_unit(directory: Path, unit: Unit) -> None:
+    """Write a unit as a folder under its final name. Raises OutputError."""
+    lods = [
+        {
+            "triangles": len(lod.mesh.triangles),
+            "vertices": len(lod.mesh.positions),
+            "distance_um": lod.distance_um,
+            "maps": _describe_maps(lod),
+            "quality": None if lod.quality is None else asdict(lod.quality),
+        }
+        for lod in unit.lods
+    ]
+    with replacing_folder(directory) as folder:
+        # numpy's own way to a file has no word for a full disk
+        buffer = io.BytesIO()
+        np.save(buffer, unit.volume)
+        (folder / _VOLUME).write_bytes(buffer.getbuffer())
+        for level, lod in enumerate(unit.lods):
+            np.savez(lod_file(folder, level), **_arrays(lod))
+        if unit.closed is not None:
+            write_stl(folder / _CLOSED, unit.closed.mesh)
+        record = {
+            "reason": unit.reason,
+            "lods": lods,
+            "closed": _describe_closed(unit.closed),
+            "volume": list(unit.volume.shape),
+            "fragments_dropped": unit.fragments_dropped,
+            "cavities_filled": unit.cavities_filled,
+            "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
+        }
+        write_json(folder / _RECORD, record | {_OWN: _digest_of(record)})
+        # after the files were listed: a unit is whole without
+        write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
+
+
+def is_whole(directory: Path) -> bool:
+    """Return whether a unit's folder holds all that its record names, as it was written.
+
+    What has not changed since by its size and time is not read: see file_list.py.
+    """
+    record = find_json(directory / _RECORD, SCHEMA)
+    if record is None or not _is_own(record):
+        return False
+    return not find_faults(directory, record["files"], since=directory / _RECORD)
+
+
+def find_damage(directory: Path) -> dict[str, str]:
+    """Return what is wrong with each file of a unit, by name; all are hashed."""
+    if not is_file(directory / _RECORD):
+        return {_RECORD: MISSING}
+    record = find_json(directory / _RECORD, SCHEMA)
+    if record is None or not _is_own(record):
+        return {_RECORD: DAMAGED}
+    return find_faults(directory, record["files"])
+
+
+def load_record(directory: Path) -> dict[str, Any]:
+    """Return what unit.json holds: triangles, distances, reason. Raises OutputError."""
+    record = dict(read_json(directory / _RECORD, SCHEMA, _remedy(directory)))
+    if not _is_own(record):
+        raise OutputError(f"{directory / _RECORD}: damaged: {_remedy(directory)}")
+    return record
+
+
+def _digest_of(record: Mapping[str, Any]) -> str:
+    """Return what a record says of itself: a hash of all else that is in it."""
+    others = {name: value for name, value in record.items() if name != _OWN}
+    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
+
+
+def _is_own(record: Mapping[str, Any]) -> bool:
+    return bool(record[_OWN] == _digest_of(record))
+
+
+def _as_written(directory: Path, file: Path) -> Path:
+    """Return a file of a unit, which is what the record says. Raises OutputError."""
+    bring(file)
+    entry = load_record(directory)["files"].get(file.name)
+    fault = "not in unit.json" if entry is None else ""
+    if entry is not None and not file.is_file():
+        fault = MISSING
+    elif entry is not None and not is_same(file, entry):
+        fault = "damaged, not the bytes that unit.json says"
+    if fault:
+        raise OutputError(f"{file}: {fault}: {_remedy(directory)}")
+    return file
+
+
+def find_seconds(directory: Path) -> dict[str, float]:
+    """Return the seconds of each step of a unit; none where they were lost."""
+    return dict(find_json(directory / _SECONDS, _SECONDS_SCHEMA) or {})
+
+
+def lod_file(directory: Path, level: int) -> Path:
+    """Return where `save_unit` puts one level of detail."""
+    return directory / f"lod{level}.npz"
+
+
+def find_closed(directory: Path) -> Path | None:
+    """Return the file of the unit's closed copy; None if it has none. Raises OutputError."""
+    has_one = load_record(directory)["closed"] is not None
+    return _as_written(directory, directory / _CLOSED) if has_one else None
+
+
+def load_lods(directory: Path) -> tuple[Lod, ...]:
+    """Return the levels of detail that `save_unit` wrote. Raises OutputError for a damaged file."""
+    lods = load_record(directory)["lods"]
+    try:
+        return tuple(_load_lod(directory, level, lod) for level, lod in enumerate(lods))
+    except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
+        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
+
+
+def load_quality(stored: Mapping[str, Any]) -> Quality:
+    """Return what a record holds of one level's quality."""
+    ways = {way: Spread(**stored[way]) for way in ("away", "back")}
+    return Quality(**{**stored, **ways})
+
+
+def load_volume(directory: Path) -> NDArray[np.uint8]:
+    """Return the 8-bit voxels (z, y, x), mapped from the file. Raises OutputError."""
+    file = _as_written(directory, directory / _VOLUME)
+    try:
+        volume: NDArray[np.uint8] = np.load(file, mmap_mode="r")
+    except (OSError, ValueError, EOFError) as error:
+        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
+    return volume
+
+
+def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
+    # opened here: numpy leaves a damaged file open
+    with (
+        _as_written(directory, lod_file(directory, level)).open("rb") as file,
+        np.load(file) as arrays,
+    ):
+        mesh = Mesh(
+            arrays["positions"],
+            arrays["triangles"],
+            arrays["normals"],
+            arrays.get("uvs"),
+            arrays.get("tangents"),
+        )
+        quality = stored["quality"] and load_quality(stored["quality"])
+        baked = None
+        if "openness" in arrays:
+            maps = stored["maps"]
+            facts = (maps["texel_um"], maps["charts"], maps["reason"])
+            baked = Baked(arrays["openness"], arrays.get("paint"), *facts)
+        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"), quality, baked)
+
+
+def _describe_closed(closed: Closed | None) -> dict[str, int] | None:
+    """Return what unit.json says of the closed copy."""
+    if closed is None:
+        return None
+    return {
+        "triangles": len(closed.mesh.triangles),
+        "faults": closed.faults,
+        "fallbacks": closed.fallbacks,
+    }
+
+
+def _describe_maps(lod: Lod) -> dict[str, Any]:
+    """Return what unit.json says of a level's maps."""
+    height, width = (0, 0) if lod.normal_map is None else lod.normal_map.shape[:2]
+    baked = lod.baked
+    return {
+        "size": [width, height],
+        "texel_um": baked.texel_um if baked else 0.0,
+        "charts": baked.charts if baked else 0,
+        "painted": baked is not None and baked.paint is not None,
+        "reason": baked.reason if baked else "",
+    }
+
+
+def _arrays(lod: Lod) -> dict[str, Any]:
+    arrays = {
+        "positions": lod.mesh.positions,
+        "triangles": lod.mesh.triangles,
+        "normals": lod.mesh.normals,
+        "uvs": lod.mesh.uvs,
+        "tangents": lod.mesh.tangents,
+        "normal_map": lod.normal_map,
+        "openness": lod.baked and lod.baked.openness,
+        "paint": lod.baked and lod.baked.paint,
+    }
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _remedy(directory: Path) -> str:
+    return f"remove {directory} and run `stereocell units OUT`"

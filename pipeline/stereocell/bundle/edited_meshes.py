@@ -1,0 +1,347 @@
+"""Levels of detail as a bundle shows them where a mesh was edited by hand.
+
+An edited finest level is the surface that counts from then on: coarser ones are made anew from it,
+by the same simplification, and distances are measured from it. A level that the artist edited too
+stays as it is, and is measured. Where only coarser levels were edited, these are measured.
+
+How an edit is known: the pipeline writes a hash of each mesh's points and faces into its layer, and
+compares it with the composed ones. The layer that an opinion comes from would not do: an edit in
+place and a flattened stage have one layer. A stage without hashes is taken as it is. Within the
+levels of one mesh, a transform of one level alone is an edit too.
+
+Nothing of an edited mesh is claimed unseen: it is certified anew.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from stereocell.building.settings import Settings, from_dict
+from stereocell.meshes.distance import Nearest, measure_distance
+from stereocell.meshes.simplify import compact
+from stereocell.meshes.validity import Faults, Plane, border, certify
+from stereocell.model.channel import to_srgb8
+from stereocell.model.errors import StageError
+from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.timing import Clock
+from stereocell.textures.bake import Baker, FineSurface, bake
+from stereocell.textures.lod_chain import make_levels
+from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_mesh import move_mesh
+from stereocell.usd.read_stage import (
+    ComposedLod,
+    MadeMaps,
+    find_emptied,
+    mesh_at,
+    read_local,
+    read_lods,
+)
+from stereocell.usd.read_textures import ComposedMaps, read_image
+
+_FAULTS = {
+    "degenerate": "triangles without area",
+    "open": "open edges",
+    "crowded": "edges of more than two triangles",
+    "pinched": "pinched vertices",
+    "inside_out": "bodies inside out",
+    "crossings": "crossings",
+    "walls": "triangles in the cut",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The levels that are shown, finest first, and a line about what was edited, or nothing."""
+
+    lods: tuple[ComposedLod, ...]
+    edit: str = ""
+
+
+def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
+    """Return a loaded tile's levels of one channel from `finest` on. Raises StageError."""
+    lods = list(read_lods(tile, channel_id))
+    emptied = find_emptied(tile, channel_id)
+    if emptied and (not lods or emptied[0] < lods[0].level):
+        return Shown((), f"edited by hand: lod{emptied[0]} is empty: no surface is left")
+    edited = _edited_levels(lods)
+    told = [f"lod{level} is empty and left out" for level in emptied]
+    if edited:
+        if not np.isfinite(np.concatenate([lod.mesh.positions for lod in lods])).all():
+            prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
+            raise StageError(f"{prim}.points: a number that is not finite, expected places in um")
+        lods, said = _follow(tile, channel_id, lods, edited)
+        told = [*said, *told, *_odd_units(tile, channel_id, min(edited))]
+    line = f"edited by hand: {'; '.join(told)}" if told else ""
+    return Shown(tuple(lod for lod in lods if lod.level >= finest), line)
+
+
+def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
+    """Return the levels that are not as they were built, or that one alone was moved."""
+    edited = {lod.level for lod in lods if lod.shape != lod.built}
+    if len({lod.own for lod in lods}) > 1:
+        still = tuple(np.eye(4).ravel().tolist())
+        edited |= {lod.level for lod in lods if lod.own != still}
+    return edited
+
+
+def _follow(
+    tile: Usd.Prim, channel_id: str, lods: list[ComposedLod], edited: set[int]
+) -> tuple[list[ComposedLod], list[str]]:
+    """Return the levels with those that follow from an edited one, and what is to be told."""
+    fine, settings = lods[0], _settings(tile.GetStage())
+    planes = _cut_planes(tile, channel_id, fine)
+    to_fine = Nearest(fine.mesh, settings.lod.samples)
+
+    def away(lod: ComposedLod) -> float:
+        return measure_distance(to_fine, Nearest(lod.mesh, settings.lod.samples))
+
+    def verdict(lod: ComposedLod) -> str:
+        _, faults = _certified(read_local(tile, channel_id, lod.level), planes)
+        lost = f", without {' and '.join(lod.lost)}, which fit other faces" if lod.lost else ""
+        return f"lod{lod.level} ({_describe(faults)}{lost})"
+
+    if fine.level not in edited:
+        told = [f"{verdict(lod)} {away(lod):.3g} um from lod{fine.level}, which is as it was built"
+                for lod in lods if lod.level in edited]  # fmt: skip
+        return [
+            replace(lod, distance_um=fine.distance_um + away(lod)) if lod.level in edited else lod
+            for lod in lods
+        ], told
+    told = [verdict(fine)]
+    # an opinion outside the variants lies over all levels: the finest's edit, not their own
+    own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
+    made = _make(tile, channel_id, lods, settings, planes) if len(own) < len(lods) - 1 else {}
+    result = [replace(fine, distance_um=0.0)]
+    anew = []
+    for lod in lods[1:]:
+        if lod.level in own:
+            lod = replace(lod, distance_um=away(lod))
+            told.append(f"{verdict(lod)} stays, {lod.distance_um:.3g} um from lod{fine.level}")
+        else:
+            lod, faults = made[lod.level]
+            found = "" if not faults else f" with {faults} faults"
+            anew.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
+        result.append(lod)
+    if anew:
+        told.append(f"made anew from lod{fine.level}: {', '.join(anew)}")
+    return result, told
+
+
+def _make(
+    tile: Usd.Prim,
+    channel_id: str,
+    lods: Sequence[ComposedLod],
+    settings: Settings,
+    planes: tuple[Plane, ...],
+) -> dict[int, tuple[ComposedLod, int]]:
+    """Return the coarser levels made of the finest one, by level, and how many faults they have."""
+    fine, first = lods[0], lods[0].level + 1
+    spacing = _spacing(tile, channel_id, fine)
+    mesh, _ = _certified(_with_values(read_local(tile, channel_id, fine.level), fine), planes)
+    bare = Mesh(mesh.positions, mesh.triangles, mesh.normals)
+    openness = np.ones(len(bare.positions), np.float32) if mesh.openness is None else mesh.openness
+    paints = [] if mesh.colors is None else list(np.ascontiguousarray(mesh.colors.T))
+    sources = [FineSurface(bare, openness, paint) for paint in paints or [None]]
+    errors = settings.lod.errors[: lods[-1].level + 1]
+    settings = replace(settings, lod=replace(settings.lod, errors=errors))
+    made = make_levels(bare, planes, spacing, settings, Clock(), sources[0], first)
+    others = [Baker(source) for source in sources[1:]]
+    stretch = float(np.linalg.norm(fine.matrix[:3, :3], 2))
+    result: dict[int, tuple[ComposedLod, int]] = {}
+    before = fine, 0
+    for past, lod in pairwise(lods):
+        place = lod.level - first
+        # a channel with fewer levels than others repeats its last
+        if (lod.built and lod.built == past.built) or place >= len(made):
+            found = replace(before[0], level=lod.level), before[1]
+        else:
+            dressed = _compose(made[place], lod, fine, mesh, others)
+            um = made[place].distance_um * stretch
+            quality = made[place].quality
+            found = replace(dressed, distance_um=um), quality.faults if quality else 0
+        result[lod.level] = before = found
+    return result
+
+
+def _compose(
+    made: Lod, lod: ComposedLod, fine: ComposedLod, source: Mesh, others: Sequence[Baker]
+) -> ComposedLod:
+    """Return a level that was made anew, in world um; `others` look up green and blue."""
+    mesh, baked = made.mesh, made.baked
+    assert baked is not None
+    color: NDArray[np.float32] | None = None
+    if source.colors is not None and baked.paint is not None:
+        parts = [baked.paint]
+        for baker in others:
+            if made.normal_map is not None:
+                paint = bake(mesh, made.normal_map.shape[:2], baker).paint
+            else:
+                wide = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
+                paint = np.round(np.asarray(baker.look_up(*wide).paint) * 255).astype(np.uint8)
+            assert paint is not None
+            parts.append(paint)
+        color = np.divide(np.stack(parts, axis=-1), 255, dtype=np.float32)
+    is_open = source.openness is None
+    images = None
+    if made.normal_map is not None:
+        images = MadeMaps(
+            made.normal_map,
+            None if is_open else baked.openness,
+            None if color is None else to_srgb8(color),
+        )
+    else:
+        share = None if is_open else np.divide(baked.openness, 255, dtype=np.float32)
+        mesh = replace(mesh, colors=color, openness=share)
+    return replace(
+        lod,
+        mesh=move_mesh(mesh, fine.matrix),
+        maps=ComposedMaps(),
+        images=images,
+        material=replace(lod.material, color=fine.material.color),
+        matrix=fine.matrix,
+        lost=(),
+    )
+
+
+def _with_values(mesh: Mesh, fine: ComposedLod) -> Mesh:
+    """Return the mesh with the occlusion and colours of its maps at its vertices."""
+    if mesh.uvs is None:
+        return mesh
+
+    def at_vertices(path: Any) -> NDArray[np.float64]:
+        image = read_image(path).astype(np.float64) / 255
+        height, width = image.shape[:2]
+        assert mesh.uvs is not None
+        u, v = mesh.uvs.astype(np.float64).clip(0, 1).T
+        rows = np.minimum(((1 - v) * height).astype(int), height - 1)
+        return np.asarray(image[rows, np.minimum((u * width).astype(int), width - 1)])
+
+    if fine.maps.occlusion is not None and mesh.openness is None:
+        openness = at_vertices(fine.maps.occlusion)[:, 0].astype(np.float32)
+        mesh = replace(mesh, openness=openness)
+    if fine.maps.color is not None and mesh.colors is None:
+        bent = at_vertices(fine.maps.color)
+        linear = np.where(bent <= 0.04045, bent / 12.92, ((bent + 0.055) / 1.055) ** 2.4)
+        mesh = replace(mesh, colors=linear.astype(np.float32))
+    return mesh
+
+
+def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Faults]:
+    """Return the mesh and its faults; welded, where seams of UVs or of normals cut it open."""
+    faults = certify(mesh, planes)
+    if not faults.total:
+        return mesh, faults
+    _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
+    triangles = first[twin.ravel()][mesh.triangles].astype(np.uint32)
+    has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # as not at a pole's seam
+    triangles = triangles[has_area]
+    welded = compact(mesh, triangles)
+    found = certify(welded, planes)
+    if found.total >= faults.total:
+        return mesh, faults
+    used = np.unique(triangles)
+    return replace(
+        welded,
+        colors=None if mesh.colors is None else mesh.colors[used],
+        openness=None if mesh.openness is None else mesh.openness[used],
+    ), found
+
+
+def _describe(faults: Faults) -> str:
+    found = [f"{count} {_FAULTS[kind]}" for kind, count in faults.counts.items() if count]
+    return ", ".join(found) or "sound"
+
+
+def _cut_planes(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[Plane, ...]:
+    """Return where the mesh is open because another tile follows: at the ends of its tile's box.
+
+    The stage names no planes, but a cut's vertices lie on one bit by bit, and moved ones do not.
+    """
+    mesh = read_local(tile, channel_id, fine.level)
+    low, high = _box(tile, channel_id) or (
+        mesh.positions.min(axis=0).astype(np.float64),
+        mesh.positions.max(axis=0).astype(np.float64),
+    )
+    ends = mesh.positions[border(mesh.triangles)]
+    hair = 1e-5 * max(float(np.abs([low, high]).max()), 1.0)
+    planes = set()
+    for axis in range(3):
+        one, other = ends[..., axis].T
+        for value in np.unique(one[one == other]).tolist():
+            if value <= low[axis] + hair or value >= high[axis] - hair:
+                planes.add((axis, float(value)))
+    return tuple(sorted(planes))
+
+
+def _volume(tile: Usd.Prim, channel_id: str) -> Usd.Prim:
+    name = f"{channel_id}_{tile.GetName()}_volume"
+    return tile.GetStage().GetPrimAtPath(tile.GetPath().AppendPath(f"{channel_id}/{name}"))
+
+
+def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return the corners of a tile's lattice in its own space; None: its volume is gone."""
+    prim = _volume(tile, channel_id)
+    low, high = (
+        prim.GetAttribute(f"stereocell:bounds{end}").Get() if prim else None
+        for end in ("Min", "Max")
+    )
+    if low is None or high is None:
+        return None
+    return np.array(low, np.float64), np.array(high, np.float64)
+
+
+def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[float, float, float]:
+    """Return the voxel spacing (z, y, x) in um; without the volume an edge's usual length."""
+    box, prim = _box(tile, channel_id), _volume(tile, channel_id)
+    size = prim.GetAttribute("stereocell:atlasSize").Get() if box is not None else None
+    if box is not None and size:
+        apron = int(prim.GetAttribute("stereocell:apron").Get() or 0)
+        steps = np.array(size, np.float64) - 2 * apron - 1
+        x, y, z = ((box[1] - box[0]) / np.maximum(steps, 1)).tolist()
+        if min(x, y, z) > 0:
+            return z, y, x
+    corners = fine.mesh.positions[fine.mesh.triangles].astype(np.float64)
+    edge = float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+    return edge, edge, edge
+
+
+def _settings(stage: Usd.Stage) -> Settings:
+    """Return what the stage says of how its levels were made; defaults where it doesn't.
+
+    Raises UsageError for values that are none.
+    """
+    for layer in stage.GetUsedLayers():
+        found = layer.customLayerData.get("stereocell", {}).get("settings", {})
+        sections = {name: found.get(name) for name in ("lod", "unwrap")}
+        if all(isinstance(content, dict) for content in sections.values()):
+            return from_dict({name: dict(_known(name, sections[name])) for name in sections})
+    return Settings()
+
+
+def _known(section: str, content: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the settings of a section, as JSON has them; another version's are passed over."""
+    for field in fields(getattr(Settings(), section)):
+        if field.name in content:
+            value = content[field.name]
+            is_list = isinstance(value, str) and value.startswith("[")
+            yield field.name, json.loads(value) if is_list else value
+
+
+def _odd_units(tile: Usd.Prim, channel_id: str, level: int) -> Iterator[str]:
+    """Yield which layer has points in other units."""
+    prim = mesh_at(tile, channel_id, level)
+    stack = prim.GetAttribute("points").GetPropertyStack() if prim else []
+    for spec in stack[:1]:
+        unit = spec.layer.pseudoRoot.GetInfo(UsdGeom.Tokens.metersPerUnit)
+        stated = spec.layer.pseudoRoot.HasInfo(UsdGeom.Tokens.metersPerUnit)
+        if stated and not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
+            yield (
+                f"points of {spec.layer.GetDisplayName()}, whose metersPerUnit is {unit:g}, are "
+                "taken as um: USD does not rescale them"
+            )

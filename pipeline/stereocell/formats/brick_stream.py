@@ -1,0 +1,280 @@
+"""Bytes of a voxel BVH, on disk and on the wire, and the messages of the websocket `/bricks`.
+
+docs/brick-stream.md tells the protocol and every byte; schemas/brick_stream.schema.json has the
+messages, and the layouts below as data, which a test holds against this module. All numbers are
+little-endian. Each brick is a zstd frame of its own, named by the first 128 bits of the SHA-256 of
+that frame: a cache of bricks is one by content, and what comes is checked before it is unpacked.
+Bricks differenced along x were 5 % larger than plain ones (7 T head, zstd 1 to 9), and zstd's level
+9 saved 1 % of level 3's bytes in six times its time: plain, level 3.
+"""
+
+import hashlib
+import json
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import zstandard
+from jsonschema import Draft202012Validator
+from numpy.typing import NDArray
+
+from stereocell.formats.voxel_bvh import BRICK, EMPTY, STORED, Bvh, Bytes3
+from stereocell.model.errors import StereoCellError
+from stereocell.storage.assets import schema_path
+
+VERSION = 1
+MAGIC = b"\x89SCBVH\r\n"
+HEADER = struct.Struct("<8s2H4B5Ih2xQ16s")
+RECORD = np.dtype(
+    {
+        "names": [
+            *("level", "flags", "child_mask", "constant", "x", "y", "z", "min", "max"),
+            *("error_max", "error_rms", "length", "hash"),
+        ],
+        "formats": [*("u1",) * 4, *("<u2",) * 3, *("u1",) * 3, "<f4", "<u4", "V16"],
+        "offsets": [0, 1, 2, 3, 4, 6, 8, 10, 11, 12, 16, 20, 24],
+        "itemsize": 40,
+    }
+)
+HASH_BYTES = 16
+FRAME = struct.Struct("<BBHIII")
+ENTRY = struct.Struct("<III")
+TABLE_FRAME, BRICKS_FRAME = 1, 2
+_ZSTD = 1
+_ZSTD_LEVEL = 3
+_MAX_TABLE_BYTES = 1 << 28
+_LONGEST_FRAME = 1 << 14  # a zstd frame of a brick is at most some bytes longer than its 18^3
+
+
+class BrickFormatError(StereoCellError):
+    """Bytes or a message that break the rules of docs/brick-stream.md."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A tree without its bricks: header and node records.
+
+    size         texels (z, y, x)
+    threshold    as in voxel_bvh.Bvh
+    source       first 128 bits of the SHA-256 of the volume's KTX2 file
+    nodes        records of RECORD: voxel_bvh.NODE's fields; `length` and `hash` of the brick's
+                 zstd frame, zeros in empty nodes
+    brick_bytes  of all frames together
+    """
+
+    size: tuple[int, int, int]
+    threshold: int
+    source: bytes
+    nodes: NDArray[np.void]
+    brick_bytes: int
+
+    @property
+    def bytes(self) -> int:
+        """Length of the table as it is written: where the bricks begin in a file."""
+        return HEADER.size + self.nodes.nbytes
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a binary frame carries of one tree: `at` is a byte of its table, or a node."""
+
+    tree: int
+    at: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A binary frame. kind: TABLE_FRAME or BRICKS_FRAME; view: whose it is, 0 for tables."""
+
+    kind: int
+    sequence: int
+    view: int
+    parts: tuple[Part, ...]
+
+
+def content_hash(data: bytes) -> bytes:
+    """Return the first 128 bits of SHA-256."""
+    return hashlib.sha256(data).digest()[:HASH_BYTES]
+
+
+def encode_tree(bvh: Bvh, source: bytes) -> bytes:
+    """Return a tree as a file holds it: header, node records, bricks in the nodes' order.
+
+    source: the first 128 bits of the SHA-256 of the volume's KTX2 file.
+    """
+    compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL, write_content_size=True)
+    frames = [compressor.compress(brick.tobytes()) for brick in bvh.bricks]
+    nodes = np.zeros(len(bvh.nodes), dtype=RECORD)
+    for name in bvh.nodes.dtype.names or ():
+        nodes[name] = bvh.nodes[name]
+    stored = np.flatnonzero((nodes["flags"] & EMPTY) == 0)
+    nodes["length"][stored] = [len(frame) for frame in frames]
+    nodes["hash"][stored] = np.array([content_hash(frame) for frame in frames], dtype="V16")
+    z, y, x = bvh.size
+    header = HEADER.pack(
+        MAGIC,
+        VERSION,
+        HEADER.size,
+        BRICK,
+        (STORED - BRICK) // 2,
+        int(nodes["level"][0]) + 1,
+        _ZSTD,
+        x,
+        y,
+        z,
+        len(nodes),
+        len(frames),
+        bvh.threshold,
+        sum(map(len, frames)),
+        source,
+    )
+    return b"".join([header, nodes.tobytes(), *frames])
+
+
+def parse_table(data: bytes) -> Table:
+    """Return the tree at the start of `data`, which may go on with the bricks.
+
+    Raises BrickFormatError for whatever a client or server could stumble over.
+    """
+    if len(data) < HEADER.size:
+        raise BrickFormatError(f"a tree of {len(data)} bytes, expected {HEADER.size} or more")
+    magic, version, header_bytes, brick, apron, levels, codec, *rest = HEADER.unpack_from(data)
+    x, y, z, count, stored, threshold, brick_bytes, source = rest
+    if magic != MAGIC:
+        raise BrickFormatError(f"magic is {magic!r}, expected {MAGIC!r}")
+    layout = (version, header_bytes, brick, apron, codec)
+    expected = (VERSION, HEADER.size, BRICK, 1, _ZSTD)
+    if layout != expected:
+        raise BrickFormatError(
+            f"version, header, brick, apron, codec are {layout}, expected {expected}"
+        )
+    end = HEADER.size + count * RECORD.itemsize
+    if count == 0 or end > min(len(data), _MAX_TABLE_BYTES):
+        raise BrickFormatError(f"{count} nodes in {len(data)} bytes")
+    if not 0 < levels <= 16 or not all(0 < n <= BRICK << levels - 1 for n in (x, y, z)):
+        raise BrickFormatError(f"{x} x {y} x {z} texels in {levels} levels")
+    nodes = np.frombuffer(data, dtype=RECORD, count=count, offset=HEADER.size)
+    _check_nodes(nodes, levels, stored, brick_bytes)
+    return Table((z, y, x), threshold, source, nodes, brick_bytes)
+
+
+def _check_nodes(nodes: NDArray[np.void], levels: int, stored: int, brick_bytes: int) -> None:
+    is_empty = (nodes["flags"] & EMPTY) != 0
+    counts = np.bitwise_count(nodes["child_mask"])
+    parents = np.repeat(np.arange(len(nodes)), counts)
+    faults = {
+        "flags": nodes["flags"] > EMPTY,
+        "child_mask": (counts > 0) != (~is_empty & (nodes["level"] > 0)),
+        "length": is_empty != (nodes["length"] == 0),
+        "length of a frame": nodes["length"] > _LONGEST_FRAME,
+        "min": nodes["min"] > nodes["max"],
+        "error_rms": ~(nodes["error_rms"] >= 0),
+    }
+    for name, fault in faults.items():
+        if fault.any():
+            raise BrickFormatError(f"node {fault.argmax()}: {name} breaks its rule")
+    if len(parents) != len(nodes) - 1 or (parents >= np.arange(1, len(nodes))).any():
+        raise BrickFormatError(f"{len(parents)} children in a tree of {len(nodes)} nodes")
+    bits = np.unpackbits(nodes["child_mask"][:, np.newaxis], axis=1, bitorder="little")
+    octant = np.nonzero(bits)[1]
+    child, parent = nodes[1:], nodes[parents]
+    fits = child["level"] + 1 == parent["level"]
+    for shift, axis in enumerate("xyz"):
+        fits &= child[axis] == 2 * parent[axis].astype(np.int64) + (octant >> shift & 1)
+    root = nodes[0]
+    if root["level"] != levels - 1 or root["x"] or root["y"] or root["z"] or not fits.all():
+        raise BrickFormatError("nodes lie elsewhere than their parents say")
+    if np.count_nonzero(~is_empty) != stored or int(nodes["length"].sum()) != brick_bytes:
+        raise BrickFormatError("bricks don't add up to what the header says")
+
+
+def decode_brick(frame: bytes) -> Bytes3:
+    """Return a brick (18, 18, 18), (z, y, x), from its zstd frame. Raises BrickFormatError."""
+    try:
+        size = zstandard.get_frame_parameters(frame).content_size
+        if size != STORED**3:
+            raise BrickFormatError(f"a brick of {size} bytes, expected {STORED**3}")
+        data = zstandard.decompress(frame)
+    except zstandard.ZstdError as error:
+        raise BrickFormatError(f"a brick that is no zstd frame: {error}") from None
+    return np.frombuffer(data, dtype=np.uint8).reshape(STORED, STORED, STORED)
+
+
+def encode_frame(frame: Frame) -> bytes:
+    """Return the bytes of a binary frame; `data` of a table's part is not yet compressed."""
+    datas, lengths = [], []
+    for part in frame.parts:
+        is_table = frame.kind == TABLE_FRAME
+        datas.append(zstandard.compress(part.data, _ZSTD_LEVEL) if is_table else part.data)
+        lengths.append(len(datas[-1]))
+    head = FRAME.pack(frame.kind, VERSION, 0, frame.sequence, frame.view, len(frame.parts))
+    entries = [
+        ENTRY.pack(part.tree, part.at, n) for part, n in zip(frame.parts, lengths, strict=True)
+    ]
+    return b"".join([head, *entries, *datas])
+
+
+def decode_frame(data: bytes) -> Frame:
+    """Return a binary frame, tables' parts unpacked. Raises BrickFormatError."""
+    if len(data) < FRAME.size:
+        raise BrickFormatError(f"a frame of {len(data)} bytes, expected {FRAME.size} or more")
+    kind, version, _, sequence, view, count = FRAME.unpack_from(data)
+    if kind not in (TABLE_FRAME, BRICKS_FRAME) or version != VERSION:
+        raise BrickFormatError(f"a frame of kind {kind}, version {version}")
+    end = FRAME.size + count * ENTRY.size
+    if end > len(data):
+        raise BrickFormatError(f"{count} parts in {len(data)} bytes")
+    parts = []
+    for tree, at, length in ENTRY.iter_unpack(data[FRAME.size : end]):
+        content = data[end : end + length]
+        end += length
+        if kind == TABLE_FRAME and end <= len(data):
+            content = zstandard.decompress(content)
+        parts.append(Part(tree, at, content))
+    if end != len(data):
+        raise BrickFormatError(f"parts end at byte {end} of {len(data)}")
+    return Frame(kind, sequence, view, tuple(parts))
+
+
+def parse_message(text: str) -> dict[str, Any]:
+    """Return a client's message, which fits its schema. Raises BrickFormatError, in one line."""
+    try:
+        message = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise BrickFormatError(f"not JSON: {_short(str(error))}") from None
+    if not isinstance(message, dict):
+        raise BrickFormatError("not a JSON object")
+    kind = message.get("type")
+    validators = _validators()
+    if not isinstance(kind, str) or kind not in validators:
+        raise BrickFormatError(f"type: expected one of {', '.join(validators)}")
+    fault = next(validators[kind].iter_errors(message), None)  # all of them would take seconds
+    if fault is not None:
+        where = _short(f"{fault.json_path}: {fault.validator}")
+        raise BrickFormatError(f"{kind}: {where} is not as the schema asks")
+    return message
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else f"{text[:60]}..."
+
+
+@cache
+def _validators() -> dict[str, Draft202012Validator]:
+    schema = json.loads(schema_path("brick_stream.schema.json").read_bytes())
+    return {
+        name: Draft202012Validator({"$defs": schema["$defs"], "$ref": ref})
+        for name, ref in _kinds(schema["$defs"]["ClientMessage"]["oneOf"])
+    }
+
+
+def _kinds(references: Sequence[dict[str, str]]) -> list[tuple[str, str]]:
+    return [(ref["$ref"].rsplit("/", 1)[1].lower(), ref["$ref"]) for ref in references]

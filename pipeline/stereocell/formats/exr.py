@@ -1,0 +1,156 @@
+"""OpenEXR images: volumes as slice atlases, and transfer functions as lookup tables.
+
+An atlas lays the slices of a volume out in columns x rows, slice 0 at the upper left, as game
+engines import 3D textures. Its one channel is `Y`, which readers take for grey; a lone `R` comes in
+red. 1/255 steps survive a half exactly enough to be read back as the same bytes.
+
+Compression, 196 x 514 x 514 noisy voxels on 2 cores: PIZ 0.5 s and 31 MB; ZIP 1.3 s and 52 MB; RLE
+0.4 s and 97 MB.
+"""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from stereocell.model.channel import APRON, OpacityPoints, evaluate
+from stereocell.model.errors import OutputError, StageError
+from stereocell.storage.atomic_write import replacing
+
+_MAGIC = b"\x76\x2f\x31\x01"
+_OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # tiles, deep data, several parts
+_ROWS_OF = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}  # by compression
+_LEVELS = (np.arange(256, dtype=np.float32) / 255).astype(np.float16)
+
+
+def write_atlas(path: Path, volume: NDArray[np.uint8]) -> None:
+    """Write a volume, uint8 (z, y, x) with its apron, as `volume` / 255 in half floats.
+
+    The header says how to cut it again: `columns`, `rows`, `atlasSize` (x, y, z), `apron`.
+    Raises OutputError.
+    """
+    depth, height, width = volume.shape
+    columns = min(depth, max(1, round((depth * height / width) ** 0.5)))  # nearly square
+    rows = -(-depth // columns)
+    slices = np.zeros((rows * columns, height, width), dtype=np.uint8)
+    slices[:depth] = volume
+    sheet = slices.reshape(rows, columns, height, width).transpose(0, 2, 1, 3)
+    image = _LEVELS[sheet.reshape(rows * height, columns * width)]
+    attributes = {
+        "columns": columns,
+        "rows": rows,
+        "atlasSize": np.array([width, height, depth], dtype=np.int32),
+        "apron": APRON,
+    }
+    _write(path, {"Y": image}, attributes)
+
+
+def read_atlas(path: Path) -> NDArray[np.uint8]:
+    """Return the volume of an atlas, uint8 (z, y, x) with its apron.
+
+    Raises StageError if the file is missing, damaged, or not an atlas.
+    """
+    check_exr(path)
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            header, channels = dict(file.header()), file.channels()
+            image = np.array(channels["Y"].pixels) if "Y" in channels else None
+    except (RuntimeError, ValueError) as error:  # ValueError: the header is whole, pixels are not
+        reason = " ".join(str(error).split())
+        raise StageError(f"{path}: can't be read as OpenEXR: {reason}") from error
+    lacking = [key for key in ("columns", "rows", "atlasSize") if key not in header]
+    if image is None or lacking:
+        what = f"header attribute {lacking[0]}" if lacking else "channel Y"
+        raise StageError(f"{path}: no {what}, expected a slice atlas")
+    width, height, depth = (int(n) for n in header["atlasSize"])
+    columns, rows = int(header["columns"]), int(header["rows"])
+    if image.shape != (rows * height, columns * width) or not 0 < depth <= rows * columns:
+        raise StageError(
+            f"{path}: {image.shape[1]} x {image.shape[0]} pixels don't hold "
+            f"{columns} x {rows} slices of {width} x {height}, {depth} of them used"
+        )
+    sheet = np.rint(image.astype(np.float32) * 255).clip(0, 255).astype(np.uint8)
+    slices = sheet.reshape(rows, height, columns, width).transpose(0, 2, 1, 3)
+    return np.ascontiguousarray(slices.reshape(-1, height, width)[:depth])
+
+
+def check_exr(path: Path) -> None:
+    """Raise StageError if a file is missing, is no OpenEXR, or was cut short.
+
+    Follows the chunk offsets (OpenEXR's "File Layout") and reads no pixels. OpenEXR, asked to read
+    a file that was cut short, prints lines of its own before it raises. Tiled, deep and multi-part
+    files, which the pipeline never writes, are only known by their first bytes.
+    """
+    try:
+        content = np.memmap(path, dtype=np.uint8, mode="r").data
+        damage = _find_damage(content)
+    except OSError as error:
+        raise StageError(f"{path}: can't be read: {error.strerror or error}") from error
+    except ValueError:  # nothing to map
+        damage = "it is empty"
+    except (struct.error, IndexError, KeyError):
+        damage = "its header was cut short"
+    if damage is not None:
+        raise StageError(f"{path}: can't be read as OpenEXR: {damage}")
+
+
+def _find_damage(content: memoryview) -> str | None:
+    if bytes(content[:4]) != _MAGIC:
+        return "its first bytes are not OpenEXR's"
+    (version,) = struct.unpack_from("<I", content, 4)
+    if version & _OTHER_LAYOUTS:
+        return None
+    attributes = {}
+    at = 8
+    while content[at]:
+        name, at = _text_at(content, at)
+        _, at = _text_at(content, at)
+        (size,) = struct.unpack_from("<I", content, at)
+        attributes[name] = content[at + 4 : at + 4 + size]
+        at += 4 + size
+    _, top, _, bottom = struct.unpack("<4i", attributes[b"dataWindow"])
+    rows = _ROWS_OF.get(attributes[b"compression"][0])
+    if rows is None:
+        return None
+    count = (bottom - top) // rows + 1
+    for offset in struct.unpack_from(f"<{count}Q", content, at + 1):
+        if not at < offset <= len(content) - 8:
+            return f"it ends at byte {len(content)}, before its last rows"
+        _, size = struct.unpack_from("<2i", content, offset)
+        if size < 0 or offset + 8 + size > len(content):
+            return f"it ends at byte {len(content)}, expected {offset + 8 + size} or more"
+    return None
+
+
+def _text_at(content: memoryview, start: int) -> tuple[bytes, int]:
+    """Return the text that a zero byte ends, and where the next thing begins."""
+    end = start
+    while content[end]:
+        end += 1
+    return bytes(content[start:end]), end + 1
+
+
+def write_lut(path: Path, points: OpacityPoints) -> None:
+    """Write a transfer function as 256 x 1 RGBA half floats, opacity in A.
+
+    RGB is 1: the channel's colour multiplies it. Column i stands for intensity i / 255. Raises
+    OutputError.
+    """
+    table = np.ones((1, 256, 4), dtype=np.float16)
+    table[0, :, 3] = evaluate(points)
+    _write(path, {"RGBA": table}, {})
+
+
+def _write(
+    path: Path, channels: dict[str, NDArray[np.float16]], attributes: dict[str, object]
+) -> None:
+    header = {"compression": OpenEXR.PIZ_COMPRESSION, "type": OpenEXR.scanlineimage, **attributes}
+    with replacing(path) as temporary:
+        try:
+            OpenEXR.File(header, channels).write(str(temporary))
+        except RuntimeError as error:
+            raise OutputError(
+                f"{path}: can't be written: {' '.join(str(error).split())}"
+            ) from error

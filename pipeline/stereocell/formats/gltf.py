@@ -1,0 +1,259 @@
+"""Write one mesh as a binary glTF 2.0 file that a phone decodes fast.
+
+Assembled here because no package on PyPI writes EXT_meshopt_compression. Also used:
+KHR_mesh_quantization and, for baked maps, KHR_texture_basisu.
+
+No cracks between tiles. Neighbouring tiles hold the vertices on their common plane as equal
+floats; they must decode to equal positions too. So all files of a bundle share ONE lattice: a
+vertex becomes round(position / step), `step` the same everywhere and a power of two in METRES.
+A file stores the 16-bit offset from its own origin, which is a lattice point as well, and its
+node carries scale = step and translation = origin * step. Every factor is then a dyadic number
+and a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps
+(for tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin).
+The coarsest LODs, which a reader waits for first, have a lattice of their own with longer steps.
+"""
+
+import json
+import math
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.formats.meshopt import CompressedBuffers, reorder
+from stereocell.model.mesh import Mesh
+from stereocell.model.version import GENERATOR
+
+_METRES_PER_UM = 1e-6
+_MOST_STEPS = 0xFFFF  # that 16 bits span
+_WANTED_STEPS = 1 << 14  # as fine as a 20th of a voxel, and the low bits don't compress
+_UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
+AMBIENT_SHARE = 0.4  # of the light in the viewer's room, about
+_OF_COLOR = {"baseColorTexture"}  # the maps that lie one level deeper in a material
+_LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """What a surface is drawn with: linear RGB, metallic and roughness, all 0..1."""
+
+    color: tuple[float, float, float]
+    metallic: float = 0.0
+    roughness: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Textures:
+    """Baked maps, KTX2 files of Basis Universal: normals and occlusion linear, colours in sRGB."""
+
+    normal: bytes | None = None
+    occlusion: bytes | None = None
+    color: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Glb:
+    """A whole .glb file, and the box of its decoded vertices (x, y, z) in metres, y up."""
+
+    data: bytes
+    min_m: tuple[float, float, float]
+    max_m: tuple[float, float, float]
+
+
+def choose_step(extent_um: float) -> float:
+    """Return the lattice step in metres for meshes whose longest edge is `extent_um` or less.
+
+    It is the smallest power of two for which 14 bits span the extent: 8192 to 16384 steps.
+    """
+    if extent_um <= 0:
+        return 2.0**-30
+    return float(2.0 ** math.ceil(math.log2(extent_um * _METRES_PER_UM / _WANTED_STEPS)))
+
+
+def encode_glb(
+    mesh: Mesh,
+    step_m: float,
+    material: Material,
+    name: str,
+    extras: dict[str, str],
+    textures: Textures | None = None,
+) -> Glb:
+    """Return the mesh as .glb.
+
+    `extras` come on the scene and on its one node. UVs are written only where there is a map to
+    look up, tangents where it is one of normals.
+    Raises ValueError for a mesh without triangles, one that is larger than 65535 steps along
+    an axis, and maps without UVs.
+    """
+    maps = _pick(textures or Textures())
+    if len(mesh.triangles) == 0:
+        raise ValueError(f"{name} has no triangles")
+    indices, order = reorder(mesh.triangles, len(mesh.positions))
+
+    steps = np.rint(mesh.positions[order].astype(np.float64) * (_METRES_PER_UM / step_m))
+    lattice = steps.astype(np.int64)
+    origin = lattice.min(axis=0)
+    offsets = lattice - origin
+    if offsets.max() > _MOST_STEPS:
+        raise ValueError(f"{name} spans {offsets.max()} lattice steps, more than {_MOST_STEPS}")
+    max_offset = offsets.max(axis=0)
+
+    buffers = CompressedBuffers()
+    attributes = {
+        "POSITION": buffers.add_attribute(
+            _padded(offsets.astype(np.uint16)),
+            {
+                "componentType": _UNSIGNED_SHORT,
+                "type": "VEC3",
+                "min": [0, 0, 0],
+                "max": [int(m) for m in max_offset],
+            },
+        ),
+        "NORMAL": buffers.add_directions(_unit(mesh.normals[order]), "VEC3"),
+    }
+    if maps:
+        if mesh.uvs is None:
+            raise ValueError(f"{name} has baked maps and no UVs")
+        attributes["TEXCOORD_0"] = _add_uvs(buffers, mesh.uvs[order])
+        if mesh.tangents is not None and "normalTexture" in maps:
+            attributes["TANGENT"] = _add_tangents(buffers, mesh.tangents[order])
+    if mesh.colors is not None or mesh.openness is not None:
+        attributes["COLOR_0"] = _add_colors(buffers, mesh, order)
+    primitive = {
+        "attributes": attributes,
+        "indices": buffers.add_indices(indices, len(order)),
+        "material": 0,
+    }
+
+    drawn: dict[str, Any] = {
+        "name": extras.get("channel", name),
+        "doubleSided": True,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*material.color, 1.0],
+            "metallicFactor": material.metallic,
+            "roughnessFactor": material.roughness,
+        },
+    }
+    extensions = ["EXT_meshopt_compression", "KHR_mesh_quantization"]
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": GENERATOR},
+        "extensionsUsed": extensions,
+        "extensionsRequired": extensions,
+        "scene": 0,
+        "scenes": [{"name": name, "nodes": [0], "extras": extras}],
+        "nodes": [
+            {
+                "name": name,
+                "mesh": 0,
+                "translation": list(_to_metres(origin, step_m)),
+                "scale": [step_m] * 3,
+                "extras": extras,
+            }
+        ],
+        "meshes": [{"name": name, "primitives": [primitive]}],
+        "materials": [drawn],
+    }
+    if maps:
+        extensions.append("KHR_texture_basisu")
+        for i, name_of_map in enumerate(maps):
+            holder = drawn["pbrMetallicRoughness"] if name_of_map in _OF_COLOR else drawn
+            holder[name_of_map] = {"index": i}
+        document["textures"] = [
+            {"sampler": 0, "extensions": {"KHR_texture_basisu": {"source": i}}}
+            for i in range(len(maps))
+        ]
+        document["images"] = [
+            {"mimeType": "image/ktx2", "bufferView": buffers.add(data)} for data in maps.values()
+        ]
+        document["samplers"] = [
+            {
+                "magFilter": _LINEAR,
+                "minFilter": _LINEAR_MIPMAP_LINEAR,
+                "wrapS": _CLAMP,
+                "wrapT": _CLAMP,
+            }
+        ]
+    binary = buffers.finish(document)
+    return Glb(
+        _pack(document, binary), _to_metres(origin, step_m), _to_metres(origin + max_offset, step_m)
+    )
+
+
+def _to_metres(point: NDArray[np.int64], step_m: float) -> tuple[float, float, float]:
+    x, y, z = (float(n * step_m) for n in point)
+    return x, y, z
+
+
+def _add_uvs(buffers: CompressedBuffers, uvs: NDArray[np.float32]) -> int:
+    """Store UVs, v downwards as glTF has it; 16 bits unless some lie outside 0..1."""
+    flipped = np.stack([uvs[:, 0], 1 - uvs[:, 1]], axis=1)
+    if flipped.min() < 0 or flipped.max() > 1:
+        floats = np.ascontiguousarray(flipped, dtype=np.float32)
+        return buffers.add_attribute(floats, {"componentType": _FLOAT, "type": "VEC2"})
+    values = np.rint(flipped * 0xFFFF).astype(np.uint16)
+    return buffers.add_attribute(
+        values, {"componentType": _UNSIGNED_SHORT, "normalized": True, "type": "VEC2"}
+    )
+
+
+def _pick(textures: Textures) -> dict[str, bytes]:
+    """Return the maps that there are, by their names in a material."""
+    named = {
+        "normalTexture": textures.normal,
+        "occlusionTexture": textures.occlusion,
+        "baseColorTexture": textures.color,
+    }
+    return {name: data for name, data in named.items() if data is not None}
+
+
+def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> int:
+    """Store what the base colour is multiplied by: the mesh's colours, dimmed where it is hidden.
+
+    glTF has no occlusion at vertices. An occlusion map dims ambient light only; what dims a colour
+    dims all light, so it gets the share that is ambient.
+    """
+    colors = np.ones((len(order), 3))
+    if mesh.colors is not None:
+        colors *= np.clip(mesh.colors[order], 0, 1)
+    if mesh.openness is not None:
+        hidden = 1 - np.clip(mesh.openness[order].astype(np.float64), 0, 1)
+        colors *= (1 - AMBIENT_SHARE * hidden)[:, np.newaxis]
+    values = _padded(np.rint(colors * 255).astype(np.uint8))
+    return buffers.add_attribute(
+        values, {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "VEC3"}
+    )
+
+
+def _add_tangents(buffers: CompressedBuffers, tangents: NDArray[np.float32]) -> int:
+    signs = np.where(tangents[:, 3:] < 0, -1.0, 1.0)
+    return buffers.add_directions(np.hstack([_unit(tangents[:, :3]), signs]), "VEC4")
+
+
+def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return unit vectors (n, 3); those of no length point to z."""
+    wide = vectors.astype(np.float64)
+    lengths = np.linalg.norm(wide, axis=1, keepdims=True)
+    wide[lengths[:, 0] == 0] = (0.0, 0.0, 1.0)
+    return wide / np.where(lengths == 0, 1.0, lengths)
+
+
+def _padded(values: NDArray[Any]) -> NDArray[Any]:
+    """Return rows of 3 numbers with a zero behind: vertex strides are multiples of 4 bytes."""
+    return np.pad(values, ((0, 0), (0, 1)))
+
+
+def _pack(document: dict[str, Any], binary: bytes) -> bytes:
+    text = json.dumps(document, separators=(",", ":"), ensure_ascii=True).encode()
+    text += b" " * (-len(text) % 4)
+    length = 12 + 8 + len(text) + 8 + len(binary)
+    return b"".join(
+        [
+            struct.pack("<4sII", b"glTF", 2, length),
+            struct.pack("<I4s", len(text), b"JSON"),
+            text,
+            struct.pack("<I4s", len(binary), b"BIN\0"),
+            binary,
+        ]
+    )

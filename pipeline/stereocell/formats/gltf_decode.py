@@ -1,0 +1,128 @@
+"""Take a .glb of the bundle apart, by the tables of glTF 2.0 and of EXT_meshopt_compression."""
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import meshoptimizer
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import CheckError
+
+_TYPES = {
+    5120: np.int8,
+    5121: np.uint8,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_HEAD = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<I4s")
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What a viewer draws of a file.
+
+    positions_m  float32 (n, 3), world metres
+    triangles    (m, 3)
+    normals      of the vertices, unit vectors (n, 3)
+    colors       of the vertices, 0..1 (n, 3), or None
+    color        of the material, linear RGB 0..1
+    maps         KTX2 files by their names in the material
+    uvs          of the vertices, v downwards (n, 2), or None
+    step_m       between two places that a vertex may have
+    """
+
+    positions_m: NDArray[np.float32]
+    triangles: NDArray[np.int64]
+    normals: NDArray[np.float64]
+    colors: NDArray[np.float64] | None
+    color: tuple[float, float, float]
+    maps: dict[str, bytes]
+    uvs: NDArray[np.float64] | None
+    step_m: float
+
+
+def read_glb(path: Path) -> Drawn:
+    """Return what the one mesh of a file is. Raises CheckError for a file of another kind."""
+    try:
+        return _drawn(*_open(path.read_bytes()))
+    except OSError as error:
+        raise CheckError(f"{path}: {error.strerror or error}") from error
+    except (ValueError, LookupError, TypeError, struct.error, RuntimeError) as error:
+        raise CheckError(f"{path}: can't be decoded: {error!r}") from error
+
+
+def _open(data: bytes) -> tuple[dict[str, Any], bytes]:
+    magic, version, length = _HEAD.unpack_from(data)
+    if (magic, version, length) != (b"glTF", 2, len(data)):
+        raise ValueError("no glTF 2.0 of that length")
+    text_length, _ = _CHUNK.unpack_from(data, _HEAD.size)
+    start = _HEAD.size + _CHUNK.size
+    document = json.loads(data[start : start + text_length])
+    return document, data[start + text_length + _CHUNK.size :]
+
+
+def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
+    (node,) = document["nodes"]
+    (mesh,) = document["meshes"]
+    (primitive,) = mesh["primitives"]
+    attributes = primitive["attributes"]
+    offsets = _decode(document, binary, attributes["POSITION"]).astype(np.float32)
+    directions = _decode(document, binary, attributes["NORMAL"])
+    scale, translation = (np.array(node[key], np.float32) for key in ("scale", "translation"))
+    colors = None
+    if "COLOR_0" in attributes:
+        colors = _decode(document, binary, attributes["COLOR_0"])[:, :3] / 255.0
+    uvs = None
+    if "TEXCOORD_0" in attributes:
+        stored = _decode(document, binary, attributes["TEXCOORD_0"])
+        uvs = stored / (0xFFFF if stored.dtype == np.uint16 else 1.0)
+    material = document["materials"][primitive["material"]]
+    shading = material["pbrMetallicRoughness"]
+    red, green, blue, _ = shading["baseColorFactor"]
+    return Drawn(
+        offsets * scale + translation,
+        _decode(document, binary, primitive["indices"]).reshape(-1, 3).astype(np.int64),
+        directions / float(np.iinfo(directions.dtype).max),
+        colors,
+        (red, green, blue),
+        {
+            name: _image(document, binary, holder[name]["index"])
+            for holder in (material, shading)
+            for name in holder
+            if name.endswith("Texture")
+        },
+        uvs,
+        float(scale[0]),
+    )
+
+
+def _decode(document: dict[str, Any], binary: bytes, index: int) -> NDArray[Any]:
+    """Return the rows of an accessor (n, components)."""
+    accessor = document["accessors"][index]
+    view = document["bufferViews"][accessor["bufferView"]]["extensions"]["EXT_meshopt_compression"]
+    stored = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+    dtype = np.dtype(_TYPES[accessor["componentType"]])
+    if view["mode"] == "TRIANGLES":
+        # the package decodes into 32-bit indices whatever they are meant to become
+        indices: NDArray[Any] = meshoptimizer.decode_index_buffer(view["count"], 4, stored)
+        return indices
+    row = np.dtype([("row", dtype, view["byteStride"] // dtype.itemsize)])
+    rows = meshoptimizer.decode_vertex_buffer(view["count"], view["byteStride"], stored, dtype=row)
+    decoded = np.ascontiguousarray(rows["row"])
+    if view.get("filter") == "OCTAHEDRAL":
+        decoded = meshoptimizer.decode_filter_oct(decoded, *decoded.shape)
+    return decoded[:, : _WIDTHS[accessor["type"]]]
+
+
+def _image(document: dict[str, Any], binary: bytes, texture: int) -> bytes:
+    source = document["textures"][texture]["extensions"]["KHR_texture_basisu"]["source"]
+    view = document["bufferViews"][document["images"][source]["bufferView"]]
+    start = view.get("byteOffset", 0)
+    return binary[start : start + view["byteLength"]]

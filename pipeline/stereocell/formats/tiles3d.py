@@ -1,0 +1,177 @@
+"""Describe one channel's surfaces as a 3D Tiles 1.1 tileset (OGC 22-025r4).
+
+    root (no content)
+      one child for each spatial tile: coarsest LOD -> ... -> lod0, each replacing the one before
+
+Lengths are metres. Tilesets are z-up where glTF is y-up: readers turn glTF's (x, y, z) into
+(x, -z, y), and the boxes here are turned the same way.
+
+The extras of each content give its file's hash, so that a reader who trusts the tileset knows a
+spoilt surface. 128 bits are enough for that, in base64url, named as RFC 6920 names them:
+"sha-256-128".
+
+The first picture waits for manifest.json and one tileset, and of that for the coarsest LODs alone.
+So where tiles are many, the finer ones of each are in a tileset of their own, `<tile>/finer.json`,
+which is fetched with the first of them; few tiles are one file: one request. Numbers are rounded,
+boxes outwards and errors upwards. Together: 242 tiles of four LODs were 328 kB, are 112.
+"""
+
+import base64
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
+from itertools import accumulate, pairwise
+from pathlib import PurePosixPath
+from typing import Any
+
+from stereocell.model.version import GENERATOR
+from stereocell.storage.json_files import compact_json
+
+_METRES_PER_UM = 1e-6
+_NM_PER_METRE = 1e9
+CONTENT_HASH = "sha-256-128"  # in the extras of a content
+_CONTENT_HASH_BYTES = 16
+_ROOT_ERROR = 100.0  # in diagonals of the channel: never small enough to draw nothing
+MOST_WHOLE_TILES = 64  # that one file describes with all LODs: 59 kB with four each
+TILESET = "tileset.json"
+_FINER = "finer.json"
+_UPWARDS = Context(prec=4, rounding=ROUND_CEILING)  # four digits
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class TileLod:
+    """One .glb: its address from the tileset, and the box (x, y, z) of its vertices in metres.
+
+    uri          `<tile>/<name>.glb`
+    sha256       of the file, hexadecimal
+    distance_um  the LOD's measured distance from the finest surface
+    """
+
+    uri: str
+    sha256: str
+    distance_um: float
+    min_m: Point
+    max_m: Point
+
+
+def content_hash(sha256: str) -> str:
+    """Return what a content's extras say of a file with this SHA-256 (hexadecimal)."""
+    start = bytes.fromhex(sha256)[:_CONTENT_HASH_BYTES]
+    return base64.urlsafe_b64encode(start).rstrip(b"=").decode()
+
+
+def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
+    """Return a channel's JSON files by address; each tile's LODs finest first, at least one each.
+
+    `tileset.json` describes up to MOST_WHOLE_TILES tiles alone; of more, it names the others. A
+    coarser LOD never gets a smaller geometricError than a finer one: readers ask for that.
+    """
+    boxes = [_Box.around(lods) for lods in tiles]
+    whole = _Box.holding(boxes)
+    farthest_um = max(lod.distance_um for lods in tiles for lod in lods)
+    error = _round_up(max(_ROOT_ERROR * whole.diagonal_m, farthest_um * _METRES_PER_UM))
+    files: dict[str, bytes] = {}
+    children = []
+    for lods, box in zip(tiles, boxes, strict=True):
+        folder = PurePosixPath(lods[0].uri).parent
+        if len(tiles) <= MOST_WHOLE_TILES or len(lods) == 1:
+            children.append(_nested(_levels(lods, box)))
+            continue
+        *finer, coarsest = _levels(lods, box)
+        for tile in finer:
+            tile["content"]["uri"] = PurePosixPath(tile["content"]["uri"]).name
+        address = f"{folder}/{_FINER}"
+        files[address] = compact_json(_tileset(_nested(finer), coarsest["geometricError"]))
+        sha256 = hashlib.sha256(files[address]).hexdigest()
+        # nothing is drawn here: what the JSON holds replaces the coarsest
+        holder = _tile(box, coarsest["geometricError"], address, sha256)
+        children.append(_nested([holder, coarsest]))
+    root = {
+        "boundingVolume": {"box": whole.numbers()},
+        "geometricError": error,
+        "children": children,
+    }
+    return {TILESET: compact_json(_tileset(root, error)), **files}
+
+
+def _tileset(root: dict[str, Any], error: float) -> dict[str, Any]:
+    return {
+        "asset": {"version": "1.1", "extras": {"generator": GENERATOR}},
+        "geometricError": error,
+        "root": {**root, "refine": "REPLACE"},  # all below inherit it
+    }
+
+
+def _levels(lods: Sequence[TileLod], box: "_Box") -> list[dict[str, Any]]:
+    """Return a tile of the tileset for each LOD, finest first, without children."""
+    errors = accumulate((_round_up(lod.distance_um * _METRES_PER_UM) for lod in lods[1:]), max)
+    return [
+        _tile(box, error, lod.uri, lod.sha256)
+        for lod, error in zip(lods, (0.0, *errors), strict=True)
+    ]
+
+
+def _tile(box: "_Box", error: float, uri: str, sha256: str) -> dict[str, Any]:
+    return {
+        "boundingVolume": {"box": box.numbers()},
+        "geometricError": error,
+        "content": {"uri": uri, "extras": {CONTENT_HASH: content_hash(sha256)}},
+    }
+
+
+def _nested(tiles: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the last tile, each having the one before as its child."""
+    for finer, coarser in pairwise(tiles):
+        coarser["children"] = [finer]
+    return tiles[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class _Box:
+    """Corners (x, y, z), y up, in whole nm; edges are even, so that the centre is whole too."""
+
+    low: tuple[int, ...]
+    high: tuple[int, ...]
+
+    @classmethod
+    def around(cls, lods: Sequence[TileLod]) -> "_Box":
+        """Return the box of all LODs, rounded outwards: a tile's box holds its children's."""
+        lows = zip(*(lod.min_m for lod in lods), strict=True)
+        highs = zip(*(lod.max_m for lod in lods), strict=True)
+        return cls._evened(
+            [math.floor(min(axis) * _NM_PER_METRE) for axis in lows],
+            [math.ceil(max(axis) * _NM_PER_METRE) for axis in highs],
+        )
+
+    @classmethod
+    def holding(cls, boxes: Sequence["_Box"]) -> "_Box":
+        """Return the box that holds all of these."""
+        return cls._evened(
+            [min(axis) for axis in zip(*(box.low for box in boxes), strict=True)],
+            [max(axis) for axis in zip(*(box.high for box in boxes), strict=True)],
+        )
+
+    @classmethod
+    def _evened(cls, low: Sequence[int], high: Sequence[int]) -> "_Box":
+        return cls(tuple(low), tuple(b + (b - a) % 2 for a, b in zip(low, high, strict=True)))
+
+    @property
+    def diagonal_m(self) -> float:
+        return math.dist(self.low, self.high) / _NM_PER_METRE
+
+    def numbers(self) -> list[float]:
+        """Return centre and half axes in metres, z up."""
+        centre = [(a + b) // 2 for a, b in zip(self.low, self.high, strict=True)]
+        half = [(b - a) // 2 for a, b in zip(self.low, self.high, strict=True)]
+        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # the shortest decimals there are
+        hx, hy, hz = (n / _NM_PER_METRE for n in half)
+        return [cx, 0 - cz, cy, hx, 0, 0, 0, hz, 0, 0, 0, hy]
+
+
+def _round_up(error: float) -> float:
+    """Return the error with four significant digits, never smaller."""
+    return float(_UPWARDS.create_decimal(repr(error)))

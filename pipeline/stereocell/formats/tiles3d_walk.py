@@ -1,0 +1,101 @@
+"""Walk the tilesets of a bundle: what they name, also by way of external tilesets."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stereocell.model.errors import CheckError
+from stereocell.storage.json_files import read_json
+
+_JSON = ".json"
+_MOST_CHARACTERS = 1024  # of an address: no file system knows longer names
+_REMEDY = "run `stereocell bundle OUT`"
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """A file that a tileset names: a surface, or an external tileset.
+
+    tileset   the JSON file that names it
+    path      where it lies, in the bundle
+    named     the content as it stands there: `uri`, `extras`
+    error_m   geometricError of its tile
+    limit_m   that of the tile's parent
+    boxes     of the tile, its parent and so on: 12 numbers each, z up
+    """
+
+    tileset: Path
+    path: Path
+    named: dict[str, Any]
+    error_m: float
+    limit_m: float
+    boxes: tuple[tuple[float, ...], ...]
+
+    @property
+    def is_tileset(self) -> bool:
+        return self.path.suffix == _JSON
+
+
+def walk(bundle: Path, tileset: Path, tile_id: str | None = None) -> Iterator[Content]:
+    """Yield each content of a tileset, and of those that it names, coarse ones first.
+
+    tile_id  only what lies in this tile's folder is looked at; None: all
+
+    An external tileset is yielded before it is opened. Raises StereoCellError, which names the
+    file, where a tileset is missing or is none, or names a file outside `bundle` or a tileset that
+    was met before.
+    """
+    place = _place(tileset)
+    yield from _walk_file(_place(bundle), tileset, tile_id, None, (), {place})
+
+
+def _walk_file(
+    bundle: Path,
+    tileset: Path,
+    tile_id: str | None,
+    parent_m: float | None,
+    around: tuple[tuple[float, ...], ...],
+    met: set[Path],
+) -> Iterator[Content]:
+    content = read_json(tileset, None, _REMEDY)
+    try:
+        whole_m = content["geometricError"]
+        most_m = float(whole_m) if parent_m is None else min(float(whole_m), parent_m)
+        waiting = [(content["root"], most_m, around)]
+        while waiting:
+            tile, limit_m, holding = waiting.pop()
+            error_m = float(tile["geometricError"])
+            if "transform" in tile:
+                raise CheckError(
+                    f"{tileset}: found a tile with a transform, expected none: surfaces lie in the "
+                    "world"
+                )
+            boxes = (tuple(float(n) for n in tile["boundingVolume"]["box"]), *holding)
+            waiting += [(child, error_m, boxes) for child in reversed(tile.get("children", ()))]
+            if "content" not in tile:
+                continue
+            uri = tile["content"]["uri"]
+            if len(uri) > _MOST_CHARACTERS:
+                raise CheckError(f"{tileset}: {uri:.80}...: over {_MOST_CHARACTERS} characters")
+            path = tileset.parent / uri
+            place = _place(path)
+            if not place.is_relative_to(bundle):
+                raise CheckError(f"{tileset}: {uri} is outside the bundle")
+            if tile_id is not None and place.parent.name != tile_id:
+                continue
+            found = Content(tileset, path, tile["content"], error_m, limit_m, boxes)
+            yield found
+            if found.is_tileset:
+                if place in met:
+                    raise CheckError(f"{tileset}: {uri} is a tileset that was named before")
+                met.add(place)
+                yield from _walk_file(bundle, path, tile_id, error_m, boxes, met)
+    except (AttributeError, KeyError, OSError, TypeError, ValueError) as error:
+        raise CheckError(f"{tileset}: no 3D Tiles tileset: {error!r:.200}") from error
+
+
+def _place(path: Path) -> Path:
+    """Return where a path leads; of links in a circle, some place."""
+    return Path(os.path.realpath(path))

@@ -1,0 +1,140 @@
+"""What a channel's tiles say together: how sure each iso-value is, and which one each tile takes.
+
+The summit of a criterion's curve is broad: many levels are nearly as good as the best, and which of
+them wins is chance. Where a neighbour's value lies on the summit too, there is no evidence for a
+jump, and a jump would show as a step in the surface. A value never leaves its own summit.
+
+A jump from the neighbours also weakens weak evidence: confidence = evidence ^ (1 + jump / 4), where
+jump, 0 to 1, is the distance to the median of those neighbours that are sure by themselves, by the
+larger of the two heights above the background. Strong evidence stays (.9 beside a neighbour eight
+times as bright: .88), and no more weight than that: a dark part of a real brain, whose cells are
+outlined well at .44 of its neighbour's value, has .49, and keeps .44.
+
+A channel is clear if the mean of its tiles' confidences, each with the strength of its edges as
+weight, reaches `isovalue.min_confidence`: tiles in which a stain is absent have hardly any edges
+steeper than noise and don't count against it. In a clear channel a tile that isn't takes the mean
+of those that are. In a channel that isn't, each tile keeps what was found.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from stereocell.model.channel import Verdict
+from stereocell.model.tiling import Box, Tile
+
+SUMMIT = 0.99  # of the best score: levels that are as good; .95 cost a lone ball 11 % of volume
+JUMP_WEIGHT = 0.25
+Neighbours = Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Agreed:
+    """One channel's iso-values.
+
+    values       by tile id; None: the tile takes the mean of the others
+    confidences  by tile id, 0..1
+    confidence   the channel's, 0..1
+    verdict      on its surface
+    """
+
+    values: dict[str, float | None]
+    confidences: dict[str, float]
+    confidence: float
+    verdict: Verdict
+
+
+def agree(
+    neighbours: Neighbours, found: Mapping[str, Mapping[str, Any]], min_confidence: float
+) -> Agreed:
+    """Return what the tiles agree on.
+
+    neighbours  by tile id, as of `find_neighbours`
+    found       by tile id: `value` (None: the tile has none); where it has one `confidence`, by its
+                own evidence, `strength`, `levels` and `score`
+    """
+    values = {tile: found[tile]["value"] for tile in neighbours}
+    evidence = {
+        tile: 0.0 if value is None else found[tile]["confidence"] for tile, value in values.items()
+    }
+    sure = {tile for tile in neighbours if evidence[tile] >= min_confidence}
+    confidences = {}
+    for tile, beside in neighbours.items():
+        others = [values[other] for other in beside if other in sure]
+        jump = _jump(values[tile], median(others)) if values[tile] is not None and others else 0.0
+        confidences[tile] = evidence[tile] ** (1 + JUMP_WEIGHT * jump)
+    known = [tile for tile, value in values.items() if value is not None]
+    if not known:
+        return Agreed(values, confidences, 0.0, "none")
+    weights = [found[tile]["strength"] for tile in known]
+    confidence = float(
+        np.average([confidences[tile] for tile in known], weights=weights if any(weights) else None)
+    )
+    verdict: Verdict = "clear" if confidence >= min_confidence else "unclear"
+    if verdict == "clear":
+        values = {
+            tile: value if confidences[tile] >= min_confidence else None
+            for tile, value in values.items()
+        }
+    return Agreed(_drawn(neighbours, values, found), confidences, confidence, verdict)
+
+
+def find_neighbours(tiles: Sequence[Tile]) -> dict[str, list[str]]:
+    """Return the ids of the tiles that share a face with each, by tile id."""
+    starting = defaultdict(list)
+    for tile in tiles:
+        for axis in range(3):
+            starting[axis, tile.box.start[axis]].append(tile)
+    found: dict[str, list[str]] = {tile.id: [] for tile in tiles}
+    for tile in tiles:
+        for axis in range(3):
+            for other in starting[axis, tile.box.stop[axis]]:
+                if _overlap(tile.box, other.box, axis):
+                    found[tile.id].append(other.id)
+                    found[other.id].append(tile.id)
+    return found
+
+
+def _overlap(a: Box, b: Box, axis: int) -> bool:
+    """Return whether two boxes overlap along both other axes."""
+    ends = zip(a.start, a.stop, b.start, b.stop, strict=True)
+    return all(
+        i == axis or (low < other_high and other_low < high)
+        for i, (low, high, other_low, other_high) in enumerate(ends)
+    )
+
+
+def _jump(value: float, others: float) -> float:
+    height = max(abs(value), abs(others))
+    return min(1.0, abs(value - others) / height) if height > 0 else 0.0
+
+
+def _drawn(
+    neighbours: Neighbours,
+    values: Mapping[str, float | None],
+    found: Mapping[str, Mapping[str, Any]],
+) -> dict[str, float | None]:
+    """Return each tile's value, drawn half-way to the median of its neighbours'."""
+    drawn = dict(values)
+    for tile, value in values.items():
+        beside = [v for other in neighbours[tile] if (v := values[other]) is not None]
+        if value is not None and beside:
+            low, high = _summit(value, found[tile])
+            # half the way: going all of it, two neighbours would only change places
+            drawn[tile] = min(max((value + median(beside)) / 2, low), high)
+    return drawn
+
+
+def _summit(value: float, found: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the range of levels about the value that score nearly as well as the best."""
+    levels, score = np.asarray(found["levels"]), np.asarray(found["score"])
+    best = int(score.argmax())
+    worse = np.flatnonzero(score < SUMMIT * score[best])
+    end = int(np.searchsorted(worse, best))
+    first = int(worse[end - 1]) + 1 if end else 0
+    last = int(worse[end]) - 1 if end < len(worse) else len(levels) - 1
+    return min(value, float(levels[first])), max(value, float(levels[last]))

@@ -1,0 +1,169 @@
+"""Levels of detail: each simplified from the one before, each with its measured distance.
+
+Simplification is meshoptimizer's (quadric errors, Garland & Heckbert 1997), bounded by an absolute
+error in um. It only removes vertices, so normals stay valid, and borders are locked: the cut edges
+on a common plane are the same at every level, and neighbours at different levels still meet.
+"""
+
+import ctypes
+from dataclasses import dataclass
+
+import meshoptimizer
+import numpy as np
+from meshoptimizer._loader import lib
+from numpy.typing import NDArray
+
+from stereocell.meshes.validity import bodies
+from stereocell.model.errors import UsageError
+from stereocell.model.mesh import Mesh
+from stereocell.model.settings import setting
+
+# meshoptimizer 0.2.30a0 declares no argument types for the only call that takes locked vertices;
+# without them a float goes over as an int
+lib.meshopt_simplifyWithAttributes.argtypes = [
+    ctypes.POINTER(ctypes.c_uint),  # destination
+    ctypes.POINTER(ctypes.c_uint),  # indices
+    ctypes.c_size_t,
+    ctypes.POINTER(ctypes.c_float),  # positions
+    ctypes.c_size_t,  # how many
+    ctypes.c_size_t,  # stride
+    ctypes.POINTER(ctypes.c_float),  # attributes
+    ctypes.c_size_t,  # stride
+    ctypes.POINTER(ctypes.c_float),  # their weights
+    ctypes.c_size_t,  # how many
+    ctypes.POINTER(ctypes.c_ubyte),  # locked
+    ctypes.c_size_t,  # indices wanted
+    ctypes.c_float,  # error allowed
+    ctypes.c_uint,  # options
+    ctypes.POINTER(ctypes.c_float),  # error found
+]
+lib.meshopt_simplifyWithAttributes.restype = ctypes.c_size_t
+
+
+@dataclass(frozen=True, slots=True)
+class LodOptions:
+    """How levels of detail are made."""
+
+    errors: tuple[float, ...] = setting(
+        (0.1, 0.5, 0.8, 4.0),
+        "aim of simplifying to lod0, lod1, ..., in finest spacings; what comes out is measured",
+    )
+    samples: int = setting(1000, "points at which distances are measured, each way")
+
+    def __post_init__(self) -> None:
+        if not self.errors or list(self.errors) != sorted(self.errors) or self.errors[0] <= 0:
+            raise UsageError(f"lod.errors is {list(self.errors)}, expected rising positive numbers")
+        if self.samples < 1:
+            raise UsageError(f"lod.samples is {self.samples}, expected 1 or more")
+
+
+FEWEST = 8  # triangles of a body that would vanish: an octahedron
+
+
+def simplify(mesh: Mesh, max_error_um: float) -> Mesh:
+    """Return the mesh with as few triangles as the error allows, border vertices untouched."""
+    locked = np.zeros(len(mesh.positions), bool)
+    return compact(mesh, simplify_part(mesh, mesh.triangles, max_error_um, locked))
+
+
+def simplify_part(
+    mesh: Mesh,
+    triangles: NDArray[np.uint32],
+    max_error_um: float,
+    locked: NDArray[np.bool_],
+) -> NDArray[np.uint32]:
+    """Return fewer triangles in place of those of some whole bodies; `locked` vertices (n,) stay.
+
+    The simplifier's error is a mean over planes: at a bound near a body's radius the whole body
+    vanishes, or lies flat. Such a body is simplified by itself, down to FEWEST triangles.
+    """
+    kept = drop_doubles(_simplify(mesh.positions, triangles, max_error_um, 0, locked))
+    numbers = bodies(triangles, len(mesh.positions))
+    body = numbers[triangles[:, 0]]
+    vanished = np.flatnonzero(~np.isin(body, numbers[kept[:, 0]]))
+    vanished = vanished[np.argsort(body[vanished], kind="stable")]
+    ends = np.flatnonzero(np.diff(body[vanished])) + 1
+    small = [
+        _shrink(mesh, triangles[part], max_error_um, locked)
+        for part in np.split(vanished, ends)
+        if len(part)
+    ]
+    return np.concatenate([kept, *small])
+
+
+def _shrink(
+    mesh: Mesh,
+    triangles: NDArray[np.uint32],
+    max_error_um: float,
+    locked: NDArray[np.bool_],
+) -> NDArray[np.uint32]:
+    """Return FEWEST triangles, or as many as the error needs, in place of those of one body."""
+    shrunk = drop_doubles(_simplify(mesh.positions, triangles, max_error_um, FEWEST, locked))
+    return shrunk if len(shrunk) else triangles
+
+
+def _simplify(
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.uint32],
+    max_error_um: float,
+    fewest: int,
+    locked: NDArray[np.bool_],
+) -> NDArray[np.uint32]:
+    # only the vertices that are used: the simplifier's time goes by all that it is given
+    used, own = renumber(triangles, len(positions))
+    source = own.ravel()
+    result = np.empty_like(source)
+    count = meshoptimizer.simplify_with_attributes(
+        result,
+        source,
+        np.ascontiguousarray(positions[used]),
+        vertex_attributes=np.zeros((len(used), 1), np.float32),
+        attribute_weights=np.zeros(0, np.float32),
+        vertex_lock=locked[used],
+        target_index_count=3 * fewest,
+        target_error=max_error_um,
+        options=meshoptimizer.SIMPLIFY_LOCK_BORDER | meshoptimizer.SIMPLIFY_ERROR_ABSOLUTE,
+    )
+    return used[result[:count]].astype(np.uint32).reshape(-1, 3)
+
+
+def renumber(
+    triangles: NDArray[np.uint32], vertices: int
+) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+    """Return the vertices that are used, in order, and the triangles by their places there."""
+    used = np.zeros(vertices, bool)
+    used[triangles.ravel()] = True
+    place = (np.cumsum(used) - 1).astype(np.uint32)
+    return np.flatnonzero(used), place[triangles]
+
+
+def drop_doubles(triangles: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Return the triangles without collapsed and repeated ones, in the same order.
+
+    Two triangles of the same corners, wound against each other, are a sheet without thickness:
+    both go. Each edge loses one in either direction, so that a closed mesh stays closed, and a
+    border where it is. Of triangles wound alike the first stays.
+    """
+    a, b, c = np.sort(triangles, axis=1).T
+    order = np.lexsort((c, b, a))
+    a, b, c = a[order], b[order], c[order]
+    new = np.ones(len(order), bool)
+    new[1:] = (a[1:] != a[:-1]) | (b[1:] != b[:-1]) | (c[1:] != c[:-1])
+    collapsed = (a == b) | (b == c)
+    if new.all() and not collapsed.any():
+        return triangles
+    first, middle, last = triangles[order].T
+    rising = (first < middle).astype(int) + (middle < last) + (last < first)
+    winding = np.where(rising == 2, 1, -1)  # a cyclic turn of (a, b, c), or of (c, b, a)
+    group = np.cumsum(new) - 1
+    balance = np.bincount(group, winding)[group]
+    stays = (winding * balance > 0) & ~collapsed
+    # the first of its group that is wound as most are
+    _, firsts = np.unique(group[stays], return_index=True)
+    return triangles[np.sort(order[stays][firsts])]
+
+
+def compact(mesh: Mesh, triangles: NDArray[np.uint32]) -> Mesh:
+    """Return the mesh of these triangles with the vertices that they use, in the same order."""
+    used, own = renumber(triangles, len(mesh.positions))
+    return Mesh(mesh.positions[used], own, mesh.normals[used])

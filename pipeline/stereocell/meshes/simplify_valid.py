@@ -1,0 +1,226 @@
+"""Simplify a mesh so that it stays sound: check exactly, lock what went wrong, simplify again.
+
+Simplification knows of no neighbours: it lets walls cross, and pinches bodies. Pinched sheets are
+parted; round each fault that is left the vertices of the surface before are locked, wider with
+every try, and the bodies at fault are simplified anew. A body that still has faults after ROUNDS
+keeps the surface it had before.
+
+Its error is a mean over planes, and says little of a thin process that it cuts off: vertices that
+would be left too far away are locked as well.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from stereocell.meshes.distance import Nearest
+from stereocell.meshes.self_intersections import MARGIN
+from stereocell.meshes.separate_sheets import part_sheets
+from stereocell.meshes.simplify import compact, renumber, simplify_part
+from stereocell.meshes.validity import Faults, Plane, bodies, border, certify
+from stereocell.model.mesh import Mesh
+
+ROUNDS = 14
+FAR_ROUNDS = 4  # in which vertices too far away are looked for: each lock may make another stray
+GROWTH = 2.0  # of the balls in which vertices are locked, with each try in a place
+
+# large and odd, one for each corner: sums of multiples, modulo 2^64, tell triangles apart
+MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+
+Triangles = NDArray[np.uint32]
+
+
+@dataclass(frozen=True, slots=True)
+class Mended:
+    """`mended`: bodies simplified again; `fallbacks`: bodies that stayed as they were."""
+
+    mesh: Mesh
+    mended: int
+    fallbacks: int
+
+
+def simplify_soundly(
+    mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float, max_away_um: float = np.inf
+) -> Mended:
+    """Return the mesh simplified and without faults, its borders as they are.
+
+    `planes` are where it may be open. A mesh that has faults itself keeps bodies with faults.
+    Vertices that would lie further than `max_away_um` from what is returned stay, but for a few in
+    bodies that still have such after FAR_ROUNDS.
+    """
+    draft = _Draft(mesh, planes)
+    body = draft.body  # of the mesh's own vertices
+    tries = np.zeros(len(mesh.positions), np.int64)
+    tree: cKDTree | None = None
+    triangles = draft.part(simplify_part(mesh, mesh.triangles, max_error_um, tries > 0))
+    chosen = np.ones(int(body.max(initial=0)) + 1, bool)
+    redone: set[int] = set()
+    mended: set[int] = set()
+    kept: set[int] = set()
+    for number in count():
+        faults = draft.faults(triangles, redone if number else None)
+        worst = np.unique(draft.body[faults.vertices(triangles)])
+        far = _strays(
+            draft, triangles, body, chosen, max_away_um if number < FAR_ROUNDS else np.inf
+        )
+        if kept.issuperset(worst.tolist()) and not len(far):  # no faults but the given mesh's own
+            break
+        mended.update(worst.tolist())
+        tries[far] += 1
+        chosen[:] = False
+        chosen[worst] = chosen[body[far]] = True
+        redone.update(np.flatnonzero(chosen).tolist())
+        again = mesh.triangles[chosen[body[mesh.triangles[:, 0]]]]
+        if number < ROUNDS:
+            if tree is None:
+                tree = cKDTree(mesh.positions)
+            if faults.total:
+                tries[_around(tree, draft.mesh, triangles, faults, tries)] += 1
+            again = draft.part(simplify_part(mesh, again, max_error_um, tries > 0))
+        else:
+            kept.update(worst.tolist())
+        triangles = np.concatenate([triangles[~chosen[draft.body[triangles[:, 0]]]], again])
+    return Mended(compact(draft.mesh, triangles), len(mended - kept), len(kept))
+
+
+class _Draft:
+    """One simplification of a mesh after another, and their faults.
+
+    mesh       the mesh, and after its own the vertices by which sheets were parted
+    body       which body of the mesh each of the vertices belongs to
+    rim        the mesh's border
+    triangles  what was checked last, and `crossings` the pairs of these that meet
+
+    Vertices never move, so that two triangles of before meet now if they met then: crossings are
+    looked for among pairs with a fresh triangle only, and what is found is what `certify` finds.
+    """
+
+    def __init__(self, mesh: Mesh, planes: tuple[Plane, ...]) -> None:
+        self.mesh, self.planes = mesh, planes
+        self.body = bodies(mesh.triangles, len(mesh.positions))
+        self.rim = border(mesh.triangles)
+        self.triangles = np.zeros((0, 3), np.uint32)
+        self.crossings = np.zeros((0, 2), np.int64)
+
+    def part(self, triangles: Triangles) -> Triangles:
+        """Return the triangles with sheets parted, by vertices that the mesh gets for it."""
+        self.mesh, parted, source = part_sheets(self.mesh, triangles)
+        self.body = np.concatenate([self.body, self.body[source]])
+        return parted
+
+    def faults(self, triangles: Triangles, changed: set[int] | None) -> Faults:
+        """Return the faults by numbers of these triangles; a border that changed counts as open.
+
+        With `changed`, bodies whose boxes lie clear of these bodies' are as sound as they were.
+        """
+        mesh, body, rim = self.mesh, self.body, self.rim
+        part, past = np.arange(len(triangles)), np.arange(len(self.triangles))
+        if changed is not None:
+            near = _near(mesh, triangles, body, changed)
+            part, past = (
+                np.flatnonzero(near[body[of[:, 0]]]) for of in (triangles, self.triangles)
+            )
+            rim = rim[np.isin(body[rim[:, 0]], np.unique(body[triangles[part, 0]]))]
+        before = _find(triangles[part], self.triangles[past])
+        used, own = renumber(triangles[part], len(mesh.positions))
+        found = certify(
+            Mesh(mesh.positions[used], own, mesh.normals[used]), self.planes, before < 0
+        )
+        now = np.full(len(self.triangles), -1, np.int64)
+        stayed = before >= 0
+        now[past[before[stayed]]] = part[stayed]
+        # what crossed is near: its bodies are among those that changed
+        old = now[self.crossings]
+        both = np.concatenate([old[(old >= 0).all(axis=1)], part[found.crossings]])
+        self.triangles, self.crossings = triangles, np.unique(np.sort(both, axis=1), axis=0)
+        open_now = border(triangles[part])
+        key = len(mesh.positions)
+        differs = np.setxor1d(open_now[:, 0] * key + open_now[:, 1], rim[:, 0] * key + rim[:, 1])
+        return replace(
+            found,
+            degenerate=part[found.degenerate],
+            open=np.concatenate([used[found.open], np.stack(np.divmod(differs, key), axis=1)]),
+            crowded=used[found.crowded],
+            pinched=used[found.pinched],
+            inside_out=part[found.inside_out],
+            crossings=self.crossings,
+            walls=part[found.walls],
+        )
+
+
+def _find(triangles: Triangles, among: Triangles) -> NDArray[np.int64]:
+    """Return where each of the triangles is among the others; -1 for none, and for repeated ones.
+
+    By a sum that different triangles may share: of two that do, one counts as not found.
+    """
+    if not len(among):
+        return np.full(len(triangles), -1, np.int64)
+    sums, others = ((of.astype(np.uint64) * MIX).sum(axis=1) for of in (triangles, among))
+    order = np.argsort(others, kind="stable")
+    at = order[np.minimum(np.searchsorted(others, sums, sorter=order), len(order) - 1)]
+    place = np.where((among[at] == triangles).all(axis=1), at, -1)
+    repeated = np.bincount(place[place >= 0], minlength=len(among)) > 1
+    return np.where(repeated[place], -1, place)
+
+
+def _strays(
+    draft: _Draft,
+    triangles: Triangles,
+    body: NDArray[np.int32],
+    chosen: NDArray[np.bool_],
+    limit_um: float,
+) -> NDArray[np.int64]:
+    """Return the vertices of the chosen bodies that are further than the limit from them.
+
+    `body`: of the vertices (n,) that are looked at.
+    """
+    if limit_um == np.inf:
+        return np.zeros(0, np.int64)
+    vertices = np.flatnonzero(chosen[body])
+    own = compact(draft.mesh, triangles[chosen[draft.body[triangles[:, 0]]]])
+    away = Nearest(own, 1).distances(draft.mesh.positions[vertices].astype(np.float64))
+    return vertices[away > limit_um]
+
+
+def _near(
+    mesh: Mesh, triangles: Triangles, body: NDArray[np.int32], changed: set[int]
+) -> NDArray[np.bool_]:
+    """Return which bodies have boxes that touch those of the changed ones."""
+    number = int(body.max()) + 1
+    low, high = np.full((number, 3), np.inf), np.full((number, 3), -np.inf)
+    used = np.unique(triangles)
+    used = used[np.argsort(body[used], kind="stable")]
+    starts = np.flatnonzero(np.diff(body[used], prepend=-1))
+    low[body[used[starts]]] = np.minimum.reduceat(mesh.positions[used], starts)
+    high[body[used[starts]]] = np.maximum.reduceat(mesh.positions[used], starts)
+    near = np.zeros(number, bool)
+    for one in sorted(changed):
+        near |= ((low <= high[one]) & (high >= low[one])).all(axis=1)
+    return near
+
+
+def _around(
+    tree: cKDTree, mesh: Mesh, triangles: Triangles, faults: Faults, tries: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the vertices in balls round the faults, larger by GROWTH for each of the tries."""
+    corners = mesh.positions[triangles].astype(np.float64)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    first, second = faults.crossings.T
+    edges = mesh.positions[np.concatenate([faults.open, faults.crowded])].astype(np.float64)
+    pinched = mesh.positions[faults.pinched].astype(np.float64)
+    whole = np.concatenate([faults.degenerate, faults.inside_out, faults.walls])
+    # two triangles can meet only where their boxes do
+    lows = [np.maximum(low[first], low[second]), edges.min(axis=1), pinched, low[whole]]
+    highs = [np.minimum(high[first], high[second]), edges.max(axis=1), pinched, high[whole]]
+    start, end = np.concatenate(lows), np.concatenate(highs)
+    sides = corners - np.roll(corners, 1, axis=1)
+    least = float(np.median(np.linalg.norm(sides, axis=2))) / 4
+    size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, least)
+    away, nearest = tree.query((start + end) / 2)
+    # one vertex at least, or the next try would be as this one
+    radius = np.maximum(size * GROWTH ** tries[nearest], (1 + MARGIN) * away)
+    found = tree.query_ball_point((start + end) / 2, radius)
+    return np.unique(np.concatenate([np.asarray(each, np.int64) for each in found]))

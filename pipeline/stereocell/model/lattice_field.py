@@ -1,0 +1,115 @@
+"""Fields that run linearly between the knots of a lattice: iso-values and backgrounds.
+
+Each tile has its own iso-value, and neighbours must agree on their common plane; so the surface is
+taken where f(x) = iso(x), iso running linearly from tile centre to tile centre, constant beyond the
+last. The background that is subtracted from f is such a field too, on a lattice of its own.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.tiling import Box, Tile
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeField:
+    """Values on a grid of places.
+
+    centres  three rising tuples, (z, y, x), in voxels of the level
+    values   float64 (z, y, x), one for each combination of centres
+    """
+
+    centres: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+    values: NDArray[np.float64]
+
+    def at(self, box: Box) -> NDArray[np.float32]:
+        """Return the field at the voxels of the box, float32; it broadcasts over (z, y, x).
+
+        An axis along which only one centre reaches into the box is 1 long. A voxel's value depends
+        on nothing but its place, bit by bit: linear steps axis by axis, weights from the voxel's
+        index alone.
+        """
+        near = self.around(box)
+        weights = [
+            _weights(np.asarray(centres), start, stop)
+            for centres, start, stop in zip(near.centres, box.start, box.stop, strict=True)
+        ]
+        columns = _blend(_blend(near.values, 0, weights[0]), 1, weights[1])
+        field = np.empty((*columns.shape[:2], len(weights[2].share)), np.float32)
+        for plane, column in zip(field, columns, strict=True):  # all in float64 would be GBs
+            plane[...] = _blend(column, 1, weights[2])
+        return field
+
+    def around(self, window: Box) -> "LatticeField":
+        """Return the part that reaches into a unit's window: what its result depends on."""
+        keep = []
+        for axis, centres in enumerate(self.centres):
+            first = np.searchsorted(centres, window.start[axis], side="right") - 1
+            last = np.searchsorted(centres, window.stop[axis] - 1, side="left")
+            keep.append(slice(max(0, int(first)), int(last) + 1))
+        z, y, x = (centres[part] for centres, part in zip(self.centres, keep, strict=True))
+        return LatticeField((z, y, x), self.values[tuple(keep)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the field as plain values."""
+        return {"centres": [list(axis) for axis in self.centres], "values": self.values.tolist()}
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "LatticeField":
+        """Return the field that `to_json` was given."""
+        z, y, x = (tuple(axis) for axis in content["centres"])
+        return cls((z, y, x), np.array(content["values"], np.float64))
+
+
+@dataclass(frozen=True, slots=True)
+class _Weights:
+    """Each voxel lies at `share` of the way from centre number `low` to `high`; arrays (n,)."""
+
+    low: NDArray[np.intp]
+    high: NDArray[np.intp]
+    share: NDArray[np.float64]
+
+
+def _weights(centres: NDArray[np.float64], start: int, stop: int) -> _Weights:
+    """Return the weights of the voxels start..stop; of one that stands for all with one centre."""
+    voxels = np.arange(start, stop if len(centres) > 1 else start + 1, dtype=np.float64)
+    below = np.searchsorted(centres, voxels, side="right") - 1
+    low = np.clip(below, 0, len(centres) - 1)
+    high = np.clip(below + 1, 0, len(centres) - 1)
+    span = centres[high] - centres[low]
+    inside = span > 0
+    share = np.where(inside, (voxels - centres[low]) / np.where(inside, span, 1.0), 0.0)
+    return _Weights(low, high, share)
+
+
+def _blend(values: NDArray[np.float64], axis: int, weights: _Weights) -> NDArray[np.float64]:
+    a, b = np.take(values, weights.low, axis=axis), np.take(values, weights.high, axis=axis)
+    share = weights.share.reshape([-1 if i == axis else 1 for i in range(values.ndim)])
+    blended: NDArray[np.float64] = a + (b - a) * share
+    return blended
+
+
+def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> LatticeField | None:
+    """Return the field of one channel's iso-values, by tile id; None if no tile has one.
+
+    A tile without a value takes the mean of the channel's others.
+    """
+    known = [value for value in found.values() if value is not None]
+    if not known:
+        return None
+    centre = {
+        tile.id: tuple((a + b - 1) / 2 for a, b in zip(tile.box.start, tile.box.stop, strict=True))
+        for tile in tiles
+    }
+    z, y, x = (tuple(sorted({c[axis] for c in centre.values()})) for axis in range(3))
+    values = np.full((len(z), len(y), len(x)), np.mean(known))
+    for tile in tiles:
+        value = found.get(tile.id)
+        if value is not None:
+            k, j, i = centre[tile.id]
+            values[z.index(k), y.index(j), x.index(i)] = value
+    return LatticeField((z, y, x), values)

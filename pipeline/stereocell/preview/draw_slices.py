@@ -1,0 +1,254 @@
+"""Mid-slices of a unit in xy, xz and yz, with what was extracted drawn on them.
+
+The amber line is the cross-section of the LOD0 mesh with the plane, so it shows what is there and
+not what should be. The dashed line is where the smoothed 8-bit field meets the iso-value: where
+the two part, repair or simplification has been at work.
+"""
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from matplotlib import get_data_path
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+from scipy import ndimage
+
+from stereocell.filters.denoise import SMOOTHING_REACH, smooth
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume, zyx_to_xyz
+
+# the axes (of z, y, x) that are cut, run down the picture, and run to its right
+VIEWS = {"xy": (0, 1, 2), "xz": (1, 0, 2), "yz": (2, 1, 0)}
+Color = tuple[int, int, int]
+OUTLINE = (255, 190, 40)
+FIELD = (70, 190, 255)
+_GROUND = (38, 43, 51)
+_LONGEST_PX = 300
+_GAP_PX = 6
+_FINE = 3  # lines are drawn this many times larger and averaged down
+_DASH_PX = 4
+_SHOWN_PX = 330  # as wide as a phone or a card shows it: lines and words grow with wider pictures
+
+
+@dataclass(frozen=True, slots=True)
+class Slice:
+    """One plane through a unit; row and column are the picture's.
+
+    grey     uint8 (rows, columns), window applied
+    spacing_um  (row, column)
+    outline  float64 (n, 2, 2): n line segments between two points (row, column), in voxels
+    above    float32 (rows, columns): field minus iso-value, or None without an iso-value
+    contours colours (RGB), each with a field like `above` whose zero line is drawn whole
+    """
+
+    name: str
+    grey: NDArray[np.uint8]
+    spacing_um: tuple[float, float]
+    outline: NDArray[np.float64]
+    above: NDArray[np.float32] | None
+    contours: tuple[tuple[Color, NDArray[np.float32]], ...] = ()
+
+
+def cut_unit(
+    volume: NDArray[np.uint8],
+    lattice: Box,
+    first_um: tuple[float, float, float],
+    spacing_um: tuple[float, float, float],
+    mesh: Mesh | None,
+    sigma_um: float,
+    iso_at: Callable[[Box], NDArray[np.float32]] | None,
+) -> list[Slice]:
+    """Return the three mid-slices of a unit.
+
+    volume    uint8 (z, y, x), the lattice's voxels, without an apron
+    first_um  (z, y, x), the centre of the first of them
+    mesh      the finest, in world um; None: no surface
+    sigma_um  of the smoothing before the surface
+    iso_at    the iso-value in steps of 8 bits at the voxels of a box of the dataset
+    """
+    points = None if mesh is None else voxels_of(mesh, first_um, spacing_um)
+    slices = []
+    for name, (axis, down, right) in VIEWS.items():
+        k = lattice.shape[axis] // 2
+        order = (axis, down, right)
+        turned = volume.transpose(order)
+        spacing = tuple(spacing_um[i] for i in order)
+        above = None
+        if iso_at is not None:
+            reach = math.ceil(SMOOTHING_REACH * sigma_um / spacing[0])
+            slab = turned[max(0, k - reach) : k + reach + 1]
+            field = smooth(Volume(slab, (spacing[0], spacing[1], spacing[2])), sigma_um)
+            plane = iso_at(_plane(lattice, axis, k)).transpose(order)[0]
+            above = field[min(k, reach)] - plane
+        outline = np.zeros((0, 2, 2))
+        if points is not None and mesh is not None:
+            outline = cross_section(points, mesh.triangles, axis, float(k))[:, :, [down, right]]
+        slices.append(Slice(name, turned[k], (spacing[1], spacing[2]), outline, above))
+    return slices
+
+
+def voxels_of(
+    mesh: Mesh, first_um: tuple[float, float, float], spacing_um: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Return the vertices in voxels from the one at first_um: float64 (n, 3), (z, y, x)."""
+    axes = zyx_to_xyz(np.eye(3))  # world directions of z, y, x: orthonormal, so this inverts it
+    positions = mesh.positions.astype(np.float64) @ axes.T
+    return (positions - np.asarray(first_um)) / np.asarray(spacing_um)
+
+
+def cross_section(
+    points: NDArray[np.float64], triangles: NDArray[np.uint32], axis: int, at: float
+) -> NDArray[np.float64]:
+    """Return where triangles meet the plane points[:, axis] = at: segments, float64 (n, 2, 3).
+
+    A vertex on the plane counts as above it, so that each triangle gives one segment or none and
+    closed meshes give closed lines.
+    """
+    above = points[:, axis] >= at
+    sides = above[triangles]
+    mixed = sides.any(axis=1) & ~sides.all(axis=1)
+    met, sides = triangles[mixed].astype(np.int64), sides[mixed]
+    # of the three corners one is alone on its side; both ends lie on its edges
+    lone = np.where(sides[:, 0] == sides[:, 1], 2, np.where(sides[:, 0] == sides[:, 2], 1, 0))
+    rows = np.arange(len(met))
+    tip = points[met[rows, lone]]
+    ends = []
+    for step in (1, 2):
+        other = points[met[rows, (lone + step) % 3]]
+        rise = other[:, axis] - tip[:, axis]
+        ends.append(tip + (other - tip) * ((at - tip[:, axis]) / rise)[:, None])
+    return np.stack(ends, axis=1) if len(met) else np.zeros((0, 2, 3))
+
+
+def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
+    """Return a WebP picture of the slices, its width and height."""
+    picture = paint_slices(slices, _LONGEST_PX)
+    return encode(picture), *picture.size
+
+
+def paint_slices(
+    slices: Sequence[Slice], longest_px: int, shown_px: int = _SHOWN_PX
+) -> Image.Image:
+    """Return a picture of the slices, none longer than so many pixels: yz right of xy, xz below it.
+
+    shown_px  how wide it will be shown
+
+    All three have one scale, the specimen's own proportions, and xy's image rows run downwards.
+    """
+    longest = max(um for s in slices for um in _extent(s))
+    scale = longest_px / longest
+    shapes = {s.name: [max(2, round(um * scale)) for um in _extent(s)] for s in slices}
+    (down, right), (deep, _) = shapes["xy"], shapes["xz"]
+    width, height = right + _GAP_PX + shapes["yz"][1], down + _GAP_PX + deep
+    weight = max(1.0, width / shown_px)
+    corners = {"xy": (0, 0), "xz": (0, down + _GAP_PX), "yz": (right + _GAP_PX, 0)}
+    picture = Image.new("RGB", (width, height), _GROUND)
+    draw = ImageDraw.Draw(picture)
+    for part in slices:
+        rows, columns = shapes[part.name]
+        corner = corners[part.name]
+        picture.paste(_panel(part, (columns, rows), weight), corner)
+        if min(rows, columns) >= 24 * weight:
+            _write(draw, (corner[0] + 4, corner[1] + 2), part.name, weight)
+    if min(down, right) >= 60 * weight:
+        _scale_bar(draw, (right, down), scale, weight)
+    return picture
+
+
+def encode(picture: Image.Image) -> bytes:
+    """Return the picture as a WebP file."""
+    buffer = io.BytesIO()
+    picture.save(buffer, "WEBP", quality=78, method=4)
+    return buffer.getvalue()
+
+
+def _extent(part: Slice) -> tuple[float, float]:
+    return part.grey.shape[0] * part.spacing_um[0], part.grey.shape[1] * part.spacing_um[1]
+
+
+def _plane(lattice: Box, axis: int, k: int) -> Box:
+    start, stop = list(lattice.start), list(lattice.stop)
+    start[axis] += k
+    stop[axis] = start[axis] + 1
+    return Box((start[0], start[1], start[2]), (stop[0], stop[1], stop[2]))
+
+
+def _panel(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
+    picture = Image.fromarray(part.grey).resize(size, Image.Resampling.BILINEAR)
+    panel = picture.convert("RGB")
+    if part.above is not None:
+        panel.paste(FIELD, (0, 0), _zero_line(part.above, size, weight, is_dashed=True))
+    for color, above in part.contours:
+        panel.paste(color, (0, 0), _zero_line(above, size, weight, is_dashed=False))
+    if len(part.outline):
+        panel.paste(OUTLINE, (0, 0), _lines(part, size, weight))
+    return panel
+
+
+def _zero_line(
+    above: NDArray[np.float32], size: tuple[int, int], weight: float, *, is_dashed: bool
+) -> Image.Image:
+    """Return the mask of the zero line of `above`, whole or broken into dashes."""
+    fine = (size[0] * _FINE, size[1] * _FINE)
+    inside = np.asarray(Image.fromarray(above).resize(fine, Image.Resampling.BILINEAR)) > 0
+    edge = np.zeros(inside.shape, bool)
+    edge[:-1] |= inside[:-1] != inside[1:]
+    edge[:, :-1] |= inside[:, :-1] != inside[:, 1:]
+    if is_dashed:
+        diagonal = np.add.outer(np.arange(fine[1]), np.arange(fine[0]))
+        edge &= diagonal // round(_DASH_PX * _FINE * weight) % 2 == 0
+    return _averaged(edge, weight)
+
+
+def _lines(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
+    """Return the mask of the outline: points close enough along each segment to join up."""
+    shape = (size[1] * _FINE, size[0] * _FINE)
+    fine = np.array(shape)
+    pixels = (part.outline + 0.5) * (fine / np.array(part.grey.shape))
+    steps = np.ceil(np.abs(pixels[:, 1] - pixels[:, 0]).max(axis=1)).astype(np.int64) + 1
+    segment = np.repeat(np.arange(len(steps)), steps)
+    along = np.arange(len(segment)) - np.repeat(np.cumsum(steps) - steps, steps)
+    share = (along / np.maximum(steps[segment] - 1, 1))[:, None]
+    points = pixels[segment, 0] + (pixels[segment, 1] - pixels[segment, 0]) * share
+    cells = np.floor(points).astype(np.int64)
+    cells = cells[((cells >= 0) & (cells < fine)).all(axis=1)]
+    mask = np.zeros(shape, bool)
+    mask[cells[:, 0], cells[:, 1]] = True
+    return _averaged(mask, weight)
+
+
+def _averaged(mask: NDArray[np.bool_], weight: float) -> Image.Image:
+    """Return the mask at the picture's size, its lines about `weight` pixels wide."""
+    reach = max(1, round((_FINE * weight - 1) / 2))
+    wide = mask.astype(np.uint8) * 255
+    for axis in (0, 1):
+        wide = ndimage.maximum_filter1d(wide, 2 * reach + 1, axis=axis, mode="constant")
+    return Image.fromarray(wide).reduce(_FINE)
+
+
+def _write(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, weight: float) -> None:
+    font = find_font(round(10 * weight))
+    draw.text(at, text, (255, 255, 255), font, stroke_width=1, stroke_fill=(0, 0, 0))
+
+
+@cache
+def find_font(size: int) -> ImageFont.FreeTypeFont:
+    """Return a font that every machine with this program has, and that has a micro sign."""
+    return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf", size)
+
+
+def _scale_bar(draw: ImageDraw.ImageDraw, xy: tuple[int, int], scale: float, weight: float) -> None:
+    """Draw a bar of 1, 2 or 5 times a power of ten um at the lower left of xy (width, height)."""
+    longest = 0.35 * xy[0] / scale
+    power = 10.0 ** math.floor(math.log10(longest))
+    length = max(step * power for step in (1, 2, 5) if step * power <= longest)
+    y = xy[1] - 7
+    draw.rectangle((5, y - 2, 7 + length * scale, y + 2), fill=(0, 0, 0))
+    draw.rectangle((6, y - 1, 6 + length * scale, y + 1), fill=(255, 255, 255))
+    _write(draw, (6, y - 4 - 12 * weight), f"{length:g} µm", weight)

@@ -1,0 +1,79 @@
+"""From a grid in the patient to canonical axes, and from those to the world.
+
+Canonical voxels (z, y, x) have the axes nearest to (anterior, inferior, left): flips and
+permutations only, nothing is resampled. What is left, a rotation near the identity and an offset,
+is the placement. World: +x is the patient's left, +y superior, +z anterior, so that the patient
+faces the viewer: (L, S, -P) of a point in LPS, a proper rotation.
+"""
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.rigid_transform import Matrix, to_matrix
+
+_CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])  # A, I, L in LPS
+LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
+_UM_PER_MM = 1000.0
+_PLANES = ("sagittal", "coronal", "axial")  # by the axis of LPS that the normal is nearest to
+_OBLIQUE = np.cos(np.radians(2.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Canonical:
+    """How stored axes become canonical ones.
+
+    order       which stored axis becomes z, y, x
+    flips       which of z, y, x run backwards through the stored ones
+    spacing_um  (z, y, x)
+    placement   rows of a (4, 4) matrix for columns, um: from the pipeline's world, with the centre
+                of canonical voxel (0, 0, 0) at the origin, to the patient's world
+    """
+
+    order: tuple[int, int, int]
+    flips: tuple[bool, bool, bool]
+    spacing_um: tuple[float, float, float]
+    placement: Matrix
+
+    def apply(self, voxels: NDArray[np.generic]) -> NDArray[np.generic]:
+        """Return stored voxels (three axes) as canonical (z, y, x): a view."""
+        turned = voxels.transpose(self.order)
+        return turned[tuple(slice(None, None, -1 if flip else 1) for flip in self.flips)]
+
+
+def canonical_of(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> Canonical:
+    """Return the canonical form of a grid with orthogonal axes.
+
+    affine  (4, 4) for columns, from (i, j, k, 1) of the stored axes to LPS in mm
+    """
+    spacing = np.linalg.norm(affine[:3, :3], axis=0)
+    axes = affine[:3, :3] / spacing
+    likeness = _CANONICAL @ axes  # canonical axis by stored axis
+    best = max(permutations(range(3)), key=lambda p: sum(abs(likeness[i, p[i]]) for i in range(3)))
+    order = (best[0], best[1], best[2])
+    backwards = [bool(likeness[i, axis] < 0) for i, axis in enumerate(order)]
+    first = np.zeros(3)
+    for axis, flip in zip(order, backwards, strict=True):
+        first[axis] = shape[axis] - 1 if flip else 0
+    origin = LPS_TO_WORLD @ (affine[:3, :3] @ first + affine[:3, 3]) * _UM_PER_MM
+    signs = np.where(backwards, -1.0, 1.0)
+    z, y, x = (LPS_TO_WORLD @ (axes[:, axis] * s) for axis, s in zip(order, signs, strict=True))
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([x, -y, z], axis=1)  # rows of an image run downwards
+    matrix[:3, 3] = origin
+    sz, sy, sx = (float(spacing[axis]) * _UM_PER_MM for axis in order)
+    return Canonical(
+        order,
+        (backwards[0], backwards[1], backwards[2]),
+        (sz, sy, sx),
+        to_matrix((matrix + 0.0).tolist()),  # no negative zeros
+    )
+
+
+def plane_name(normal: NDArray[np.float64]) -> str:
+    """Return what planes with this normal (LPS) are called: `axial`, `oblique sagittal`, ..."""
+    along = np.abs(normal)
+    name = _PLANES[int(along.argmax())]
+    return name if along.max() >= _OBLIQUE else f"oblique {name}"

@@ -1,0 +1,179 @@
+"""DICOM: a folder at any depth, or one file, single-frame or enhanced multi-frame.
+
+PS3.3 for the attributes; dicom_header.py says what is looked at, dicom_series.py how frames become
+volumes, stack_layout.py where they lie. Files are found by content, whatever they are called.
+"""
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.anatomical_axes import Canonical, canonical_of
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.dicom.frame import Frame
+from stereocell.read.dicom.header import NoPlaneError, is_dicom, read_frames
+from stereocell.read.dicom.pixels import decode, dtype_of
+from stereocell.read.dicom.series import Stack, find_stacks
+from stereocell.read.image import Image
+from stereocell.read.resample import resample_stack
+from stereocell.read.spacing import Grid
+from stereocell.read.whole_array import WholeArray
+from stereocell.storage.location import Location, is_own
+
+UNKNOWN = "DICOM"  # the name of what has no modality that we know
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What lies in a folder: DICOM files in the order of names, stacks, and why others are none."""
+
+    paths: tuple[Path, ...]
+    stacks: tuple[Stack, ...]
+    left_out: Counter[str]
+
+
+def read_image(location: Location, series: int = 0) -> Image:
+    """Return one series; 0 is the largest, others count from 1 as `list_series` does.
+
+    Raises SourceError, UsageError for a series that isn't there.
+    """
+    found = _find(location)
+    if series > len(found.stacks):
+        raise UsageError(
+            f"{location.shown}: --series: found {series}, expected 1 to {len(found.stacks)} "
+            "(`--series list` shows them)"
+        )
+    stack = found.stacks[max(series, 1) - 1]
+    if stack.layout is None:
+        raise SourceError(
+            f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
+        )
+    layout, dtype = stack.layout, dtype_of([f for frames in stack.times for f in frames])
+    canonical = canonical_of(layout.affine, layout.shape)
+    z, y, x = (layout.shape[axis] for axis in canonical.order)
+    load = partial(_load, stack, canonical, found.paths, dtype, location.shown)
+    voxels = WholeArray((len(stack.times), z, y, x), dtype, load)
+    modality = stack.first.modality
+    return Image(
+        arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
+        grids=(Grid((z, y, x), canonical.spacing_um),),
+        names=(modality or UNKNOWN,),
+        colors=(None,),
+        images=1,
+        title=modality or UNKNOWN,
+        modality=modality,
+        placement=canonical.placement,
+        notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
+    )
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each series, as `--series` counts them. Raises SourceError."""
+    found = _find(location)
+    lines = [f"{i:3d}  {stack.label}" for i, stack in enumerate(found.stacks, start=1)]
+    for i, stack in enumerate(found.stacks):
+        lines[i] += "".join(f"; {note}" for note in stack.notes)
+    return tuple(lines)
+
+
+def _find(location: Location) -> Found:
+    root = Path(location.source)
+    files = _files(root) if root.is_dir() else [root]
+    _require_own(location, files)
+    paths = [path for path in files if is_dicom(path)]
+    left_out: Counter[str] = Counter()
+    if len(paths) < len(files):
+        left_out["not DICOM"] = len(files) - len(paths)
+    frames: dict[bytes, Frame] = {}
+    copies: list[tuple[Frame, Frame]] = []
+    for index, path in enumerate(paths):
+        try:
+            for frame in read_frames(path, index):
+                key = frame.instance + frame.index.to_bytes(4)
+                earlier = frames.setdefault(key, frame)
+                if earlier is not frame:
+                    copies.append((earlier, frame))
+        except NoPlaneError as error:
+            left_out[str(error)] += 1
+    compare = partial(_are_equal, paths, location.shown)
+    for earlier, frame in copies:  # the same image twice; if pixels differ, it is another
+        if earlier.position == frame.position and compare(earlier, frame):
+            left_out["copies of others"] += 1
+        else:
+            frames[f"{frame.file} {frame.index}".encode()] = frame
+    if not frames:
+        held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
+        many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""
+        raise SourceError(
+            f"{location.shown}: no DICOM image with a place in the patient: found "
+            f"{many}{held or 'nothing'}; expected slices of MR, CT or the like"
+        )
+    return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return all files below a folder, sorted, so that another disk gives the same order."""
+    found = [Path(at) / name for at, _, names in os.walk(folder) for name in names]
+    return sorted(found, key=lambda path: path.relative_to(folder).parts)
+
+
+def _require_own(location: Location, files: Sequence[Path]) -> None:
+    """Raise SourceError for a link that leads out of the folder, by its number: names are private.
+
+    Pipes, devices and links that lead nowhere are left out: they are not opened.
+    """
+    own = [location.folder]
+    for number, path in enumerate(files, start=1):
+        if path.is_file() and not is_own(path, own):
+            raise SourceError(
+                f"{location.shown}: file {number} of {len(files)} in the order of names: is a link "
+                "that leads out of the folder, expected files in it or below "
+                "(`cp -rL` copies what links lead to)"
+            )
+
+
+def _are_equal(paths: Sequence[Path], shown: str, a: Frame, b: Frame) -> bool:
+    if (a.rows, a.columns) != (b.rows, b.columns):
+        return False
+    ours, theirs = (decode([f], paths, dtype_of([a, b]), shown) for f in (a, b))
+    return bool(np.array_equal(ours, theirs))
+
+
+def _load(
+    stack: Stack,
+    canonical: Canonical,
+    paths: Sequence[Path],
+    dtype: np.dtype[Any],
+    shown: str,
+    time: int,
+) -> NDArray[Any]:
+    planes = decode(stack.times[time], paths, dtype, shown)
+    if stack.layout is not None and stack.layout.is_resampled:
+        planes = resample_stack(planes, stack.layout)
+    return canonical.apply(planes)
+
+
+def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
+    if len(found.stacks) == 1:
+        return ()
+    number = found.stacks.index(stack) + 1
+    why = "the largest" if series == 0 else "asked for"
+    return (
+        f"{len(found.stacks)} series or orientations; building --series {number}, {why}: "
+        f"{stack.label}",
+    )
+
+
+def _left_out(reasons: Counter[str]) -> tuple[str, ...]:
+    if not reasons:
+        return ()
+    listed = ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items()))
+    return (f"files left out: {listed}",)

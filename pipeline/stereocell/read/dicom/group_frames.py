@@ -1,0 +1,193 @@
+"""Which DICOM frames belong to one stack: the same in all that is stated, and parallel.
+
+Decimal strings are rounded, and may be rounded anew in each slice: pixel spacings and orientations
+that differ by no more than that are one. They are compared with the mean of those that are in the
+group already, so that a wobble about it keeps them together, and the mean is the stack's. Planes
+that are turned into it turn about their first pixels, whose places are stated, or about their
+middles: about whichever of the two lie more evenly, since a wobble moves one and not the other.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.read.dicom.frame import Frame, Vector
+
+PARALLEL = 2e-3  # rad: planes further apart in orientation are another stack
+ALIKE = 1e-3  # of the pixel spacing: half a pixel over 512 of them
+_SAME_WAY = np.cos(np.radians(5.0))  # stacks whose normals are closer than that can interleave
+
+# what tells stacks apart, in the standard's words
+_STATED: tuple[tuple[str, str], ...] = (
+    ("series", "SeriesInstanceUID"),
+    ("reference", "FrameOfReferenceUID"),
+    ("stack", "StackID"),
+    ("modality", "Modality"),
+    ("rows", "Rows"),
+    ("columns", "Columns"),
+)
+
+
+class Group:
+    """Frames of one stack, in the order in which they came."""
+
+    def __init__(self, first: Frame) -> None:
+        self.frames = [first]
+        self._directions = _directions(first)
+        self._spacing = np.array(first.spacing)
+        self._is_exact = True  # all state the same: no mean, which rounds
+
+    def takes(self, frame: Frame) -> bool:
+        """Return whether a frame with the same key is parallel to these, and as finely sampled."""
+        return not (_turns(self._mean_directions, _directions(frame)) or self._is_other(frame))
+
+    def add(self, frame: Frame) -> None:
+        first = self.frames[0]
+        self._is_exact &= (
+            frame.along_row == first.along_row
+            and frame.along_column == first.along_column
+            and frame.spacing == first.spacing
+        )
+        self.frames.append(frame)
+        self._directions = self._directions + _directions(frame)
+        self._spacing = self._spacing + frame.spacing
+
+    def straighten(self) -> None:
+        """Turn the planes into the mean orientation; call it when all frames are there."""
+        if self._is_exact or len(self.frames) < 3:
+            return
+        first = self.frames[0]
+        to_middle = (np.array([first.columns, first.rows]) - 1) / 2 * self.spacing[::-1]
+        corners = np.array([frame.position for frame in self.frames])
+        middles = corners + [to_middle @ _directions(frame) for frame in self.frames]
+        normal = _axes(self)[0]
+        if _unevenness(middles, normal) < _unevenness(corners, normal):
+            corners = middles - to_middle @ self._mean_directions
+            self.frames = [
+                replace(frame, position=_vector(corner))
+                for frame, corner in zip(self.frames, corners, strict=True)
+            ]
+
+    @property
+    def along_row(self) -> Vector:
+        """The mean, a unit vector, as is `along_column`."""
+        return self.frames[0].along_row if self._is_exact else _vector(self._mean_directions[0])
+
+    @property
+    def along_column(self) -> Vector:
+        if self._is_exact:
+            return self.frames[0].along_column
+        return _vector(self._mean_directions[1])
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """The mean, mm between (rows, columns)."""
+        if self._is_exact:
+            return self.frames[0].spacing
+        rows, columns = (self._spacing / len(self.frames)).tolist()
+        return rows, columns
+
+    @property
+    def _mean_directions(self) -> NDArray[np.float64]:
+        lengths = np.linalg.norm(self._directions, axis=1, keepdims=True)
+        return np.asarray(self._directions / lengths)
+
+    def _is_other(self, frame: Frame) -> bool:
+        mean = self._spacing / len(self.frames)
+        return bool((np.abs(frame.spacing - mean) > ALIKE * mean).any())
+
+    def differences(self, other: "Group") -> list[str]:
+        """Return what tells this stack from another, in the standard's words."""
+        a, b = self.frames[0], other.frames[0]
+        found = [word for name, word in _STATED if getattr(a, name) != getattr(b, name)]
+        mean, step = np.array(other.spacing), ALIKE * np.array(self.spacing)
+        if (np.abs(mean - self.spacing) > step).any():
+            found.append("PixelSpacing")
+        if _turns(self._mean_directions, other._mean_directions):
+            found.append("ImageOrientationPatient")
+        return found
+
+    def interleaves(self, other: "Group") -> bool:
+        """Return whether these planes lie, at least in part, among the other stack's."""
+        axes = _axes(self)
+        if abs(axes[0] @ _axes(other)[0]) < _SAME_WAY:
+            return False
+        ours, theirs = self._box(axes), other._box(axes)
+        shared = np.minimum(ours[1], theirs[1]) - np.maximum(ours[0], theirs[0])
+        return bool(shared[0] >= 0 and (shared[1:] > 0).all())  # a single plane is not thick
+
+    def _box(self, axes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return lowest and highest place (2, 3), mm along the axes."""
+        first = self.frames[0]
+        size = np.array(self.spacing) * (first.rows, first.columns)
+        corner = _directions(first)[::-1] * size[:, None]  # down the rows, then along them
+        positions = np.array([frame.position for frame in self.frames])
+        places = np.concatenate([positions, positions + corner.sum(axis=0)]) @ axes.T
+        return np.stack([places.min(axis=0), places.max(axis=0)])
+
+
+def find_groups(frames: Iterable[Frame]) -> list[Group]:
+    """Return the frames by stack."""
+    groups: dict[tuple[object, ...], list[Group]] = {}
+    for frame in frames:
+        alike = groups.setdefault(tuple(getattr(frame, name) for name, _ in _STATED), [])
+        group = next((group for group in alike if group.takes(frame)), None)
+        if group is None:
+            alike.append(Group(frame))
+        else:
+            group.add(frame)
+    found = [group for alike in groups.values() for group in alike]
+    for group in found:
+        group.straighten()
+    return found
+
+
+def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...]:
+    """Say, in a sentence or none, how much of the same series lies among a group's planes."""
+    if len(group.frames) < 2:
+        return ()
+    among = [
+        other
+        for other in groups
+        if other is not group
+        and other.frames[0].series == group.frames[0].series
+        and group.interleaves(other)
+    ]
+    if not among:
+        return ()
+    images = sum(len(other.frames) for other in among)
+    apart = sorted({word for other in among for word in group.differences(other)})
+    return (
+        f"{images} more images of the same series lie among these and are not built: another "
+        f"{', '.join(apart)} (`--series list` shows them)",
+    )
+
+
+def _unevenness(points: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
+    """Return how the steps from point to point (n, 3) change along a normal, squared and summed."""
+    rising = points[np.argsort(points @ normal)]
+    return float((np.diff(rising, 2, axis=0) ** 2).sum())
+
+
+def _directions(frame: Frame) -> NDArray[np.float64]:
+    return np.array([frame.along_row, frame.along_column])
+
+
+def _turns(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    """Return whether directions (2, 3) differ by more than rounding: a chord is its angle here."""
+    return bool(np.linalg.norm(a - b, axis=1).max() > PARALLEL)
+
+
+def _axes(group: Group) -> NDArray[np.float64]:
+    """Return unit vectors (3, 3) along the normal, down the rows and along them."""
+    across = np.array(group.along_row)
+    normal = np.cross(across, group.along_column)
+    normal /= np.linalg.norm(normal)
+    return np.stack([normal, np.cross(normal, across), across])
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,275 @@
+"""What of a DICOM file's header the reader looks at: geometry, modality, how pixels are stored.
+
+Privacy begins here. pydicom is asked for the tags of `_TAGS` alone and skips the values of all
+others; UIDs, which tell series and copies apart, leave as digests; what pydicom logs or warns
+about, which may quote values, is not passed on, nor is the text of its exceptions; and a file is
+known by its number in the order of names, never by its name.
+"""
+
+import hashlib
+import math
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pydicom
+from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
+
+from stereocell.model.modality import MODALITIES
+from stereocell.read.dicom.codecs import PLUGINS, is_compressed
+from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+
+_TAGS: list[Any] = [
+    "SOPClassUID",
+    "Modality",
+    "SeriesInstanceUID",
+    "SOPInstanceUID",
+    "FrameOfReferenceUID",
+    "InstanceNumber",
+    "NumberOfFrames",
+    "Rows",
+    "Columns",
+    "SamplesPerPixel",
+    "PhotometricInterpretation",
+    "BitsAllocated",
+    "BitsStored",
+    "HighBit",
+    "PixelRepresentation",
+    "PixelPaddingValue",
+    "PixelPaddingRangeLimit",
+    "PixelSpacing",
+    "ImagePositionPatient",
+    "ImageOrientationPatient",
+    "RescaleSlope",
+    "RescaleIntercept",
+    "ModalityLUTSequence",
+    "SharedFunctionalGroupsSequence",
+    "PerFrameFunctionalGroupsSequence",
+]
+# mm between pixels; beyond it, distances that are told in pixels mean nothing
+_SPACINGS = (1e-6, 100.0)
+
+
+class NoPlaneError(Exception):
+    """A file holds no plane that we can use; the text says why in words without its values."""
+
+
+def is_dicom(path: Path) -> bool:
+    """Return whether a regular file begins as DICOM does, with its preamble or without."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            head = file.read(132)
+    except OSError:
+        return False
+    return head[128:] == b"DICM" or _lacks_preamble(head)
+
+
+def _lacks_preamble(head: bytes) -> bool:
+    """Old files begin with their first element: group 2 or 8, little-endian, a low element."""
+    if len(head) < 8:
+        return False
+    group, element = struct.unpack_from("<HH", head)
+    return group in (0x0002, 0x0008) and element <= 0x0018
+
+
+def read_frames(path: Path, file: int) -> list[Frame]:
+    """Return the planes of a file, from its header alone.
+
+    Raises NoPlaneError, whose text holds nothing of the file.
+    """
+    try:
+        with quiet(), path.open("rb") as opened:
+            head = opened.read(132)
+            if head[128:] == b"DICM":
+                _refuse_deflated(path)
+            elif not _lacks_preamble(head):
+                raise NoPlaneError("not DICOM")
+            opened.seek(0)
+            header = pydicom.dcmread(
+                opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
+            )
+            return _frames(header, opened, path.stat().st_size, file)
+    except DICOM_FAULTS:
+        raise NoPlaneError("damaged in their headers") from None
+
+
+def _refuse_deflated(path: Path) -> None:
+    """A deflated file would be unpacked whole, whatever it claims to become."""
+    meta = pydicom.filereader.read_file_meta_info(path)
+    if meta.get("TransferSyntaxUID") == DeflatedExplicitVRLittleEndian:
+        raise NoPlaneError("deflated as a whole, which is not read")
+
+
+def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
+    rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
+    if opened.tell() >= size or rows < 1 or columns < 1:
+        raise NoPlaneError(f"without pixels{_kind(header)}")
+    grey = ("MONOCHROME1", "MONOCHROME2")
+    kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
+    if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
+        raise NoPlaneError("of colours, not of grey values")
+    if "ModalityLUTSequence" in header:
+        raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
+    count = int(header.get("NumberOfFrames") or 1)
+    is_float = _check_pixels(header, opened, size, rows * columns * count)
+    series, instance, reference = (
+        hashlib.sha256(str(header.get(key, "")).encode()).digest()
+        for key in ("SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID")
+    )
+    if "SOPInstanceUID" not in header:  # then nothing tells copies
+        instance = f"{file}".encode()
+    modality = str(header.get("Modality", "")).strip()
+    shared = _first(header.get("SharedFunctionalGroupsSequence"))
+    own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
+    if (own or count > 1) and len(own) != count:
+        raise NoPlaneError("of several frames without a place for each")
+    frames = []
+    padding = _padding(header)
+    for index in range(count):
+        groups = [own[index] if own else None, shared]
+        stack = _found({}, groups, "FrameContentSequence", "StackID")
+        position, directions, spacing = _place(header, groups)
+        frames.append(
+            Frame(
+                file,
+                index,
+                series,
+                instance,
+                reference,
+                hashlib.sha256(str(stack).encode()).digest(),
+                int(header.get("InstanceNumber") or 0),
+                modality if modality in MODALITIES else "",
+                rows,
+                columns,
+                position,
+                *directions,
+                spacing,
+                _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
+            )
+        )
+    return frames
+
+
+def _kind(header: Any) -> str:
+    """Return what a file without pixels is, in the words of the standard: " (...)"; or nothing."""
+    kind = UID(str(header.get("SOPClassUID", "")))
+    return f" ({kind.name})" if kind.name != kind else ""  # of one that is private it is the UID
+
+
+def _padding(header: Any) -> tuple[int, int] | None:
+    """Return the lowest and highest value that pads: PS3.3 C.7.5.1.1.2, stored as pixels are."""
+    ends = []
+    for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
+        value = header.get(key)
+        if isinstance(value, bytes) and len(value) == 2:  # where the VR is not told
+            little = header.original_encoding[1]
+            value = int.from_bytes(value, "little" if little else "big")
+        if isinstance(value, int):
+            ends.append(value)
+        elif not ends:
+            return None
+    if header.get("PixelRepresentation"):  # whatever sign its VR gave it
+        ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
+    else:
+        ends = [end & 0xFFFF for end in ends]
+    return min(ends), max(ends)
+
+
+def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
+    """Return whether the pixels are floats. Raises NoPlaneError if they are cut short.
+
+    `opened` stands at the element of the pixels: tag, (VR, 2 bytes,) length.
+    """
+    implicit, little = header.original_encoding
+    order = "<" if little else ">"
+    head = opened.read(12)
+    _, element = struct.unpack_from(f"{order}HH", head)
+    length = struct.unpack_from(f"{order}I", head, 4 if implicit else 8)[0]
+    bits = int(header.get("BitsAllocated") or 0)
+    is_float = element in (0x0008, 0x0009)
+    if bits not in (32, 64) if is_float else bits not in (8, 16, 32):
+        raise NoPlaneError(f"of {bits} bits a pixel, not of 8, 16 or 32")
+    syntax = header.file_meta.get("TransferSyntaxUID") if header.file_meta else None
+    if is_compressed(syntax):
+        if syntax not in PLUGINS:
+            raise NoPlaneError("compressed in a way that is not read")
+        return is_float
+    begin = opened.tell() - (4 if implicit else 0)
+    if min(length, size - begin) < count * bits // 8:
+        raise NoPlaneError("cut short")
+    return is_float
+
+
+def _first(sequence: Any) -> Any:
+    return sequence[0] if sequence else None
+
+
+def _found(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
+    """Return a value from the frame's group, the shared one, or the header itself; None: nowhere.
+
+    An enhanced image states these in functional groups, PS3.3 C.7.6.16.
+    """
+    for group in groups:
+        item = None if group is None else _first(group.get(sequence))
+        if item is not None and item.get(key) is not None:
+            return item[key].value
+    return header.get(key)
+
+
+def _numbers(value: Any, count: int) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(v) for v in value)
+    except DICOM_FAULTS:
+        numbers = ()
+    if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
+        raise NoPlaneError("without a place in the patient")
+    return numbers
+
+
+def _place(
+    header: Any, groups: Sequence[Any]
+) -> tuple[Vector, tuple[Vector, Vector], tuple[float, float]]:
+    position = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+    orientation = _found(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
+    spacing = _found(header, groups, "PixelMeasuresSequence", "PixelSpacing")
+    x, y, z = _numbers(position, 3)
+    between = _numbers(spacing, 2)
+    cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
+    lengths = np.linalg.norm(cosines, axis=1)
+    is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
+    if min(between) <= 0 or not is_frame:
+        raise NoPlaneError("without a place in the patient")
+    if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
+        shown = " and ".join(f"{value:g}" for value in between)
+        raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
+    along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
+    return (x, y, z), (along_row, along_column), (between[0], between[1])
+
+
+def _encoding(
+    header: Any,
+    groups: Sequence[Any],
+    is_inverted: bool,
+    is_float: bool,
+    padding: tuple[int, int] | None,
+) -> Encoding:
+    sequence = "PixelValueTransformationSequence"
+    slope = _found(header, groups, sequence, "RescaleSlope")
+    intercept = _found(header, groups, sequence, "RescaleIntercept")
+    slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
+    if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
+        raise NoPlaneError("of values that no rescale slope gives")
+    allocated = int(header.get("BitsAllocated") or 0)
+    if is_float:
+        return Encoding(allocated, 0, 0, True, False, slope, intercept)
+    bits = int(header.get("BitsStored") or allocated)
+    high_bit = int(header["HighBit"].value if "HighBit" in header else bits - 1)
+    if not 1 <= bits <= high_bit + 1 <= allocated:
+        raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
+    signed = bool(header.get("PixelRepresentation") or 0)
+    return Encoding(allocated, bits, high_bit, signed, is_inverted, slope, intercept, padding)

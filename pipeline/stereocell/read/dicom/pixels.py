@@ -1,0 +1,84 @@
+"""Decode the pixels of DICOM frames: codec, bits, sign, MONOCHROME1, rescale, padding."""
+
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dicom.frame import Encoding, Frame
+from stereocell.read.dicom.gdcm_process import GdcmProcess
+from stereocell.read.dicom.padding import Padding, is_padding
+from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.stored_values import open_pixels, stored_values
+from stereocell.read.rescale import dtype_for, rescale
+
+
+def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
+    """Return the dtype that holds the values of all frames, from their headers alone."""
+    encodings = {frame.encoding for frame in frames}
+    if any(encoding.bits == 0 for encoding in encodings):
+        return np.dtype(np.float32)
+    return dtype_for((*e.stored_range, e.slope, e.intercept) for e in encodings)
+
+
+def decode(
+    frames: Sequence[Frame], paths: Sequence[Path], dtype: np.dtype[Any], shown: str
+) -> NDArray[Any]:
+    """Return the values of frames of one size, (n, rows, columns), in their order.
+
+    Each file is read once; the frames' padding is replaced (dicom_padding.py). Raises SourceError
+    for a frame that can't be decoded: it names the file by its number among `paths`, never by name.
+    """
+    padding = Padding()
+    planes = np.empty((len(frames), frames[0].rows, frames[0].columns), dtype)
+    has_padding = any(frame.encoding.padding is not None for frame in frames)
+    order = sorted(range(len(frames)), key=lambda place: (frames[place].file, frames[place].index))
+    with GdcmProcess() as apart:
+        for file, places in groupby(order, key=lambda place: frames[place].file):
+            wanted = list(places)
+            where = f"{shown}: file {file + 1} of {len(paths)} in the order of names"
+            indices = [frames[place].index for place in wanted]
+            try:
+                with quiet():
+                    dataset, plugin = open_pixels(paths[file])
+                    stored = (
+                        apart.decode(paths[file], indices)
+                        if plugin == "gdcm"
+                        else stored_values(dataset, plugin, indices)
+                    )
+                    for place, values in zip(wanted, stored, strict=True):
+                        encoding = frames[place].encoding
+                        raw = unpack_bits(values, encoding)
+                        planes[place] = rescale(raw, encoding.slope, encoding.intercept, dtype)
+                        if has_padding:
+                            mask = is_padding(values, raw, encoding)
+                            padding.add(place, planes[place], mask)
+            except DICOM_FAULTS:  # its text may quote what the file says
+                raise SourceError(
+                    f"{where}: its pixels can't be decoded, expected {frames[wanted[0]].rows} x "
+                    f"{frames[wanted[0]].columns} whole ones, as its header says"
+                ) from None
+    padding.fill(planes)
+    return planes
+
+
+def unpack_bits(values: NDArray[Any], encoding: Encoding) -> NDArray[Any]:
+    """Return stored values out of their containers: shifted down, masked, with their sign.
+
+    Bits above `high_bit` may hold an overlay. Integers come back as int64 or as they are.
+    """
+    if encoding.bits == 0:
+        return values
+    low, high = encoding.stored_range
+    shift = encoding.high_bit + 1 - encoding.bits
+    if encoding.bits < encoding.allocated or encoding.is_inverted or shift:
+        wide = values.astype(np.int64) >> shift
+        wide &= (1 << encoding.bits) - 1
+        if encoding.is_signed:
+            wide -= (wide >> (encoding.bits - 1)) << encoding.bits
+        return high + low - wide if encoding.is_inverted else wide
+    return values

@@ -1,0 +1,196 @@
+"""Open a source: find its format, read its metadata, check that it is a volume we can build."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import fsspec
+import numpy as np
+
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.dataset import ChannelInfo, Dataset
+from stereocell.read.image import Image
+from stereocell.read.spacing import Triple, levels_of
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
+
+DTYPES = ("uint8", "uint16", "int16", "float32")
+MAX_CHUNK_BYTES = 4 << 30  # a chunk is decoded whole: a header that asks for more is refused
+
+
+def _open_zarr(location: Location) -> Image:
+    from stereocell.read.ome_zarr import read_image  # 2 s to import, and not both are needed
+
+    return read_image(location)
+
+
+def _open_tiff(location: Location) -> Image:
+    from stereocell.read.ome_tiff import read_image
+
+    return read_image(location)
+
+
+def _open_nifti(location: Location) -> Image:
+    from stereocell.read.nifti import read_image
+
+    return read_image(location)
+
+
+READERS: dict[str, Callable[[Location], Image]] = {
+    "ome-zarr": _open_zarr,
+    "ome-tiff": _open_tiff,
+    "nifti": _open_nifti,
+}
+
+
+def open(
+    source: str | Path, *, time: int = 0, spacing_um: Triple | None = None, series: int = 0
+) -> Dataset:
+    """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
+
+    No voxels are read yet; of DICOM at most slices that lie at one place, to tell copies, and
+    NIfTI's floats, to tell how many are none.
+
+    `source` is a local path (DICOM and NIfTI only that) or an address (`http://`, `https://`,
+    `s3://`, or another one that fsspec knows). `time` is the time point, from 0. `spacing_um`
+    (z, y, x) replaces the voxel spacing that the source states. `series` picks one of DICOM's, from
+    1 as `list_series` counts; 0 is the largest.
+
+    Raises SourceError for a source that can't be read as a volume (one line: what, where, what was
+    expected), UsageError for a time point or a series that it doesn't hold, or a spacing that is no
+    length.
+    """
+    location = Location.of(source)
+    if location.is_local and not Path(location.source).exists():
+        raise SourceError(
+            f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
+        )
+    if location.is_local and not Path(location.source).is_dir():
+        require_own(location.source, [location.folder], location.shown)
+    if location.format is None:
+        raise SourceError(
+            f"{location.shown}: unknown format, "
+            "expected OME-Zarr (NAME.zarr), OME-TIFF (NAME.ome.tif), NIfTI (NAME.nii, NAME.nii.gz) "
+            "or DICOM (a folder or a file, on this machine)"
+        )
+    if not location.is_local:
+        with one_line(location.shown, "an address that fsspec opens"):
+            files, path = fsspec.url_to_fs(location.source, **location.storage_options)
+        if not does_answer(files, path):
+            raise SourceError(
+                f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
+            )
+    if location.format == "dicom":
+        from stereocell.read.dicom import read_image
+
+        image = read_image(location, series)
+    elif series:
+        raise UsageError(f"{location.shown}: --series {series}: only DICOM holds series")
+    else:
+        image = READERS[location.format](location)
+    try:
+        return _dataset(location, image, time, spacing_um)
+    except BaseException:
+        if image.close is not None:
+            image.close()
+        raise
+
+
+def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | None) -> Dataset:
+    where = location.shown
+    finest = image.arrays[0]
+    _check_arrays(where, image)
+    if not 0 <= time < finest.size("t"):
+        raise UsageError(
+            f"{where}: --time: found {time}, expected 0 to {finest.size('t') - 1} "
+            f"(the source holds {finest.size('t')} time points)"
+        )
+    given = [_shown(name or "") for name in image.names]
+    channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
+    return Dataset(
+        source=location.source,
+        name=image.title or _shown(location.name) or "dataset",
+        dtype=np.dtype(finest.array.dtype).newbyteorder("="),
+        levels=levels_of(image.grids, spacing_um, where),
+        channels=tuple(channels),
+        time_points=finest.size("t"),
+        time=time,
+        images=image.images,
+        arrays=image.arrays,
+        shown=where,
+        on_close=image.close,
+        modality=image.modality,
+        placement=image.placement,
+        remarks=(*image.notes, *(image.notes_at(time) if image.notes_at is not None else ())),
+    )
+
+
+def list_series(source: str | Path) -> tuple[str, ...]:
+    """Return a line for each series of a DICOM folder or file; line i is `series` = i.
+
+    A line holds modality, orientation, size and spacing, nothing that the files describe
+    themselves by. Raises SourceError, UsageError for a source of another format.
+    """
+    location = Location.of(source)
+    if location.format != "dicom":
+        raise UsageError(f"{location.shown}: --series list: expected DICOM, which holds series")
+    from stereocell.read.dicom import list_series as list_all
+
+    return list_all(location)
+
+
+def _check_arrays(where: str, image: Image) -> None:
+    finest = image.arrays[0]
+    for index, level in enumerate(image.arrays):
+        dtype = np.dtype(level.array.dtype)
+        if dtype.name not in DTYPES or dtype != np.dtype(finest.array.dtype):
+            expected = ", ".join(DTYPES[:-1]) + f" or {DTYPES[-1]}, the same in all levels"
+            raise SourceError(
+                f"{where}: dtype of level {index}: found {dtype.name}, expected {expected}"
+            )
+        if any(level.size(axis) != finest.size(axis) for axis in "tc"):
+            raise SourceError(
+                f"{where}: level {index}: found {level.size('t')} time points and "
+                f"{level.size('c')} channels, expected {finest.size('t')} and {finest.size('c')} "
+                "as in level 0"
+            )
+        extra = {a: level.size(a) for a in level.axes if a not in "tczyx" and level.size(a) > 1}
+        for axis, size in extra.items():
+            raise SourceError(
+                f"{where}: axis {axis!r} of length {size}, expected only t, c, z, y and x"
+            )
+        bytes_of_one = math.prod(int(n) for n in level.array.chunks) * dtype.itemsize
+        if bytes_of_one > MAX_CHUNK_BYTES:
+            found = min(-(-100 * bytes_of_one >> 30), 10**20) / 100  # up, so that it is more
+            raise SourceError(
+                f"{where}: chunk {level.array.chunks} of level {index}: found {found:g} GiB, "
+                f"expected at most {MAX_CHUNK_BYTES >> 30} GiB"
+            )
+    if finest.shape[0] < 2:
+        raise SourceError(
+            f"{where}: a volume needs at least 2 planes: found {finest.shape[0]} along z"
+        )
+
+
+def _shown(name: str) -> str:
+    """Return a name without the characters that nothing shows (controls, NUL, line ends)."""
+    if name.isprintable():
+        return name
+    return " ".join("".join(c if c.isprintable() else " " for c in name).split())
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Fill in missing names, and tell equal ones apart (a marker imaged in every cycle)."""
+    filled = list(names)
+    for index in (i for i, name in enumerate(names) if not name):
+        filled[index] = f"Channel{index}"
+        while filled[index] in names:
+            filled[index] += "_"
+    while len(set(filled)) < len(filled):
+        count = Counter(filled)
+        filled = [
+            f"{name} (channel {index})" if count[name] > 1 else name
+            for index, name in enumerate(filled)
+        ]
+    return filled

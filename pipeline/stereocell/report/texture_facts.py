@@ -1,0 +1,86 @@
+"""What the report says of baked maps: texels, charts, levels that go without, and likeness."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from stereocell.building.unit_files import load_lods, load_record
+from stereocell.report.facts import Facts, UnitFacts
+from stereocell.report.select_units import thin_out
+from stereocell.report.texture_similarity import find_close_likeness, find_likeness
+
+MOST_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
+COMPARED = 2  # the level, or the coarsest if there are fewer
+
+
+@dataclass(frozen=True, slots=True)
+class LevelMaps:
+    """The maps of one channel at one level; um a texel from the finest to the coarsest.
+
+    without  tiles whose level has its values at vertices, by the reason
+    """
+
+    level: int
+    tiles: int
+    texel_um: tuple[float, float]
+    texels: int
+    charts: int
+    painted: bool
+    without: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How like lod0 a unit looks at a level with its maps: SSIM at each view, and close up."""
+
+    unit: str
+    level: int
+    views: tuple[float, ...]
+    close: float
+
+    @property
+    def mean(self) -> float:
+        return sum(self.views) / len(self.views)
+
+
+def sum_up_maps(units: Sequence[UnitFacts]) -> list[LevelMaps]:
+    """Return what the levels of one channel's units wear."""
+    records = [load_record(unit.directory)["lods"] for unit in units if unit.lods]
+    levels = max(map(len, records), default=0)
+    return [
+        _level([lods[level]["maps"] for lods in records if level < len(lods)], level)
+        for level in range(levels)
+    ]
+
+
+def _level(maps: Sequence[dict[str, Any]], level: int) -> LevelMaps:
+    baked = [entry for entry in maps if entry["size"][0]]
+    texels = [entry["texel_um"] for entry in baked]
+    without: dict[str, int] = {}
+    for entry in maps:
+        if entry["reason"]:
+            without[entry["reason"]] = without.get(entry["reason"], 0) + 1
+    return LevelMaps(
+        level,
+        len(baked),
+        (min(texels, default=0.0), max(texels, default=0.0)),
+        sum(entry["size"][0] * entry["size"][1] for entry in baked),
+        sum(entry["charts"] for entry in baked),
+        any(entry["painted"] for entry in maps),
+        without,
+    )
+
+
+def compare(facts: Facts) -> list[Likeness]:
+    """Return the likeness of some evenly chosen units that have a level with maps."""
+    units = [unit for unit in facts.units if len(unit.lods) > 1]
+    found = []
+    every = max(1, -(-len(units) // MOST_COMPARED))
+    for i in thin_out(len(units), every)[:MOST_COMPARED]:
+        lods = load_lods(units[i].directory)
+        level = min(COMPARED, len(lods) - 1)
+        if lods[level].normal_map is not None:
+            views = find_likeness(lods[0], lods[level])
+            close = find_close_likeness(lods[0], lods[level])
+            found.append(Likeness(units[i].name, level, views, close))
+    return found

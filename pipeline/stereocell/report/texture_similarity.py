@@ -1,0 +1,135 @@
+"""How like the finest level a coarser one looks with its baked maps: pictures, compared by SSIM.
+
+Drawn here in plain numpy: the figures are the same on every machine, with OpenGL or without.
+Parallel projection, one light beside the viewer's eye, and ambient light that occlusion dims. The
+shading is per pixel, by the normal map in the frame of the interpolated tangents, as glTF and USD
+renderers do it; without maps by the interpolated normals.
+
+A picture is as large as the viewer draws the surface at the moment when it takes this level for the
+next finer one: the level's distance from the iso-surface spans ERROR_PX there.
+
+SSIM: Wang et al. 2004, Gaussian window, mean over the picture.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.model.mesh import Lod
+from stereocell.textures.rasterize import find_pixels
+
+# where the viewer is, x right, y up, z towards them: in front, then around it
+VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
+ERROR_PX = 2.0  # as the viewer's target
+LEAST_PX, MOST_PX = 48, 256  # of a picture's edge
+CLOSE_PX = 512  # the same for every level, however far off the viewer shows it
+_FINE = 2  # drawn this many times larger, then averaged down
+_AMBIENT, _GROUND = 0.35, 0.0
+_SIGMA, _TRUNCATE = 1.5, 3.5  # pixels, sigmas: 11 x 11, as in the paper
+_C1, _C2 = 0.01**2, 0.03**2
+
+
+def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
+    """Return the SSIM of two levels of one surface, for each of VIEWS."""
+    ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
+    diagonal = float(np.linalg.norm(ends[1] - ends[0]))
+    wanted = ERROR_PX * diagonal / max(coarse.distance_um, 1e-9)
+    size = int(np.clip(wanted, LEAST_PX, MOST_PX))
+    return tuple(
+        structural_similarity(draw(fine, view, ends, size), draw(coarse, view, ends, size))
+        for view in VIEWS
+    )
+
+
+def find_close_likeness(fine: Lod, coarse: Lod) -> float:
+    """Return the SSIM of two levels of one surface from the front, in CLOSE_PX."""
+    ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
+    pictures = (draw(lod, VIEWS[0], ends, CLOSE_PX) for lod in (fine, coarse))
+    return structural_similarity(*pictures)
+
+
+def draw(
+    lod: Lod, view: Sequence[float], ends: NDArray[np.float32], size: int
+) -> NDArray[np.float64]:
+    """Return the level as seen from `view`, grey 0..1 (size, size).
+
+    `ends`: two corners (x, y, z) of the box that fills the picture.
+    """
+    mesh = lod.mesh
+    to_eye = np.asarray(view) / np.linalg.norm(view)
+    right = np.cross([0.0, 1.0, 0.0], to_eye)
+    right /= np.linalg.norm(right)
+    up = np.cross(to_eye, right)
+    edge = size * _FINE
+    scale = edge / max(float(np.linalg.norm(ends[1] - ends[0])), 1e-12)
+    from_middle = mesh.positions.astype(np.float64) - ends.mean(axis=0)
+    places = np.stack([from_middle @ right, -(from_middle @ up)], axis=1) * scale + edge / 2
+    depth = from_middle @ to_eye
+    pixel, triangle, weights = find_pixels(
+        places[mesh.triangles], depth[mesh.triangles], (edge, edge)
+    )
+    normals, openness = _shading(lod, triangle, weights)
+    normals *= np.where(normals @ to_eye < 0, -1.0, 1.0)[:, None]  # both sides are drawn
+    light = to_eye + 0.5 * right + 0.5 * up
+    light /= np.linalg.norm(light)
+    picture = np.full(edge * edge, _GROUND)
+    lit = np.maximum(normals @ light, 0)
+    picture[pixel] = _AMBIENT * openness + (1 - _AMBIENT) * lit
+    return picture.reshape(size, _FINE, size, _FINE).mean(axis=(1, 3))
+
+
+def _shading(
+    lod: Lod, triangle: NDArray[np.int64], weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unit normals (n, 3) and openness (n,) at places of triangles."""
+    mesh, baked = lod.mesh, lod.baked
+    corners = mesh.triangles[triangle]
+
+    def interpolate(values: NDArray[np.float32]) -> NDArray[np.float64]:
+        return np.einsum("nk,nk...->n...", weights, values[corners].astype(np.float64))
+
+    normals = _unit(interpolate(mesh.normals))
+    openness = np.ones(len(triangle))
+    if lod.normal_map is None or mesh.uvs is None or mesh.tangents is None:
+        if baked is not None:
+            openness = interpolate(baked.openness.astype(np.float32)) / 255
+        return normals, openness
+    uvs = interpolate(mesh.uvs)
+    tangent = _unit(interpolate(mesh.tangents[:, :3]))
+    bitangent = np.cross(normals, tangent) * mesh.tangents[corners[:, 0], 3:]
+    x, y, z = (sample(lod.normal_map[..., k], uvs) / 127.5 - 1 for k in range(3))
+    shaded = x[:, None] * tangent + y[:, None] * bitangent + z[:, None] * normals
+    if baked is not None:
+        openness = sample(baked.openness, uvs) / 255
+    return _unit(shaded), openness
+
+
+def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an image (h, w), row 0 at v = 1, at UVs (n, 2): bilinear, clamped at its edges."""
+    height, width = image.shape
+    place = [(1 - uvs[:, 1]) * height - 0.5, uvs[:, 0] * width - 0.5]
+    found: NDArray[np.float64] = ndimage.map_coordinates(
+        image.astype(np.float64), place, order=1, mode="nearest"
+    )
+    return found
+
+
+def structural_similarity(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Return the mean SSIM of two pictures of values 0..1."""
+
+    def blur(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return ndimage.gaussian_filter(values, _SIGMA, truncate=_TRUNCATE)
+
+    mean_a, mean_b = blur(a), blur(b)
+    spread_a, spread_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
+    common = blur(a * b) - mean_a * mean_b
+    index = (2 * mean_a * mean_b + _C1) * (2 * common + _C2)
+    index /= (mean_a**2 + mean_b**2 + _C1) * (spread_a + spread_b + _C2)
+    inner = index[5:-5, 5:-5]  # where the window lies inside
+    return float(inner.mean())
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)

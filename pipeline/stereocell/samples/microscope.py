@@ -1,0 +1,235 @@
+"""What a confocal microscope would record of the tissue: dye, blur, background, noise.
+
+Each dye is drawn with partial volumes from its signed distance (a ramp one sample wide over the
+surface), on samples as fine along z as in the plane, averaged into voxels, blurred by a Gaussian,
+and lifted by an uneven background; then come Poisson noise of the photons and Gaussian noise of
+the camera. A box is drawn from the bodies that reach into it, so any part of the block can be made
+by itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.model.tiling import Box
+from stereocell.samples.bodies import Points, Triple, Values
+from stereocell.samples.cycif_geometry import Tissue
+
+Field = NDArray[np.float32]
+
+SPACING_UM: Triple = (0.28, 0.14, 0.14)
+BLUR_UM: Triple = (0.30, 0.12, 0.12)  # sigma; wider along z, as an objective blurs
+OFFSET = 100.0  # counts of a dark voxel
+GAIN = 1.5  # counts a photo-electron
+READ_NOISE = 4.0  # counts, sigma
+MEMBRANE_UM = 0.5
+CYTOPLASM = 0.3  # of the membrane's brightness
+WALL_UM = 0.7  # of a vessel
+CHROMATIN = 0.2  # how much clumps inside a nucleus are brighter or darker than its dye
+CHROMATIN_FROM_UM = 0.4  # below the surface; full at twice that depth
+_TRUNCATE = 4.0  # sigmas
+_SAMPLES = 2  # along z in a voxel: makes the samples cubes
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """One cosine of the background: weight * cos(k . position + phase); k in 1/um."""
+
+    k: Triple
+    phase: float
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stain:
+    """One channel. Levels are counts over the offset, at brightness 1."""
+
+    name: str
+    color: str  # sRGB, hexadecimal
+    amplitude: float
+    background: float
+
+
+STAINS = (
+    Stain("Hoechst", "3D6BFF", 1000.0, 120.0),
+    Stain("MART1", "FF7A1A", 900.0, 140.0),
+    Stain("CD31", "2EE66B", 900.0, 110.0),
+)
+
+
+def waves_of(stain: int, size_um: Triple, seed: int) -> tuple[Wave, ...]:
+    """Return the unevenness of a stain's background: weights add up to 0.45 at most."""
+    rng = np.random.default_rng([seed, 1, stain])
+    longest = max(size_um)
+    waves = []
+    for weight in (0.25, 0.12, 0.08):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        k = 2.0 * np.pi / (longest * rng.uniform(0.35, 0.9))
+        tilt = float(rng.uniform(-0.5, 0.5))
+        direction = (tilt * k, float(np.sin(angle)) * k, float(np.cos(angle)) * k)
+        waves.append(Wave(direction, float(rng.uniform(0.0, 2.0 * np.pi)), weight))
+    return tuple(waves)
+
+
+def background(stain: Stain, waves: tuple[Wave, ...], points: Points) -> Values:
+    """Return the background in counts, offset included, at points in um."""
+    z, y, x = points
+    level = np.ones(np.broadcast_shapes(z.shape, y.shape, x.shape))
+    for wave in waves:
+        kz, ky, kx = wave.k
+        in_plane = ky * y + kx * x + wave.phase
+        # cos(a + b), so that a grid takes cosines of a line and of a plane only
+        level += wave.weight * (
+            np.cos(kz * z) * np.cos(in_plane) - np.sin(kz * z) * np.sin(in_plane)
+        )
+    return OFFSET + stain.background * level
+
+
+def record(tissue: Tissue, stain: int, box: Box, seed: int) -> NDArray[np.uint16]:
+    """Return the voxels (z, y, x) of a box in one channel.
+
+    The noise belongs to the box: another box that overlaps it repeats the dye, not the noise.
+    """
+    halo = [int(np.ceil(_TRUNCATE * b / h)) for b, h in zip(BLUR_UM, SPACING_UM, strict=True)]
+    canvas = _Canvas(box, (halo[0], halo[1], halo[2]))
+    dye = DRAW[STAINS[stain].name](tissue, canvas)
+    sigma = [b / h for b, h in zip(BLUR_UM, SPACING_UM, strict=True)]
+    blurred = ndimage.gaussian_filter(canvas.in_voxels(dye), sigma, truncate=_TRUNCATE)
+    inner = tuple(slice(n, size - n) for n, size in zip(halo, blurred.shape, strict=True))
+    waves = waves_of(stain, tissue.size_um, seed)
+    clean = background(STAINS[stain], waves, _positions(box)).astype(np.float32)
+    clean += STAINS[stain].amplitude * blurred[inner]
+
+    rng = np.random.default_rng([seed, 2, stain, *box.start])
+    counts = OFFSET + GAIN * rng.poisson((clean - OFFSET) / GAIN).astype(np.float32)
+    counts += READ_NOISE * rng.standard_normal(clean.shape, dtype=np.float32)
+    return np.clip(np.rint(counts), 0, 65535).astype(np.uint16)
+
+
+class _Canvas:
+    """Cubic samples over a box and its halo, on which bodies are drawn."""
+
+    def __init__(self, box: Box, halo: tuple[int, int, int]) -> None:
+        starts = [a - h for a, h in zip(box.start, halo, strict=True)]
+        counts = [n + 2 * h for n, h in zip(box.shape, halo, strict=True)]
+        z = (np.arange(counts[0] * _SAMPLES) + 0.5) / _SAMPLES - 0.5 + starts[0]
+        self.axes = (
+            z * SPACING_UM[0],
+            (np.arange(counts[1]) + starts[1]) * SPACING_UM[1],
+            (np.arange(counts[2]) + starts[2]) * SPACING_UM[2],
+        )
+        self.shape = tuple(len(axis) for axis in self.axes)
+        self.width_um = SPACING_UM[2]
+
+    def around(
+        self, low_um: Triple, high_um: Triple
+    ) -> tuple[tuple[slice, slice, slice], Points] | None:
+        """Return the samples between two corners and where they lie; None: outside."""
+        pad = 2.0 * self.width_um
+        z, y, x = (
+            slice(*(int(i) for i in np.searchsorted(axis, (a - pad, b + pad))))
+            for axis, a, b in zip(self.axes, low_um, high_um, strict=True)
+        )
+        if min(z.stop - z.start, y.stop - y.start, x.stop - x.start) <= 0:
+            return None
+        return (z, y, x), _open_grid(self.axes[0][z], self.axes[1][y], self.axes[2][x])
+
+    def share_inside(self, distance: NDArray[np.floating[Any]]) -> Field:
+        """Return how much of each sample lies inside, 0..1."""
+        share: Field = np.clip(0.5 - distance / self.width_um, 0.0, 1.0).astype(np.float32)
+        return share
+
+    def in_voxels(self, samples: Field) -> Field:
+        """Average the samples of each voxel."""
+        depth, height, width = samples.shape
+        means: Field = samples.reshape(depth // _SAMPLES, _SAMPLES, height, width).mean(axis=1)
+        return means
+
+
+def _draw_nuclei(tissue: Tissue, canvas: _Canvas) -> Field:
+    dye = np.zeros(canvas.shape, np.float32)
+    for nucleus in tissue.nuclei:
+        found = canvas.around(*_corners(nucleus.center_um, nucleus.reach_um))
+        if found is not None:
+            where, points = found
+            distance = nucleus.distance(points)
+            # Chromatin shows well inside only: at the surface the dye is even, as the truth says.
+            depth = np.clip((-distance - CHROMATIN_FROM_UM) / CHROMATIN_FROM_UM, 0.0, 1.0)
+            even = nucleus.brightness * (1.0 + CHROMATIN * depth * _chromatin(points))
+            dye[where] = np.maximum(dye[where], even * canvas.share_inside(distance))
+    return dye
+
+
+def _chromatin(points: Points) -> Values:
+    """Clumps about 1.5 um apart, -1 .. 1: slanted waves that bend one another."""
+    z, y, x = points
+    a = 3.1 * z + 2.9 * y + 1.0 * x
+    b = 0.9 * z - 2.4 * y + 3.7 * x
+    c = 2.5 * z + 1.9 * y - 3.3 * x
+    clumps: Values = np.sin(a + 1.4 * np.sin(b)) * np.sin(b + 1.4 * np.sin(0.7 * c + 0.5 * a))
+    return clumps
+
+
+def _draw_membranes(tissue: Tissue, canvas: _Canvas) -> Field:
+    """Tumour cells: balls that share a flat wall where two overlap, as soap bubbles do."""
+    nearest = np.full(canvas.shape, 1e3, np.float32)
+    second = np.full(canvas.shape, 1e3, np.float32)
+    brightness = np.zeros(canvas.shape, np.float32)
+    for cell in tissue.nuclei:
+        found = canvas.around(*_corners(cell.center_um, cell.cell_um))
+        if cell.cell_um == 0.0 or found is None:
+            continue
+        where, points = found
+        distance = cell.cell_distance(points).astype(np.float32)
+        wins = distance < nearest[where]
+        np.minimum(second[where], np.where(wins, nearest[where], distance), out=second[where])
+        brightness[where][wins] = cell.brightness
+        np.minimum(nearest[where], distance, out=nearest[where])
+    depth = np.minimum(-nearest, (second - nearest) / 2.0)  # from the cell's own boundary inwards
+    body = canvas.share_inside(nearest)
+    inner = canvas.share_inside(MEMBRANE_UM - depth)
+    plasma = inner.copy()
+    for nucleus in tissue.nuclei:
+        found = canvas.around(*_corners(nucleus.center_um, nucleus.reach_um))
+        if found is not None:
+            where, points = found
+            plasma[where] *= 1.0 - canvas.share_inside(nucleus.distance(points))
+    dye: Field = brightness * (body - inner + CYTOPLASM * plasma)
+    return dye
+
+
+def _draw_vessels(tissue: Tissue, canvas: _Canvas) -> Field:
+    """Tubes with a wall and an open lumen, which runs on through the forks."""
+    outer = np.full(canvas.shape, 1e3, np.float32)
+    for tube in tissue.vessels:
+        found = canvas.around(tube.low_um, tube.high_um)
+        if found is not None:
+            where, points = found
+            outer[where] = np.minimum(outer[where], tube.distance(points))
+    wall: Field = canvas.share_inside(outer) - canvas.share_inside(outer + WALL_UM)
+    return wall
+
+
+DRAW: dict[str, Callable[[Tissue, _Canvas], Field]] = {
+    "Hoechst": _draw_nuclei,
+    "MART1": _draw_membranes,
+    "CD31": _draw_vessels,
+}
+
+
+def _corners(center_um: Triple, reach_um: float) -> tuple[Triple, Triple]:
+    z, y, x = center_um
+    return (z - reach_um, y - reach_um, x - reach_um), (z + reach_um, y + reach_um, x + reach_um)
+
+
+def _positions(box: Box) -> Points:
+    z, y, x = (np.arange(a, b) * h for a, b, h in zip(box.start, box.stop, SPACING_UM, strict=True))
+    return _open_grid(z, y, x)
+
+
+def _open_grid(z: NDArray[Any], y: NDArray[Any], x: NDArray[Any]) -> Points:
+    return z[:, None, None], y[None, :, None], x[None, None, :]

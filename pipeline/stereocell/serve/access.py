@@ -1,0 +1,149 @@
+"""Who may ask a server: requests by its own names, pages of its own origin, holders of a session.
+
+A page of another site can have a browser send requests here. Against that: the Host header must be
+one of the server's names (DNS rebinding), and the Origin, which browsers always send with a
+websocket and pages can't change, must be the same host and port (cross-site websocket hijacking).
+Where a page of another site asks without one (an image, a script, a frame), browsers say so by
+Sec-Fetch-Site; it may only lead a person here. Programs that are no browsers send neither and need
+none. On the LAN all requests need a session besides: a one-time token, in the address that a QR
+code carries, is exchanged for a cookie and then void.
+"""
+
+import secrets
+from collections.abc import Callable, Collection
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, urlsplit
+
+from starlette.datastructures import Headers
+from starlette.responses import PlainTextResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
+
+from stereocell.serve.headers import protect
+from stereocell.serve.static_files import redirect
+
+# __Host-: browsers take it with Secure and Path=/ only, and from no neighbouring host.
+# Lax: the page may be opened from a scanner's link; websockets of other sites go without it.
+COOKIE = "__Host-stereocell"
+_ATTRIBUTES = "Path=/; Secure; HttpOnly; SameSite=Lax"
+
+
+class Gate:
+    """Tokens and sessions of a server on the LAN. Nothing is kept beyond the process."""
+
+    def __init__(self, on_used: Callable[[], None]) -> None:
+        """on_used: called when a token was used; `token` is then a new one, for another device."""
+        self._on_used = on_used
+        self._sessions: list[str] = []
+        self.token = secrets.token_urlsafe(32)
+
+    def exchange(self, token: str) -> str | None:
+        """Return a new session for the token, which is void from now on; None: it is wrong."""
+        if not secrets.compare_digest(token.encode(), self.token.encode()):
+            return None
+        self.token = secrets.token_urlsafe(32)
+        self._sessions.append(secrets.token_urlsafe(32))
+        self._on_used()
+        return self._sessions[-1]
+
+    def knows(self, session: str) -> bool:
+        """Return whether this is a session."""
+        found = False
+        for known in self._sessions:
+            found |= secrets.compare_digest(session.encode(), known.encode())
+        return found
+
+
+class Access:
+    """ASGI middleware: refuses with 403 whoever may not ask, before anything is looked at.
+
+    All answers get the headers that protect them (serve_headers.py): it is the outermost layer.
+    """
+
+    def __init__(self, app: ASGIApp, names: Collection[str], gate: Gate | None) -> None:
+        """names: hosts that this server answers to, in lower case; gate: None on localhost."""
+        self._app = app
+        self._names = frozenset(names)
+        self._gate = gate
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+
+        async def send_protected(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = protect(message.get("headers", []))
+            await send(message)
+
+        answer = self._judge(scope)
+        if answer is None:
+            await self._app(scope, receive, send_protected)
+        elif scope["type"] == "http":
+            await answer(scope, receive, send_protected)
+        else:
+            # 403 without a word: after a response of its own uvicorn logs a fault that is none
+            await WebSocket(scope, receive, send).close()
+
+    def _judge(self, scope: Scope) -> Response | None:
+        """Return the answer to a request that goes no further, or None."""
+        headers = Headers(scope=scope)
+        host = headers.get("host", "").lower()
+        if _name(host) not in self._names:
+            return PlainTextResponse("this server answers to its own names only", 403)
+        if not (_is_own_origin(headers, host) and _is_own_fetch(headers)):
+            return PlainTextResponse("pages of other origins may not ask this server", 403)
+        return None if self._gate is None else self._judge_session(scope, headers, self._gate)
+
+    def _judge_session(self, scope: Scope, headers: Headers, gate: Gate) -> Response | None:
+        tokens = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
+        is_known = gate.knows(_cookie(headers))
+        if not tokens:
+            return None if is_known else _no_session()
+        if scope["type"] != "http" or scope["method"] != "GET":  # a HEAD is a preview, not a visit
+            return _no_session()
+        if is_known:
+            return redirect(scope["path"])
+        session = gate.exchange(tokens[0])
+        if session is None:
+            return _no_session()
+        answer = redirect(scope["path"])
+        answer.headers["set-cookie"] = f"{COOKIE}={session}; {_ATTRIBUTES}"
+        return answer
+
+
+def _is_own_origin(headers: Headers, host: str) -> bool:
+    try:
+        return all(urlsplit(one.lower()).netloc == host for one in headers.getlist("origin"))
+    except ValueError:
+        return False
+
+
+def _is_own_fetch(headers: Headers) -> bool:
+    """Return whether it is this server's page, a person, or no browser that asks."""
+    if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
+        return True
+    goes = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
+    return goes == ("navigate", "document")  # a link, on a page or in a chat
+
+
+def _name(host: str) -> str:
+    """Return a Host header without its port; [::1]:80 keeps its brackets."""
+    name, colon, port = host.rpartition(":")
+    return name if colon and port.isdecimal() else host
+
+
+def _cookie(headers: Headers) -> str:
+    try:
+        morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+    except CookieError:
+        return ""
+    return "" if morsel is None else morsel.value
+
+
+def _no_session() -> Response:
+    return PlainTextResponse(
+        "scan the QR code in the terminal where this server was started; each works once",
+        403,
+        {"Cache-Control": "no-store"},
+    )

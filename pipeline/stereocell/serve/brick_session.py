@@ -1,0 +1,445 @@
+"""One client's websocket `/bricks`: what it asks for by view comes in order, coarse to fine.
+
+Three tasks share a connection: one reads messages, one opens trees (which may have to be built),
+one sends. Whatever takes time runs in threads, so that no client waits for another's. What is on
+its way, unacknowledged, never exceeds the client's window. Whoever breaks the rules of
+docs/brick-stream.md is closed with a code and a reason:
+
+    1003  a binary frame                    1007  no UTF-8, no JSON, not as the schema asks
+    1008  against the order or the limits   1009  a message that is too long
+    1012  the bundle was written anew       1013  too many connections
+
+(1001, the server ends, and limits of frames that are no messages: serve_socket.py.)
+"""
+
+import asyncio
+import base64
+import binascii
+import json
+import logging
+from collections import Counter, deque
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from stereocell.formats.brick_stream import (
+    BRICKS_FRAME,
+    ENTRY,
+    FRAME,
+    TABLE_FRAME,
+    VERSION,
+    BrickFormatError,
+    Frame,
+    Part,
+    encode_frame,
+    parse_message,
+)
+from stereocell.model.errors import StereoCellError
+from stereocell.serve.brick_library import BrickFile, BrickLibrary, UnknownVolumeError
+from stereocell.serve.brick_order import View, order
+from stereocell.serve.limits import (
+    ACK_S,
+    ACKS_PER_S,
+    CLIENT_SOCKETS,
+    FRAME_BYTES,
+    HELLO_S,
+    MAX_CONNECTIONS,
+    MAX_TREES,
+    MESSAGE_BYTES,
+    MESSAGES_PER_S,
+    WINDOW_BYTES,
+    Bucket,
+    Refusal,
+)
+
+_AHEAD = 2048  # bricks that are looked at for one frame
+_LOG = logging.getLogger(__name__)
+T = TypeVar("T")
+
+
+class BrickEndpoint:
+    """The websocket's side of a server: its connections share a library and threads."""
+
+    def __init__(self, library: BrickLibrary) -> None:
+        self._library = library
+        self._builder = ThreadPoolExecutor(1, "bricks-build")
+        self._quick = ThreadPoolExecutor(2, "bricks-read")
+        self._connections: Counter[str] = Counter()  # by the client's address
+
+    async def talk(self, socket: WebSocket) -> None:
+        """Talk to one client until it leaves or is closed."""
+        await socket.accept()
+        address = socket.client.host if socket.client else ""
+        counts = self._connections
+        for count, most in ((counts.total(), MAX_CONNECTIONS), (counts[address], CLIENT_SOCKETS)):
+            if count >= most:
+                await socket.close(1013, f"{most} connections are open, try again later")
+                return
+        counts[address] += 1
+        try:
+            await BrickSession(socket, self._library, self._builder, self._quick).run()
+        finally:
+            counts[address] -= 1
+            counts += Counter()  # leaves out those at 0
+
+    def close(self) -> None:
+        """Let the threads end; what they are at is finished."""
+        self._builder.shutdown(wait=False, cancel_futures=True)
+        self._quick.shutdown(wait=False, cancel_futures=True)
+
+
+@dataclass(slots=True)
+class _Tree:
+    tile: str
+    channel: str
+    table_hash: str
+    nodes: int
+    sent: bytearray  # a byte for each node: 1 where the client has its brick
+
+
+@dataclass(slots=True)
+class _Running:
+    """A view under way. order: tree's number, node, bytes: int64 (3, n), once it is known."""
+
+    id: int
+    message: dict[str, Any]
+    budget: int
+    order: NDArray[np.int64] | None = None
+    files: dict[int, BrickFile] | None = None
+    at: int = 0
+    bricks: int = 0
+    bytes: int = 0
+
+
+class BrickSession:
+    """One connection."""
+
+    def __init__(
+        self,
+        socket: WebSocket,
+        library: BrickLibrary,
+        builder: ThreadPoolExecutor,
+        quick: ThreadPoolExecutor,
+    ) -> None:
+        self._socket = socket
+        self._library = library
+        self._builder = builder
+        self._quick = quick
+        self._window = WINDOW_BYTES
+        self._trees: list[_Tree] = []
+        self._asked = 0  # trees that were asked for
+        self._to_open: asyncio.Queue[dict[str, str]] = asyncio.Queue()
+        self._outbox: deque[str | Part] = deque()
+        self._view: _Running | None = None
+        self._wake = asyncio.Event()
+        self._sequence = 0
+        self._flying: deque[tuple[int, int]] = deque()  # (sequence, bytes) without an ack
+        self._flying_bytes = 0
+        self._acked = asyncio.Event()
+        self._messages = Bucket(MESSAGES_PER_S)
+        self._acks = Bucket(ACKS_PER_S)
+
+    async def run(self) -> None:
+        """Serve the client. Closes the socket itself, unless the client left."""
+        tasks = [asyncio.create_task(work) for work in (self._read(), self._open(), self._send())]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        errors = [error for task in done if (error := task.exception()) is not None]
+        if any(isinstance(error, WebSocketDisconnect) for error in errors):
+            return
+        for error in errors:
+            if not isinstance(error, Refusal):
+                raise error
+        for error in errors:
+            assert isinstance(error, Refusal)
+            try:
+                await self._socket.close(error.code, error.reason)
+            except (WebSocketDisconnect, RuntimeError):  # it left at this moment
+                return
+            break
+
+    # --- what comes in
+
+    async def _read(self) -> None:
+        try:
+            async with asyncio.timeout(HELLO_S):
+                hello = await self._receive()
+        except TimeoutError:
+            raise Refusal(1008, f"no hello within {HELLO_S:g} s") from None
+        if hello["type"] != "hello":
+            raise Refusal(1008, f"{hello['type']} before hello")
+        if hello["version"] != VERSION:
+            raise Refusal(1008, f"version {hello['version']}, expected {VERSION}")
+        self._window = int(hello.get("window", WINDOW_BYTES))
+        limits = {
+            "message_bytes": MESSAGE_BYTES,
+            "trees": MAX_TREES,
+            "messages_per_s": MESSAGES_PER_S,
+            "ack_s": ACK_S,
+        }
+        self._say({"type": "welcome", "version": VERSION, "window": self._window, "limits": limits})
+        handlers: dict[str, Callable[[dict[str, Any]], None]] = {
+            "ack": self._on_ack,
+            "cancel": self._on_cancel,
+            "have": self._on_have,
+            "open": self._on_open,
+            "view": self._on_view,
+        }
+        while True:
+            message = await self._receive()
+            handler = handlers.get(message["type"])
+            if handler is None:
+                raise Refusal(1008, "a second hello")
+            handler(message)
+
+    async def _receive(self) -> dict[str, Any]:
+        event = await self._socket.receive()
+        if event["type"] != "websocket.receive":
+            raise WebSocketDisconnect(event.get("code", 1006), event.get("reason"))
+        text = event.get("text")
+        if text is None:
+            raise Refusal(1003, "binary frames go to the client only")
+        if len(text) > MESSAGE_BYTES:
+            raise Refusal(1009, f"a message of more than {MESSAGE_BYTES} bytes")
+        try:
+            message = parse_message(text)
+        except BrickFormatError as error:
+            raise Refusal(1007, str(error)) from None
+        bucket = self._acks if message["type"] == "ack" else self._messages
+        if not bucket.take():
+            raise Refusal(1008, f"more than {bucket.per_s} messages a second")
+        return message
+
+    def _on_ack(self, message: dict[str, Any]) -> None:
+        sequence = int(message["sequence"])
+        if sequence > self._sequence:
+            raise Refusal(1008, f"ack of frame {sequence}, the last one was {self._sequence}")
+        while self._flying and self._flying[0][0] <= sequence:
+            self._flying_bytes -= self._flying.popleft()[1]
+        self._acked.set()
+
+    def _on_cancel(self, message: dict[str, Any]) -> None:
+        if self._view is not None and self._view.id == int(message["id"]):
+            self._finish("cancelled")
+
+    def _on_have(self, message: dict[str, Any]) -> None:
+        tree = self._trees[self._known(int(message["tree"]))]
+        try:
+            packed = base64.b64decode(message["nodes"], validate=True)
+        except binascii.Error:
+            raise Refusal(1007, "have: nodes is not base64") from None
+        if len(packed) != (tree.nodes + 7) // 8:
+            raise Refusal(1007, f"have: {len(packed)} bytes for {tree.nodes} nodes")
+        bits = np.unpackbits(np.frombuffer(packed, np.uint8), count=tree.nodes, bitorder="little")
+        tree.sent = bytearray(bits.tobytes())
+
+    def _on_open(self, message: dict[str, Any]) -> None:
+        self._asked += len(message["volumes"])
+        if self._asked > MAX_TREES:
+            raise Refusal(1008, f"more than {MAX_TREES} trees on one connection")
+        for volume in message["volumes"]:
+            self._to_open.put_nowait(volume)
+
+    def _on_view(self, message: dict[str, Any]) -> None:
+        for number in message["trees"]:
+            self._known(int(number))
+        if self._view is not None:
+            self._finish("cancelled")
+        self._view = _Running(int(message["id"]), message, int(message["budget"]))
+        self._wake.set()
+
+    def _known(self, number: int) -> int:
+        if number >= len(self._trees):
+            raise Refusal(1008, f"tree {number} is not open")
+        return number
+
+    # --- trees
+
+    async def _open(self) -> None:
+        while True:
+            wanted = await self._to_open.get()
+            tile, channel = wanted["tile"], wanted["channel"]
+            try:
+                there = partial(self._library.open_built, tile, channel)
+                file = await self._in(self._quick, there)
+                if file is None:
+                    file = await self._in(self._builder, partial(self._library.open, tile, channel))
+            except UnknownVolumeError as error:
+                self._tell(wanted, "unknown", str(error))
+                continue
+            except (StereoCellError, OSError) as error:
+                _LOG.error("%s", error)  # for this machine's user: it may name folders
+                self._tell(wanted, "damaged", "can't be read; the server's terminal says why")
+                continue
+            table = file.table
+            number = len(self._trees)
+            self._trees.append(
+                _Tree(tile, channel, file.table_hash, len(table.nodes), bytearray(len(table.nodes)))
+            )
+            follows = wanted.get("table") != file.table_hash
+            self._say(
+                {
+                    "type": "tree",
+                    "tree": number,
+                    "tile": tile,
+                    "channel": channel,
+                    "source": file.volume.source,
+                    "table": file.table_hash,
+                    "table_bytes": table.bytes,
+                    "table_follows": follows,
+                    "nodes": len(table.nodes),
+                    "bricks": int(np.count_nonzero(table.nodes["length"])),
+                    "brick_bytes": table.brick_bytes,
+                }
+            )
+            if follows:
+                for at in range(0, table.bytes, FRAME_BYTES):
+                    part = file.table_bytes[at : at + FRAME_BYTES]
+                    self._outbox.append(Part(number, at, part))
+
+    # --- what goes out
+
+    async def _send(self) -> None:
+        while True:
+            if self._outbox:
+                item = self._outbox.popleft()
+                if isinstance(item, str):
+                    await self._socket.send_text(item)
+                else:
+                    frame = Frame(TABLE_FRAME, self._sequence + 1, 0, (item,))
+                    await self._push(await self._in(self._quick, partial(encode_frame, frame)))
+            elif self._view is None:
+                self._wake.clear()
+                await self._wake.wait()
+            elif self._view.order is None:
+                await self._plan(self._view)
+            else:
+                await self._send_batch(self._view)
+
+    async def _plan(self, view: _Running) -> None:
+        trees = {int(number): self._trees[int(number)] for number in view.message["trees"]}
+
+        def work() -> tuple[dict[int, BrickFile], NDArray[np.int64]]:
+            files = {}
+            for number, tree in trees.items():
+                file = self._library.open_built(tree.tile, tree.channel)
+                if file is None or file.table_hash != tree.table_hash:
+                    raise Refusal(1012, "the bundle was written anew, connect again")
+                files[number] = file
+            found = _find_order(view.message, files)
+            for number, tree in trees.items():  # here, as the event loop must not be held up
+                sent = np.frombuffer(tree.sent, np.uint8)
+                here = found[0] == number
+                here[here] = sent[found[1, here]] != 0
+                found = found[:, ~here]
+            return files, found
+
+        try:
+            view.files, view.order = await self._in(self._quick, work)
+        except (StereoCellError, OSError) as error:
+            _LOG.error("%s", error)
+            raise Refusal(1012, "the bundle was written anew, connect again") from None
+
+    async def _send_batch(self, view: _Running) -> None:
+        order, files = view.order, view.files
+        assert order is not None
+        assert files is not None
+        picked, spent, length, at = [], 0, FRAME.size, view.at
+        is_over = False
+        for tree, node, size in order[:, at : at + _AHEAD].T.tolist():
+            if not self._trees[tree].sent[node]:
+                is_over = view.bytes + spent + size > view.budget
+                if is_over or length + ENTRY.size + size > FRAME_BYTES:
+                    break
+                picked.append((tree, node))
+                spent += size
+                length += ENTRY.size + size
+            at += 1
+        if not picked:
+            view.at = at
+            if is_over or at == order.shape[1]:
+                self._finish("budget" if is_over else "complete")
+            return
+
+        def work() -> bytes:
+            parts = [Part(t, n, files[t].read([n])[0]) for t, n in picked]
+            return encode_frame(Frame(BRICKS_FRAME, self._sequence + 1, view.id, tuple(parts)))
+
+        data = await self._in(self._quick, work)
+        await self._wait_for_room(len(data))
+        if self._view is not view:  # ended meanwhile, and its `done` is on its way
+            return
+        view.at = at
+        view.bricks += len(picked)
+        view.bytes += spent
+        for tree, node in picked:
+            self._trees[tree].sent[node] = 1
+        await self._push(data)
+
+    async def _push(self, data: bytes) -> None:
+        """Send a binary frame, which carries the next sequence number."""
+        await self._wait_for_room(len(data))
+        self._sequence += 1
+        self._flying.append((self._sequence, len(data)))
+        self._flying_bytes += len(data)
+        await self._socket.send_bytes(data)
+
+    async def _wait_for_room(self, length: int) -> None:
+        while self._flying_bytes + length > self._window:
+            self._acked.clear()
+            try:
+                async with asyncio.timeout(ACK_S):
+                    await self._acked.wait()
+            except TimeoutError:
+                raise Refusal(1008, f"no ack within {ACK_S:g} s") from None
+
+    def _finish(self, reason: str) -> None:
+        view = self._view
+        assert view is not None
+        self._view = None
+        counts = {"bricks": view.bricks, "bytes": view.bytes}
+        self._say({"type": "done", "view": view.id, "reason": reason, **counts})
+
+    def _tell(self, volume: dict[str, str], code: str, message: str) -> None:
+        place = {"tile": volume["tile"], "channel": volume["channel"]}
+        self._say({"type": "error", "code": code, "message": message, **place})
+
+    def _say(self, message: dict[str, Any]) -> None:
+        self._outbox.append(json.dumps(message))
+        self._wake.set()
+
+    async def _in(self, threads: ThreadPoolExecutor, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(threads, work)
+
+
+def _find_order(message: dict[str, Any], files: dict[int, BrickFile]) -> NDArray[np.int64]:
+    """Return tree's number, node, bytes of all bricks that a view wants, (3, n), in order."""
+
+    def vector(key: str) -> NDArray[np.float64]:
+        return np.array(message[key], dtype=np.float64)
+
+    view = View(
+        vector("clip").reshape(4, 4).T,
+        vector("eye"),
+        vector("gaze"),
+        float(message["pixels_per_radian"]),
+        float(message["texel_px"]),
+        float(message.get("error_grey", 0.0)),
+    )
+    numbers = list(files)
+    tree, node, _ = order(view, [files[number].placed for number in numbers])
+    sizes = np.zeros(len(node), dtype=np.int64)
+    for i, number in enumerate(numbers):
+        here = tree == i
+        sizes[here] = files[number].table.nodes["length"][node[here]]
+    return np.stack([np.array(numbers)[tree], node, sizes])

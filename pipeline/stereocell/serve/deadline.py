@@ -1,0 +1,62 @@
+"""Close connections on which no request comes: uvicorn itself lets them stand for ever.
+
+Its `timeout_keep_alive` begins with the end of an answer and ends with the next byte, whatever that
+is; nothing is counted before the first request, and `limit_concurrency` counts whole requests. So a
+client that connects and is silent, or sends a head (or the body of what was answered) a byte at a
+time, holds a socket for good. Here a head has HEAD_S seconds, from the connection on or from the
+end of the answer before it. (The TLS handshake, which comes first, has as long: serve_lifetime.py.)
+"""
+
+import asyncio
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from stereocell.serve.limits import HEAD_S
+
+
+class HeadDeadline(H11Protocol):
+    """uvicorn's HTTP protocol, whose client must send its request's head in time."""
+
+    head_s = HEAD_S
+    _deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._await_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._stop()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        self._stop_if_answering()
+
+    def on_response_complete(self) -> None:
+        self._await_head()
+        super().on_response_complete()  # a request that came in the meantime begins here
+        self._stop_if_answering()
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        self._stop()  # what follows has limits of its own: serve_limits.py
+        super().handle_websocket_upgrade(event)
+
+    def _await_head(self) -> None:
+        self._stop()
+        self._deadline = self.loop.call_later(self.head_s, self._give_up)
+
+    def _stop_if_answering(self) -> None:
+        if self.cycle is not None and not self.cycle.response_complete:
+            self._stop()
+
+    def _stop(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+    def _give_up(self) -> None:
+        if self.transport.get_write_buffer_size():
+            self.transport.close()  # the end of an answer is still on its way
+        else:
+            self.transport.abort()  # closing TLS would wait for the client once more

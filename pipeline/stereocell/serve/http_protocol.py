@@ -1,0 +1,213 @@
+"""HTTP as far as a bundle needs it: whatever else comes is refused before it is looked at.
+
+uvicorn hands every request to the application, and closes what it can't parse with 400. Here a
+request has no body (413; without one there is nothing to smuggle a second request in), one plain
+path, and a head of limited size; a client has so many connections and requests. A refused client
+may go on sending for LINGER_S: closed at once, its system would throw the answer away.
+"""
+
+import asyncio
+import sys
+from http import HTTPStatus
+from typing import Any
+
+import h11
+import uvicorn
+from uvicorn.server import ServerState
+
+from stereocell.serve.deadline import HeadDeadline
+from stereocell.serve.headers import protect
+from stereocell.serve.limits import (
+    HEAD_BYTES,
+    LINGER_S,
+    MAX_HEADERS,
+    REQUESTS_PER_S,
+    STALL_S,
+    TARGET_BYTES,
+    Clients,
+)
+
+_LINE_BYTES = 8 << 10  # a header; websockets takes no longer one
+_VERSIONS = ("1.0", "1.1")
+
+
+class State(ServerState):
+    """What all connections of a server share."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.clients = Clients()
+
+
+class _RefusedError(Exception):
+    """The request is answered with this status, and its connection closed."""
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+class GuardedHttp(HeadDeadline):
+    """uvicorn's HTTP protocol, for clients that may mean ill."""
+
+    stall_s = STALL_S
+    _is_refused = False
+    _is_counted = False
+    _stalled: asyncio.TimerHandle | None = None
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, app_state, _loop)
+        assert isinstance(server_state, State)
+        self._clients = server_state.clients
+
+    # --- connections
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._is_counted = self._clients.enter(self._address)
+        if not self._is_counted:
+            self._refuse(_RefusedError(503, "too many connections are open, try again later"))
+            self.transport.close()  # lingering would keep what there is too much of
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self._is_counted:
+            self._clients.leave(self._address)
+            self._is_counted = False
+        self._end_stall()
+        super().connection_lost(exc)
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        self._is_counted = False  # it is the websocket's now, which leaves in its time
+        super().handle_websocket_upgrade(event)
+
+    @property
+    def _address(self) -> str:
+        return self.client[0] if self.client else ""
+
+    def shutdown(self) -> None:
+        if self._is_refused:
+            self.transport.abort()
+        else:
+            super().shutdown()
+
+    # --- requests
+
+    def data_received(self, data: bytes) -> None:
+        if not self._is_refused:
+            super().data_received(data)
+
+    def handle_events(self) -> None:
+        try:
+            super().handle_events()
+        except _RefusedError as error:
+            self._refuse(error)
+
+    def _should_upgrade(self) -> bool:
+        """The place between a head and its answer: refuse what no honest client sends."""
+        self._judge()
+        return super()._should_upgrade()
+
+    def _judge(self) -> None:
+        if not self._clients.ask(self._address):
+            raise _RefusedError(429, f"more than {REQUESTS_PER_S} requests a second")
+        scope, headers = self.scope, self.headers
+        if scope["http_version"] not in _VERSIONS:
+            raise _RefusedError(505, "this server speaks HTTP/1.1")
+        target = len(scope["raw_path"]) + len(scope["query_string"])
+        if target > TARGET_BYTES:
+            raise _RefusedError(414, f"an address of more than {TARGET_BYTES} bytes")
+        sizes = [len(name) + len(value) for name, value in headers]
+        is_long = target + sum(sizes) > HEAD_BYTES or max(sizes, default=0) > _LINE_BYTES
+        if is_long or len(sizes) > MAX_HEADERS:
+            raise _RefusedError(
+                431, f"more than {MAX_HEADERS} headers, {_LINE_BYTES} bytes of one or {HEAD_BYTES}"
+            )
+        if not scope["raw_path"].startswith(b"/"):
+            raise _RefusedError(400, "expected the path of a file")
+        names = {name for name, _ in headers}
+        if {b"content-length", b"transfer-encoding"} <= names:
+            raise _RefusedError(400, "both Content-Length and Transfer-Encoding")
+        length = next((value for name, value in headers if name == b"content-length"), b"0")
+        if b"transfer-encoding" in names or length.strip(b"0"):
+            raise _RefusedError(413, "this server takes no bodies")
+        if b"upgrade" in names and scope["method"] != "GET":
+            raise _RefusedError(405, "websockets begin with GET")
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer what can't be parsed; called where h11's error is handled.
+
+        There is no text: it may have been a HEAD, whose answer has no body.
+        """
+        status = getattr(sys.exception(), "error_status_hint", 400)
+        if status == 431 and b"\n" not in self.conn.trailing_data[0]:
+            status = 414
+        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            self._refuse(_RefusedError(status, ""))
+        else:
+            self.transport.abort()
+
+    def _refuse(self, error: _RefusedError) -> None:
+        self._is_refused = True
+        self._stop()
+        self._unset_keepalive_if_required()
+        text = f"{error}\n".encode() if str(error) else b""
+        headers = [
+            (b"content-type", b"text/plain; charset=utf-8"),
+            (b"content-length", str(len(text)).encode()),
+            (b"cache-control", b"no-store"),
+            (b"connection", b"close"),
+        ]
+        if error.status in (429, 503):
+            headers.append((b"retry-after", b"1"))
+        if error.status == 405:
+            headers.append((b"allow", b"GET, HEAD"))
+        answer = h11.Response(
+            status_code=error.status,
+            headers=protect(self.server_state.default_headers + headers),
+            reason=HTTPStatus(error.status).phrase.encode(),
+        )
+        # a HEAD is told the length alone: h11 takes no body for its answer
+        is_head = self.scope is not None and self.scope["method"] == "HEAD"
+        for event in (answer, h11.Data(data=b"" if is_head else text), h11.EndOfMessage()):
+            self.transport.write(self.conn.send(event) or b"")
+        if self.transport.can_write_eof():
+            self.transport.write_eof()
+            self.transport.resume_reading()
+        else:
+            self.transport.close()  # TLS: waits for the client's part of the end
+        self.loop.call_later(LINGER_S, self.transport.abort)
+
+    # --- answers that nobody takes
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._await_progress()
+
+    def resume_writing(self) -> None:
+        self._end_stall()
+        super().resume_writing()
+
+    def timeout_keep_alive_handler(self) -> None:
+        super().timeout_keep_alive_handler()
+        self.loop.call_later(self.stall_s, self.transport.abort)
+
+    def _await_progress(self) -> None:
+        left = self.transport.get_write_buffer_size()
+        self._stalled = self.loop.call_later(self.stall_s, self._check_progress, left)
+
+    def _check_progress(self, left: int) -> None:
+        if self.transport.get_write_buffer_size() >= left:
+            self.transport.abort()
+        else:
+            self._await_progress()
+
+    def _end_stall(self) -> None:
+        if self._stalled is not None:
+            self._stalled.cancel()
+            self._stalled = None

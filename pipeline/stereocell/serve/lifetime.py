@@ -1,0 +1,153 @@
+"""Begin and end: what runs when the server is stopped may end in STOP_S, and nothing new begins.
+
+uvicorn alone gives TLS a minute before the first byte, logs a fault and a traceback for what did
+not end in time, and from Python 3.12 on waits for clients even after the second Ctrl+C. asyncio
+counts a connection with TLS as one only once it has shaken hands: a crowd that keeps silent would
+take all that this process may open.
+"""
+
+import asyncio
+import errno
+import signal
+import socket
+import ssl
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import uvicorn
+
+from stereocell.serve.http_protocol import GuardedHttp, State
+from stereocell.serve.limits import HEAD_S, STOP_S
+
+_TICK_S = 0.05
+
+
+class Lifetime(uvicorn.Server):
+    """uvicorn's server on one bound socket."""
+
+    handshake_s = HEAD_S
+    stop_s = STOP_S
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        context: ssl.SSLContext | None,
+        on_wait: Callable[[int], None],
+    ) -> None:
+        """context: for TLS; on_wait: told how many transfers the end waits for."""
+        super().__init__(config)
+        self.server_state = state = State()
+        self._clients = state.clients
+        self._context = context
+        self._on_wait = on_wait
+        self._handshakes: set[asyncio.Task[None]] = set()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await self.lifespan.startup()
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(_tell_fault)
+        make: Callable[[], asyncio.Protocol] = self._make_http
+        if self._context is not None:
+            make = partial(_Door, self._shake)
+        self.servers = [await loop.create_server(make, sock=one) for one in sockets or []]
+        self.started = True
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Answer SIGTERM, and SIGINT unless it was ignored: so shells start what runs behind."""
+        is_ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        with super().capture_signals():
+            if is_ignored and threading.current_thread() is threading.main_thread():
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+            yield
+
+    def _make_http(self) -> GuardedHttp:
+        return GuardedHttp(self.config, self.server_state, self.lifespan.state)
+
+    def _shake(self, transport: asyncio.Transport) -> None:
+        """Begin TLS on a new connection, which counts from now on."""
+        address = str((transport.get_extra_info("peername") or ("",))[0])
+        if not self._clients.enter(address):
+            transport.abort()
+            return
+
+        async def shake() -> None:
+            early = _Early()
+            try:
+                secure = await asyncio.get_running_loop().start_tls(
+                    transport,
+                    early,
+                    self._context,  # type: ignore[arg-type]
+                    server_side=True,
+                    ssl_handshake_timeout=self.handshake_s,
+                )
+            except OSError:  # no TLS, or too slow
+                return transport.abort()
+            finally:
+                self._clients.leave(address)
+            if secure is not None and not early.is_over:
+                http = self._make_http()
+                secure.set_protocol(http)
+                http.connection_made(secure)
+                if early.data:  # nothing at all would be the client's end
+                    http.data_received(early.data)
+
+        task = asyncio.ensure_future(shake())
+        self._handshakes.add(task)
+        task.add_done_callback(self._handshakes.discard)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        state, loop = self.server_state, asyncio.get_running_loop()
+        for server in self.servers:
+            server.close()
+        for handshake in self._handshakes:
+            handshake.cancel()
+        for connection in list(state.connections):
+            connection.shutdown()
+        end = loop.time() + self.stop_s
+        await asyncio.sleep(2 * _TICK_S)
+        transfers = sum(isinstance(one, GuardedHttp) for one in state.connections)
+        if transfers and not self.force_exit:
+            self._on_wait(transfers)
+        while (state.connections or state.tasks) and not self.force_exit and loop.time() < end:
+            await asyncio.sleep(_TICK_S)
+        for connection in list(state.connections):
+            connection.transport.abort()
+        if state.tasks:  # they hear that their clients left
+            await asyncio.wait(state.tasks, timeout=1)
+        await self.lifespan.shutdown()
+
+
+class _Door(asyncio.Protocol):
+    """A connection before TLS."""
+
+    def __init__(self, shake: Callable[[asyncio.Transport], None]) -> None:
+        self._shake = shake
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._shake(transport)
+
+
+class _Early(asyncio.Protocol):
+    """What comes right behind a handshake, before the server knows that it is over."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.is_over = False
+
+    def data_received(self, data: bytes) -> None:
+        self.data += data
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.is_over = True
+
+
+def _tell_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Pass on what went wrong, but that no more can be opened: asyncio says so for each try."""
+    fault = context.get("exception")
+    if not isinstance(fault, OSError) or fault.errno not in (errno.EMFILE, errno.ENFILE):
+        loop.default_exception_handler(context)

@@ -1,0 +1,230 @@
+"""Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
+
+The static bundle stands by itself and works on any web host; here it is served with byte ranges,
+and beside it the websocket `/bricks` sends volumes by view (serve_bricks.py). On localhost, or with
+`--lan` to the network: then by TLS, and to holders of a token only (serve_access.py). Nothing is
+logged but faults of the program itself and of the bundle: no request, so no token, and no name that
+a client sent. What the other modules refuse, and from whom, is listed in docs/brick-stream.md.
+"""
+
+import json
+import logging
+import os
+import signal
+import socket
+import ssl
+import sys
+import webbrowser
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.types import ASGIApp
+
+from stereocell.model.errors import StereoCellError
+from stereocell.serve.access import Access, Gate
+from stereocell.serve.brick_library import MANIFEST, BrickLibrary
+from stereocell.serve.brick_session import BrickEndpoint
+from stereocell.serve.http_protocol import GuardedHttp
+from stereocell.serve.lan import draw_qr, explain, find_addresses, find_names, make_certificate
+from stereocell.serve.lifetime import Lifetime
+from stereocell.serve.limits import MESSAGE_BYTES, STOP_S
+from stereocell.serve.static_files import BundleFiles, ShrunkError
+from stereocell.serve.websocket_protocol import GuardedSocket
+
+LOCALHOST = "127.0.0.1"
+_OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
+
+
+def serve(
+    out: Path, port: int, lan: bool, open_browser: bool, *, for_program: bool = False
+) -> None:
+    """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
+
+    What a person is told on stdout, a program gets as lines of JSON: first the address, then, with
+    `lan`, an address that lets in one device, anew whenever one has come in.
+
+    Returns when the transfers that run have ended, or STOP_S later. Raises KeyboardInterrupt at
+    once at a second Ctrl+C; StereoCellError if there is no bundle, the port is taken, or there is
+    no network.
+    """
+    server = BundleServer(out, port, lan, for_program)
+    # uvicorn ends by it once it runs, and then repeats it
+    before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
+    try:
+        server.introduce()
+        server.invite()
+        if open_browser:
+            webbrowser.open(server.address)
+        with suppress(KeyboardInterrupt):
+            server.run()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    if server.was_forced:
+        raise KeyboardInterrupt
+
+
+def make_app(
+    bundle: Path, library: BrickLibrary | None, names: tuple[str, ...], gate: Gate | None
+) -> ASGIApp:
+    """Return the application: the bundle's files, and `/bricks`.
+
+    library  of the bundle; None: there is no `/bricks`
+    names    the hosts that it answers to
+    gate     who may ask on the LAN; None: everybody on this machine
+    """
+    files = BundleFiles(bundle, library is not None)
+    endpoint = None if library is None else BrickEndpoint(library)
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        yield
+        if endpoint is not None:
+            endpoint.close()
+
+    routes: list[BaseRoute] = [Route("/{path:path}", files.answer, methods=["GET"])]
+    if endpoint is not None:
+        routes.insert(0, WebSocketRoute("/bricks", endpoint.talk))
+    app = Starlette(routes=routes, lifespan=lifespan)
+    app.router.redirect_slashes = False  # where a path has a line break, which no route matches
+    return Access(app, names, gate)
+
+
+def _places(out: Path) -> tuple[Path, Path | None]:
+    """Return the folders of a bundle and its trees of bricks: of OUT, or where OUT is a bundle.
+
+    None: a bundle by itself, beside which nothing is ours to write.
+    """
+    if (out / "bundle").exists() or not (out / MANIFEST).is_file():
+        return out / "bundle", out / "bricks"
+    holder = Path(os.path.abspath(out)).parent
+    is_of_build = (holder / "bundle" / MANIFEST).is_file() and (holder / "plan.json").is_file()
+    if is_of_build and os.path.samefile(holder / "bundle", out):
+        return out, holder / "bricks"
+    return out, None
+
+
+class BundleServer:
+    """A bound server: `address` is where it listens; run() until stop()."""
+
+    def __init__(self, out: Path, port: int, lan: bool, for_program: bool = False) -> None:
+        """Raises StereoCellError if there is no bundle, the port is taken, or no network."""
+        bundle, bricks = _places(out)
+        library = None if bricks is None else BrickLibrary(bundle, bricks)
+        self.bundle, self.has_bricks = bundle, bricks is not None
+        self.for_program = for_program
+        for name in (MANIFEST, "index.html"):
+            if not (bundle / name).is_file():
+                raise StereoCellError(
+                    f"{bundle / name}: expected a built bundle, found no such file; "
+                    "`stereocell bundle OUT` writes it"
+                )
+        names: tuple[str, ...] = _OWN_NAMES
+        self.gate: Gate | None = None
+        self.fingerprint = ""
+        context: ssl.SSLContext | None = None
+        host, scheme = "localhost", "http"
+        if lan:
+            addresses = find_addresses()
+            names = tuple(find_names(addresses))
+            context, self.fingerprint = make_certificate(names)
+            self.gate = Gate(self.invite)
+            host, scheme = addresses[0], "https"
+        self._socket = _bind("0.0.0.0" if lan else LOCALHOST, port)
+        self.port: int = self._socket.getsockname()[1]
+        self.address = f"{scheme}://{host}:{self.port}/"
+        config = uvicorn.Config(
+            make_app(bundle, library, names, self.gate),
+            log_config=None,
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            http=GuardedHttp,
+            ws=GuardedSocket,
+            ws_max_size=MESSAGE_BYTES,
+            ws_per_message_deflate=False,  # bricks are compressed
+        )
+        logging.getLogger("uvicorn.error").addFilter(_is_ours)
+        self._server = Lifetime(config, context, self._tell_wait)
+
+    @property
+    def has_started(self) -> bool:
+        """Whether it answers."""
+        return self._server.started
+
+    @property
+    def was_forced(self) -> bool:
+        """Whether a second Ctrl+C cut its end short."""
+        return self._server.force_exit
+
+    def introduce(self) -> None:
+        """Print the address, and what is there."""
+        if self.for_program:
+            about = {"bundle": str(self.bundle), "bricks": self.has_bricks}
+            _print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
+            return
+        alone = "" if self.has_bricks else " (a bundle by itself: its volumes come whole)"
+        print(f"{self.address} shows {self.bundle}{alone}; Ctrl+C ends it", flush=True)
+
+    def invite(self) -> None:
+        """Print the QR code for the next device on the LAN, and what to make of its warning."""
+        if self.gate is None:
+            return
+        invitation = f"{self.address}?token={self.gate.token}"
+        if self.for_program:
+            _print_json({"invitation": invitation})
+            return
+        code = draw_qr(invitation, sys.stdout.encoding or "utf-8")
+        print(explain(self.address, self.fingerprint, code), flush=True)
+
+    def _tell_wait(self, transfers: int) -> None:
+        print(
+            f"finishing {transfers} transfer{'s' * (transfers > 1)}, at most {STOP_S:g} s; "
+            "Ctrl+C again stops at once",
+            file=sys.stderr if self.for_program else sys.stdout,
+            flush=True,
+        )
+
+    def run(self) -> None:
+        """Answer until stop(), or a signal in the main thread."""
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            self._socket.close()
+
+    def stop(self) -> None:
+        """Have run() end soon; may be called from any thread."""
+        self._server.should_exit = True
+
+
+def _print_json(content: dict[str, object]) -> None:
+    print(json.dumps(content), flush=True)
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        if sys.platform != "win32":  # there it would take a port that is in use
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(128)
+    except (OSError, OverflowError) as error:
+        listener.close()
+        raise StereoCellError(
+            f"port {port}: {error}; choose another, or 0 for a free one"
+        ) from error
+    return listener
+
+
+def _is_ours(record: logging.LogRecord) -> bool:
+    """Leave out tracebacks of frames that a client got wrong: it was closed with a code.
+
+    A file that was cut meanwhile is told in a line.
+    """
+    fault = record.exc_info[1] if record.exc_info else None
+    if isinstance(fault, ShrunkError):
+        record.msg, record.args, record.exc_info = str(fault), (), None
+    return not isinstance(fault, UnicodeDecodeError)

@@ -1,0 +1,124 @@
+"""Serve the files of a bundle: types, byte ranges, 304 for what a browser has, nothing outside.
+
+The viewer fetches single mip levels by ranges (RFC 9110, section 14). A Range header that is
+malformed, in another unit, or asks for several ranges is ignored, as that section allows: the whole
+file is the answer. Everything is `no-cache`: the bundle may be built anew meanwhile.
+"""
+
+import os
+import re
+from pathlib import Path
+from urllib.parse import quote
+
+import anyio.to_thread
+import h11
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from stereocell.serve.headers import policy
+
+BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # tells a page that /bricks is there
+_HEADERS = {"Cache-Control": "no-cache"}
+_TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".glb": "model/gltf-binary",
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".ktx2": "image/ktx2",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+    ".wasm": "application/wasm",
+    ".webmanifest": "application/manifest+json",
+}
+_RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
+_DIGITS = 18  # of a number in a Range header: no file has more bytes
+
+
+class ShrunkError(Exception):
+    """A file became shorter while it was sent."""
+
+
+class _SentFile(FileResponse):
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        except h11.LocalProtocolError as error:  # less than its head had promised
+            raise ShrunkError(f"{self.path}: became shorter while it was sent") from error
+
+
+class BundleFiles:
+    """The folder that is served, and whether pages learn of bricks beside it."""
+
+    def __init__(self, folder: Path, has_bricks: bool) -> None:
+        self._root = folder.resolve()
+        self._headers = _HEADERS | (BRICKS_HEADER if has_bricks else {})
+
+    async def answer(self, request: Request) -> Response:
+        """Answer a GET or HEAD."""
+        found = await anyio.to_thread.run_sync(self._find, request.scope["path"])
+        if found is None:
+            return PlainTextResponse("not found", 404)
+        path, status = found
+        kind = _TYPES.get(path.suffix, "application/octet-stream")
+        headers = {**self._headers, **policy(kind)}
+        response = _SentFile(path, headers=headers, media_type=kind, stat_result=status)
+        response.headers["content-type"] = kind
+        tag = response.headers["etag"]
+        if tag in [known.strip() for known in request.headers.get("if-none-match", "").split(",")]:
+            return Response(status_code=304, headers={**headers, "ETag": tag})
+        _plain_range(request, status.st_size)
+        return response
+
+    def _find(self, name: str) -> tuple[Path, os.stat_result] | None:
+        """Return the file that a path names; None: there is none inside the root."""
+        if "\0" in name:
+            return None
+        try:
+            path = (self._root / name.lstrip("/")).resolve()
+            if path.is_dir():
+                path = (path / "index.html").resolve()
+            if not path.is_relative_to(self._root) or not path.is_file():
+                return None
+            return path, path.stat()
+        except (OSError, RuntimeError):  # too long a name, a folder without rights, links in a ring
+            return None
+
+
+def parse_range(header: str, size: int) -> range | None:
+    """Return the bytes that a Range header asks for, clipped to a file of `size` bytes.
+
+    An empty range can't be satisfied. None: the header is to be ignored (it is malformed, in
+    another unit, or asks for several ranges, which a server may answer with the whole file).
+    """
+    match = _RANGE.fullmatch(header.strip())
+    if match is None or max(map(len, match.groups())) > _DIGITS:
+        return None
+    first, last = match.groups()
+    if first:
+        if last and int(last) < int(first):
+            return None
+        return range(int(first), min(int(last) + 1, size) if last else size)
+    if last:
+        return range(max(0, size - int(last)), size)
+    return None
+
+
+def _plain_range(request: Request, size: int) -> None:
+    """Leave FileResponse no Range header but one plain range, or none."""
+    headers = [(key, value) for key, value in request.scope["headers"] if key != b"range"]
+    asked = parse_range(request.headers.get("range", ""), size)
+    if asked is not None:
+        last = max(asked.stop - 1, asked.start)
+        headers.append((b"range", f"bytes={asked.start}-{last}".encode()))
+    request.scope["headers"] = headers
+
+
+def redirect(path: str) -> Response:
+    """Return a redirect to a path of this server, which no cache keeps.
+
+    Its slashes are single ones: a browser takes what stands between two and a third for a host.
+    """
+    place = quote(re.sub("/+", "/", f"/{path}"))  # ":" and backslashes are encoded
+    return Response(status_code=303, headers={"Location": place, "Cache-Control": "no-store"})

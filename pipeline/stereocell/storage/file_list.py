@@ -1,0 +1,102 @@
+"""Lists of files, with size and SHA-256 of each: what was written, to be held against later.
+
+A unit, the stage and the bundle each have one. Whoever reads a file hashes it before (`is_same`),
+`stereocell check` hashes all. What only asks whether there is anything to do reads no file that is
+no newer than its list: there sizes have to do. SHA-256 hashes 1 GB/s here, BLAKE2b no more.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from stereocell.model.errors import OutputError
+from stereocell.storage.json_files import read_json
+from stereocell.storage.object_store import at_hand, is_mirrored, sizes_below
+
+# by path from the list's folder, with forward slashes: {"bytes": ..., "sha256": ...}
+FileList = Mapping[str, Mapping[str, Any]]
+MISSING, DAMAGED = "missing", "damaged"
+
+
+def measure(file: Path) -> dict[str, Any]:
+    """Return a file's entry in a list."""
+    with file.open("rb") as opened:
+        digest = hashlib.file_digest(opened, "sha256")
+        return {"bytes": os.fstat(opened.fileno()).st_size, "sha256": digest.hexdigest()}
+
+
+def list_files(*paths: Path, root: Path) -> dict[str, dict[str, Any]]:
+    """Return the list of files, and of all below folders, by their paths from `root`."""
+    listed = {}
+    for path in paths:
+        with at_hand(path):
+            for file in sizes_below(path):
+                listed[file.relative_to(root).as_posix()] = measure(file)
+    return listed
+
+
+def encode(listed: FileList) -> bytes:
+    """Return a list as the JSON of a file, in the order of the paths."""
+    return to_json(dict(sorted(listed.items())))
+
+
+def to_json(content: object) -> bytes:
+    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def read_list(path: Path, remedy: str) -> dict[str, Any]:
+    """Return the list that a file holds. Raises OutputError.
+
+    Its entries alone are looked at: a schema of all takes hundreds of times as long.
+    """
+    listed = read_json(path, None, remedy)
+    if not isinstance(listed, dict) or not listed or not all(map(_is_entry, listed.values())):
+        raise OutputError(f"{path}: damaged, no list of files: {remedy}")
+    return listed
+
+
+def _is_entry(entry: Any) -> bool:
+    return isinstance(entry, dict) and entry.keys() == {"bytes", "sha256"}
+
+
+def is_same(file: Path, entry: Mapping[str, Any]) -> bool:
+    """Return whether a file, which is at hand, is the one of the list."""
+    return file.stat().st_size == entry["bytes"] and measure(file) == entry
+
+
+def find_faults(root: Path, listed: FileList, since: Path | None = None) -> dict[str, str]:
+    """Return what is wrong with the files of a list, by path: MISSING or DAMAGED.
+
+    since  the file that holds the list: a file that is no newer and of the right size passes; so
+           does, on object storage, any of the right size. None: all are hashed
+    """
+    return dict(_faults(root, listed, since))
+
+
+def _faults(root: Path, listed: FileList, since: Path | None) -> Iterator[tuple[str, str]]:
+    sizes = {file.relative_to(root).as_posix(): size for file, size in sizes_below(root).items()}
+    newest = None if since is None or is_mirrored(root) else since.stat().st_mtime_ns
+    hashed = faults = 0
+    for path, entry in listed.items():
+        file = root / path
+        if path not in sizes:
+            fault = MISSING
+        elif sizes[path] != entry["bytes"]:
+            fault = DAMAGED
+        elif since is not None and (newest is None or file.stat().st_mtime_ns <= newest):
+            continue
+        else:
+            hashed += 1
+            with at_hand(file):
+                if is_same(file, entry):
+                    continue
+            fault = DAMAGED
+        faults += 1
+        yield path, fault
+    if since is not None and hashed and not faults:
+        with suppress(OSError):  # a copy whose files have the times of copying: hashed once
+            os.utime(since)

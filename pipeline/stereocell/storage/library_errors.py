@@ -1,0 +1,133 @@
+"""What the format libraries raise on damaged, odd or unreachable sources, told in one line."""
+
+import logging
+import struct
+import sys
+import warnings
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from json import JSONDecodeError
+from xml.etree.ElementTree import ParseError
+
+from bioio_base.exceptions import UnsupportedFileFormatError
+from botocore.exceptions import BotoCoreError  # type: ignore[import-untyped]
+from pydantic import ValidationError
+from zarr.errors import NodeNotFoundError
+from zstandard import ZstdError
+
+import stereocell.storage.location as location
+from stereocell.model.errors import SourceError, StereoCellError
+
+# Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
+# KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
+# ValueError, and struct.error for a header cut short. Metadata of another form than the format's
+# end in AttributeError, sizes beyond this machine in MemoryError, OverflowError and SystemError.
+_FAULTS = (
+    OSError,
+    EOFError,
+    ValueError,
+    TypeError,
+    LookupError,
+    RuntimeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+    SystemError,
+    struct.error,
+    zlib.error,
+    ZstdError,
+    BotoCoreError,
+    UnsupportedFileFormatError,
+)
+
+
+def _faults() -> tuple[type[BaseException], ...]:
+    """Return what is caught: aiohttp's errors too where something has imported it, slowly."""
+    aiohttp = sys.modules.get("aiohttp")
+    return _FAULTS if aiohttp is None else (*_FAULTS, aiohttp.ClientError)
+
+
+@contextmanager
+def one_line(
+    where: str, expected: str, raised: type[StereoCellError] = SourceError
+) -> Iterator[None]:
+    """Turn what a library raises inside the block into an error of one line.
+
+    Only calls into format libraries belong inside: the caught classes are broad.
+    """
+    try:
+        yield
+    except StereoCellError:
+        raise
+    except _faults() as error:
+        raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, UnsupportedFileFormatError):
+        cause = error.__cause__ or error.__context__
+        if cause is not None:
+            return _reason(cause)
+        return _shortened(str(error).partition("'. ")[2])  # without "does not support '...'"
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        field = ".".join(str(step) for step in first["loc"])
+        return f"field {field}: found {first['input']!r:.60}, {first['msg'].lower()}"
+    if isinstance(error, NodeNotFoundError):
+        return "zarr.json, .zgroup or .zarray: not found, or not reachable"
+    if isinstance(error, FileNotFoundError):
+        return "not found, or not reachable"
+    if isinstance(error, KeyError):
+        return f"field {error} is missing"
+    if isinstance(error, AttributeError):
+        return f"metadata of another form ({_shortened(str(error))})"
+    if isinstance(error, MemoryError | OverflowError | SystemError):
+        return "it asks for more memory than there can be"
+    if isinstance(error, RecursionError):
+        return "metadata: nested too deeply"
+    if isinstance(error, ParseError):
+        return f"OME-XML: {error}"
+    if isinstance(error, JSONDecodeError):
+        return f"metadata: {error}"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    if isinstance(error, TimeoutError):  # aiohttp says more of silence than of other waits
+        is_silence = bool(str(error))
+        return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"
+    return _shortened(str(error)) or type(error).__name__
+
+
+def _shortened(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= 160 else text[:157] + "..."
+
+
+class _Collector(logging.Filter):
+    def __init__(self) -> None:
+        super().__init__()
+        self.messages: list[str] = []
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        self.messages.append(record.getMessage())
+        return False
+
+
+@contextmanager
+def collected_log(logger_name: str) -> Iterator[list[str]]:
+    """Keep a library's log lines from the user inside the block; yields them as they come."""
+    collector = _Collector()
+    logger = logging.getLogger(logger_name)
+    logger.addFilter(collector)
+    try:
+        yield collector.messages
+    finally:
+        logger.removeFilter(collector)
+
+
+@contextmanager
+def without_warning(message: str, category: type[Warning]) -> Iterator[None]:
+    """Silence one known warning of a library; `message` is a regular expression of its start."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=message, category=category)
+        yield

@@ -1,0 +1,241 @@
+"""Where a source lies: a local path or an address that fsspec opens."""
+
+import os
+import re
+import stat
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import fsspec
+from fsspec import AbstractFileSystem
+from fsspec.asyn import AsyncFileSystem, sync
+from fsspec.exceptions import FSTimeoutError
+
+from stereocell.model.errors import SourceError, StereoCellError, UsageError
+
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
+_TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
+_ZARR_SUFFIXES = (".ome.zarr", ".zarr")
+_NIFTI_SUFFIXES = (".nii", ".nii.gz")
+_DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
+_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
+ANSWER_S = 25.0  # less than SILENCE_S: of a timeout fsspec's http makes "does not exist"
+_CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs tries it again
+_AWS_CREDENTIALS = (
+    "AWS_ACCESS_KEY_ID",
+    "AWS_PROFILE",
+    "AWS_WEB_IDENTITY_TOKEN_FILE",
+    "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
+    "AWS_CONTAINER_CREDENTIALS_FULL_URI",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """One source.
+
+    source    an absolute local path or an address, as the format libraries take it
+    is_local  a path on this machine
+    """
+
+    source: str
+    is_local: bool
+
+    @classmethod
+    def of(cls, source: str | Path) -> "Location":
+        """Return the location of a path or of an address such as `https://...` or `s3://...`."""
+        text = str(source)
+        if not _ADDRESS.match(text):
+            return cls(os.path.abspath(os.path.expanduser(text)), True)
+        try:
+            parts = urlsplit(text)
+        except ValueError as error:
+            raise UsageError(
+                f"{text}: found no address ({error}), expected https:// or s3://"
+            ) from None
+        if parts.scheme == "file":
+            return cls(os.path.abspath(unquote(parts.path)), True)
+        return cls(text, False)
+
+    @property
+    def folder(self) -> Path:
+        """The source's own folder, links followed: what it names has to lie there or below."""
+        path = Path(os.path.realpath(self.source))
+        return path if path.is_dir() else path.parent
+
+    @property
+    def shown(self) -> str:
+        """The source without what an address may hold in secret (user, password, signature)."""
+        if self.is_local:
+            return self.source
+        parts = urlsplit(self.source)
+        host = parts.netloc.rpartition("@")[2]
+        return f"{parts.scheme}://{host}{parts.path}"
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names along the path."""
+        path = self.source if self.is_local else self.shown.partition("://")[2]
+        return tuple(part for part in path.split("/") if part)
+
+    @property
+    def name(self) -> str:
+        """The file's name without its suffix, to show; `plate.zarr/0` becomes `plate-0`."""
+        parts = self.parts
+        first = next((i for i, part in enumerate(parts) if part.endswith(".zarr")), len(parts) - 1)
+        return "-".join(_stem(part) for part in parts[first:]) or "dataset"
+
+    @property
+    def format(self) -> str | None:
+        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content tells.
+
+        DICOM is any other folder on this machine, and a file that says so in its first bytes.
+        """
+        if any(part.endswith(".zarr") for part in self.parts):
+            return "ome-zarr"
+        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
+            return "ome-tiff"
+        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
+            return "ome-zarr"
+        if not self.is_local or not self.parts:
+            return None
+        if self.parts[-1].lower().endswith(_NIFTI_SUFFIXES):
+            return "nifti"
+        is_named = self.parts[-1].lower().endswith(_DICOM_SUFFIXES)
+        if is_named or os.path.isdir(self.source) or _begins_as_dicom(self.source):
+            return "dicom"
+        return None
+
+    @property
+    def storage_options(self) -> dict[str, Any]:
+        """What fsspec needs beside the address.
+
+        s3: signed requests if this machine's environment holds credentials or `FSSPEC_S3` says
+        so, else anonymous ones, which public buckets take. The endpoint comes from the usual
+        environment (`AWS_ENDPOINT_URL`), and what `FSSPEC_S3` says of waiting goes first.
+        http: waits for silence alone, else aiohttp gives up what takes 5 minutes, however it goes.
+        """
+        scheme = urlsplit(self.source).scheme
+        if scheme in ("http", "https"):
+            return {"client_kwargs": _http_client()}
+        if scheme not in ("s3", "s3a"):
+            return {}
+        configured = fsspec.config.conf.get("s3", {})
+        waits = {"connect_timeout": _CONNECT_S, "read_timeout": SILENCE_S}
+        options = {"config_kwargs": {**waits, **configured.get("config_kwargs", {})}}
+        if "anon" in configured:
+            return {**options, "anon": configured["anon"]}
+        files = (
+            os.environ.get("AWS_SHARED_CREDENTIALS_FILE", "~/.aws/credentials"),
+            os.environ.get("AWS_CONFIG_FILE", "~/.aws/config"),
+        )
+        signed = any(name in os.environ for name in _AWS_CREDENTIALS) or any(
+            os.path.exists(os.path.expanduser(file)) for file in files
+        )
+        return {**options, "anon": not signed}
+
+
+def _http_client() -> dict[str, Any]:
+    """Return aiohttp's settings: ours, and over them what the user has for fsspec."""
+    from aiohttp import ClientTimeout  # slow to import, and only the network wants it
+
+    waits = ClientTimeout(total=None, sock_connect=SILENCE_S, sock_read=SILENCE_S)
+    configured: dict[str, Any] = {}
+    for protocol in ("http", "https"):  # one file system to fsspec: either's settings are both's
+        configured |= fsspec.config.conf.get(protocol, {}).get("client_kwargs", {})
+    return {"timeout": waits, **configured}
+
+
+def does_answer(files: AbstractFileSystem, path: str) -> bool:
+    """Return whether a store says anything at all within ANSWER_S; errors are an answer too.
+
+    Each request is tried again, with its own wait: without this one, a host that takes connections
+    and is silent would be waited for for minutes.
+    """
+    if isinstance(files, AsyncFileSystem):
+        try:
+            sync(files.loop, files._exists, path, timeout=ANSWER_S)
+        except FSTimeoutError:
+            return False
+        except Exception:  # told by who reads, better
+            pass
+    return True
+
+
+def is_own(path: str | Path, folders: Sequence[Path]) -> bool:
+    """Return whether a path, its links followed, lies in one of some folders or below."""
+    real = Path(os.path.realpath(path))
+    return any(real.is_relative_to(folder) for folder in folders)
+
+
+def require_own(
+    path: str | Path,
+    folders: Sequence[Path],
+    named: str,
+    raised: type[StereoCellError] = SourceError,
+) -> os.stat_result | None:
+    """Return the state of a file that a source names, or None where there is none.
+
+    Sources come from strangers, and results are published: so whatever they name, by a path in
+    their metadata or by a link, has to be a regular file in one of `folders` (links followed) or
+    below. Else it is not opened, which would hang on a pipe, and `raised` says `named` and why.
+    """
+    real = os.path.realpath(path)
+    if not is_own(real, folders):
+        raise raised(
+            f"{named}: leads to {real}, expected a file in {folders[0]} or below (links followed)"
+        )
+    try:
+        status = os.stat(real)
+    except OSError:  # told by who reads
+        return None
+    if not stat.S_ISREG(status.st_mode):
+        raise raised(f"{named}: is no regular file, expected one")
+    return status
+
+
+def require_own_key(key: str, named: str) -> None:
+    """Raise SourceError where a key leaves the address that it is joined to.
+
+    Stores of http take `%2e%2e` for `..`, as often as it is escaped.
+    """
+    found, steps = "", key
+    while found != steps:
+        found, steps = steps, unquote(steps)
+    if ".." in re.split(r"[/\\?#]", steps):
+        raise SourceError(f"{named}: leads out of the address, expected a key below it")
+
+
+def require_apart(source: str | Path, out: Path) -> None:
+    """Raise UsageError if OUT is a local source, or lies inside one (or inside its .zarr)."""
+    location = Location.of(source)
+    if not location.is_local:
+        return
+    path = Path(location.source)
+    outermost = next((p for p in [*reversed(path.parents), path] if p.suffix == ".zarr"), path)
+    # not Path.resolve, which has no word of ours for links in a ring
+    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(outermost)):
+        raise UsageError(
+            f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
+            "it would write into the data"
+        )
+
+
+def _begins_as_dicom(path: str) -> bool:
+    if not os.path.isfile(path):
+        return False
+    try:
+        with open(path, "rb") as file:
+            return file.read(132)[128:] == b"DICM"
+    except OSError:
+        return False
+
+
+def _stem(name: str) -> str:
+    for suffix in _TIFF_SUFFIXES + _ZARR_SUFFIXES:
+        if name.lower().endswith(suffix) and len(name) > len(suffix):
+            return name[: -len(suffix)]
+    return name

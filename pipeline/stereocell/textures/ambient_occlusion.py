@@ -1,0 +1,111 @@
+"""Ambient occlusion: how much of the sky above a surface its own body and its neighbours hide.
+
+Rays are cast from points of the surface through the repaired field that the surface was taken
+from, not through its triangles. The field reaches past the tile into its halo, so that neighbours
+find about the same on both sides of a cut; a mesh ends there. And all rays of one direction step
+together, so that no ray tracer is needed: libigl's, the one at hand, knows no radius.
+
+The directions are the same for every point and every tile: no noise, and the same bytes each time.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from stereocell.model.tiling import Box
+from stereocell.model.volume import xyz_to_zyx
+
+DIRECTIONS = 48  # over the whole sphere; half of them rise above a surface
+STEP = 0.75  # of a ray, in coarsest voxel spacings
+NEIGHBOURS = 4  # points with a value of their own that others take the mean of
+
+
+def find_openness(
+    solid: NDArray[np.bool_],
+    window: Box,
+    points: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    spacing_um: tuple[float, float, float],
+    origin_um: tuple[float, float, float],
+    radius_um: float,
+) -> NDArray[np.float32]:
+    """Return for each point (n, 3) the share of open sky, 0..1; 1 all over for a radius of 0.
+
+    `solid` (z, y, x) covers `window`. Points and unit normals: x, y, z in the world, um. Directions
+    count by the cosine to the normal; what is hit farther off counts less, at `radius_um` nothing.
+    Rays start a STEP above the surface, so that it is not hidden by its own voxels.
+    """
+    if radius_um <= 0 or not len(points):
+        return np.ones(len(points), np.float32)
+    kept = thin_out(points, max(spacing_um))
+    found = _cast(
+        solid, window, points[kept], normals[kept], spacing_um, np.asarray(origin_um), radius_um
+    )
+    return spread(points[kept], found, points)
+
+
+def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
+    """Return the first point of each block of space that has any; blocks lie on one world grid."""
+    blocks = np.floor(points / edge_um).astype(np.int64)
+    blocks -= blocks.min(axis=0)
+    size = blocks.max(axis=0) + 1
+    number = (blocks[:, 0] * size[1] + blocks[:, 1]) * size[2] + blocks[:, 2]
+    return np.sort(np.unique(number, return_index=True)[1])
+
+
+def spread(
+    known: NDArray[np.float32], values: NDArray[np.float32], points: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return the values at the points: of the nearest that are known, the mean by closeness."""
+    tree = cKDTree(known, balanced_tree=False, compact_nodes=False)
+    distance, nearest = tree.query(points, k=list(range(1, min(NEIGHBOURS, len(known)) + 1)))
+    weights = 1 / (np.asarray(distance) + 1e-6)
+    mean: NDArray[np.float64] = (values[nearest] * weights).sum(axis=1) / weights.sum(axis=1)
+    return mean.astype(np.float32)
+
+
+def _cast(
+    solid: NDArray[np.bool_],
+    window: Box,
+    points: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    spacing_um: tuple[float, float, float],
+    origin_um: NDArray[np.float64],
+    radius_um: float,
+) -> NDArray[np.float32]:
+    spacing = np.asarray(spacing_um)
+    offset = step = STEP * max(spacing_um)
+    distances = np.arange(offset, radius_um + offset, step)
+    # empty all round, so that no ray leaves the array
+    margin = np.ceil((distances[-1] + offset) / spacing).astype(int) + 2
+    padded = np.pad(solid, [(m, m) for m in margin])
+    strides = np.array([padded.shape[1] * padded.shape[2], padded.shape[2], 1])
+    padded = padded.ravel()
+    up = xyz_to_zyx(normals.astype(np.float64))
+    start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin_um) / spacing
+    start += margin - np.asarray(window.start) + 0.5  # truncated, the nearest voxel
+    start, up = start.astype(np.float32), up.astype(np.float32)
+
+    whole, hidden = np.zeros(len(points), np.float32), np.zeros(len(points), np.float32)
+    for direction in sphere(DIRECTIONS):
+        cosine = up @ direction.astype(np.float32)
+        flying = np.flatnonzero(cosine > 0.05)
+        weight = cosine[flying]
+        whole[flying] += weight
+        at, delta = start[flying], (direction / spacing).astype(np.float32)
+        for distance in distances:
+            voxel = (at + np.float32(distance) * delta).astype(np.int32) @ strides
+            hit = padded[voxel]
+            hidden[flying[hit]] += weight[hit] * np.float32(max(0.0, 1 - distance / radius_um))
+            flying, weight, at = flying[~hit], weight[~hit], at[~hit]
+    share = 1 - hidden / np.maximum(whole, np.float32(1e-6))
+    return share.astype(np.float32)
+
+
+def sphere(count: int) -> NDArray[np.float64]:
+    """Return `count` directions, evenly over the sphere, (count, 3): Fibonacci's spiral."""
+    place = np.arange(count) + 0.5
+    height = 1 - 2 * place / count
+    turn = np.pi * (1 + np.sqrt(5)) * place
+    across = np.sqrt(1 - height**2)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)

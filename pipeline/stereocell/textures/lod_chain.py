@@ -1,0 +1,81 @@
+"""All levels of detail of one unit, from its fine surface; each certified, each measured."""
+
+import numpy as np
+
+from stereocell.building.settings import Settings
+from stereocell.meshes.distance import Nearest, measure_distance, measure_enclosure, measure_spread
+from stereocell.meshes.fairing import make_fair
+from stereocell.meshes.simplify_valid import simplify_soundly
+from stereocell.meshes.validity import Plane, certify
+from stereocell.model.mesh import Lod, Mesh, Quality
+from stereocell.model.timing import Clock
+from stereocell.textures.bake import Baker, FineSurface
+from stereocell.textures.dressing import dress
+
+STRAY = 3.0  # errors: how far a vertex may lie from the next level; about .1 % would be further
+SLIDE = 0.5  # finest voxel spacings: how far a vertex of lod0 may go along the surface
+
+
+def make_levels(
+    fine: Mesh,
+    planes: tuple[Plane, ...],
+    spacing: tuple[float, float, float],
+    settings: Settings,
+    clock: Clock,
+    source: FineSurface | None = None,
+    first: int = 0,
+) -> tuple[Lod, ...]:
+    """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
+
+    `source`: what maps are baked from, the fine surface and what lies past the planes; without one
+    the fine surface alone, which nothing hides.
+    `first`: the finest level to be made, of a surface that is itself the level before it.
+    Meshes are certified before seams of charts split their vertices: places stay the same.
+    """
+    options = settings.lod
+    lods: list[Lod] = []
+    mesh = fine
+    unwrapping = settings.unwrap.resolved(spacing)
+    with clock("bake"):
+        baker = Baker(source or FineSurface.bare(fine))
+    with clock("measure"):
+        to_fine = Nearest(fine, options.samples)
+    for level, error in list(enumerate(options.errors))[first:]:
+        with clock("simplify"):
+            length = error * min(spacing)
+            mended = simplify_soundly(mesh, planes, length, STRAY * length)
+            mesh = mended.mesh
+        if level == 0:
+            with clock("fair"):
+                mesh = make_fair(mesh, planes, SLIDE * min(spacing), error * min(spacing))
+        with clock("certify"):
+            left = certify(mesh, planes).total
+        with clock("measure"):
+            to_mesh = Nearest(mesh, options.samples)
+            distance = measure_distance(to_fine, to_mesh)
+            # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
+            distance = max(distance, lods[-1].distance_um if lods else 0.0)
+            quality = Quality(
+                away=measure_spread(to_fine, to_mesh),
+                back=measure_spread(to_mesh, to_fine),
+                mended=mended.mended,
+                fallbacks=mended.fallbacks,
+                faults=left,
+                angle_deg=sharpest_angle(mesh),
+                enclosed=measure_enclosure(to_fine, to_mesh),
+            )
+        lod = Lod(mesh, distance, quality=quality)
+        if len(mesh.triangles):
+            lod = dress(lod, level, baker, unwrapping, clock)
+        lods.append(lod)
+    return tuple(lods)
+
+
+def sharpest_angle(mesh: Mesh) -> float:
+    """Return the 1st percentile, in degrees, of the triangles' smallest angles."""
+    corners = mesh.positions[mesh.triangles].astype(np.float64)
+    sides = np.sort(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), axis=1)
+    a, b, c = sides.T  # the smallest angle lies across from the shortest side
+    cosine = (b**2 + c**2 - a**2) / np.maximum(2 * b * c, 1e-30)
+    smallest = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    return float(np.percentile(smallest, 1))

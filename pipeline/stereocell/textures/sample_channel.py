@@ -1,0 +1,40 @@
+"""Another channel's intensity on a surface, as `--paint CD31=MART1` asks for.
+
+At each vertex: the largest value from the surface down to a stated depth below it, since a marker
+of the membrane peaks beside the iso-surface, not on it, and one of the cytoplasm below. Voxels
+count by the painted channel's own window, as in its 8-bit volume.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume, xyz_to_zyx
+
+
+def find_paint(
+    painted: Volume,
+    window: Box,
+    display: tuple[float, float],
+    points: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    origin_um: tuple[float, float, float],
+    depth_um: float,
+) -> NDArray[np.float32]:
+    """Return the intensity 0..1 at each point (n, 3), x, y, z in um; `painted` covers `window`.
+
+    `display`: voxel values that become 0 and 1. `origin_um`: where voxel (0, 0, 0) lies.
+    """
+    spacing = np.asarray(painted.spacing_um)
+    voxels = painted.voxels.astype(np.float32)
+    at = (xyz_to_zyx(points) - origin_um) / spacing - np.asarray(window.start)
+    inwards = -xyz_to_zyx(normals) / spacing
+    largest = np.full(len(points), -np.inf, np.float32)
+    steps = max(int(np.ceil(depth_um / min(painted.spacing_um))), 1)
+    for depth in np.linspace(0.0, depth_um, steps + 1):
+        place = (at + depth * inwards).T
+        here = ndimage.map_coordinates(voxels, place, order=1, mode="nearest")
+        largest = np.maximum(largest, here)
+    low, high = display
+    return np.clip((largest - low) / (high - low), 0, 1).astype(np.float32)

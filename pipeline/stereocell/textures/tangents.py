@@ -1,0 +1,60 @@
+"""Tangents by MikkTSpace's rules (Mikkelsen 2008), which glTF and USD name as their convention.
+
+Each triangle has one direction along +u, of unit length. A vertex takes those of its triangles,
+each laid into the plane across the vertex's normal, made a unit again and weighted by the angle of
+the triangle's corner, measured in that plane; the sum is made a unit. The sign says on which side
+of normal and tangent +v lies: bitangent = sign * cross(normal, tangent).
+
+No package for this installs: `pymikktspace` is source only and does not build. In one thing the
+rules are narrowed: where triangles that are mirrored in UV space meet others at one vertex,
+MikkTSpace splits it; here the larger angle wins. Charts of xatlas are not mirrored inside.
+The stage and the bundle carry these tangents, and the maps are baked with them, so that no reader
+has to derive its own.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.mesh import Mesh
+
+
+def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
+    """Return per-vertex tangents (n, 4): along +u, across the normal, and the bitangent's sign."""
+    assert mesh.uvs is not None
+    p, t = mesh.positions.astype(np.float64), mesh.uvs.astype(np.float64)
+    normals = mesh.normals.astype(np.float64)
+    a, b, c = mesh.triangles.T
+    e1, e2, d1, d2 = p[b] - p[a], p[c] - p[a], t[b] - t[a], t[c] - t[a]
+    signed = d1[:, 0] * d2[:, 1] - d2[:, 0] * d1[:, 1]  # twice the area in UV space
+    side = np.where(signed < 0, -1.0, 1.0)
+    along = _unit((e1 * d2[:, 1:] - e2 * d1[:, 1:]) * side[:, None])
+    along[signed == 0] = 0.0  # no area in UV space: no direction
+
+    total, handed = np.zeros_like(p), np.zeros(len(p))
+    for here, after, before in ((a, b, c), (b, c, a), (c, a, b)):
+        n = normals[here]
+        there, back = (_unit(_across(n, p[other] - p[here])) for other in (after, before))
+        angle = np.arccos(np.clip((there * back).sum(axis=1), -1, 1))
+        angle[signed == 0] = 0.0
+        part = _unit(_across(n, along)) * angle[:, None]
+        for axis in range(3):
+            total[:, axis] += np.bincount(here, part[:, axis], len(p))
+        handed += np.bincount(here, side * angle, len(p))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    # a vertex whose triangles say nothing: any direction across the normal serves
+    beside = np.where(np.abs(normals[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    spare = _unit(np.cross(normals, beside))
+    tangent = np.where(length > 1e-12, total / np.maximum(length, 1e-12), spare)
+    sign = np.where(handed < 0, -1.0, 1.0)
+    return np.concatenate([tangent, sign[:, None]], axis=1).astype(np.float32)
+
+
+def _across(normals: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the vectors without their parts along the normals."""
+    return vectors - normals * (normals * vectors).sum(axis=1, keepdims=True)
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the vectors at unit length; what has none stays."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 1e-30)

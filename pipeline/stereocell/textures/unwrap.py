@@ -1,0 +1,209 @@
+"""UVs for a level of detail: charts that end at sharp edges, packed at a stated texel density.
+
+Charts and packing are xatlas's. It knows sharp edges by their normals alone, and ours are smooth:
+so it is given the mesh split along them, with the split parts' own normals.
+
+Padding and mip levels. A bilinear lookup inside a chart at mip level k reaches 1.5 * 2^k texels
+beyond it, and the texels between two charts are shared half and half: `padding` texels keep charts
+apart up to the level k for which padding >= 3 * 2^k. With 6 that is levels 0 and 1. A level of
+detail gives way to a coarser one before its texels, a coarse voxel wide, are much below a pixel,
+so deeper levels matter for the coarsest only, where what mixes is a rim of a chart.
+"""
+
+import atexit
+import ctypes
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xatlas
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from stereocell.model.errors import UsageError
+from stereocell.model.mesh import Mesh
+from stereocell.model.settings import AUTO, length_um, setting
+from stereocell.textures.tangents import make_tangents
+
+# xatlas 0.0.11 tells its worker threads to end without holding the lock that they sleep under: an
+# atlas destroyed at the very moment when a worker lies down waits for it for ever (seen once, its
+# stack in ~TaskScheduler). So an atlas is destroyed some unwraps later, its workers long asleep,
+# and the last ones never: the process takes them along.
+ATLASES_KEPT = 4
+_past_atlases: deque[xatlas.Atlas] = deque()
+
+TEXTURES = tuple(2**k for k in range(6, 14))  # largest edges that a map may have
+SHARP_DEG = 75.0  # between two triangles; coarse levels turn by 60 everywhere
+MULTIPLE = 8  # of texels, a map's edges: blocks of 4 down to mip level 1
+MOST_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
+# Texels finer than voxels show nothing new; xatlas takes long over a tenth, and far below crashes.
+MOST_TEXELS = 10  # along the finest voxel spacing
+# Of rays into the body and past its ends: all that they cross is held in memory.
+MOST_REACH = 64.0  # coarsest voxel spacings
+COARSENINGS = 3  # of texels, each by the square root of two at least, before a level goes without
+
+
+@dataclass(frozen=True, slots=True)
+class UnwrapOptions:
+    """UVs and baked maps. Levels without maps have occlusion and paint at their vertices."""
+
+    first_lod: int = setting(1, "the finest level that gets UVs and baked maps")
+    texel_um: float | str = setting(AUTO, "um a texel; auto: the coarsest voxel spacing")
+    padding: int = setting(6, "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2")
+    # Texels of one coarse voxel spacing want an edge of 1750 on a unit of 194 x 512 x 512 that is
+    # full of membranes, 300 to 1000 on nuclei and vessels.
+    max_texture: int = setting(1024, "texels, largest edge of a map; texels grow up to 2.8 times")
+    max_triangles: int = setting(100_000, "levels with more triangles go without maps")
+    occlusion_um: float | str = setting(
+        AUTO, "how far ambient occlusion looks; auto: 8 coarsest spacings; 0: none"
+    )
+    paint_um: float | str = setting(
+        AUTO, "depth below the surface within which paint's maximum counts; auto: 2 coarsest"
+    )
+
+    def __post_init__(self) -> None:
+        if self.first_lod < 0:
+            raise UsageError(f"unwrap.first_lod is {self.first_lod}, expected 0 or more")
+        if not 3 <= self.padding <= MOST_PADDING:
+            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 to {MOST_PADDING}")
+        if self.max_triangles < 0:
+            raise UsageError(f"unwrap.max_triangles is {self.max_triangles}, expected 0 or more")
+        if self.max_texture not in TEXTURES:
+            raise UsageError(
+                f"unwrap.max_texture is {self.max_texture}, expected a power of two "
+                f"from {TEXTURES[0]} to {TEXTURES[-1]}"
+            )
+
+    def resolved(self, spacing_um: tuple[float, float, float]) -> "UnwrapOptions":
+        """Return the options with every `auto` replaced by a length.
+
+        Raises UsageError for a length that suits no such voxels.
+        """
+        finest, coarsest = min(spacing_um), max(spacing_um)
+        texel_um = length_um("unwrap.texel_um", self.texel_um, coarsest)
+        if MOST_TEXELS * texel_um < finest * (1 - 1e-9):
+            raise UsageError(
+                f"unwrap.texel_um is {texel_um:g}, expected at least {finest / MOST_TEXELS:g} "
+                f"(the finest voxel spacing / {MOST_TEXELS})"
+            )
+        occlusion_um = length_um("unwrap.occlusion_um", self.occlusion_um, 8 * coarsest)
+        paint_um = length_um("unwrap.paint_um", self.paint_um, 2 * coarsest)
+        for key, length in (("occlusion_um", occlusion_um), ("paint_um", paint_um)):
+            if length > MOST_REACH * coarsest * (1 + 1e-9):
+                raise UsageError(
+                    f"unwrap.{key} is {length:g}, expected at most {MOST_REACH * coarsest:g} "
+                    f"({MOST_REACH:g} times the coarsest voxel spacing)"
+                )
+        return replace(self, texel_um=texel_um, occlusion_um=occlusion_um, paint_um=paint_um)
+
+
+@dataclass(frozen=True, slots=True)
+class Unwrapped:
+    """A mesh with UVs and tangents, split along the seams of its charts.
+
+    size      texels (height, width) of its maps
+    texel_um  edge of a texel on the surface
+    """
+
+    mesh: Mesh
+    size: tuple[int, int]
+    texel_um: float
+    charts: int
+
+
+def mip_levels_apart(padding: int) -> int:
+    """Return for how many mip levels, from 0, a lookup in a chart meets no other: see above."""
+    return int(math.log2(padding / 3)) + 1
+
+
+def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
+    """Return the mesh unwrapped, or why it isn't: too many triangles, or too many charts.
+
+    `options` are resolved. The mesh's own normals stay.
+    """
+    if len(mesh.triangles) > options.max_triangles:
+        return f"{len(mesh.triangles):,} triangles, more than {options.max_triangles:,}"
+    vertices, corners, normals = split_sharp_edges(mesh)
+    texel_um = float(options.texel_um)
+    for _ in range(COARSENINGS + 1):
+        atlas = xatlas.Atlas()
+        atlas.add_mesh(mesh.positions[vertices], corners, normals)
+        charts, pack = xatlas.ChartOptions(), xatlas.PackOptions()
+        charts.max_iterations = 1
+        charts.normal_seam_weight = 1000.0  # from here on no chart crosses a seam
+        pack.texels_per_unit, pack.padding = 1 / texel_um, options.padding
+        atlas.generate(charts, pack)
+        width, height = atlas.width, atlas.height
+        longest = max(width, height)
+        if longest <= options.max_texture:
+            break
+        count = atlas.chart_count
+        _retire(atlas)
+        texel_um *= max(math.sqrt(2), 1.05 * longest / options.max_texture)
+    else:
+        return f"{count:,} charts, too many for a map of {options.max_texture} texels"
+    count = atlas.chart_count
+    own, triangles, uvs = atlas.get_mesh(0)
+    _retire(atlas)
+    size = _rounded(height), _rounded(width)
+    # the map is larger than the atlas by a few empty texels
+    scale = np.array([width / size[1], height / size[0]])
+    at = vertices[own]
+    split = Mesh(
+        mesh.positions[at],
+        triangles.astype(np.uint32),
+        mesh.normals[at],
+        (uvs.astype(np.float64) * scale).astype(np.float32),
+    )
+    return Unwrapped(replace(split, tangents=make_tangents(split)), size, texel_um, count)
+
+
+def split_sharp_edges(
+    mesh: Mesh,
+) -> tuple[NDArray[np.int64], NDArray[np.uint32], NDArray[np.float32]]:
+    """Return the mesh cut open along its sharp edges, for xatlas.
+
+    The original vertex of each new one (n,), triangles (m, 3), and normals (n, 3), each of the
+    triangles around it that no sharp edge parts, weighted by area.
+    """
+    triangles = mesh.triangles.astype(np.int64)
+    a, b, c = mesh.positions[triangles].astype(np.float64).transpose(1, 0, 2)
+    facing = np.cross(b - a, c - a)
+    unit = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-30)
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    corner = np.arange(start.size)
+    after = np.roll(corner.reshape(-1, 3), -1, axis=1).ravel()
+    edge = np.minimum(start, end) * len(mesh.positions) + np.maximum(start, end)
+    order = np.argsort(edge, kind="stable")
+    pair = np.flatnonzero(edge[order][1:] == edge[order][:-1])
+    one, two = order[pair], order[pair + 1]
+    cosine = (unit[one // 3] * unit[two // 3]).sum(axis=1)
+    is_smooth = cosine > math.cos(math.radians(SHARP_DEG))
+    one, two = one[is_smooth], two[is_smooth]
+    # the two triangles run along their common edge in opposite directions
+    joined = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
+    links = coo_matrix((np.ones(len(joined[0]), np.int8), joined), (start.size, start.size))
+    count, label = connected_components(links, directed=False)
+    _, first = np.unique(label, return_index=True)
+    total = [np.bincount(label, np.repeat(facing[:, k], 3), count) for k in range(3)]
+    normals = np.stack(total, axis=1).astype(np.float64)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return start[first], label.reshape(-1, 3).astype(np.uint32), normals.astype(np.float32)
+
+
+def _rounded(texels: int) -> int:
+    return max(-(-texels // MULTIPLE), 1) * MULTIPLE
+
+
+def _retire(atlas: xatlas.Atlas) -> None:
+    _past_atlases.append(atlas)
+    if len(_past_atlases) > ATLASES_KEPT:
+        _past_atlases.popleft()
+
+
+@atexit.register
+def _never_destroy_the_last() -> None:
+    for atlas in _past_atlases:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))

@@ -1,0 +1,185 @@
+"""Where a head is, and where in it the brain: thresholds, a hull (brain_surface.py), fluid.
+
+The hull begins at what erosion leaves of bright tissue, as in Shattuck et al., NeuroImage 13
+(2001), and is found twice: the second time with a rough bias field taken out, which the first one
+shows. Lengths are lengths, not voxels.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.filters import threshold_multiotsu, threshold_otsu
+
+from stereocell.model.errors import SourceError
+from stereocell.tissue.brain_hull import Hull, fill_hull, find_hull
+
+Mask = NDArray[np.bool_]
+Triple = tuple[float, float, float]
+COARSE_UM = 2000.0  # the hull is found in voxels of about this
+NOISE_UM = 800.0  # sigma that smooths them
+BIAS_UM = 20_000.0  # sigma of the rough bias field
+ERODED_UM = 4500.0  # parts brain from scalp, optic nerves and dura
+GYRI_UM = 3000.0  # bright tissue so far out of the hull is the brain's
+RIM_UM = 12000.0  # the fluid around the brain goes no farther
+CALM = 0.3  # share of the dark voxels, of lowest gradient, in which bone and fluid are told apart
+PARTED = 0.85  # Otsu's separability, 0..1, of two kinds: of an even spread it is .75
+
+
+def find_foreground(smooth: NDArray[np.float32]) -> Mask:
+    """Return what isn't background, bool (z, y, x): Otsu's class of log values, largest component.
+
+    `smooth` float32, noise smoothed. Raises SourceError for a constant volume.
+    """
+    if smooth.min() == smooth.max():
+        raise SourceError(f"every voxel is {smooth.flat[0]:g}: expected tissue of several kinds")
+    sample = smooth[::2, ::2, ::2]
+    values = np.log1p(np.maximum(sample - np.percentile(sample, 1), 0))
+    level = np.expm1(float(threshold_otsu(values))) + np.percentile(sample, 1)  # type: ignore[no-untyped-call]
+    mask = _largest(smooth > level)
+    return np.asarray(ndimage.binary_fill_holes(mask), np.bool_)
+
+
+def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> Mask:
+    """Return the brain with the fluid in and around it, bool (z, y, x).
+
+    `smooth` float32, noise smoothed. Where fluid is told from bone, it is followed outward from the
+    hull; where it is as dark as bone, its outer bound is not known, and the hull is what is
+    returned. Raises SourceError where there is no brain to begin at.
+    """
+    coarse, inside, spacing = _coarsen(smooth, head, spacing_um)
+    hull, tissue_level = _find_hull(coarse, inside, spacing)
+    brain = fill_hull(hull, _shape(smooth), _mm(spacing_um), _shift(spacing, spacing_um))
+    brain &= head
+    if not brain.any():
+        raise SourceError("no brain: the hull holds no voxel, expected a head in MR")
+    return _add_fluid(brain, smooth, head, tissue_level, spacing_um)
+
+
+def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tuple[Hull, float]:
+    """Return the hull, and the level above which there is tissue, not fluid, bone or air."""
+    level = float(threshold_multiotsu(field[head], 3)[0])  # type: ignore[no-untyped-call]
+    tissue = head & (field > level)
+    core = _within(tissue, -ERODED_UM, spacing_um)
+    if not core.any():
+        raise SourceError(
+            "no brain: bright tissue is nowhere 9 mm thick, expected a head in MR (or --everywhere)"
+        )
+    core = _within(_largest(core), ERODED_UM, spacing_um) & tissue
+    mm = _mm(spacing_um)
+    at = ndimage.center_of_mass(core)
+    center = (at[0] * mm[0], at[1] * mm[1], at[2] * mm[2])
+    radius = float(np.cbrt(3 / (4 * np.pi) * core.sum() * np.prod(mm)))
+
+    hull = find_hull(field, mm, center, radius, _levels(field, head, core))
+    brain = fill_hull(hull, _shape(field), mm) & tissue
+    if not brain.any():
+        raise SourceError("no brain: the hull holds no bright tissue, expected a head in MR")
+    flat = field / _rough_bias(field, brain, spacing_um)
+    return find_hull(flat, mm, center, radius, _levels(flat, head, brain)), level
+
+
+def _levels(field: NDArray[np.float32], head: Mask, brain: Mask) -> Triple:
+    """Return what find_hull goes by: dark, the least of what is bright, the brain's median."""
+    dark, bright = float(np.percentile(field, 2)), float(np.percentile(field[head], 98))
+    return dark, dark + 0.1 * (bright - dark), float(np.median(field[brain]))
+
+
+def _rough_bias(field: NDArray[np.float32], brain: Mask, spacing_um: Triple) -> NDArray[np.float32]:
+    """Return the field's own blur in the brain, about 1 there; far from it 1."""
+    sigma = [BIAS_UM / h for h in spacing_um]
+    weight = ndimage.gaussian_filter(brain.astype(np.float32), sigma)
+    log = np.log(np.maximum(field, np.float32(1e-6) * field.max())) * brain
+    blur = ndimage.gaussian_filter(log, sigma) / np.maximum(weight, 1e-6)
+    blur -= np.median(blur[brain])
+    return np.where(weight > 0.02, np.exp(blur), np.float32(1)).astype(np.float32)
+
+
+def _add_fluid(
+    brain: Mask, smooth: NDArray[np.float32], head: Mask, level: float, spacing_um: Triple
+) -> Mask:
+    tissue = head & (smooth > level)
+    near = _within(brain, RIM_UM, spacing_um) & head
+    places = np.flatnonzero(near & ~tissue & ~brain)
+    places = places[:: max(1, len(places) // 1_000_000)]
+    if len(places) < 100:
+        return brain
+    dark = smooth.ravel()[places]
+    steep = ndimage.gaussian_gradient_magnitude(smooth, 0.5).ravel()[places]
+    if _separability(dark[steep <= np.quantile(steep, CALM)]) < PARTED:
+        return brain
+    split = float(threshold_otsu(dark))  # type: ignore[no-untyped-call]
+    bone, fluid = dark[dark <= split], dark[dark > split]
+    # half-way between their middles: voxels of mixed content pull Otsu's level up
+    split = min(0.5 * float(np.median(bone) + np.median(fluid)), split)
+    near &= (smooth > split) & (~tissue | _within(brain, GYRI_UM, spacing_um))
+    return np.asarray(ndimage.binary_fill_holes(_touching(near, brain)), np.bool_)
+
+
+def _separability(values: NDArray[np.float32]) -> float:
+    """Return the share of the variance that lies between Otsu's two classes, his eta (1979)."""
+    if values.min() == values.max():
+        return 0.0
+    split = float(threshold_otsu(values))  # type: ignore[no-untyped-call]
+    low, high = values[values <= split], values[values > split]
+    share = len(low) / len(values)
+    between = share * (1 - share) * float(low.mean() - high.mean()) ** 2
+    return between / float(values.var())
+
+
+def _coarsen(
+    field: NDArray[np.float32], mask: Mask, spacing_um: Triple
+) -> tuple[NDArray[np.float32], Mask, Triple]:
+    """Return means over blocks of about COARSE_UM, smoothed, the mask of most, and the spacing."""
+    z, y, x = (max(1, round(COARSE_UM / h)) for h in spacing_um)
+    d, h, w = (n // k for n, k in zip(field.shape, (z, y, x), strict=True))
+
+    def mean(values: NDArray[Any]) -> NDArray[np.float32]:
+        blocks = values[: d * z, : h * y, : w * x].reshape(d, z, h, y, w, x)
+        return np.asarray(blocks.mean(axis=(1, 3, 5), dtype=np.float32), np.float32)
+
+    spacing = (spacing_um[0] * z, spacing_um[1] * y, spacing_um[2] * x)
+    smooth = ndimage.gaussian_filter(mean(field), [NOISE_UM / s for s in spacing])
+    return smooth, mean(mask) > 0.5, spacing
+
+
+def _shift(coarse_um: Triple, spacing_um: Triple) -> Triple:
+    """Return where the coarse voxel (0, 0, 0) has its centre, mm from the fine one's."""
+    z, y, x = ((c - f) / 2000 for c, f in zip(coarse_um, spacing_um, strict=True))
+    return z, y, x
+
+
+def _mm(lengths_um: Triple) -> Triple:
+    z, y, x = (length / 1000 for length in lengths_um)
+    return z, y, x
+
+
+def _shape(field: NDArray[Any]) -> tuple[int, int, int]:
+    z, y, x = field.shape
+    return z, y, x
+
+
+def _largest(mask: Mask) -> Mask:
+    labels, count = ndimage.label(mask)
+    if count < 2:
+        return mask
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    return np.asarray(labels == sizes.argmax(), np.bool_)
+
+
+def _touching(mask: Mask, seed: Mask) -> Mask:
+    labels, count = ndimage.label(mask | seed)
+    hit = np.zeros(count + 1, np.bool_)
+    hit[np.unique(labels[seed])] = True
+    hit[0] = False
+    return hit[labels]
+
+
+def _within(mask: Mask, reach_um: float, spacing_um: Triple) -> Mask:
+    """Return the mask dilated (or, by a negative reach, eroded) by a ball."""
+    import edt
+
+    far = edt.edt(mask if reach_um < 0 else ~mask, anisotropy=spacing_um, black_border=False)
+    return np.asarray(far > -reach_um if reach_um < 0 else far <= reach_um, np.bool_)

@@ -1,0 +1,204 @@
+"""A network of the user's own, as an ONNX file, that tells each voxel's class.
+
+Patches half overlap and are blended by a Gaussian, as in Isensee et al., "nnU-Net", Nature Methods
+18 (2021). It runs on the processor, on one thread: the same voxels give the same bytes.
+
+Input   float32 (1, 1, D, H, W): voxels less their mean over the foreground, by their deviation
+        there. D, H, W are what the model fixes, else 64.
+Output  float32 (1, K, D, H, W): probabilities, or anything else is taken for logits (softmax).
+"""
+
+import hashlib
+import itertools
+import json
+import re
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.tissue.brain_mask import find_foreground
+
+Field = NDArray[np.float32]
+PATCH = 64  # voxels each way where the model leaves it open
+LARGEST = 512  # and at most what it may ask for
+MOST_CLASSES = 32
+NAMES_KEY = "stereocell_classes"  # of the model's metadata: a JSON list of K names, "" leaves out
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A loaded model. `classes`: the names of its K outputs; an empty one is not shown."""
+
+    name: str
+    digest: str
+    patch: tuple[int, int, int]
+    classes: tuple[str, ...]
+    session: Any = field(repr=False, compare=False)
+
+    @property
+    def count(self) -> int:
+        return sum(bool(name) for name in self.classes)
+
+    def settings(self) -> dict[str, Any]:
+        """Return what the result depends on: no path and no name of a file."""
+        return {
+            "model": self.digest,
+            "patch": list(self.patch),
+            "names": list(self.classes),
+            "onnxruntime": version("onnxruntime"),
+        }
+
+    @classmethod
+    def load(cls, path: Path) -> "Network":
+        """Return the model, tried on one empty patch. Raises UsageError, SourceError."""
+        onnxruntime = _find_runtime()
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4
+        try:
+            session = onnxruntime.InferenceSession(
+                content, options, providers=["CPUExecutionProvider"]
+            )
+        except _errors() as error:
+            raise SourceError(f"{path}: {_why(error)}, expected an ONNX model") from None
+        patch = _patch(path, session)
+        tried = _run(str(path), session, np.zeros(patch, np.float32))
+        names = _names(path, session, tried.shape[0])
+        return cls(path.name, hashlib.sha256(content).hexdigest(), patch, names, session)
+
+
+def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
+    """Return probabilities float32 (k, z, y, x), 1 in sum, of voxels (z, y, x)."""
+    values = voxels.astype(np.float32)
+    inside = values[find_foreground(ndimage.gaussian_filter(values, 0.8))]
+    values -= inside.mean(dtype=np.float64)
+    values /= max(float(inside.std(dtype=np.float64)), 1e-12)
+    missing = [max(0, p - n) for p, n in zip(network.patch, values.shape, strict=True)]
+    padded = np.pad(values, [(0, n) for n in missing], mode="edge")
+    weight = _gaussian(network.patch)
+    total = np.zeros((len(network.classes), *padded.shape), np.float32)
+    weights = np.zeros(padded.shape, np.float32)
+    is_probability: bool | None = None
+    starts = [_starts(n, p) for n, p in zip(padded.shape, network.patch, strict=True)]
+    for corner in itertools.product(*starts):
+        box = tuple(slice(a, a + p) for a, p in zip(corner, network.patch, strict=True))
+        found = _run(network.name, network.session, padded[box])
+        if is_probability is None:  # asked of the first patch, so that all are taken alike
+            is_probability = bool(found.min() >= 0 and np.abs(found.sum(axis=0) - 1).max() < 1e-3)
+        if not is_probability:
+            found = np.exp(found - found.max(axis=0))
+        found = np.clip(found, 0, None)
+        found /= np.maximum(found.sum(axis=0), 1e-12)
+        total[(slice(None), *box)] += weight * found
+        weights[box] += weight
+    total /= weights
+    z, y, x = values.shape
+    return total[:, :z, :y, :x]
+
+
+def _find_runtime() -> Any:
+    """Return onnxruntime, an optional package; by name, so that it is no part of our lineage."""
+    try:
+        return import_module("onnxruntime")
+    except ImportError:
+        raise UsageError(
+            "--model needs the package onnxruntime, which isn't installed: "
+            "pip install 'stereocell[onnx]'"
+        ) from None
+
+
+def _errors() -> tuple[type[Exception], ...]:
+    """Return onnxruntime's errors, which have no class of their own in common."""
+    state = import_module("onnxruntime.capi.onnxruntime_pybind11_state")
+    found = (v for v in vars(state).values() if isinstance(v, type) and issubclass(v, Exception))
+    return (*found, RuntimeError, ValueError)
+
+
+def _why(error: Exception) -> str:
+    """Return what the runtime says without its own name and codes; files of no model say little."""
+    text = " ".join(str(error).split())
+    if "protobuf" in text:  # it couldn't be parsed, or holds no graph
+        return "found another kind of file"
+    return re.sub(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ", "", text)[:200]
+
+
+def _starts(length: int, patch: int) -> list[int]:
+    """Return where patches begin that half overlap; the last one ends where the axis does."""
+    step = max(1, patch // 2)
+    return [*range(0, length - patch, step), length - patch]
+
+
+def _gaussian(patch: tuple[int, int, int]) -> Field:
+    parts = [np.exp(-0.5 * ((np.arange(n) - (n - 1) / 2) / max(n / 8, 0.5)) ** 2) for n in patch]
+    weight = np.einsum("z,y,x->zyx", *parts)
+    return np.maximum(weight, 1e-4).astype(np.float32)
+
+
+def _patch(path: Path, session: Any) -> tuple[int, int, int]:
+    inputs, outputs = session.get_inputs(), session.get_outputs()
+    if len(inputs) != 1 or len(outputs) != 1:
+        raise SourceError(
+            f"{path}: found {len(inputs)} inputs and {len(outputs)} outputs, expected one of each"
+        )
+    shape, kind = inputs[0].shape, inputs[0].type
+    is_fit = len(shape) == 5 and all(n == 1 for n in shape[:2] if isinstance(n, int))
+    if kind != "tensor(float)" or not is_fit:
+        raise SourceError(
+            f"{path}: input {inputs[0].name!r} is {kind} of shape {shape}, expected tensor(float) "
+            "of shape (1, 1, D, H, W)"
+        )
+    z, y, x = (n if isinstance(n, int) else PATCH for n in shape[2:])
+    if not all(1 <= n <= LARGEST for n in (z, y, x)):
+        raise SourceError(
+            f"{path}: input {inputs[0].name!r} asks for patches of {z} x {y} x {x} voxels, "
+            f"expected 1 to {LARGEST} each way"
+        )
+    return z, y, x
+
+
+def _run(where: str, session: Any, patch: Field) -> Field:
+    try:
+        (found,) = session.run(None, {session.get_inputs()[0].name: patch[None, None]})
+    except _errors() as error:
+        raise SourceError(f"{where}: failed on a patch of {patch.shape}: {_why(error)}") from None
+    result = np.asarray(found)
+    shape = result.shape
+    is_fit = len(shape) == 5 and shape[0] == 1 and shape[2:] == patch.shape
+    if not is_fit or not 2 <= shape[1] <= MOST_CLASSES or result.dtype.kind != "f":
+        expected = ", ".join(str(n) for n in patch.shape)
+        raise SourceError(
+            f"{where}: output is {result.dtype} of shape {shape}, expected floats of shape "
+            f"(1, K, {expected}) with K from 2 to {MOST_CLASSES}"
+        )
+    if not np.isfinite(result).all():
+        raise SourceError(f"{where}: output holds NaN or infinity, expected finite numbers")
+    return result[0].astype(np.float32)
+
+
+def _names(path: Path, session: Any, count: int) -> tuple[str, ...]:
+    text = session.get_modelmeta().custom_metadata_map.get(NAMES_KEY)
+    if text is None:
+        return tuple(f"tissue {k + 1}" for k in range(count))
+    try:
+        names = json.loads(text)
+    except ValueError:
+        names = None
+    is_list = isinstance(names, list) and all(isinstance(name, str) for name in names)
+    shown = [name for name in names if name] if is_list else []
+    if not is_list or len(names) != count or len(set(shown)) != len(shown) or not shown:
+        raise SourceError(
+            f"{path}: metadata {NAMES_KEY!r} is {text[:80]!r}, expected a JSON list of {count} "
+            "different names (an empty one leaves its class out)"
+        )
+    return tuple(names)

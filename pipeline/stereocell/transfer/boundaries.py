@@ -1,0 +1,263 @@
+"""Find the boundaries between materials in a histogram of value and gradient magnitude.
+
+A boundary between materials of values a < b, an ideal edge blurred by a Gaussian, crosses the
+value at a + t (b - a) with the gradient (b - a) / (s sqrt(2 pi)) exp(-erfinv(2t - 1)^2): an arc
+from one material to the other (Kindlmann & Durkin 1998).
+
+Arcs of different pairs cross, and one that spans the whole window passes over the others' voxels.
+So no arc is looked for by itself: what lies above the noise is explained as a sum of boundaries of
+all pairs of materials (see materials.py) at a row of blurs (see edge_counts.py), and of what the
+materials' own noise leaves there, none of them negative (Lawson & Hanson, Solving Least Squares
+Problems, 1974). The pairs that it takes much of are the boundaries; one that passes over a third
+material, whose own noise it can pass for, only if the rest explains what is there clearly worse.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+from scipy.special import erf
+
+from stereocell.model.channel import Shape, Shapes
+from stereocell.transfer.edge_model import (
+    COARSER,
+    Plane,
+    Ratios,
+    count_edge,
+    count_material,
+    find_steepest,
+    value_noise,
+)
+from stereocell.transfer.joint_histogram import choose_gradient_max, rebin
+from stereocell.transfer.material_peaks import find_materials, find_noise
+
+BLURS = np.geomspace(0.3, 8.0, 14)  # sigma of an edge, in finest voxels
+NOISES = (1.0, 1.5)  # x a material's noise, which a bias field widens
+LEAST_CONTRAST = 0.06  # of the window, between two materials
+OVER_NOISE = 1.1  # x the noise, to an arc's apex
+LEAST_SEEN = 0.02  # of an edge's voxels above the noise, to be told
+LEAST_SHARE = 0.05  # of what all boundaries explain, to one of them
+LEAST_MISSED = 0.05  # more squares left over without a boundary that passes over a third material
+LEAST_VOXELS = 2e-5  # of all, to a boundary: a ball of 40 voxels in 256^3 has twice as many
+FEWEST = 20.0  # voxels: cells of fewer weigh no more, as nothing is quite as ideal
+MAX_ARCS = 6
+CLEAR = 2.0  # sigmas of noise that a shape keeps from a material's value
+EVEN: Ratios = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A boundary between two materials.
+
+    low, high  values of the materials, 0..1 in the window
+    apex       its steepest gradient, met head-on, 0..1 of the scale's end: at times a little above
+    steepest   the same, met in the direction that has most
+    blur       sigma of the edge, in finest voxels
+    share      of all voxels, those above the noise that it explains
+    noise      gradient magnitude at the middle value, 0..1 of the scale's end, that noise may have
+    sigma      of the values' noise there
+    """
+
+    low: float
+    high: float
+    apex: float
+    steepest: float
+    blur: float
+    share: float
+    noise: float
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Boundaries:
+    """What was found; `reason` says why there is no arc, empty if there is one.
+
+    materials  values 0..1, rising
+    """
+
+    arcs: tuple[Arc, ...]
+    materials: tuple[float, ...]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A first 2D function for a channel; `reason` says why it has no shapes, empty if it has some.
+
+    gradient_max  the gradient magnitude that is 1 to the shapes
+    """
+
+    shapes: Shapes
+    gradient_max: float
+    reason: str
+
+
+def propose(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> Proposal:
+    """Return shapes on the boundaries of a channel; `fine`: counts, see choose_gradient_max."""
+    gradient_max = choose_gradient_max(fine)
+    found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um)
+    return Proposal(propose_shapes(found), gradient_max, found.reason)
+
+
+def find_boundaries(
+    counts: NDArray[np.int64], gradient_max: float, spacing_um: Ratios = EVEN
+) -> Boundaries:
+    """Return materials and boundaries of a histogram, int (rows, columns); see histogram2d.py.
+
+    Same histogram, same answer. A constant volume, or one of a single material, has no arcs.
+    """
+    total = int(counts.sum())
+    noise = find_noise(counts, gradient_max)
+    if total == 0:
+        return Boundaries((), (), "no voxels were counted")
+    materials = find_materials(counts, noise)
+    if len(materials) < 2:
+        return Boundaries((), materials, f"materials found: {len(materials)}, expected at least 2")
+    finest = min(spacing_um)
+    z, y, x = (h / finest for h in spacing_um)
+    plane = Plane(len(counts), counts.shape[1] // COARSER, gradient_max, (z, y, x))
+    arcs = _explain(counts, noise, materials, plane)
+    arcs = [arc for arc in arcs if arc.share >= LEAST_VOXELS]
+    arcs = sorted(arcs, key=lambda arc: (-arc.share, arc.low, arc.high))[:MAX_ARCS]
+    reason = "" if arcs else f"no boundary rises above the noise between {len(materials)} materials"
+    return Boundaries(tuple(sorted(arcs, key=lambda a: (a.low, a.high))), materials, reason)
+
+
+def propose_shapes(boundaries: Boundaries) -> Shapes:
+    """Return a triangle on each arc: its tip below the apex, its sides between the materials.
+
+    What lies within 0.3 of the contrast of the middle value at the apex's height is taken, as far
+    as the noise of the two materials leaves room, and up to a little above the boundary's steepest
+    voxels. The lower a boundary's value, the more lies behind it: outer ones let more through.
+    """
+    arcs = sorted(boundaries.arcs, key=lambda arc: (arc.low + arc.high, arc.low))
+    shapes = []
+    for i, arc in enumerate(arcs):
+        middle, contrast = (arc.low + arc.high) / 2, arc.high - arc.low
+        top = min(1.0, 1.2 * arc.steepest)
+        room = max(contrast / 2 - CLEAR * arc.sigma, 0.1 * contrast)
+        half = min(0.3 * contrast * top / min(arc.apex, top), room)
+        bottom = min(max(0.4 * arc.apex, min(arc.noise, 0.7 * arc.apex)), 0.9 * top)
+        opacity = 0.7 if len(arcs) == 1 else 0.15 + 0.55 * i / (len(arcs) - 1)
+        shapes.append(
+            Shape(
+                "triangle",
+                (round(max(0.0, middle - half), 4), round(min(1.0, middle + half), 4)),
+                (round(bottom, 4), round(top, 4)),
+                round(middle, 4),
+                (1.0, 1.0, 1.0),
+                round(opacity, 4),
+                0.5,
+            )
+        )
+    return tuple(shapes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sum:
+    """What lies above the noise, as a sum to be found.
+
+    matrix  (cells, terms): what each boundary, and then each material, leaves there; weighted
+    cells   (cells,) what was counted; weighted
+    pairs   (boundaries,) which pair of materials each is of
+    blurs   (boundaries,) in finest voxels
+    seen    (boundaries,) voxels above the noise that one of 1 has
+    """
+
+    matrix: NDArray[np.float64]
+    cells: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    blurs: NDArray[np.float64]
+    seen: NDArray[np.float64]
+
+    def fit(self, without: int = -1) -> tuple[NDArray[np.float64], float]:
+        """Return the voxels of each boundary, and the squares that are left; without one pair."""
+        used = np.ones(self.matrix.shape[1], bool)
+        used[: len(self.pairs)] = self.pairs != without
+        matrix = self.matrix[:, used]
+        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
+        found, left = optimize.nnls(matrix / scale, self.cells, maxiter=100 * len(scale))
+        amounts = np.zeros(len(used))
+        amounts[used] = found / scale
+        return amounts[: len(self.pairs)] * self.seen, float(left) ** 2
+
+
+def _explain(
+    counts: NDArray[np.int64],
+    noise: NDArray[np.float64],
+    materials: tuple[float, ...],
+    plane: Plane,
+) -> list[Arc]:
+    """Return the boundaries that have their share of what lies above the noise."""
+    pairs = [(a, b) for a, b in combinations(materials, 2) if b - a >= LEAST_CONTRAST]
+    terms = _make_terms(counts, noise, materials, pairs, plane)
+    if terms is None:
+        return []
+    voxels, left = terms.fit()
+    arcs = []
+    for number, (low, high) in enumerate(pairs):
+        own = terms.pairs == number
+        held = float(voxels[own].sum())
+        if held <= 0 or held < LEAST_SHARE * voxels.sum():
+            continue
+        here = _noise_at(noise, (low + high) / 2)
+        blur = float(np.exp(np.average(np.log(terms.blurs[own]), weights=voxels[own])))
+        per_step = (high - low) / plane.gradient_max
+        apex = per_step * float(erf(1 / blur / np.sqrt(2)))
+        if apex < OVER_NOISE * here:
+            continue
+        if any(low < other < high for other in materials):
+            _, without = terms.fit(number)
+            if without < (1 + LEAST_MISSED) * left:
+                continue
+        arcs.append(
+            Arc(
+                low,
+                high,
+                apex,
+                per_step * find_steepest(blur, plane.ratios),
+                blur,
+                held / float(counts.sum()),
+                here,
+                value_noise(here, plane.gradient_max),
+            )
+        )
+    return arcs
+
+
+def _make_terms(
+    counts: NDArray[np.int64],
+    noise: NDArray[np.float64],
+    materials: tuple[float, ...],
+    pairs: list[tuple[float, float]],
+    plane: Plane,
+) -> _Sum | None:
+    """Return the sum for all pairs and blurs; None where no boundary rises above the noise."""
+    cells = counts.reshape(plane.rows, plane.columns, COARSER).sum(axis=2).astype(np.float64)
+    level = noise.reshape(plane.columns, COARSER).max(axis=1)
+    is_steep = np.arange(plane.rows)[:, np.newaxis] > level * (plane.rows - 1)
+    weight = 1 / np.sqrt(cells[is_steep] + FEWEST)  # counts are off by their root
+    terms: list[NDArray[np.float64]] = []
+    edges: list[tuple[int, float, float]] = []
+    for number, (low, high) in enumerate(pairs):
+        sigma = value_noise(_noise_at(noise, (low + high) / 2), plane.gradient_max)
+        for blur in BLURS:
+            share = count_edge(low, high, float(blur), sigma, plane)
+            seen = share[is_steep]
+            if seen.sum() > LEAST_SEEN * share.sum():
+                terms.append(seen * weight)
+                edges.append((number, float(blur), float(seen.sum())))
+    if not edges:
+        return None
+    for value in materials:
+        for wider in NOISES:
+            sigma = wider * value_noise(_noise_at(noise, value), plane.gradient_max)
+            terms.append(count_material(value, sigma, plane)[is_steep] * weight)
+    numbers, blurs, seen_of = (np.array(column) for column in zip(*edges, strict=True))
+    return _Sum(np.stack(terms, axis=1), cells[is_steep] * weight, numbers, blurs, seen_of)
+
+
+def _noise_at(noise: NDArray[np.float64], value: float) -> float:
+    return float(noise[round(value * (len(noise) - 1))])

@@ -1,0 +1,156 @@
+"""What must be known of the whole dataset before any unit: windows, histograms, transfer functions.
+
+8 bits mean the same in every tile, so a channel's window comes from all of the region, on a coarse
+level, and so does its threshold. Iso-values are found per tile; transfer functions need their mean.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.settings import WindowOptions
+from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Look, Verdict
+from stereocell.model.lattice_field import LatticeField
+from stereocell.transfer.adaptive_threshold import (
+    Histogram,
+    Threshold,
+    find_adaptive_threshold,
+    make_histogram,
+)
+from stereocell.transfer.boundaries import Proposal
+from stereocell.transfer.opacity import make_transfer_functions
+from stereocell.transfer.shapes2d import NAME as NAME_2D
+from stereocell.transfer.shapes2d import fall_back, shapes_from
+
+BINS = 256
+_AT_ONCE = 1 << 20  # voxels
+NO_PROPOSAL = Proposal((), DEFAULT_GRADIENT_MAX, "not looked for")
+NOTHING_COUNTED = Histogram((), 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """One channel's window in voxel values, voxel counts (256 bins) inside it, its background, the
+    2D function that is proposed for it, and the counts that its threshold is read from.
+    """
+
+    window: tuple[float, float]
+    histogram: tuple[int, ...]
+    background: LatticeField | None
+    proposal: Proposal = NO_PROPOSAL
+    values: Histogram = NOTHING_COUNTED
+
+    @property
+    def threshold(self) -> Threshold | None:
+        return find_adaptive_threshold(self.values)
+
+
+def find_display(
+    voxels: NDArray[Any],
+    options: WindowOptions,
+    background: LatticeField | None = None,
+    window: tuple[float, float] | None = None,
+) -> Display:
+    """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide.
+
+    `window`, where it is known, is not sought. The voxels are left in another order: a sorted copy
+    would be what the memory of a small build peaks at.
+    """
+    percentiles = (options.low_percentile, options.high_percentile)
+    voxels = voxels.reshape(-1)
+    low, high = (float(v) for v in np.percentile(voxels, percentiles, overwrite_input=True))
+    if not high > low:  # sparse channels: fewer bright voxels than the percentile leaves out
+        low, high = float(voxels.min()), float(voxels.max())
+    if not high > low:
+        high = low + max(1.0, 1e-6 * abs(low))  # more than float32 tells apart
+    if window is not None:
+        low, high = window
+    if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
+        voxels = voxels.astype(np.float64)  # bins so narrow that float32 has no edges for them
+    counts = np.zeros(BINS, np.int64)
+    for start in range(0, voxels.size, _AT_ONCE):  # clipped, an integer takes eight bytes
+        part = np.clip(voxels[start : start + _AT_ONCE], low, high)
+        counts += np.histogram(part, BINS, (low, high))[0]
+    values = make_histogram(voxels, (low, high))
+    return Display((low, high), tuple(int(n) for n in counts), background, values=values)
+
+
+def display_to_json(display: Display) -> dict[str, Any]:
+    """Return a display as plain values, as survey.json holds it."""
+    field = display.background
+    return {
+        "window": list(display.window),
+        "histogram": list(display.histogram),
+        "background": None if field is None else field.to_json(),
+        "proposal": asdict(display.proposal),
+        "values": asdict(display.values),
+    }
+
+
+def display_from_json(content: Mapping[str, Any]) -> Display:
+    """Return the display that `display_to_json` was given; the content has passed its schema."""
+    field, proposal, values = content["background"], content["proposal"], content["values"]
+    low, high = content["window"]
+    return Display(
+        (low, high),
+        tuple(content["histogram"]),
+        None if field is None else LatticeField.from_json(field),
+        Proposal(shapes_from(proposal["shapes"]), proposal["gradient_max"], proposal["reason"]),
+        Histogram(tuple(values["counts"]), values["low"], values["high"]),
+    )
+
+
+def make_look(
+    name: str,
+    color: tuple[float, float, float],
+    display: Display,
+    iso_values: Mapping[str, float | None],
+    confidence: float,
+    surface: Verdict,
+) -> Look:
+    """Return how a channel is drawn; iso-values by tile id, confidence and verdict for all."""
+    known = [value for value in iso_values.values() if value is not None]
+    iso_value = float(np.mean(known)) if known else None
+    found = display.threshold
+    look = replace(
+        Look(name, color, display.window, iso_value, confidence, surface, {}),
+        threshold=None if found is None else found.value,
+    )
+    # a level that nothing tells from noise is no place for opacity to begin
+    level = look.iso_normalized if surface == "clear" else None
+    functions = make_transfer_functions(
+        np.asarray(display.histogram), level, look.threshold_normalized
+    )
+    shapes = display.proposal.shapes
+    if shapes:
+        functions[NAME_2D] = fall_back(shapes)
+    return replace(
+        look,
+        transfer_functions=functions,
+        shapes={NAME_2D: shapes} if shapes else {},
+        gradient_max=display.proposal.gradient_max,
+    )
+
+
+def look_from(content: Mapping[str, Any]) -> Look:
+    """Return the look that survey.json holds."""
+    functions = {
+        name: tuple((float(x), float(opacity)) for x, opacity in points)
+        for name, points in content["transfer_functions"].items()
+    }
+    return Look(
+        content["name"],
+        tuple(content["color"]),
+        tuple(content["window"]),
+        content["iso_value"],
+        content["iso_confidence"],
+        content["surface"],
+        functions,
+        content["painted_by"],
+        {name: shapes_from(shapes) for name, shapes in content["shapes"].items()},
+        content["gradient_max"],
+        content["threshold"],
+    )

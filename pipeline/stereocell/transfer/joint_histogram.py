@@ -1,0 +1,141 @@
+"""Count a channel's voxels by value and gradient magnitude: the domain of 2D transfer functions.
+
+The gradient magnitude is the step of intensity (0..1 of the window) over two finest voxel
+spacings, by central differences: 2 h |grad f|, h the finest spacing. At a voxel's centre it is just
+what a shader gets of trilinear samples one h to either side along each axis: with r = h / spacing
+of that axis, f(+r) - f(-r) = r (f[1] - f[-1]). `gradient_max`, one number a channel, is the step
+that the last row stands for.
+
+Kindlmann & Durkin, "Semi-automatic generation of transfer functions for direct volume rendering",
+IEEE Symposium on Volume Visualization 1998; Kniss, Kindlmann & Hansen, "Multidimensional transfer
+functions for interactive volume rendering", IEEE TVCG 8(3), 2002.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.tiling import Box
+
+ROWS, COLUMNS = 64, 256  # gradient magnitudes, values of 8 bits
+STEEPEST = 3**0.5  # the largest step there is: all of the window along each axis
+FINE_ROWS = 1024  # of 0..STEEPEST, before gradient_max is known: half a step of 8 bits each
+ENERGY_SHARE = 0.995  # of the squared steps lies below gradient_max
+SMALLEST_MAX = 0.05  # 13 steps of 8 bits: below it, rows would be finer than what is told apart
+SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, where not all of a region is counted
+
+
+def find_steps(
+    voxels: NDArray[np.uint8], spacing_um: tuple[float, float, float]
+) -> NDArray[np.float32]:
+    """Return the gradient magnitude at all voxels but the outermost, as 8-bit values: 255 is 1.
+
+    uint8 (z, y, x) to float32 (z - 2, y - 2, x - 2).
+    """
+    finest = min(spacing_um)
+    inner = (slice(1, -1),) * 3
+    total = np.zeros([n - 2 for n in voxels.shape], np.float32)
+    for axis, spacing in enumerate(spacing_um):
+        after, before = ([*inner] for _ in range(2))
+        after[axis], before[axis] = slice(2, None), slice(None, -2)
+        step = np.subtract(voxels[tuple(after)], voxels[tuple(before)], dtype=np.float32)
+        step *= np.float32(finest / spacing)
+        step *= step
+        total += step
+    steps: NDArray[np.float32] = np.sqrt(total, out=total)
+    return steps
+
+
+def count_joint(
+    voxels: NDArray[np.uint8],
+    spacing_um: tuple[float, float, float],
+    gradient_max: float,
+    rows: int = ROWS,
+    every: int = 1,
+) -> NDArray[np.int64]:
+    """Return how many voxels have each gradient magnitude and value, int64 (rows, COLUMNS).
+
+    uint8 (z, y, x), of which the outermost voxels are counted only as neighbours; an axis of fewer
+    than 3 voxels has its ends repeated. Row j stands for j / (rows - 1) of `gradient_max`, the last
+    one for all that is steeper too; column k for the value k / 255. Of the planes every `every`-th.
+    """
+    short = [(1, 1) if n < 3 else (0, 0) for n in voxels.shape]
+    voxels = np.pad(voxels, short, mode="edge") if (1, 1) in short else voxels
+    factor = np.float32((rows - 1) / (255 * gradient_max))
+    counts = np.zeros(rows * COLUMNS, np.int64)
+    for z in range(1, len(voxels) - 1, every):  # by planes: they stay in the cache
+        steps = find_steps(voxels[z - 1 : z + 2], spacing_um)[0]
+        row = np.minimum(steps * factor + np.float32(0.5), rows - 1).astype(np.intp)
+        row *= COLUMNS
+        row += voxels[z, 1:-1, 1:-1]
+        counts += np.bincount(row.ravel(), minlength=counts.size)
+    return counts.reshape(rows, COLUMNS)
+
+
+def choose_gradient_max(fine: NDArray[np.int64]) -> float:
+    """Return the step that a channel's last row is to stand for, rounded up to 3 digits.
+
+    `fine`: counts of FINE_ROWS x COLUMNS over 0..STEEPEST. Nearly all of the squared steps lie
+    below it: voxels without a boundary, which are most, weigh nothing, and a few hot ones little.
+    """
+    steps = np.linspace(0, STEEPEST, len(fine))
+    energy = np.cumsum(fine.sum(axis=1) * steps**2)
+    found = steps[np.searchsorted(energy, ENERGY_SHARE * energy[-1])] if energy[-1] > 0 else 0.0
+    return float(np.ceil(1000 * max(found, SMALLEST_MAX) - 1e-9) / 1000)
+
+
+def rebin(fine: NDArray[np.int64], gradient_max: float, rows: int = ROWS) -> NDArray[np.int64]:
+    """Return the counts of FINE_ROWS over 0..STEEPEST as those of `rows` over 0..gradient_max."""
+    steps = np.linspace(0, STEEPEST, len(fine))
+    row = np.minimum(steps / gradient_max * (rows - 1) + 0.5, rows - 1).astype(np.intp)
+    counts = np.zeros((rows, fine.shape[1]), np.int64)
+    np.add.at(counts, row, fine)
+    return counts
+
+
+def log_scaled(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Return counts as a picture, uint8: 0 where there is none, 255 where there are most."""
+    most = int(counts.max(initial=0))
+    if most == 0:
+        return np.zeros(counts.shape, np.uint8)
+    picture = np.rint(255 * np.log1p(counts) / np.log1p(most)).astype(np.uint8)
+    return np.where(counts > 0, np.maximum(picture, 1), 0).astype(np.uint8)
+
+
+def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
+    """Return voxels as the 8-bit volumes hold them: the window's ends are 0 and 255.
+
+    Any real dtype and shape (z, ...) to uint8 of that shape; `window` in voxel values.
+    """
+    low, high = window
+    result = np.empty(voxels.shape, np.uint8)
+    for z, plane in enumerate(voxels):  # one at a time: float32 is large
+        share = (plane.astype(np.float32) - np.float32(low)) / np.float32(high - low)
+        result[z] = np.rint(np.clip(share, 0, 1) * 255)
+    return result
+
+
+def sample_boxes(region: Box, limit: int) -> list[Box]:
+    """Return boxes of a region with at most about `limit` voxels in all: all of it, or blocks.
+
+    Blocks stand evenly along each axis, from end to end, as far as the limit goes.
+    """
+    shape = region.shape
+    if np.prod(shape, dtype=np.int64) <= limit:
+        return [region]
+    edge = [min(n, e) for n, e in zip(shape, SAMPLE_EDGE, strict=True)]
+    room = [n / e for n, e in zip(shape, edge, strict=True)]
+    wanted = limit / float(np.prod(edge, dtype=np.int64))
+    share = min(1.0, (wanted / float(np.prod(room))) ** (1 / 3))
+    counts = [max(1, int(r * share)) for r in room]
+    starts = [
+        np.rint(a + (np.arange(count) + 0.5) * n / count - e / 2).astype(int)
+        for a, n, e, count in zip(region.start, shape, edge, counts, strict=True)
+    ]
+    return [
+        Box((z, y, x), (z + edge[0], y + edge[1], x + edge[2]))
+        for z in map(int, starts[0])
+        for y in map(int, starts[1])
+        for x in map(int, starts[2])
+    ]

@@ -1,0 +1,54 @@
+"""Transfer functions: from a channel's intensities to opacity, made from histogram and iso-value.
+
+Intensity 0..1 is the channel's window. Opacity is what one finest voxel spacing of the material
+absorbs; the marcher corrects it for its own step. Colour is the channel's, kept apart, so that a
+recoloured channel needs no new table.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.channel import OpacityPoints
+
+NAMES = ("default", "soft", "sharp", "surface")
+THRESHOLD = "threshold"  # of channels that have one
+RAMP = 0.08  # of the window, over which opacity rises from the threshold
+
+
+def make_transfer_functions(
+    histogram: NDArray[np.int64],
+    iso_normalized: float | None,
+    threshold_normalized: float | None = None,
+) -> dict[str, OpacityPoints]:
+    """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
+
+    `histogram`: voxel counts over 0..1 in equal bins. Background is what most voxels are: opacity
+    starts half-way between the median and the level, which is the iso-value, or the 99th
+    percentile in a channel without a clear surface.
+    """
+    share = np.cumsum(histogram) / max(1, int(histogram.sum()))
+    bins = len(histogram)
+    percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.99)}
+    level = percentile[0.99] if iso_normalized is None else iso_normalized
+    level = float(np.clip(level, 0.02, 0.96))
+    floor = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
+    bright = max(level + 0.5 * (1 - level), level + 0.02)
+    functions = {
+        "default": _points((floor, 0.0), (level, 0.12), (bright, 0.45), (1.0, 0.6)),
+        "soft": _points((0.6 * floor, 0.0), (level, 0.04), (1.0, 0.2)),
+        "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
+        "surface": _points(
+            (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
+        ),
+    }
+    if threshold_normalized is not None:  # nothing below it: bricks of nothing are not visited
+        start = float(np.clip(threshold_normalized, 0.01, 0.97))
+        top = start + min(RAMP, 0.9 * (1 - start))
+        functions[THRESHOLD] = _points((start, 0.0), (top, 0.45), (1.0, 0.6))
+    return functions
+
+
+def _points(*points: tuple[float, float]) -> OpacityPoints:
+    """Return the points after the origin, rounded so that text files repeat."""
+    inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]
+    return ((0.0, 0.0), *inner)

@@ -1,0 +1,51 @@
+"""Frame a specimen with three cameras: `mono`, and `left` and `right` for a stereo pair.
+
+The specimen is looked at as the viewer shows it in a room, its longest edge 1.2 m: the distance
+between the eyes, 63 mm, shrinks by the same scale. The eyes look straight ahead, parallel; their
+windows are shifted so that both see the specimen's centre at the same place (off-axis stereo, no
+keystone distortion).
+
+USD gives lens numbers in tenths of a stage unit, so millimetres become mm * 0.01 / metersPerUnit.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Usd, UsdGeom
+
+from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, vec3d
+
+ROOM_SIZE_M = 1.2  # the specimen's longest edge, as the viewer shows it
+PUPIL_DISTANCE_M = 0.063
+FOCAL_LENGTH_MM = 35.0
+APERTURE_MM = (36.0, 20.25)  # 16:9
+MARGIN = 1.08  # so much farther away than where the specimen would fill the frame
+
+_LENS = 0.01 / METERS_PER_UNIT
+
+
+def define_cameras(stage: Usd.Stage, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+    """Define the cameras for a box in world um (x, y, z), seen from +z."""
+    width, height, depth = (float(v) for v in high - low)
+    eye = 0.5 * PUPIL_DISTANCE_M * max(width, height, depth) / ROOM_SIZE_M
+    across, upwards = (0.5 * a / FOCAL_LENGTH_MM for a in APERTURE_MM)
+    # the front of the box fills the frame first; half an eye distance more keeps it in both eyes'
+    to_front = MARGIN * max((width / 2 + eye) / across, height / 2 / upwards)
+    distance = to_front + depth / 2
+    centre = (low + high) / 2
+    UsdGeom.Scope.Define(stage, CAMERAS)
+    roles = {
+        "mono": (0.0, UsdGeom.Tokens.mono),
+        "left": (-eye, UsdGeom.Tokens.left),
+        "right": (eye, UsdGeom.Tokens.right),
+    }
+    for name, (shift, role) in roles.items():
+        camera = UsdGeom.Camera.Define(stage, CAMERAS.AppendChild(name))
+        camera.AddTranslateOp().Set(vec3d(centre + np.array([shift, 0, distance])))
+        camera.CreateFocalLengthAttr(FOCAL_LENGTH_MM * _LENS)
+        camera.CreateHorizontalApertureAttr(APERTURE_MM[0] * _LENS)
+        camera.CreateVerticalApertureAttr(APERTURE_MM[1] * _LENS)
+        if shift:
+            camera.CreateHorizontalApertureOffsetAttr(-shift * FOCAL_LENGTH_MM * _LENS / distance)
+        camera.CreateFocusDistanceAttr(distance)
+        camera.CreateClippingRangeAttr(Gf.Vec2f(distance / 100, distance * 10))
+        camera.CreateStereoRoleAttr(role)

@@ -1,0 +1,116 @@
+"""What every layer of a stage has in common: its units, its root prim, how it gets to disk.
+
+USD never rescales between layers, so each layer states micrometres, Y up and its default prim.
+Importing this module registers the codeless API schema of schemas/usd with USD, which reads its
+schemas once, when the first stage of a process opens.
+"""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pxr import Gf, Plug, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
+
+from stereocell.model.errors import OutputError
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.storage.assets import find_asset
+from stereocell.storage.atomic_write import replacing
+
+METERS_PER_UNIT = 1e-6
+UP_AXIS = UsdGeom.Tokens.y
+ROOT = Sdf.Path("/Specimen")
+CHANNELS = ROOT.AppendChild("Channels")
+TILES = ROOT.AppendChild("Tiles")
+CAMERAS = ROOT.AppendChild("Cameras")
+CHANNEL_API = "StereoCellChannelAPI"
+SPECIMEN_API = "StereoCellSpecimenAPI"
+LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
+
+SHAPE_HASH = "stereocell:shapeHash"  # of a mesh: the shape that the pipeline gave it
+
+Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
+
+
+def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
+    """Return a stage in memory whose one layer has its units and the name of its root prim.
+
+    Payloads stay unloaded: the files that they name need not exist yet.
+    """
+    layer = Sdf.Layer.CreateAnonymous(suffix)
+    layer.defaultPrim = default_prim
+    stage = Usd.Stage.Open(layer, Usd.Stage.LoadNone)
+    UsdGeom.SetStageMetersPerUnit(stage, METERS_PER_UNIT)
+    UsdGeom.SetStageUpAxis(stage, UP_AXIS)
+    return stage
+
+
+def is_layer(file: Path) -> bool:
+    """Return whether USD can open a file as a layer, read anew from the disk."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # of a damaged one USD prints pages
+    try:
+        return Sdf.Layer.OpenAsAnonymous(str(file)) is not None
+    except Tf.ErrorException:
+        return False
+    finally:
+        del quiet
+
+
+def export(layer: Sdf.Layer, path: Path) -> None:
+    """Write a layer, whole or not at all. Raises OutputError."""
+    with replacing(path) as temporary:
+        try:
+            written = layer.Export(str(temporary))
+        except Tf.ErrorException as error:
+            raise OutputError(
+                f"{path}: can't be written: {' '.join(str(error).split())}"
+            ) from error
+        if not written:
+            raise OutputError(f"{path}: can't be written")
+
+
+def set_attribute(
+    prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object, *, custom: bool = False
+) -> None:
+    prim.CreateAttribute(name, kind, custom).Set(value)
+
+
+def hash_shape(mesh: UsdGeom.Mesh) -> str:
+    """Return a hash of a mesh's points and faces as composed; empty: they are no numbers."""
+    digest = hashlib.sha256()
+    faces = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
+    for attribute, kind in ((mesh.GetPointsAttr(), "<f4"), *((one, "<i4") for one in faces)):
+        value = attribute.Get()
+        try:
+            array = np.ascontiguousarray([] if value is None else value, kind)
+        except (TypeError, ValueError):
+            return ""
+        digest.update(f"{array.size} ".encode() + array.tobytes())
+    return digest.hexdigest()[:32]
+
+
+def vec3f(points: ArrayLike) -> Vt.Vec3fArray:
+    """Return (n, 3) numbers as USD's array."""
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, dtype=np.float32))
+
+
+def world_box(
+    first_um: ArrayLike, last_um: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lower and upper corner (x, y, z) in world of a box between points (z, y, x)."""
+    corners = zyx_to_xyz(np.stack([first_um, last_um])) + 0.0  # no negative zeros
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def move_box(
+    low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the box along the world's axes around a box moved by a (4, 4) matrix for rows."""
+    picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
+    corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def vec3d(point: ArrayLike) -> Gf.Vec3d:
+    x, y, z = (float(v) for v in np.asarray(point))
+    return Gf.Vec3d(x, y, z)

@@ -1,0 +1,88 @@
+"""Read single values of a composed stage, and say which prim lacks one."""
+
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Tf, Usd
+
+from stereocell.model.errors import StageError
+
+Point = tuple[float, float, float]
+
+
+def value_of(prim: Usd.Prim, name: str) -> Any:  # what USD holds there
+    """Return an attribute's value at the default time. Raises StageError if it has none."""
+    value = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
+    if value is None:
+        raise StageError(f"{prim.GetPath()}.{name}: no value")
+    return value
+
+
+def file_of(attribute: Usd.Attribute) -> Path:
+    """Return the file that an asset attribute resolves to. Raises StageError if there is none."""
+    asset = attribute.Get() if attribute else None
+    if asset is None or not asset.resolvedPath:
+        named = asset.path if asset is not None else ""
+        raise StageError(f"{attribute.GetPath()}: no file at {named!r}")
+    return Path(asset.resolvedPath)
+
+
+def color_of(attribute: Usd.Attribute) -> tuple[float, float, float]:
+    """Return a colour. Raises StageError if it is none, or one brighter than glTF can say."""
+    value = attribute.Get() if attribute else None
+    if value is None or not all(0 <= part <= 1 for part in value):
+        raise StageError(f"{attribute.GetPath()}: {value}, expected three numbers in 0..1")
+    r, g, b = (shortest(part) for part in value)
+    return r, g, b
+
+
+def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
+    """Return an attribute's numbers. Raises StageError unless there are `count`, all finite."""
+    value = value_of(prim, name)
+    try:
+        numbers = [] if isinstance(value, str) else [float(part) for part in np.ravel(value)]
+    except (TypeError, ValueError):
+        numbers = []
+    if len(numbers) != count or not all(map(isfinite, numbers)):
+        raise StageError(
+            f"{prim.GetPath()}.{name}: found {value!s:.60}, expected {count} finite numbers"
+        )
+    return numbers
+
+
+def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
+    """Return an attribute's whole numbers, each 0 or more. Raises StageError."""
+    numbers = numbers_of(prim, name, count)
+    if not all(number >= 0 and number.is_integer() for number in numbers):
+        raise StageError(f"{prim.GetPath()}.{name}: found {numbers}, expected sizes in voxels")
+    return [int(number) for number in numbers]
+
+
+def point_of(prim: Usd.Prim, name: str) -> Point:
+    """Return a place, or a distance along three axes. Raises StageError."""
+    x, y, z = numbers_of(prim, name, 3)
+    return x, y, z
+
+
+def shortest(number: float) -> float:
+    """Return the shortest decimal that is this float32: 0.2, not 0.20000000298023224."""
+    return float(str(np.float32(number)))
+
+
+def select_variant(prim: Usd.Prim, variant_set: str, variant: str) -> None:
+    """Select a variant for this process alone: in the session layer, which is never saved."""
+    stage = prim.GetStage()
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        prim.GetVariantSet(variant_set).SetVariantSelection(variant)
+
+
+def one_line(error: object) -> str:
+    """Return what USD says about an error, without its line breaks and places in its source."""
+    args = error.args if isinstance(error, Tf.ErrorException) else ()
+    try:
+        text = "; ".join(entry.commentary for entry in args) or str(error)
+    except UnicodeDecodeError:  # it quotes what is no text
+        text = "a layer or a file of it is damaged"
+    return " ".join(text.split())

@@ -1,0 +1,196 @@
+"""Read the looks of a composed stage: the channels', and what a tile's own mesh is drawn with."""
+
+import itertools
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdShade
+
+from stereocell.formats.gltf import Material
+from stereocell.model.channel import OpacityPoints, Shapes, Verdict, normalized
+from stereocell.model.errors import StageError
+from stereocell.usd.layer import CHANNELS
+from stereocell.usd.read_attributes import (
+    color_of,
+    numbers_of,
+    select_variant,
+    shortest,
+    value_of,
+)
+from stereocell.usd.read_shapes2d import read_gradient_max, read_shapes
+from stereocell.usd.read_textures import feeder
+from stereocell.usd.write_looks import DEFAULT_FUNCTION
+
+WHITE = (1.0, 1.0, 1.0)
+_VOLUME_WINDOW = "stereocell:volumeWindow"
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedLook:
+    """One channel as the stage draws it; see specimen.Look.
+
+    window         the voxel values to be shown as 0 and 1
+    volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
+    surface        the verdict on it
+    chosen         a transfer function
+    shapes         of those functions that are two-dimensional, by name
+    gradient_max   the gradient magnitude that is 1 to shapes
+    threshold      where the body begins, in voxel values; None: it is not known
+    """
+
+    id: str
+    name: str
+    color: tuple[float, float, float]
+    window: tuple[float, float]
+    volume_window: tuple[float, float]
+    iso_value: float | None
+    surface: Verdict
+    chosen: str
+    transfer_functions: dict[str, OpacityPoints]
+    shapes: dict[str, Shapes]
+    gradient_max: float
+    threshold: float | None = None
+
+    @property
+    def iso_normalized(self) -> float | None:
+        """The iso-value on the window's scale; outside 0..1 where the window leaves it out."""
+        return normalized(self.iso_value, self.window)
+
+    @property
+    def threshold_normalized(self) -> float | None:
+        """The threshold on the window's scale, 0..1: one beyond its ends is drawn at the end."""
+        share = normalized(self.threshold, self.window)
+        return None if share is None else min(max(share, 0.0), 1.0)
+
+    def window_voxels(self, voxels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a volume of the stage, uint8 by `volume_window`, as uint8 by `window`."""
+        if self.window == self.volume_window:
+            return voxels
+        first, last = self.volume_window
+        low, high = self.window
+        values = first + np.arange(256) / 255 * (last - first)
+        table = np.rint(np.clip((values - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+        return table[voxels]
+
+
+def read_looks(stage: Usd.Stage) -> list[ComposedLook]:
+    """Return the channels' looks, in the stage's order. Raises StageError for a faulty one."""
+    prims = stage.GetPrimAtPath(CHANNELS).GetChildren()
+    return [_read_look(prim) for prim in prims if prim.IsA(UsdShade.Material)]
+
+
+def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
+    """Return the UsdPreviewSurface that a mesh is drawn with. Raises StageError."""
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    if not material:
+        raise StageError(f"{prim.GetPath()}: no material bound")
+    surface, _, _ = material.ComputeSurfaceSource()
+    if not surface or surface.GetShaderId() != "UsdPreviewSurface":
+        raise StageError(f"{material.GetPath()}: no UsdPreviewSurface as its surface")
+    return surface
+
+
+def material_of(surface: UsdShade.Shader) -> Material:
+    """Return what glTF takes over of a UsdPreviewSurface; white where an image or the mesh's own
+    colours feed it. Raises StageError.
+    """
+    color = WHITE
+    if feeder(surface, "color") is None:
+        diffuse = _source(surface, "diffuseColor")
+        if diffuse is None:
+            raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
+        color = color_of(diffuse)
+    # defaults: the specification of UsdPreviewSurface
+    return Material(color, _share(surface, "metallic", 0.0), _share(surface, "roughness", 0.5))
+
+
+def _read_look(prim: Usd.Prim) -> ComposedLook:
+    variants = prim.GetVariantSet("transferFunction")
+    chosen = variants.GetVariantSelection() or DEFAULT_FUNCTION
+    names = sorted(variants.GetVariantNames(), key=lambda name: (name != DEFAULT_FUNCTION, name))
+    functions, shapes = {}, {}
+    for name in names or [chosen]:  # a flattened stage has what was chosen, and no variants
+        if names:
+            select_variant(prim, "transferFunction", name)
+        functions[name] = _opacity_points(prim)
+        if found := read_shapes(prim):
+            shapes[name] = found
+    if chosen not in functions:
+        raise StageError(f"{prim.GetPath()}: no transferFunction variant {chosen!r}")
+    window = _window(prim, "stereocell:window")
+    return ComposedLook(
+        prim.GetName(),
+        prim.GetDisplayName() or prim.GetName(),
+        color_of(prim.GetAttribute("inputs:color")),
+        window,
+        # only stages of other programs lack it
+        _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
+        _number(prim, "stereocell:isoValue"),
+        _verdict(prim, "stereocell:surfaceVerdict"),
+        chosen,
+        functions,
+        shapes,
+        read_gradient_max(prim),
+        _number(prim, "stereocell:threshold"),
+    )
+
+
+def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:
+    low, high = (shortest(number) for number in numbers_of(prim, name, 2))
+    if not low < high:
+        raise StageError(f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected them to rise")
+    return low, high
+
+
+def _number(prim: Usd.Prim, name: str) -> float | None:
+    value = prim.GetAttribute(name).Get()
+    return None if value is None else shortest(value)
+
+
+def _verdict(prim: Usd.Prim, name: str) -> Verdict:
+    value = prim.GetAttribute(name).Get()
+    if value is None:  # only stages of other programs lack it
+        return "clear"
+    for verdict in get_args(Verdict):
+        if value == verdict:
+            return verdict
+    raise StageError(
+        f"{prim.GetPath()}.{name}: {value!r}, expected one of {', '.join(get_args(Verdict))}"
+    )
+
+
+def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
+    field = f"{prim.GetPath()}.stereocell:opacityPoints"
+    try:
+        points = tuple((float(x), float(y)) for x, y in value_of(prim, "stereocell:opacityPoints"))
+    except (TypeError, ValueError):
+        raise StageError(f"{field}: no pairs, expected intensity and opacity") from None
+    if not points:
+        raise StageError(f"{field}: empty, expected pairs of intensity and opacity")
+    if not all(0 <= number <= 1 for point in points for number in point):
+        raise StageError(f"{field}: a number outside 0..1")
+    if any(after[0] < before[0] for before, after in itertools.pairwise(points)):
+        raise StageError(f"{field}: intensities fall, expected them to rise")
+    return points
+
+
+def _share(surface: UsdShade.Shader, name: str, default: float) -> float:
+    source = _source(surface, name)
+    value = None if source is None else source.Get()
+    return default if value is None else min(max(shortest(value), 0.0), 1.0)
+
+
+def _source(surface: UsdShade.Shader, name: str) -> Usd.Attribute | None:
+    """Return the attribute that gives a shader's input its value, through connections."""
+    shader_input = surface.GetInput(name)
+    attributes = shader_input.GetValueProducingAttributes() if shader_input else []
+    if not attributes:
+        return None
+    if UsdShade.Output.IsOutput(attributes[0]):
+        raise StageError(
+            f"{surface.GetPath()}.inputs:{name}: comes from {attributes[0].GetPath()}, "
+            "expected a plain value"
+        )
+    return attributes[0]

@@ -1,0 +1,199 @@
+"""Read a mesh of a composed stage as it is drawn: triangles, in the world, one value a vertex.
+
+The pipeline's own meshes are triangles with vertex normals and pass through unchanged. What a DCC
+tool may have made of them passes too: polygons, values per face corner, left-handed orientation,
+moved and mirrored tiles.
+"""
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from stereocell.model.errors import StageError
+from stereocell.model.mesh import Mesh
+
+_Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
+
+
+def read_mesh(
+    mesh: UsdGeom.Mesh,
+    to_world: NDArray[np.float64],
+    shown: Collection[str] = (),
+    *,
+    is_edited: bool = False,
+) -> Mesh | None:
+    """Return the mesh in world um, at the default time; None if it has no faces.
+
+    `to_world`: matrix for row vectors, (4, 4). `shown`: which of the primvars `displayColor` and
+    `occlusion` its look takes up. `is_edited`: primvars that fit other faces are left out.
+
+    Raises StageError where its arrays contradict each other.
+    """
+    points = _values(mesh.GetPointsAttr(), np.float32)
+    counts = _values(mesh.GetFaceVertexCountsAttr(), np.int64)
+    indices = _values(mesh.GetFaceVertexIndicesAttr(), np.int64)
+    if len(counts) == 0:
+        return None
+    path = mesh.GetPath()
+    if counts.min() < 3 or counts.sum() != len(indices):
+        raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
+    if indices.min() < 0 or indices.max() >= len(points):
+        raise StageError(f"{path}: faceVertexIndices outside its {len(points)} points")
+
+    corners = _triangulate(counts)
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        corners = corners[:, ::-1]
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    found = {
+        "normals": _normals(mesh),
+        "st": _primvar(primvars.GetPrimvar("st")),
+        "tangents": _primvar(primvars.GetPrimvar("tangents")),
+        **{name: _primvar(primvars.GetPrimvar(name)) for name in sorted(shown)},
+    }
+    values = {name: given for name, given in found.items() if given is not None}
+    if is_edited:
+        sizes = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
+        for name in sorted(values.keys() - {"normals"}):
+            array, kind = values[name]
+            if len(array) != sizes.get(kind, len(points)):
+                del values[name]
+        if "st" not in values:
+            values.pop("tangents", None)
+    if all(kind in ("vertex", "varying") for _, kind in values.values()):
+        triangles = indices[corners]
+        arrays = {name: array for name, (array, _) in values.items()}
+        for name, array in arrays.items():
+            if len(array) != len(points):
+                raise StageError(f"{path}: {len(array)} {name} for {len(points)} points")
+    else:
+        triangles, points, arrays = _split(path, points, indices, counts, corners, values)
+    if "normals" not in arrays:
+        arrays["normals"] = _smooth_normals(points, triangles)
+    return move_mesh(
+        Mesh(
+            points,
+            np.ascontiguousarray(triangles, dtype=np.uint32),
+            arrays["normals"],
+            arrays.get("st"),
+            arrays.get("tangents"),
+            arrays.get("displayColor"),
+            arrays.get("occlusion"),
+        ),
+        to_world,
+    )
+
+
+def _values(attribute: Usd.Attribute, dtype: type) -> NDArray[Any]:
+    try:
+        return _array(attribute.Get(), dtype)
+    except (TypeError, ValueError):
+        raise StageError(
+            f"{attribute.GetPath()}: found {attribute.GetTypeName()}, expected an array of numbers"
+        ) from None
+
+
+def _array(value: object, dtype: type) -> NDArray[Any]:
+    return np.array([] if value is None else value, dtype=dtype)
+
+
+def _normals(mesh: UsdGeom.Mesh) -> _Values | None:
+    """`primvars:normals` is stronger than `normals`."""
+    primvar = _primvar(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"))
+    value = mesh.GetNormalsAttr().Get()
+    if primvar is not None or value is None:
+        return primvar
+    return _array(value, np.float32), str(mesh.GetNormalsInterpolation())
+
+
+def _primvar(primvar: UsdGeom.Primvar) -> _Values | None:
+    if not primvar or not primvar.HasValue():
+        return None
+    return _array(primvar.ComputeFlattened(), np.float32), str(primvar.GetInterpolation())
+
+
+def _triangulate(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the triangles of each face as a fan, (m, 3), as positions in the face corners."""
+    starts = np.cumsum(counts) - counts
+    if (counts == 3).all():
+        return starts[:, np.newaxis] + np.arange(3)
+    fans = counts - 2
+    first = np.repeat(starts, fans)
+    step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
+    return np.stack([first, first + step + 1, first + step + 2], axis=1)
+
+
+def _split(
+    path: object,
+    points: NDArray[np.float32],
+    indices: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    values: dict[str, _Values],
+) -> tuple[NDArray[np.int64], NDArray[np.float32], dict[str, NDArray[np.float32]]]:
+    """Give every face corner a vertex, and join those that are equal in all values.
+
+    Returns triangles (m, 3), points (n, 3) and the values per vertex.
+    """
+    columns = {"points": points[indices]}
+    for name, (array, kind) in values.items():
+        expected = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
+        if len(array) != expected.get(kind, len(points)):
+            raise StageError(f"{path}: {len(array)} {name} do not fit {kind} interpolation")
+        if kind == "uniform":
+            array = np.repeat(array, counts, axis=0)
+        elif kind == "constant":
+            array = np.repeat(array, len(indices), axis=0)
+        elif kind != "faceVarying":
+            array = array[indices]
+        columns[name] = array.reshape(len(array), -1)
+    rows = np.hstack(list(columns.values())) + np.float32(0)  # -0.0 becomes 0.0
+    unique, vertex_of = np.unique(rows, axis=0, return_inverse=True)
+    widths = np.cumsum([array.shape[1] for array in columns.values()])[:-1]
+    parts = dict(zip(columns, np.hsplit(unique, widths), strict=True))
+    split_points = np.ascontiguousarray(parts.pop("points"))
+    if "occlusion" in parts:
+        parts["occlusion"] = parts["occlusion"][:, 0]
+    return vertex_of.reshape(-1)[corners], split_points, parts
+
+
+def _smooth_normals(
+    points: NDArray[np.float32], triangles: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Return unit normals at the vertices, each face weighted by its area."""
+    a, b, c = (points[triangles[:, i]].astype(np.float64) for i in range(3))
+    facing = np.cross(b - a, c - a)
+    total = np.zeros((len(points), 3))
+    for axis in range(3):
+        weights = np.repeat(facing[:, axis], 3)
+        total[:, axis] = np.bincount(triangles.ravel(), weights, minlength=len(points))
+    lengths = np.linalg.norm(total, axis=1, keepdims=True)
+    return (total / np.where(lengths == 0, 1, lengths)).astype(np.float32)
+
+
+def move_mesh(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+    """Return the mesh moved by a matrix for row vectors (4, 4). The identity keeps all bits."""
+    if np.array_equal(matrix, np.eye(4)):
+        return mesh
+    linear = matrix[:3, :3]
+    positions = mesh.positions.astype(np.float64) @ linear + matrix[3, :3]
+    normals = mesh.normals.astype(np.float64) @ np.linalg.inv(linear).T
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    mirrored = np.linalg.det(linear) < 0
+    tangents = mesh.tangents
+    if tangents is not None:
+        along = tangents[:, :3].astype(np.float64) @ linear
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
+        sign = -tangents[:, 3:] if mirrored else tangents[:, 3:]
+        tangents = np.hstack([along, sign]).astype(np.float32)
+    return Mesh(
+        positions.astype(np.float32),
+        np.ascontiguousarray(mesh.triangles[:, ::-1]) if mirrored else mesh.triangles,
+        normals.astype(np.float32),
+        mesh.uvs,
+        tangents,
+        mesh.colors,
+        mesh.openness,
+    )

@@ -1,0 +1,69 @@
+"""Read the 2D transfer functions of a composed stage: parallel arrays, an entry for each shape."""
+
+from typing import Any
+
+from pxr import Usd
+
+from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Shape, Shapes
+from stereocell.model.errors import StageError
+from stereocell.transfer.shapes2d import MAX_SHAPES, find_fault
+from stereocell.usd.read_attributes import shortest
+
+_BOXES = "stereocell:shapes"
+_KINDS, _COLORS = "stereocell:shapeKinds", "stereocell:shapeColors"
+_TIPS, _SOFTNESS = "stereocell:shapeTips", "stereocell:shapeSoftness"
+_GRADIENT_MAX = "stereocell:gradientMax"
+
+
+def read_shapes(prim: Usd.Prim) -> Shapes:
+    """Return the shapes that a channel's chosen variant has; none: its function is 1D.
+
+    Only kinds and boxes are needed. Tips are then in the middle, colours the channel's, opaque, and
+    softness 0.5. Raises StageError.
+    """
+    boxes = [tuple(shortest(number) for number in box) for box in _values(prim, _BOXES)]
+    count = len(boxes)
+    kinds = _as_long(prim, _KINDS, count, None)
+    if count > MAX_SHAPES:
+        raise StageError(
+            f"{prim.GetPath()}.{_BOXES}: {count} shapes, expected {MAX_SHAPES} at most"
+        )
+    tips = _as_long(prim, _TIPS, count, [(v0 + v1) / 2 for v0, v1, _, _ in boxes])
+    colors = _as_long(prim, _COLORS, count, [(1.0, 1.0, 1.0, 1.0)] * count)
+    softness = _as_long(prim, _SOFTNESS, count, [0.5] * count)
+    shapes = []
+    for i, (kind, (v0, v1, g0, g1), color) in enumerate(zip(kinds, boxes, colors, strict=True)):
+        r, g, b, opacity = (shortest(part) for part in color)
+        soft, tip = shortest(softness[i]), shortest(tips[i])
+        shape = Shape(kind, (v0, v1), (g0, g1), tip, (r, g, b), opacity, soft)
+        fault = find_fault(shape)
+        if fault:
+            raise StageError(f"{prim.GetPath()}.{_BOXES}: shape {i}: {fault}")
+        shapes.append(shape)
+    return tuple(shapes)
+
+
+def read_gradient_max(prim: Usd.Prim) -> float:
+    """Return the gradient magnitude that is 1 to a channel's shapes. Raises StageError."""
+    value = prim.GetAttribute(_GRADIENT_MAX).Get()
+    if value is None:  # only stages of other programs lack it
+        return DEFAULT_GRADIENT_MAX
+    if not 0 < value < float("inf"):
+        raise StageError(f"{prim.GetPath()}.{_GRADIENT_MAX}: {value:g}, expected it above 0")
+    return shortest(value)
+
+
+def _values(prim: Usd.Prim, name: str) -> list[Any]:  # what USD holds there
+    return list(prim.GetAttribute(name).Get() or [])
+
+
+def _as_long(prim: Usd.Prim, name: str, count: int, default: list[Any] | None) -> list[Any]:
+    """Return an array that has an entry for each shape. Raises StageError."""
+    values = _values(prim, name)
+    if not values and default is not None:
+        return default
+    if len(values) != count:
+        raise StageError(
+            f"{prim.GetPath()}.{name}: {len(values)} entries, expected {count}, as {_BOXES} has"
+        )
+    return values

@@ -1,0 +1,399 @@
+"""Read the tiles of a composed stage, whatever layers an artist put over it.
+
+Everything comes through pxr's composition: colours, visibility, moved tiles, chosen variants. The
+levels of detail are variants; they are looked through one by one by selections in the session
+layer.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol
+
+from stereocell.formats.gltf import Material
+from stereocell.model.errors import StageError
+from stereocell.model.mesh import Mesh
+from stereocell.storage.location import Location, require_own
+from stereocell.storage.object_store import at_hand
+from stereocell.usd.layer import (
+    CHANNELS,
+    METERS_PER_UNIT,
+    ROOT,
+    SHAPE_HASH,
+    TILES,
+    hash_shape,
+    move_box,
+)
+from stereocell.usd.read_attributes import (
+    Point,
+    file_of,
+    numbers_of,
+    one_line,
+    point_of,
+    select_variant,
+    shortest,
+    sizes_of,
+)
+from stereocell.usd.read_looks import material_of, surface_of
+from stereocell.usd.read_mesh import read_mesh
+from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
+from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
+from stereocell.usd.written_files import AsWritten
+
+_FARTHEST_UM = 1e12  # from the origin: what float32 and browsers still draw
+
+
+@dataclass(frozen=True, slots=True)
+class MadeMaps:
+    """Maps of a level that was made anew, uint8: normals (h, w, 3), openness (h, w), sRGB."""
+
+    normal: NDArray[np.uint8] | None
+    occlusion: NDArray[np.uint8] | None
+    color: NDArray[np.uint8] | None
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedLod:
+    """One level of detail, in world um. `level` counts from the finest, 0.
+
+    matrix  (4, 4) for row vectors, from the mesh's own space to world um
+    shape   hash of the points and faces as composed; `built`: as the pipeline made them, or empty
+    own     the mesh prim's own transform
+    lost    what an edit left without sense: values for other vertices
+    images  maps in memory, where the level was made anew: see composed_edits.py
+    """
+
+    level: int
+    mesh: Mesh
+    distance_um: float
+    material: Material
+    maps: ComposedMaps
+    matrix: NDArray[np.float64]
+    shape: str
+    built: str
+    own: tuple[float, ...]
+    lost: tuple[str, ...] = ()
+    images: MadeMaps | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedVolume:
+    """One volume: the file with its voxels, and where they are.
+
+    field       the .vdb that other programs draw; None: the stage names none
+    size        voxels (x, y, z) with the apron
+    low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
+    matrix      (4, 4) for row vectors, to world um
+    """
+
+    atlas: Path
+    field: Path | None
+    size: tuple[int, int, int]
+    apron: int
+    low: Point
+    high: Point
+    matrix: NDArray[np.float64]
+
+
+def open_stage(path: Path) -> Usd.Stage:
+    """Open a stage without its payloads. Raises StageError if it is none, or in other units."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    try:
+        stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+    except Tf.ErrorException as error:
+        raise StageError(
+            f"{path}: can't be opened, expected a USD layer (.usda, .usdc, .usd, .usdz): "
+            f"{one_line(error)}"
+        ) from error
+    finally:
+        del quiet
+    _check_composition(stage)
+    if UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        unit = UsdGeom.GetStageMetersPerUnit(stage)
+        if not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
+            raise StageError(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+    for needed in (ROOT, CHANNELS, TILES):
+        if not stage.GetPrimAtPath(needed):
+            raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
+    return stage
+
+
+def dependencies(path: Path, stage_dir: Path) -> list[Path]:
+    """Return every file that a stage is made of: layers, also unselected ones, and assets.
+
+    None is opened that isn't the stage's own: in the folder of the layer `path`, in `stage_dir` or
+    below. Raises StageError for one that is not; what can't be opened, `open_stage` tells.
+    """
+    folders = [Location.of(path).folder, Location.of(stage_dir).folder]
+    files, names, waiting = {path}, {str(path)}, [str(path)]
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        while waiting:
+            for asset, name in _named_in(waiting.pop()):
+                file = Path(Ar.SplitPackageRelativePathOuter(name)[0])  # what is in a .usdz: that
+                if name in names or not require_own(file, folders, asset, StageError):
+                    continue
+                files.add(file)
+                names.add(name)
+                if Sdf.FileFormat.FindByExtension(name) is not None:
+                    waiting.append(name)
+    finally:
+        del quiet
+    return sorted(file for file in files if file.is_file())
+
+
+def _named_in(name: str) -> Iterator[tuple[str, str]]:
+    """Yield what one layer names, as an error would say it, and the path that USD would open."""
+    try:
+        layer = Sdf.Layer.FindOrOpen(name)
+        named = chain(*UsdUtils.ExtractExternalReferences(name)) if layer else ()
+    except Tf.ErrorException:
+        return
+    if layer and layer.expressionVariables:  # layers above it could make other paths of them
+        raise StageError(f"{name}: expressionVariables: found some, expected paths without them")
+    for asset in named:
+        path = Sdf.ComputeAssetPathRelativeToLayer(layer, Sdf.Layer.SplitIdentifier(asset)[0])
+        found = str(Ar.GetResolver().Resolve(path))
+        if found:
+            yield f"{name}: {asset!r}", found
+
+
+def specimen_name(stage: Usd.Stage) -> str:
+    root = stage.GetPrimAtPath(ROOT)
+    return str(root.GetDisplayName() or root.GetName())
+
+
+def modality_of(stage: Usd.Stage) -> str:
+    """Return what took the specimen, `MR` or the like; empty: the stage does not say."""
+    attribute = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality")
+    return str((attribute.Get() if attribute else None) or "")
+
+
+def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:
+    """Return the tiles that are active and visible, loaded or not, in the stage's order."""
+    kept = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
+    prims = stage.GetPrimAtPath(TILES).GetFilteredChildren(kept)
+    return [prim for prim in prims if _is_visible(prim)]
+
+
+def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the box in the world, um, that a tile says it fills, loaded or not: its extentsHint.
+
+    Raises StageError if it has none.
+    """
+    hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
+    if not hint:
+        raise StageError(f"{tile.GetPath()}.extentsHint: no value")
+    corners = np.array(hint, np.float64)
+    if len(corners) < 2 or not np.abs(corners).max() <= _FARTHEST_UM:
+        raise StageError(f"{tile.GetPath()}.extentsHint: found {hint!s:.60}, expected two corners")
+    return move_box(corners[0], corners[1], _to_world(tile))
+
+
+@contextmanager
+def loaded(
+    stage: Usd.Stage, tile_id: str, as_written: AsWritten | None = None
+) -> Iterator[tuple[Usd.Prim, TileChoice]]:
+    """Yield a tile's prim with its payload loaded, and what is chosen for it.
+
+    Its meshes and volumes are both active, whichever was chosen. Raises StageError; for a layer
+    that is damaged, too, where the stage is held against its list.
+    """
+    path = TILES.AppendChild(tile_id)
+    with at_hand(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
+        if as_written is not None:
+            for folder in _stage_folders(stage):
+                as_written.require_layers(folder / "tiles" / tile_id)
+        yield from _loaded(stage, path)
+
+
+def _stage_folders(stage: Usd.Stage) -> list[Path]:
+    """Return where the layers lie that a stage is made of, without its payloads."""
+    paths = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
+    return sorted({Path(path).parent for path in paths})
+
+
+def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileChoice]]:
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    stage.Load(path)
+    del quiet
+    try:
+        _check_composition(stage)
+        prim = stage.GetPrimAtPath(path)
+        choice = read_choice(prim)
+        if "both" in prim.GetVariantSet("representation").GetVariantNames():
+            select_variant(prim, "representation", "both")
+        yield prim, choice
+    finally:
+        stage.Unload(path)
+
+
+def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[ComposedLod]:
+    """Yield a loaded tile's levels of detail of one channel, `finest` first; none: no surface.
+
+    Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
+    """
+    levels = [level for level in lod_levels(tile) if level >= finest]
+    for level in levels or [0]:  # a flattened stage has one level, and no variants
+        prim = mesh_at(tile, channel_id, level)
+        if prim is None:
+            continue
+        matrix = _to_world(prim)
+        built = str(prim.GetAttribute(SHAPE_HASH).Get() or "")
+        shape = hash_shape(UsdGeom.Mesh(prim)) if built else ""
+        try:
+            surface = surface_of(prim)
+            fed = vertex_values_of(surface)
+            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, fed, is_edited=shape != built)
+        except StageError as error:
+            raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
+        if mesh is None:
+            continue
+        stretch = float(np.linalg.norm(matrix[:3, :3], 2))
+        distance = shortest(*numbers_of(prim, "stereocell:distance", 1)) * stretch
+        own = UsdGeom.Xformable(prim).GetLocalTransformation()
+        lod = ComposedLod(
+            level,
+            mesh,
+            distance,
+            material_of(surface),
+            maps_of(surface),
+            matrix,
+            shape,
+            built,
+            tuple(np.array(own).ravel().tolist()),
+        )
+        yield lod if shape == built else _without_misfits(lod, prim, fed)
+
+
+def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> ComposedLod:
+    """Return an edited level without the maps and values at vertices that fit other faces."""
+    mesh, lost, has_color = lod.mesh, [], True
+    if lod.maps.any and mesh.uvs is None:
+        has_color = lod.maps.color is None
+        lod = replace(lod, maps=ComposedMaps())
+        lost.append("maps")
+    if "occlusion" in fed and mesh.openness is None:
+        lost.append("occlusion")
+    if "displayColor" in fed and mesh.colors is None:
+        lost.append("colours")
+        has_color = False
+    colors = np.array(UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() or [], np.float64)
+    if not has_color and colors.size:  # one instead of them
+        r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
+        lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
+    return replace(lod, lost=tuple(lost))
+
+
+def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
+    """Return an edited level's mesh in its own space. Raises StageError."""
+    prim = mesh_at(tile, channel_id, level)
+    found = None
+    if prim is not None:
+        fed = vertex_values_of(surface_of(prim))
+        found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), fed, is_edited=True)
+    if found is None:
+        raise StageError(f"{tile.GetPath()}/{channel_id}: lod{level} has no mesh any more")
+    return found
+
+
+def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
+    """Return the levels whose faces somebody took away, all of them."""
+    found = []
+    for level in lod_levels(tile) or [0]:
+        prim = mesh_at(tile, channel_id, level)
+        if prim is None or not prim.GetAttribute(SHAPE_HASH).Get():
+            continue
+        if not UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get():
+            found.append(level)
+    return found
+
+
+def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
+    """Return the mesh that is drawn at a level, which is selected; None: none is."""
+    if lod_levels(tile):
+        select_variant(tile, "lod", f"lod{level}")
+    prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))
+    return prim if prim is not None and prim.IsA(UsdGeom.Mesh) else None
+
+
+def _edit_advice(level: int) -> str:
+    """An edit outside the variants lies over every level of detail, and fits one at most."""
+    return (
+        f" at lod{level}: edit inside the variant lod=lod{level}, or override points, "
+        "faceVertexCounts, faceVertexIndices and normals together"
+    )
+
+
+def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
+    """Return a loaded tile's volume of one channel; None if it is not drawn. Raises StageError."""
+    name = f"{channel_id}_{tile.GetName()}_volume"
+    prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{name}"))
+    if prim is None:
+        return None
+    width, height, depth = sizes_of(prim, "stereocell:atlasSize", 3)
+    (apron,) = sizes_of(prim, "stereocell:apron", 1)
+    if min(width, height, depth) <= 2 * apron:
+        raise StageError(
+            f"{prim.GetPath()}: found {width} x {height} x {depth} voxels, apron {apron}, "
+            "expected voxels inside it"
+        )
+    return ComposedVolume(
+        file_of(prim.GetAttribute("stereocell:atlas")),
+        _field_of(prim),
+        (width, height, depth),
+        apron,
+        point_of(prim, "stereocell:boundsMin"),
+        point_of(prim, "stereocell:boundsMax"),
+        _to_world(prim),
+    )
+
+
+def _field_of(volume: Usd.Prim) -> Path | None:
+    """Return the file of a volume's one field; None where there is none."""
+    for prim in UsdVol.Volume(volume).GetFieldPaths().values():
+        asset = UsdVol.FieldAsset(volume.GetStage().GetPrimAtPath(prim)).GetFilePathAttr().Get()
+        return Path(asset.resolvedPath) if asset and asset.resolvedPath else None
+    return None
+
+
+def _check_composition(stage: Usd.Stage) -> None:
+    """Raise StageError on the first layer, payload or reference that did not come in."""
+    errors = stage.GetCompositionErrors()
+    if errors:
+        raise StageError(f"{stage.GetRootLayer().realPath}: {one_line(errors[0])}")
+
+
+def _drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
+    prim = tile.GetStage().GetPrimAtPath(path)
+    return prim if prim and prim.IsActive() and _is_visible(prim) else None
+
+
+def _is_visible(prim: Usd.Prim) -> bool:
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible)
+
+
+def _to_world(prim: Usd.Prim) -> NDArray[np.float64]:
+    """Return the matrix from a prim's space to the world for row vectors, (4, 4).
+
+    Raises StageError for one that no surface survives.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    try:
+        matrix = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
+    except Tf.ErrorException as error:
+        raise StageError(f"{prim.GetPath()}: {one_line(error)}") from error
+    finally:
+        del quiet
+    is_near = np.abs(matrix).max() <= _FARTHEST_UM
+    if not is_near or not np.abs(np.linalg.det(matrix[:3, :3])) > 0:
+        raise StageError(
+            f"{prim.GetPath()}: its transform is flat, infinite or leads farther than "
+            f"{_FARTHEST_UM:g} um, expected one that a surface survives"
+        )
+    return matrix

@@ -1,0 +1,350 @@
+"""Check a stage: every validator that USD ships, and what they do not see.
+
+USD's validators find missing files (in unselected variants too), faults of metadata, of API schemas
+and of nesting. They do not see units that differ between layers, selections of variants that do
+not exist, wrong counts, indices and extents, names that only their folder tells apart, fields whose
+grid their .vdb lacks: those are checked here. No validator needs an exception: what write/usd.py
+writes passes all of them.
+
+Both run once for each level of detail, since each has a geometry of its own; the channels' transfer
+functions take turns with them, and meshes and volumes are active together.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdValidation, UsdVol
+
+from stereocell.formats.vdb_head import read_vdb_head
+from stereocell.model.errors import StageError
+from stereocell.usd.layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
+from stereocell.usd.read_attributes import one_line
+
+_ALL_SHOWN = {"representation": "both"}
+_TOLERANCE = 1e-4  # of a box's size: extents are float32
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One fault. `rule` names the validator; `where` is a prim, a property or a layer."""
+
+    rule: str
+    where: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message} ({self.rule})"
+
+
+def validate_stage(path: Path) -> list[Finding]:
+    """Return the faults of a stage with all its payloads; an empty list says that it is clean."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would also print what is returned here
+    findings: list[Finding] = []
+    try:
+        stage = Usd.Stage.Open(str(path))
+        findings += [*_check_selections(stage), *_check_all(stage)]
+        passes = _select_variants(stage, 0)
+        for turn in range(passes):
+            _select_variants(stage, turn)
+            findings += _check_all(stage)
+    except Tf.ErrorException as error:  # a layer that can't be read ends it all
+        findings.append(Finding("open", str(path), one_line(error)))
+    del quiet
+    return list(dict.fromkeys(findings))
+
+
+def validate_usdz(path: Path) -> list[Finding]:
+    """Return the faults of a specimen.usdz: USD's validators, those of usdz among them, and ours.
+
+    Its units are metres, as AR viewers expect, and all of it is drawn at once.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        return [Finding("open", str(path), one_line(error))]
+    unit, axis = UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)
+    findings = [*_run_validators(stage), *_check_names(stage)]
+    if (unit, axis) != (1.0, UP_AXIS):
+        message = f"metersPerUnit {unit} and upAxis {axis}, expected 1.0 and {UP_AXIS}"
+        findings.append(Finding("units", str(path), message))
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            findings += _check_mesh(UsdGeom.Mesh(prim))
+        elif prim.IsA(UsdVol.Volume):
+            findings.append(Finding("volume", _place(prim), "no client of usdz draws volumes"))
+    del quiet
+    return findings
+
+
+def _check_all(stage: Usd.Stage) -> Iterator[Finding]:
+    """Yield the faults of the stage with the variants that are selected now."""
+    yield from _check_layers(stage)
+    yield from _run_validators(stage)
+    yield from _check_names(stage)
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            yield from _check_mesh(UsdGeom.Mesh(prim))
+        elif prim.IsA(UsdVol.Volume):
+            yield from _check_volume(UsdVol.Volume(prim))
+        elif prim.HasAPI(UsdGeom.ModelAPI):
+            yield from _check_extents_hint(UsdGeom.ModelAPI(prim), boxes)
+        elif CHANNEL_API in prim.GetAppliedSchemas():
+            yield from _check_windows(prim)
+            yield from _check_opacity(prim)
+
+
+def _run_validators(stage: Usd.Stage) -> Iterator[Finding]:
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    for error in UsdValidation.ValidationContext(validators).Validate(stage):
+        sites = ", ".join(_name_site(site) for site in error.GetSites())
+        yield Finding(str(error.GetIdentifier()), sites, " ".join(error.GetMessage().split()))
+
+
+def _name_site(site: UsdValidation.ValidationErrorSite) -> str:
+    if site.IsPrim():
+        return str(site.GetPrim().GetPath())
+    if site.IsProperty():
+        return str(site.GetProperty().GetPath())
+    return _name_layer(site.GetLayer()) if site.IsValidSpecInLayer() else "stage"
+
+
+def _name_layer(layer: Sdf.Layer) -> str:
+    return str(layer.realPath or layer.identifier)
+
+
+def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
+    """Yield layers whose units, up axis or default prim are not the stage's: USD rescales none."""
+    session = stage.GetSessionLayer()
+    for layer in sorted(stage.GetUsedLayers(), key=_name_layer):
+        if layer == session:
+            continue
+        root, where = layer.pseudoRoot, _name_layer(layer)
+        unit = root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else None
+        if unit is None or not math.isclose(unit, METERS_PER_UNIT):
+            yield Finding("units", where, f"metersPerUnit is {unit}, expected {METERS_PER_UNIT}")
+        axis = root.GetInfo("upAxis") if root.HasInfo("upAxis") else None
+        if axis != UP_AXIS:
+            yield Finding("units", where, f"upAxis is {axis}, expected {UP_AXIS}")
+        if not layer.defaultPrim or not layer.GetPrimAtPath(f"/{layer.defaultPrim}"):
+            found = repr(str(layer.defaultPrim))
+            yield Finding(
+                "defaultPrim", where, f"defaultPrim is {found}, expected one of its prims"
+            )
+
+
+def _check_names(stage: Usd.Stage) -> Iterator[Finding]:
+    """Yield names that two drawn things share: clients that flatten the tree rename one of them."""
+    leaves = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Gprim)]
+    counts = Counter(prim.GetName() for prim in leaves)
+    for prim in leaves:
+        if counts[prim.GetName()] > 1:
+            message = f"{counts[prim.GetName()]} prims are called {prim.GetName()}, expected 1"
+            yield Finding("names", _place(prim), message)
+
+
+def _check_selections(stage: Usd.Stage) -> Iterator[Finding]:
+    for prim in stage.TraverseAll():
+        sets = prim.GetVariantSets()
+        for name, selected in sorted(sets.GetAllVariantSelections().items()):
+            known = list(sets.GetVariantSet(name).GetVariantNames())
+            if selected and selected not in known:
+                message = f"variant set {name} selects {selected!r}, expected one of {known}"
+                yield Finding("variants", str(prim.GetPath()), message)
+
+
+def _select_variants(stage: Usd.Stage, turn: int) -> int:
+    """Select the `turn`-th variant of every set, in the session; return how many turns there are.
+
+    A set with fewer variants stays at its last.
+    """
+    session = stage.GetSessionLayer()
+    chosen: list[tuple[Sdf.Path, str, str]] = []
+    turns = 0
+    for prim in stage.TraverseAll():
+        for name in prim.GetVariantSets().GetNames():
+            known = prim.GetVariantSets().GetVariantSet(name).GetVariantNames()
+            if name not in _ALL_SHOWN and known:
+                turns = max(turns, len(known))
+                chosen.append((prim.GetPath(), name, known[min(turn, len(known) - 1)]))
+            elif name in _ALL_SHOWN and _ALL_SHOWN[name] in known:
+                chosen.append((prim.GetPath(), name, _ALL_SHOWN[name]))
+    with Sdf.ChangeBlock():
+        for path, name, variant in chosen:
+            Sdf.CreatePrimInLayer(session, path).variantSelections[name] = variant
+    return turns
+
+
+def _check_mesh(mesh: UsdGeom.Mesh) -> Iterator[Finding]:
+    where = _place(mesh.GetPrim())
+    points = _array(mesh.GetPointsAttr(), 3)
+    counts, indices = (
+        _array(mesh.GetFaceVertexCountsAttr()),
+        _array(mesh.GetFaceVertexIndicesAttr()),
+    )
+    if not np.isfinite(points).all():
+        yield Finding("mesh", where, "points holds numbers that are not finite")
+        return
+    if counts.sum() != len(indices) or (counts < 3).any():
+        message = f"{len(indices)} indices, expected {int(counts.sum())} for its faces of 3 or more"
+        yield Finding("mesh", where, message)
+        return
+    if len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
+        span = f"indices from {int(indices.min())} to {int(indices.max())}"
+        yield Finding("mesh", where, f"{span}, expected 0 to {len(points) - 1}")
+        return
+    sizes = {"vertex": len(points), "varying": len(points), "faceVarying": len(indices)}
+    sizes |= {"uniform": len(counts), "constant": 1}
+    normals = _array(mesh.GetNormalsAttr(), 3)
+    expected = sizes[mesh.GetNormalsInterpolation()]
+    if len(normals) != expected or not np.isfinite(normals).all():
+        yield Finding("mesh", where, f"{len(normals)} normals, expected {expected} finite ones")
+    elif _is_inside_out(mesh, points, counts, indices, normals):
+        yield Finding("mesh", where, "normals point against most faces, expected with them")
+    for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues():
+        found = len(primvar.ComputeFlattened() or ())
+        wanted = sizes[primvar.GetInterpolation()] * primvar.GetElementSize()
+        if primvar.GetInterpolation() != UsdGeom.Tokens.constant and found != wanted:
+            message = f"primvar {primvar.GetPrimvarName()} has {found} values, expected {wanted}"
+            yield Finding("mesh", where, message)
+    if len(points):
+        box = np.stack([points.min(axis=0), points.max(axis=0)])
+        yield from _check_extent(mesh, where, box, np.zeros(3))
+
+
+def _is_inside_out(
+    mesh: UsdGeom.Mesh,
+    points: NDArray[np.float64],
+    counts: NDArray[np.float64],
+    indices: NDArray[np.float64],
+    normals: NDArray[np.float64],
+) -> bool:
+    """Tell whether a mesh of triangles was mirrored without turning its faces over."""
+    if len(counts) == 0 or (counts != 3).any() or len(normals) != len(points):
+        return False
+    corners = indices.astype(np.int64).reshape(-1, 3)
+    a, b, c = (points[corners[:, k]] for k in range(3))
+    faces = np.cross(b - a, c - a)
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        faces = -faces
+    return float((faces * normals[corners].sum(axis=1)).sum()) < 0
+
+
+def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
+    prim = volume.GetPrim()
+    where = _place(prim)
+    fields = volume.GetFieldPaths()
+    if len(fields) != 1:
+        yield Finding("volume", where, f"{len(fields)} fields, expected 1: clients read one file")
+    for name, path in sorted(fields.items()):
+        asset = UsdVol.OpenVDBAsset(prim.GetStage().GetPrimAtPath(path))
+        if asset:
+            yield from _check_grid(prim, asset)
+        else:
+            yield Finding("volume", where, f"field {name} is no OpenVDBAsset at {path}")
+    names = ("boundsMin", "boundsMax", "atlasSize")
+    low, high, size = (prim.GetAttribute(f"stereocell:{name}").Get() for name in names)
+    if low is None or high is None or size is None:
+        yield Finding("volume", where, f"lacks one of stereocell:{', stereocell:'.join(names)}")
+        return
+    apron = prim.GetAttribute("stereocell:apron").Get() or 0
+    cells = np.array(size) - 2 * apron - 1
+    box = np.array([low, high])
+    if (cells < 1).any() or (box[1] <= box[0]).any():
+        yield Finding("volume", where, f"atlas of {list(size)} voxels in a box of {box.tolist()}")
+        return
+    # own voxels reach half a voxel out of the lattice's box, or end half a voxel before it
+    yield from _check_extent(volume, where, box, 0.5 * (box[1] - box[0]) / cells)
+
+
+def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Finding]:
+    """Yield a field whose file lacks its grid, or has it in other units: clients draw nothing."""
+    where, file = str(asset.GetPath()), asset.GetFilePathAttr().Get()
+    if file is None or not file.resolvedPath:
+        return  # a validator of USD's finds it
+    try:
+        grids = read_vdb_head(Path(file.resolvedPath))
+    except StageError as error:
+        yield Finding("grid", where, str(error))
+        return
+    named = asset.GetFieldNameAttr().Get()
+    grid = next((grid for grid in grids if grid.name == named), None)
+    if grids and grid is None:
+        known = [grid.name for grid in grids]
+        yield Finding("grid", where, f"fieldName is {named!r}, expected one of {known} in {file}")
+    if grid is None or grid.spacing is None:
+        return
+    spacing = _voxel_spacing(volume)
+    if spacing is not None and not np.allclose(grid.spacing, spacing, rtol=_TOLERANCE, atol=0):
+        message = f"voxels of {grid.spacing.tolist()} in {file}, expected {spacing.tolist()}"
+        yield Finding("grid", where, message)
+
+
+def _voxel_spacing(volume: Usd.Prim) -> NDArray[np.float64] | None:
+    """Return the voxels' spacing (x, y, z) by the volume's own attributes; None if they lack."""
+    names = ("boundsMin", "boundsMax", "atlasSize")
+    low, high, size = (volume.GetAttribute(f"stereocell:{name}").Get() for name in names)
+    if low is None or high is None or size is None:
+        return None
+    cells = np.array(size) - 2 * (volume.GetAttribute("stereocell:apron").Get() or 0) - 1
+    return (np.array(high) - np.array(low)) / cells if (cells > 0).all() else None
+
+
+def _check_extent(
+    boundable: UsdGeom.Boundable, where: str, box: NDArray[np.float64], slack: NDArray[np.float64]
+) -> Iterator[Finding]:
+    extent = _array(boundable.GetExtentAttr(), 3)
+    tolerance = slack + _TOLERANCE * max(1e-3, float((box[1] - box[0]).max()))
+    if extent.shape != (2, 3) or (np.abs(extent - box) > tolerance).any():
+        message = f"extent is {extent.round(4).tolist()}, expected {box.round(4).tolist()}"
+        yield Finding("extent", where, message)
+
+
+def _check_extents_hint(model: UsdGeom.ModelAPI, boxes: UsdGeom.BBoxCache) -> Iterator[Finding]:
+    prim = model.GetPrim()
+    hint = model.GetExtentsHint()
+    drawn = boxes.ComputeUntransformedBound(prim).ComputeAlignedRange()
+    if hint is None or drawn.IsEmpty():
+        return
+    box, shown = np.array(list(hint)[:2]), np.array([list(drawn.GetMin()), list(drawn.GetMax())])
+    tolerance = _TOLERANCE * float((box[1] - box[0]).max())
+    if (shown[0] < box[0] - tolerance).any() or (shown[1] > box[1] + tolerance).any():
+        message = f"extentsHint {box.round(4).tolist()} does not hold {shown.round(4).tolist()}"
+        yield Finding("extent", _place(prim), message)
+
+
+def _check_windows(prim: Usd.Prim) -> Iterator[Finding]:
+    for name in ("window", "volumeWindow"):
+        window = prim.GetAttribute(f"stereocell:{name}").Get()
+        if window is not None and not window[0] < window[1]:
+            yield Finding("look", _place(prim), f"{name} is {window}, expected it to rise")
+
+
+def _check_opacity(prim: Usd.Prim) -> Iterator[Finding]:
+    points = _array(prim.GetAttribute("stereocell:opacityPoints"), 2)
+    rising = bool((np.diff(points[:, 0]) >= 0).all())
+    if len(points) < 2 or not rising or points.min() < 0 or points.max() > 1:
+        message = f"opacityPoints {points.tolist()}, expected 2 or more, 0..1, intensity rising"
+        yield Finding("look", _place(prim), message)
+
+
+def _place(prim: Usd.Prim) -> str:
+    """Return the prim's path and, inside a tile, the level of detail that is shown."""
+    for ancestor in prim.GetPath().GetPrefixes():
+        variants = prim.GetStage().GetPrimAtPath(ancestor).GetVariantSets()
+        if variants.HasVariantSet("lod"):
+            return f"{prim.GetPath()} (lod={variants.GetVariantSelection('lod')})"
+    return str(prim.GetPath())
+
+
+def _array(attribute: Usd.Attribute, width: int = 0) -> NDArray[np.float64]:
+    """Return the value as float64, (n,) or (n, width); an attribute without value has n = 0."""
+    value = attribute.Get() if attribute else None
+    shape = (-1, width) if width else (-1,)
+    return np.asarray([] if value is None else value, dtype=np.float64).reshape(shape)

@@ -1,0 +1,161 @@
+"""Write the stage of a specimen: stage.usda, which only composes, and its looks.
+
+stage.usda                    /Specimen: tiles by payload, cameras; sublayers the two looks/ layers
+looks/channels.usda           /Specimen/Channels, see usd_looks.py
+looks/lights.usda             a copy of usd_assets/lights.usda
+tiles/<tile>/tile.usdc        see usd_tile.py
+
+specimen.usdz                 see usdz.py
+
+stage.usda says nothing about what the tiles and looks hold but which variants of the tiles are
+selected, so that they are seen, and changed, in the one layer that a person reads, and known while
+a tile is unloaded. A layer of an artist's over it is stronger than all of them.
+"""
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom
+
+from stereocell.model.channel import Look, Provenance, TileContent
+from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.storage.assets import find_asset
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.object_store import at_hand
+from stereocell.usd.cameras import define_cameras
+from stereocell.usd.layer import (
+    LAYER_SUFFIXES,
+    ROOT,
+    SPECIMEN_API,
+    TILES,
+    export,
+    is_layer,
+    move_box,
+    new_stage,
+    set_attribute,
+    vec3f,
+    world_box,
+)
+from stereocell.usd.write_looks import write_looks
+from stereocell.usd.write_tile import LAYER_NAME, write_tile
+from stereocell.usd.written_files import STAGE_NAME
+
+__all__ = ["LAYER_SUFFIXES", "TileExtent", "is_layer", "write_stage", "write_tile"]
+
+_NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
+Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class TileExtent:
+    """Where a tile lies: see TileContent. All (z, y, x) in um."""
+
+    id: str
+    first_um: tuple[float, float, float]
+    last_um: tuple[float, float, float]
+    spacing_um: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, tile: TileContent) -> "TileExtent":
+        return cls(tile.id, tile.first_um, tile.last_um, tile.spacing_um)
+
+    @property
+    def drawn_box(self) -> NDArray[np.float64]:
+        """Lower and upper corner (x, y, z) of all that it draws, half a voxel wider; (2, 3)."""
+        half = np.asarray(self.spacing_um) / 2
+        return np.array(world_box(self.first_um - half, self.last_um + half))
+
+
+def write_stage(
+    stage_dir: Path,
+    name: str,
+    looks: Sequence[Look],
+    tiles: Sequence[TileExtent],
+    provenance: Provenance,
+    *,
+    modality: str = "",
+    placement: Matrix = IDENTITY,
+) -> None:
+    """Write stage.usda and looks/ over tiles that `write_tile` has written.
+
+    A tile that is written afterwards has its default variants, and no selection in stage.usda.
+
+    name        the specimen's, kept as the display name of /Specimen
+    provenance  settings and versions, kept in the layer's customLayerData; numbers, text and
+                dictionaries as they are, anything else as JSON text
+    modality    what took the specimen (`MR`, `CT`, ...), on /Specimen; empty: not known
+    placement   where the tiles stand, on /Specimen/Tiles; where that is no move, nothing is said
+
+    Raises OutputError.
+    """
+    with replacing_folder(stage_dir / "looks") as folder:
+        write_looks(folder, looks)
+        shutil.copyfile(find_asset("usd_assets/lights.usda"), folder / "lights.usda")
+
+    stage = new_stage(".usda", ROOT.name)
+    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+    root.SetDisplayName(name)
+    root.AddAppliedSchema(SPECIMEN_API)
+    set_attribute(root, "stereocell:modality", Sdf.ValueTypeNames.Token, modality)
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
+    group = UsdGeom.Xform.Define(stage, TILES)
+    Usd.ModelAPI(group.GetPrim()).SetKind(Kind.Tokens.group)
+    move = np.array(placement).T  # USD's matrices are for rows
+    if placement != IDENTITY:
+        group.AddTransformOp().Set(Gf.Matrix4d(*move.ravel().tolist()))
+    boxes = np.zeros((len(tiles), 2, 3))
+    for box, tile in zip(boxes, tiles, strict=True):
+        prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
+        Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
+        prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
+        file = stage_dir / "tiles" / tile.id / LAYER_NAME
+        with at_hand(file):
+            selections, extents = _read_layer(file)
+        for variant_set, variant in selections:
+            prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
+        # what an unloaded tile is known by; an offset takes surfaces further than its own box
+        every = np.array([tile.drawn_box, *extents])
+        box[:] = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
+        UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
+    moved = np.array([move_box(low, high, move) for low, high in boxes])
+    define_cameras(stage, moved[:, 0].min(axis=0), moved[:, 1].max(axis=0))
+
+    layer = stage.GetRootLayer()
+    layer.documentation = _NOTE
+    layer.customLayerData = {"stereocell": {k: _plain(v) for k, v in provenance.items()}}
+    del stage  # the sublayers' paths only resolve beside the file
+    layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
+    export(layer, stage_dir / STAGE_NAME)
+
+
+def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
+    """Return the variants that a tile's own layer selects, (variant set, variant), and all extents.
+
+    Extents (2, 3) are of everything in it, whatever is selected.
+    """
+    if not file.is_file():
+        return [], []
+    layer = Sdf.Layer.OpenAsAnonymous(str(file))
+    extents: list[NDArray[np.float64]] = []
+
+    def collect(path: Sdf.Path) -> None:
+        if path.name == "extent":
+            extents.append(np.array(layer.GetAttributeAtPath(path).default, np.float64))
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, collect)
+    selected = layer.GetPrimAtPath(f"/{layer.defaultPrim}").variantSelections
+    chosen = sorted((str(name), str(variant)) for name, variant in selected.items())
+    return chosen, extents
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, bool | int | float | str):
+        return value
+    return json.dumps(value, sort_keys=True)

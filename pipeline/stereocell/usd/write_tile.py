@@ -1,0 +1,279 @@
+"""Write one tile of a stage: tile.usdc, and beside it the volumes and baked maps that it names.
+
+A tile names no look but its channel's: its materials inherit the prim /Specimen/Channels/<channel>,
+which lies outside this file. USD resolves such an inherit in the stage that holds the payload, so
+the one prim there gives the look to all tiles, and an opinion about it in any layer over the stage
+reaches them all. What is baked is the tile's own: normals, occlusion and paint of each level are
+fed to the shader inside its variant. An opinion of the channel's would be the stronger one, so the
+look of a channel that is painted has no opinion about diffuseColor.
+
+`lod1` is selected unless someone asks otherwise: an artist arranges and lights all tiles at once,
+for which the finest level is millions of triangles too heavy, and picks `lod0` for the final frame.
+So neither of the two is a wish for less on the phone, but a coarser one is (composed_choice.py).
+"""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
+from pxr import Kind as Kinds
+
+from stereocell.formats.exr import write_atlas
+from stereocell.formats.vdb import GRID_NAME, write_vdb
+from stereocell.model.channel import APRON, ChannelContent, TileContent, to_srgb8
+from stereocell.model.errors import StageError
+from stereocell.model.identifiers import from_identifier
+from stereocell.model.mesh import Lod
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.file_list import FileList, measure
+from stereocell.usd.layer import (
+    CHANNELS,
+    SHAPE_HASH,
+    export,
+    hash_shape,
+    new_stage,
+    set_attribute,
+    vec3d,
+    vec3f,
+    world_box,
+)
+from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
+
+DEFAULT_LOD = 1
+LAYER_NAME = "tile.usdc"
+
+_Types = Sdf.ValueTypeNames
+
+
+def write_tile(stage_dir: Path, tile: TileContent) -> FileList:
+    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one; return its files.
+
+    Tiles are independent. Raises OutputError. A volume whose shape does not fit its tile is a bug:
+    ValueError.
+    """
+    for channel in tile.channels:
+        _check_shape(tile, channel)
+    with replacing_folder(stage_dir / "tiles" / tile.id) as folder:
+        for channel in tile.channels:
+            _write_files(folder, tile, channel)
+        export(_compose(tile), folder / LAYER_NAME)
+        return {file.name: measure(file) for file in sorted(folder.iterdir())}
+
+
+def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:
+    """Return where `write_tile` puts the closed copy of one channel."""
+    return stage_dir / "tiles" / tile_id / _closed_name(channel_id)
+
+
+def has_mesh(stage_dir: Path, tile_id: str, channel_id: str) -> bool:
+    """Return whether a channel has a surface in a tile. Raises StageError."""
+    path = stage_dir / "tiles" / tile_id / LAYER_NAME
+    layer = Sdf.Layer.FindOrOpen(str(path)) if path.is_file() else None
+    if layer is None:
+        raise StageError(f"{path}: missing or damaged: run `stereocell stage OUT`")
+    prim = f"/{tile_id}/{channel_id}/{channel_id}_{tile_id}"
+    return layer.GetPrimAtPath(prim) is not None
+
+
+def _closed_name(channel_id: str) -> str:
+    return f"{channel_id}_closed.stl"
+
+
+def _compose(tile: TileContent) -> Sdf.Layer:
+    """Return the layer tile.usdc."""
+    stage = new_stage(".usdc", tile.id)
+    root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
+    Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)
+    for channel in tile.channels:
+        branch = UsdGeom.Xform.Define(stage, root.GetPath().AppendChild(channel.channel_id))
+        branch.GetPrim().SetDisplayName(from_identifier(channel.channel_id))
+        _define_look(branch, tile, channel)
+        if channel.lods:
+            _define_mesh(branch, tile, channel)
+        _define_volume(branch, tile, channel)
+    _author_lods(root, tile)
+    _author_representations(root, tile)
+    return stage.GetRootLayer()
+
+
+def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
+    box = np.subtract(tile.last_um, tile.first_um) / tile.spacing_um
+    expected = tuple(int(n) for n in np.rint(box).astype(int) + 1 + 2 * APRON)
+    if channel.volume.shape != expected or channel.volume.dtype != np.uint8:
+        found = f"{channel.volume.dtype} {channel.volume.shape}"
+        raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected uint8 {expected}")
+
+
+def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> None:
+    own = channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)]
+    write_vdb(folder / f"{channel.channel_id}.vdb", own, tile.first_um, tile.spacing_um)
+    write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
+    if channel.closed is not None:
+        shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
+    for level, lod in enumerate(channel.lods):
+        for kind, image in _images(channel, lod):
+            picture = Image.fromarray(image)
+            picture.save(folder / _map_name(channel, level, kind), format="PNG")
+
+
+def _images(channel: ChannelContent, lod: Lod) -> Iterator[tuple[Kind, NDArray[np.uint8]]]:
+    """Yield the images of a level that has UVs."""
+    if lod.normal_map is None:
+        return
+    yield "normal", lod.normal_map
+    if lod.baked is not None:
+        yield "occlusion", lod.baked.openness
+        if lod.baked.paint is not None and channel.paint is not None:
+            yield "color", to_srgb8(channel.paint.mix(lod.baked.paint))
+
+
+def _map_name(channel: ChannelContent, level: int, kind: Kind) -> str:
+    return f"{channel.channel_id}_lod{level}_{kind}.png"
+
+
+def _leaf(tile: TileContent, channel: ChannelContent, suffix: str = "") -> str:
+    """Return a name that is unique in the whole stage: some clients flatten the tree."""
+    return f"{channel.channel_id}_{tile.id}{suffix}"
+
+
+def _define_look(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+    stage, path = branch.GetPrim().GetStage(), branch.GetPath()
+    look = UsdShade.Material.Define(stage, path.AppendChild(_leaf(tile, channel, "_look")))
+    look.GetPrim().GetInherits().AddInherit(CHANNELS.AppendChild(channel.channel_id))
+
+
+def _bind(gprim: UsdGeom.Gprim, branch: UsdGeom.Xform, look: str) -> None:
+    binding = UsdShade.MaterialBindingAPI.Apply(gprim.GetPrim())
+    path = branch.GetPath().AppendChild(look)
+    binding.Bind(UsdShade.Material.Get(gprim.GetPrim().GetStage(), path))
+
+
+def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+    """Define what the levels of detail have in common."""
+    stage = branch.GetPrim().GetStage()
+    mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(True)  # a surface is cut open where its tile ends
+    _bind(mesh, branch, _leaf(tile, channel, "_look"))
+
+
+def _define_volume(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+    """Define the volume and its one field, nested below: clients read one file a volume."""
+    stage = branch.GetPrim().GetStage()
+    path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
+    volume = UsdVol.Volume.Define(stage, path)
+    field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(GRID_NAME))
+    field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
+    field.CreateFieldNameAttr(GRID_NAME)
+    field.CreateFieldClassAttr(UsdVol.Tokens.fogVolume)
+    field.CreateFieldDataTypeAttr(UsdVol.Tokens.half)
+    volume.CreateFieldRelationship(GRID_NAME, field.GetPath())
+    _bind(volume, branch, _leaf(tile, channel, "_look"))
+
+    first, spacing = np.asarray(tile.first_um), np.asarray(tile.spacing_um)
+    low, high = world_box(first - spacing / 2, first + (np.asarray(tile.own_shape) - 0.5) * spacing)
+    volume.CreateExtentAttr(vec3f([low, high]))
+    depth, height, width = channel.volume.shape
+    low, high = world_box(tile.first_um, tile.last_um)
+    prim = volume.GetPrim()
+    set_attribute(
+        prim, "stereocell:atlas", _Types.Asset, f"./{channel.channel_id}.exr", custom=True
+    )
+    size = Gf.Vec3i(width, height, depth)
+    set_attribute(prim, "stereocell:atlasSize", _Types.Int3, size, custom=True)
+    set_attribute(prim, "stereocell:apron", _Types.Int, APRON, custom=True)
+    set_attribute(prim, "stereocell:boundsMin", _Types.Double3, vec3d(low), custom=True)
+    set_attribute(prim, "stereocell:boundsMax", _Types.Double3, vec3d(high), custom=True)
+
+
+def _author_lods(root: Usd.Prim, tile: TileContent) -> None:
+    """Put each level's geometry into its variant; a channel with fewer levels repeats its last."""
+    count = max((len(channel.lods) for channel in tile.channels), default=0)
+    if count == 0:
+        return
+    variants = root.GetVariantSets().AddVariantSet("lod")
+    for level in range(count):
+        variants.AddVariant(f"lod{level}")
+        variants.SetVariantSelection(f"lod{level}")
+        with variants.GetVariantEditContext():
+            for channel in tile.channels:
+                if channel.lods:
+                    own = min(level, len(channel.lods) - 1)
+                    _author_lod(root, tile, channel, own)
+    variants.SetVariantSelection(f"lod{min(DEFAULT_LOD, count - 1)}")
+
+
+def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, level: int) -> None:
+    lod = channel.lods[level]
+    branch = root.GetPath().AppendChild(channel.channel_id)
+    mesh = UsdGeom.Mesh.Get(root.GetStage(), branch.AppendChild(_leaf(tile, channel)))
+    points = vec3f(lod.mesh.positions)
+    triangles = lod.mesh.triangles.astype(np.int32)
+    mesh.CreatePointsAttr(points)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
+    mesh.CreateNormalsAttr(vec3f(lod.mesh.normals))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    if len(points):
+        mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    set_attribute(mesh.GetPrim(), "stereocell:distance", _Types.Float, lod.distance_um, custom=True)
+    set_attribute(mesh.GetPrim(), SHAPE_HASH, _Types.String, hash_shape(mesh), custom=True)
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    vertex = UsdGeom.Tokens.vertex
+    if lod.mesh.uvs is not None:
+        st = primvars.CreatePrimvar("st", _Types.TexCoord2fArray, vertex)
+        st.Set(Vt.Vec2fArray.FromNumpy(_float32(lod.mesh.uvs)))
+    if lod.mesh.tangents is not None:
+        tangents = primvars.CreatePrimvar("tangents", _Types.Float4Array, vertex)
+        tangents.Set(Vt.Vec4fArray.FromNumpy(_float32(lod.mesh.tangents)))
+    _author_maps(mesh, branch.AppendChild(_leaf(tile, channel, "_look")), channel, level)
+
+
+def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, level: int) -> None:
+    """Feed what is baked to the surface shader that the look inherits."""
+    lod, stage = channel.lods[level], mesh.GetPrim().GetStage()
+    has_maps = lod.normal_map is not None
+    if has_maps and lod.mesh.uvs is None:
+        raise ValueError(f"{look}: maps of lod{level} on a mesh without UVs")
+    if has_maps:
+        feed_image(stage, look, "normal", f"./{_map_name(channel, level, 'normal')}")
+    baked = lod.baked
+    if baked is None:
+        return
+    if has_maps:
+        feed_image(stage, look, "occlusion", f"./{_map_name(channel, level, 'occlusion')}")
+    else:
+        feed_vertices(mesh, look, "occlusion", np.divide(baked.openness, 255, dtype=np.float32))
+    if baked.paint is None or channel.paint is None:
+        return
+    if has_maps:
+        feed_image(stage, look, "color", f"./{_map_name(channel, level, 'color')}")
+        # for those that draw without materials
+        average = channel.paint.mix(baked.paint).reshape(-1, 3).mean(axis=0)
+        UsdGeom.Gprim(mesh).CreateDisplayColorAttr([Gf.Vec3f(*map(float, average))])
+    else:
+        feed_vertices(mesh, look, "color", channel.paint.mix(baked.paint))
+
+
+def _author_representations(root: Usd.Prim, tile: TileContent) -> None:
+    variants = root.GetVariantSets().AddVariantSet("representation")
+    hidden = {"mesh": ("_volume",), "volume": ("",), "both": ()}
+    for name, suffixes in hidden.items():
+        variants.AddVariant(name)
+        variants.SetVariantSelection(name)
+        with variants.GetVariantEditContext():
+            for channel in tile.channels:
+                branch = root.GetPath().AppendChild(channel.channel_id)
+                for suffix in suffixes:
+                    if suffix or channel.lods:
+                        path = branch.AppendChild(_leaf(tile, channel, suffix))
+                        root.GetStage().OverridePrim(path).SetActive(False)
+    variants.SetVariantSelection("mesh")
+
+
+def _float32(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(values, dtype=np.float32)

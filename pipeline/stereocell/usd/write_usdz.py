@@ -1,0 +1,250 @@
+"""Write specimen.usdz: the meshes of a composed stage as one small file for AR viewers.
+
+AR viewers take metres, a scene that stands on the floor, and a few hundred thousand triangles. So
+the specimen is scaled to the size of a hand, its longest edge SIZE_M long, stands with its lowest
+point at y = 0 with its middle above the origin, and shows the finest level of detail of at most
+MAX_TRIANGLES triangles (the coarsest one, if none is so small). The scale stands in the layer's
+customLayerData: `stereocell:scale`, metres in the file for one metre of the specimen, and `size`.
+
+Volumes stay out: usdz allows no .vdb. Nothing is composed: one .usdc without variants or payloads,
+first in the archive, and beside it the baked maps of that level. The same stage gives the same
+bytes.
+"""
+
+import struct
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Kind as Kinds
+
+from stereocell.formats.gltf import Material
+from stereocell.storage.atomic_write import replacing
+from stereocell.storage.object_store import bring, remove
+from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.read_attributes import select_variant
+from stereocell.usd.read_stage import (
+    ComposedLod,
+    hinted_box,
+    loaded,
+    open_stage,
+    read_lods,
+    specimen_name,
+    tile_prims,
+)
+from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
+from stereocell.usd.written_files import AsWritten
+
+USDZ_NAME = "specimen.usdz"
+SIZE_M = 0.15
+MAX_TRIANGLES = 200_000
+
+_LAYER = "specimen.usdc"
+# zip: a local file's head without its name, the head of an extra field, and its id for padding
+_HEAD_BYTES, _EXTRA_BYTES, _PADDING_ID = 30, 4, 0x1986
+_Types = Sdf.ValueTypeNames
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One mesh: a channel in a tile."""
+
+    tile: str
+    channel: str
+    lod: ComposedLod
+
+
+def write_usdz(stage_path: Path, path: Path, as_written: AsWritten | None = None) -> int | None:
+    """Write the meshes of a stage, or of a layer over it, as `path`; return the level of detail.
+
+    as_written  what the stage's files are held against; None: nothing
+
+    None if no mesh is drawn: then no file is left at `path`. Raises StageError, OutputError.
+    """
+    as_written = as_written or AsWritten({stage_path.parent: {}})
+    stage = open_stage(stage_path)
+    level = _choose_level(stage, as_written)
+    if level is None:
+        remove(path)
+        return None
+    parts = list(_read_parts(stage, level))
+    boxes = [hinted_box(prim) for prim in tile_prims(stage)]
+    low = np.min([box[0] for box in boxes], axis=0)
+    high = np.max([box[1] for box in boxes], axis=0)
+    flat = _new_stage(specimen_name(stage), float((high - low).max()), level)
+    _define_parts(flat, parts, low, high)
+    _pack(flat.GetRootLayer(), parts, path, as_written)
+    return level
+
+
+def _choose_level(stage: Usd.Stage, as_written: AsWritten) -> int | None:
+    """Return the finest level within MAX_TRIANGLES, else the coarsest; None: there is no mesh."""
+    counts: list[list[int]] = []
+    for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
+        with loaded(stage, name, as_written) as (tile, _):
+            counts.append([])
+            variants = tile.GetVariantSet("lod").GetVariantNames()
+            for variant in sorted(variants, key=lambda v: int(v.removeprefix("lod"))) or [""]:
+                if variant:
+                    select_variant(tile, "lod", variant)
+                counts[-1].append(_count_triangles(tile))
+    if not any(map(sum, counts)):
+        return None
+    levels = range(max(map(len, counts)))
+    totals = [sum(tile[min(level, len(tile) - 1)] for tile in counts) for level in levels]
+    light = [level for level in levels if totals[level] <= MAX_TRIANGLES]
+    return light[0] if light else levels[-1]
+
+
+def _count_triangles(tile: Usd.Prim) -> int:
+    found = (prim for prim in Usd.PrimRange(tile) if prim.IsA(UsdGeom.Mesh))
+    meshes = [mesh for mesh in map(UsdGeom.Mesh, found) if _is_drawn(mesh)]
+    return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
+
+
+def _is_drawn(mesh: UsdGeom.Mesh) -> bool:
+    return bool(mesh.ComputeVisibility() != UsdGeom.Tokens.invisible)
+
+
+def _read_parts(stage: Usd.Stage, level: int) -> Iterator[_Part]:
+    """Yield every drawn mesh with triangles at a level, or at its coarsest where it has fewer."""
+    channels = [str(prim.GetName()) for prim in stage.GetPrimAtPath(CHANNELS).GetChildren()]
+    for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
+        with loaded(stage, name) as (tile, _):
+            for channel in channels:
+                lods = [lod for lod in read_lods(tile, channel) if lod.level <= level]
+                if lods and len(lods[-1].mesh.triangles):
+                    yield _Part(name, channel, lods[-1])
+
+
+def _new_stage(name: str, longest_um: float, level: int) -> Usd.Stage:
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    layer.defaultPrim = ROOT.name
+    layer.customLayerData = {
+        "stereocell": {
+            "lod": level,
+            "note": f"Scaled: the longest edge of {longest_um:g} um is {SIZE_M:g} m here.",
+            "scale": SIZE_M / (longest_um * 1e-6),
+            "size": SIZE_M,
+        }
+    }
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UP_AXIS)
+    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+    root.SetDisplayName(name)
+    Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)
+    return stage
+
+
+def _define_parts(
+    stage: Usd.Stage, parts: list[_Part], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> None:
+    """Define the meshes, tile by tile; `low` and `high` bound the specimen in world um.
+
+    A channel's meshes share one material, but for those with a normal map or a look of their own.
+    """
+    foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    scale = SIZE_M / float((high - low).max())
+    looks = UsdGeom.Scope.Define(stage, ROOT.AppendChild("Looks")).GetPath()
+    usual: dict[str, Material] = {}
+    for part in parts:
+        branch = UsdGeom.Xform.Define(stage, ROOT.AppendChild(part.tile)).GetPath()
+        leaf = f"{part.channel}_{part.tile}"
+        is_usual = usual.setdefault(part.channel, part.lod.material) == part.lod.material
+        mesh_itself = part.lod.mesh.colors is not None or part.lod.mesh.openness is not None
+        is_own = not is_usual or part.lod.maps.any or mesh_itself
+        look = looks.AppendChild(f"{leaf if is_own else part.channel}_look")
+        mesh = UsdGeom.Mesh.Define(stage, branch.AppendChild(leaf))
+        material = _define_look(stage, look, part, mesh)
+        _fill_mesh(mesh, part.lod, (part.lod.mesh.positions - foot) * scale)
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _fill_mesh(mesh: UsdGeom.Mesh, lod: ComposedLod, positions: NDArray[np.float64]) -> None:
+    points, triangles = vec3f(positions), lod.mesh.triangles.astype(np.int32)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(True)  # a surface is cut open where its tile ends
+    mesh.CreatePointsAttr(points)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
+    mesh.CreateNormalsAttr(vec3f(lod.mesh.normals))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    if lod.mesh.uvs is not None:
+        primvars = UsdGeom.PrimvarsAPI(mesh)
+        st = primvars.CreatePrimvar("st", _Types.TexCoord2fArray, UsdGeom.Tokens.vertex)
+        uvs = np.ascontiguousarray(lod.mesh.uvs, dtype=np.float32)
+        st.Set(Vt.Vec2fArray.FromNumpy(uvs))
+
+
+def _define_look(
+    stage: Usd.Stage, path: Sdf.Path, part: _Part, mesh: UsdGeom.Mesh
+) -> UsdShade.Material:
+    material = UsdShade.Material.Define(stage, path)
+    surface = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
+    surface.CreateIdAttr("UsdPreviewSurface")
+    given = part.lod.material
+    surface.CreateInput("diffuseColor", _Types.Color3f).Set(Gf.Vec3f(*given.color))
+    surface.CreateInput("metallic", _Types.Float).Set(given.metallic)
+    surface.CreateInput("roughness", _Types.Float).Set(given.roughness)
+    surface.CreateOutput("surface", _Types.Token)
+    material.CreateSurfaceOutput().ConnectToSource(surface.GetOutput("surface"))
+    for kind in _images(part):
+        feed_image(stage, path, kind, _texture_name(part, kind))
+    if part.lod.mesh.openness is not None:
+        feed_vertices(mesh, path, "occlusion", part.lod.mesh.openness)
+    if part.lod.mesh.colors is not None:
+        feed_vertices(mesh, path, "color", part.lod.mesh.colors)
+    return material
+
+
+def _images(part: _Part) -> dict[Kind, Path]:
+    """Return the images of a mesh."""
+    maps = part.lod.maps
+    named: dict[Kind, Path | None] = {
+        "normal": maps.normal,
+        "occlusion": maps.occlusion,
+        "color": maps.color,
+    }
+    return {kind: file for kind, file in named.items() if file is not None}
+
+
+def _texture_name(part: _Part, kind: Kind) -> str:
+    return f"textures/{part.channel}_{part.tile}_{kind}.png"
+
+
+def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path, as_written: AsWritten) -> None:
+    """Put the layer and its textures into an archive, the layer first.
+
+    Raises OutputError; StageError for a texture that is damaged.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        export(layer, Path(folder) / _LAYER)
+        files = [(_LAYER, Path(folder) / _LAYER)]
+        for part in parts:
+            bring(*_images(part).values())
+            files += [
+                (_texture_name(part, kind), as_written.require(file))
+                for kind, file in _images(part).items()
+            ]
+        with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+            for name, file in files:
+                archive.writestr(_entry(name, archive.start_dir), file.read_bytes())
+
+
+def _entry(name: str, offset: int) -> zipfile.ZipInfo:
+    """Return the head of an uncompressed file in the archive, padded so that its bytes start at a
+    multiple of 64, as the specification of usdz asks.
+
+    USD's own writer dates the files by the clock, so that no two archives are equal.
+    """
+    info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+    padding = -(offset + _HEAD_BYTES + len(name.encode()) + _EXTRA_BYTES) % 64
+    info.extra = struct.pack("<HH", _PADDING_ID, padding) + bytes(padding)
+    return info

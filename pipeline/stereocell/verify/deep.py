@@ -1,0 +1,181 @@
+"""`stereocell check OUT --deep`: stage against source, and bundle against stage, as a table."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from stereocell.building.input_unchanged import require_added, require_input
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Channel, Plan
+from stereocell.building.rounds import unit_tasks
+from stereocell.bundle.write import MANIFEST
+from stereocell.engine.run import Engine
+from stereocell.model.errors import OutputError, StageError, StereoCellError
+from stereocell.usd.read_attributes import shortest
+from stereocell.usd.read_looks import read_looks
+from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
+from stereocell.verify.bundle_against_stage import (
+    BundleTask,
+    hold_histograms,
+    hold_manifest,
+    hold_tile,
+)
+from stereocell.verify.formats import CheckLine, raise_on
+from stereocell.verify.stage_against_source import SourceTask, UnitFinding, hold_unit
+
+
+def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
+    """Yield a line for each comparison.
+
+    stage  what the bundle was exported from, if not OUT's own
+
+    A source that is gone is one failed line: the bundle is held against the stage all the same.
+    Raises StereoCellError where there is no plan.
+    """
+    store = Store(out)
+    if not store.plan_file.exists() and (out / MANIFEST).is_file():
+        raise OutputError(
+            f"{out}: a bundle by itself, expected OUT, with its plan.json: there is the stage that "
+            "the bundle is held against"
+        )
+    plan = store.plan()
+    exported, bundle = stage or store.stage_file, store.bundle_dir
+    try:
+        for path in (store.stage_file, exported):
+            dependencies(path, store.stage_dir)
+    except StageError as error:
+        yield CheckLine("files of the stage", False, _one_line(error))
+        return
+    yield _line("tiles of the stage", lambda: _hold_tiles(store, plan))
+    try:
+        store.require_units_of(plan)
+        require_input(plan)
+        require_added(plan)
+        odd = list(_odd_values(store, plan))
+        findings = engine.run("source", hold_unit, list(_source_tasks(store, plan)))
+    except StereoCellError as error:
+        yield CheckLine("stage against source", False, _one_line(error))
+    else:
+        for channel in plan.channels if findings else ():
+            yield from _channel_lines(channel, findings, odd)
+    yield _line("manifest against stage", lambda: _hold_manifest(exported, bundle))
+    yield _line("bundle against stage", lambda: _hold_bundle(exported, bundle, engine))
+
+
+def _line(name: str, run: Callable[[], str]) -> CheckLine:
+    try:
+        return CheckLine(name, True, run())
+    except StereoCellError as error:
+        return CheckLine(name, False, _one_line(error))
+
+
+def _one_line(error: StereoCellError) -> str:
+    return "; ".join(str(error).splitlines())
+
+
+def _tiles_in(path: Path) -> list[str]:
+    stage = open_stage(path)  # prims end with it
+    return [str(prim.GetName()) for prim in tile_prims(stage)]
+
+
+def _hold_tiles(store: Store, plan: Plan) -> str:
+    there = set(_tiles_in(store.stage_file))
+    planned = {tile.id for tile in plan.tiles}
+    raise_on(
+        [f"{name} is missing" for name in sorted(planned - there)]
+        + [f"{name} is not of the plan" for name in sorted(there - planned)]
+    )
+    return f"{len(there)}, as planned"
+
+
+def _odd_values(store: Store, plan: Plan) -> Iterator[str]:
+    """Yield which channel of the stage has other values than were found in the source.
+
+    Its window is not among them: it may be set to taste. That of its volumes is.
+    """
+    stage = open_stage(store.stage_file)
+    survey = store.survey()
+    looks = {look.id: look for look in read_looks(stage)}
+    for channel in plan.channels:
+        built, look = survey[channel.id]["look"], looks.get(channel.id)
+        if look is None:
+            yield f"{channel.id}: it is not in the stage"
+            continue
+        for name, found, wanted in (
+            ("isoValue", (look.iso_value,), (built["iso_value"],)),
+            ("threshold", (look.threshold,), (built["threshold"],)),
+            ("volumeWindow", look.volume_window, built["window"]),
+        ):
+            if found != tuple(None if value is None else shortest(value) for value in wanted):
+                told, here = (", ".join(map(str, one)) for one in (found, wanted))
+                yield f"{channel.id}: {name} is {told}; {here} was found"
+
+
+def _source_tasks(store: Store, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
+    there = set(_tiles_in(store.stage_file))
+    index = store.index()
+    for name, task, _ in unit_tasks(store, plan, store.survey()):
+        tile_id, channel_id = name.split("/")
+        if tile_id not in there:
+            continue  # told already
+        # as it was built, maybe by an earlier version
+        unit = replace(task, directory=store.unit_dir(tile_id, channel_id, index[name]))
+        tile = plan.tile(tile_id)
+        yield (
+            name,
+            SourceTask(
+                unit,
+                store.stage_file,
+                tile_id,
+                channel_id,
+                plan.position_um(tile.lattice(plan.region).start),
+                tile.box.shape,
+                plan.spacing_um,
+                plan.placement,
+                plan.settings.lod.samples,
+            ),
+        )
+
+
+def _channel_lines(
+    channel: Channel, findings: Sequence[UnitFinding], odd: Sequence[str]
+) -> Iterator[CheckLine]:
+    """Yield a row for each level of a channel's surface, and one for its volumes and problems."""
+    units = [unit for unit in findings if unit.name.split("/")[1] == channel.id]
+    for level in range(max(len(unit.levels) for unit in units)):
+        rows = [unit.levels[level] for unit in units if level < len(unit.levels)]
+        stated, found, largest = (max(row[k] for row in rows) for k in range(3))
+        yield CheckLine(
+            f"{channel.name} lod{level} against source",
+            not any(told.startswith(f"lod{level}: ") for unit in units for told in unit.problems),
+            f"{len(rows)} surfaces within {found:.4g} um, {stated:.4g} stated; at most "
+            f"{largest:.4g}",
+        )
+    problems = [problem for problem in odd if problem.startswith(f"{channel.id}: ")]
+    problems += [f"{unit.name}: {problem}" for unit in units for problem in unit.problems]
+
+    def sum_up() -> str:
+        raise_on(problems)
+        return f"{len(units)} units: surfaces as stated, volumes equal to 8 bits"
+
+    yield _line(f"{channel.name} against source", sum_up)
+
+
+def _hold_manifest(stage: Path, bundle: Path) -> str:
+    raise_on(hold_manifest(stage, bundle))
+    return "names, colours, windows, transfer functions, tiles"
+
+
+def _hold_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
+    tasks = [(name, BundleTask(stage, bundle, name)) for name in _tiles_in(stage)]
+    tiles = engine.run("bundle", hold_tile, tasks)
+    raise_on([problem for tile in tiles for problem in tile.problems])
+    raise_on(list(hold_histograms(bundle, tiles)))
+    surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
+    edits = "; ".join(line for tile in tiles for line in tile.edits)
+    worst = max((tile.worst for tile in tiles), default=0.0)
+    return (
+        f"{surfaces} surfaces within {worst:.2f} lattice steps, their colours and maps; "
+        f"{volumes} volumes, every voxel of every level, their bricks and histograms"
+        + (f"; {edits}" if edits else "")
+    )

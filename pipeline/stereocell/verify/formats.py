@@ -1,0 +1,422 @@
+"""Hold what a build left against the rules of its formats: the body of `stereocell check`.
+
+Each check is one line, and none keeps the others from running. Other people's validators do most
+of it: JSON Schema, UsdValidation, the Khronos glTF validator, ktx-parse. The last two are node
+packages; where node or they are missing, their line fails and says how to get them.
+"""
+
+import hashlib
+import json
+import shutil
+import struct
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stereocell.building import unit_files
+from stereocell.building.input_unchanged import require_added
+from stereocell.building.out_folder import Store
+from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
+from stereocell.bundle.write import FILES, MANIFEST
+from stereocell.formats.exr import check_exr
+from stereocell.formats.stl import check_stl
+from stereocell.formats.tiles3d import CONTENT_HASH, content_hash
+from stereocell.formats.tiles3d_walk import Content, walk
+from stereocell.formats.vdb import check_vdb
+from stereocell.model.errors import CheckError, OutputError, StereoCellError
+from stereocell.storage.assets import find_asset
+from stereocell.storage.file_list import measure
+from stereocell.storage.json_files import read_json
+from stereocell.storage.location import Location, require_own
+from stereocell.storage.object_store import sizes_below
+from stereocell.transfer.shapes2d import find_fault, shapes_from
+from stereocell.usd import written_files
+from stereocell.usd.read_stage import dependencies
+from stereocell.usd.validate import validate_stage, validate_usdz
+from stereocell.usd.write_tile import closed_file, has_mesh
+from stereocell.usd.write_usdz import USDZ_NAME
+
+_WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
+_MOST_SHOWN = 3  # problems in one line
+_NODE_TIMEOUT_S = 1200.0
+_PLAN = "plan.schema.json"
+_BUNDLE = "bundle.schema.json"
+_RUN_BUNDLE = "run `stereocell bundle OUT`"
+_Check = tuple[str, Callable[[], str]]
+
+
+@dataclass(frozen=True, slots=True)
+class CheckLine:
+    """One line of the answer. `detail`: what was looked at, or what is wrong."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+def check(out: Path) -> Iterator[CheckLine]:
+    """Yield a line for each check of a build's folder: plan, stage and bundle; or of a bundle that
+    lies by itself, as on a web host.
+
+    Raises OutputError, before any line, where there is neither.
+    """
+    if any((out / part).exists() for part in ("plan.json", "stage", "bundle")):
+        checks = [*_checks_of_build(out), *_checks_of_bundle(out / "bundle")]
+    elif (out / MANIFEST).is_file():
+        checks = _checks_of_bundle(out)
+    else:
+        raise OutputError(
+            f"{out}: holds no build, expected plan.json, stage/ and bundle/, "
+            f"or a bundle's {MANIFEST}"
+        )
+    for name, run in checks:
+        try:
+            yield CheckLine(name, True, run())
+        except StereoCellError as error:
+            yield CheckLine(name, False, str(error))
+
+
+def _checks_of_build(out: Path) -> list[_Check]:
+    store = Store(out)
+    return [
+        ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
+        *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
+        *([("units", lambda: _check_units(store))] if store.index_file.exists() else []),
+        ("stage hashes", lambda: _check_stage_hashes(store)),
+        ("stage", lambda: _check_stage(out)),
+        ("stage files", lambda: _check_stage_files(out)),
+        ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
+    ]
+
+
+def _checks_of_bundle(bundle: Path) -> list[_Check]:
+    return [
+        ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
+        ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
+        ("volume lists", lambda: _check_volume_lists(bundle)),
+        ("2D transfer functions", lambda: _check_transfer2d(bundle)),
+        ("tilesets", lambda: _check_tilesets(bundle)),
+        ("hashes", lambda: _check_hashes(bundle)),
+        ("glTF validator", lambda: _check_meshes(bundle)),
+        ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
+    ]
+
+
+def _check_json(path: Path, schema: str, remedy: str) -> str:
+    read_json(path, schema, remedy)
+    return f"{path.name} fits {schema}"
+
+
+def _check_tissue(out: Path) -> str:
+    """Check what `stereocell tissue` left; the bundle needs none of it."""
+    files = read_whole(out / FOLDER)["files"]
+    require_added(Store(out).plan())
+    return f"{RECORD} and {len(files)} files that it lists"
+
+
+def _check_units(store: Store) -> str:
+    """Check every file of the units against the hash in its unit.json."""
+    problems, files = [], 0
+    for name, key in store.index().items():
+        tile_id, channel_id = name.split("/")
+        folder = store.unit_dir(tile_id, channel_id, key)
+        files += len(sizes_below(folder))
+        problems += [
+            f"{(folder / file).relative_to(store.out).as_posix()}: {fault}"
+            for file, fault in unit_files.find_damage(folder).items()
+        ]
+    _raise_on_all(problems, "remove what is damaged and run `stereocell units OUT`")
+    return f"{files} files of {len(store.index())} units"
+
+
+def _check_stage_hashes(store: Store) -> str:
+    """Check every file that the build wrote against the stage's list; others are an artist's."""
+    listed = read_json(store.stage_list, "units.schema.json#FileList", written_files.REMEDY)
+    wrote = store.phases().get("stage", {"key": ""})
+    is_other = wrote["key"] and wrote["results"] != written_files.digest_of(listed)
+    if is_other or written_files.STAGE_NAME not in listed:
+        path = store.stage_list
+        raise CheckError(f"{path}: damaged, not the list that was written: {written_files.REMEDY}")
+    problems = written_files.find_damage(store.stage_dir, listed)
+    told = [f"stage/{path}: {fault}" for path, fault in problems.items()]
+    remedy = f"remove what is damaged and {written_files.REMEDY}"
+    if {written_files.CHANGED, written_files.DOUBTFUL} & set(problems.values()):
+        remedy += f"; {written_files.ADVICE}"
+    _raise_on_all(told, remedy)
+    return f"{len(listed)} files"
+
+
+def _check_stage(out: Path) -> str:
+    store = Store(out)
+    store.require_finished("stage")
+    path = store.stage_file
+    dependencies(path, path.parent)  # refuses what is not the stage's own
+    findings = validate_stage(path)
+    raise_on([str(finding) for finding in findings])
+    return f"{path.name}: nothing found by UsdValidation and by our own rules"
+
+
+def _check_usdz(path: Path) -> str:
+    if not path.parent.is_dir():
+        raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
+    if not path.is_file():
+        return f"no {path.name}: a specimen without surfaces has none"
+    dependencies(path, path.parent)
+    raise_on([str(finding) for finding in validate_usdz(path)])
+    return f"{path.name}: nothing found by the validators of usdz and by our own rules"
+
+
+def _check_stage_files(out: Path) -> str:
+    """Check that volumes and lookup tables are whole, of which USD only sees that they exist, and
+    the closed copies, of which it sees nothing."""
+    folder = out / "stage"
+    paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
+    if not paths:
+        raise CheckError(f"{folder}: no .exr and no .vdb file, expected those of its volumes")
+    problems = _lost_copies(out)
+    for path in paths:
+        try:
+            require_own(path, [Location.of(folder).folder], str(path), CheckError)
+            _WHOLE[path.suffix](path)
+        except StereoCellError as error:
+            problems.append(str(error))
+    raise_on(problems)
+    copies = sum(path.suffix == ".stl" for path in paths)
+    closed = f" and {copies} closed .stl" if copies else ""
+    return f"{len(paths) - copies} volumes and lookup tables{closed} are whole"
+
+
+def _lost_copies(out: Path) -> list[str]:
+    """Return what is wrong where the plan asks for closed copies, and surfaces have none."""
+    store = Store(out)
+    if not store.plan_file.is_file():  # the line `plan` says so
+        return []
+    plan = store.plan()
+    if not plan.settings.surface.closed_tiles:
+        return []
+    return [
+        f"{path}: missing, expected as surface.closed_tiles is on: run `stereocell stage OUT`"
+        for tile in plan.tiles
+        for channel in plan.channels
+        for path in [closed_file(store.stage_dir, tile.id, channel.id)]
+        if has_mesh(store.stage_dir, tile.id, channel.id) and not path.is_file()
+    ]
+
+
+def _check_volume_lists(bundle: Path) -> str:
+    """Check each volumes.json, and what it says of the levels in the textures."""
+    problems = []
+    volumes = 0
+    for channel in _channels(bundle):
+        path = bundle / channel["volumes"]["path"]
+        content = read_json(path, "volumes.schema.json", _RUN_BUNDLE)
+        for volume in content["volumes"]:
+            volumes += 1
+            texture = bundle / volume["file"]["path"]
+            listed = [(level["offset"], level["length"]) for level in volume["levels"]]
+            if _levels_of(texture, len(listed)) != listed:
+                problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
+                continue
+            problems += _spoilt_levels(texture, volume)
+    raise_on(problems)
+    return f"{volumes} volumes"
+
+
+def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
+    """Return offset and length of a KTX2 file's levels; nothing if it has another number."""
+    try:
+        with texture.open("rb") as file:
+            head = file.read(80 + 24 * count)
+    except OSError as error:
+        raise CheckError(f"{texture}: {error.strerror or error}") from error
+    if len(head) < 80 + 24 * count or struct.unpack_from("<I", head, 40) != (count,):
+        return []
+    return [struct.unpack_from("<2Q", head, 80 + 24 * k) for k in range(count)]
+
+
+def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
+    """Return what is wrong where a level, whose place is right, is not what its hash says."""
+    problems = []
+    try:
+        with texture.open("rb") as file:
+            for k, level in enumerate(volume["levels"]):
+                file.seek(level["offset"])
+                found = hashlib.sha256(file.read(level["length"])).hexdigest()
+                if found != level["sha256"]:
+                    problems.append(
+                        f"{volume['file']['path']}: level {k}: "
+                        f"expected SHA-256 {level['sha256']}, found {found}"
+                    )
+    except OSError as error:
+        raise CheckError(f"{texture}: {error.strerror or error}") from error
+    return problems
+
+
+def _channels(bundle: Path) -> list[dict[str, Any]]:
+    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    channels: list[dict[str, Any]] = manifest["channels"]
+    return channels
+
+
+def _transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
+    path = bundle / channel["transfer_functions_2d"]["file"]["path"]
+    content: dict[str, Any] = read_json(path, "transfer2d.schema.json", _RUN_BUNDLE)
+    return content
+
+
+def _check_transfer2d(bundle: Path) -> str:
+    """Check each transfer2d.json: its names, and what a schema can't say of its shapes."""
+    problems = []
+    count = 0
+    for channel in _channels(bundle):
+        listed, known = channel["transfer_functions_2d"], channel["transfer_functions"]
+        functions = _transfer2d(bundle, channel)["functions"]
+        if list(functions) != listed["names"] or not set(functions) <= set(known):
+            problems.append(
+                f"{listed['file']['path']}: functions are {', '.join(functions) or 'none'}, the "
+                f"manifest says {', '.join(listed['names']) or 'none'} of {', '.join(known)}"
+            )
+        for name, content in functions.items():
+            count += len(content)
+            problems += [
+                f"{listed['file']['path']}: {name}: shape {i}: {fault}"
+                for i, shape in enumerate(shapes_from(content))
+                if (fault := find_fault(shape))
+            ]
+    raise_on(problems)
+    return f"{count} shapes"
+
+
+def _check_tilesets(bundle: Path) -> str:
+    contents = 0
+    problems = []
+    for channel in _channels(bundle):
+        if channel["tileset"] is None:
+            continue
+        try:
+            for content in walk(bundle, bundle / channel["tileset"]["path"]):
+                contents += not content.is_tileset
+                problems += _spoilt_content(content)
+        except StereoCellError as error:
+            problems.append(str(error))
+    raise_on(problems)
+    return f"{contents} contents"
+
+
+def _spoilt_content(content: Content) -> list[str]:
+    """Return what is wrong with a file that a tileset names, and with what it says of it."""
+    uri = content.named["uri"]
+    name = f"{content.tileset}: {uri}"
+    problems = []
+    if content.error_m > content.limit_m:
+        problems.append(f"{name} has a larger geometricError than its parent")
+    try:
+        expected = content.named["extras"][CONTENT_HASH]
+    except (KeyError, TypeError):
+        return [*problems, f"{name} has no hash, expected extras.{CONTENT_HASH}"]
+    if not content.path.is_file():
+        if not content.is_tileset:  # of those, the walk tells
+            problems.append(f"{content.tileset}: no file at {uri}")
+        return problems
+    found = content_hash(measure(content.path)["sha256"])
+    if found != expected:
+        problems.append(f"{name}: expected {CONTENT_HASH} {expected}, found {found}")
+    return problems
+
+
+def _check_hashes(bundle: Path) -> str:
+    """Check every file against files.json, every reference too, and that no file is unlisted."""
+    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    listed = read_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)
+    problems = []
+    found = {p.relative_to(bundle).as_posix(): p for p in bundle.rglob("*") if p.is_file()}
+    for path, entry in listed.items():
+        if path not in found:
+            problems.append(f"{path}: missing")
+        elif measure(found[path]) != entry:
+            problems.append(f"{path}: not the bytes that {FILES} says")
+    problems += [
+        f"{path}: not in {FILES}" for path in found.keys() - listed.keys() - {MANIFEST, FILES}
+    ]
+    references = list(_references(manifest))
+    for channel in _channels(bundle):
+        path = bundle / channel["volumes"]["path"]
+        references += _references(read_json(path, "volumes.schema.json", _RUN_BUNDLE))
+        references += _references(_transfer2d(bundle, channel))
+    for reference in references:
+        entry = {"bytes": reference["bytes"], "sha256": reference["sha256"]}
+        expected = listed.get(reference["path"])
+        if reference["path"] == FILES:
+            expected = measure(bundle / FILES)
+        if entry != expected:
+            problems.append(f"{reference['path']}: a reference to it has another hash")
+    raise_on(sorted(problems))
+    return f"{len(listed)} files, {len(references)} references"
+
+
+def _references(content: Any) -> Iterator[dict[str, Any]]:
+    if isinstance(content, list):
+        for item in content:
+            yield from _references(item)
+    elif isinstance(content, dict):
+        if content.keys() == {"path", "bytes", "sha256"}:
+            yield content
+        for item in content.values():
+            yield from _references(item)
+
+
+def _check_meshes(bundle: Path) -> str:
+    paths = sorted(bundle.rglob("*.glb"))
+    if not paths and all(channel["tileset"] is None for channel in _channels(bundle)):
+        return "0 files: no channel has a surface"
+    return _run_node("check_glb.mjs", paths)
+
+
+def _textures(bundle: Path) -> list[Path]:
+    return sorted([*bundle.rglob("*.ktx2"), *bundle.rglob("*.glb")])
+
+
+def _run_node(script_name: str, paths: list[Path]) -> str:
+    """Run one of viewer_gltf/tools over all files at once."""
+    if not paths:
+        raise CheckError("no file to check, expected some in the bundle")
+    try:
+        script = find_asset(f"viewer_gltf/tools/{script_name}")
+    except FileNotFoundError as error:
+        raise CheckError(f"{script_name} comes with a checkout of StereoCell only") from error
+    node = shutil.which("node")
+    if node is None:
+        raise CheckError(f"no `node` to run {script_name}: install Node 20.19 or newer")
+    try:
+        answer = subprocess.run(
+            [node, str(script)],
+            input=json.dumps([str(path) for path in paths]),
+            capture_output=True,
+            text=True,
+            timeout=_NODE_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise CheckError(f"{script_name} was not done after {_NODE_TIMEOUT_S:g} s") from error
+    if "ERR_MODULE_NOT_FOUND" in answer.stderr:
+        raise CheckError(f"{script.parent.parent}: its node packages are missing: run `make setup`")
+    if answer.returncode != 0:
+        raise CheckError(f"{script_name} failed: {' '.join(answer.stderr.split())[-300:]}")
+    results = json.loads(answer.stdout)
+    raise_on([f"{result['path']}: {p}" for result in results for p in result["problems"]])
+    return f"{len(results)} files"
+
+
+def _raise_on_all(problems: list[str], remedy: str) -> None:
+    """Raise CheckError with all of the problems, if there are any."""
+    if problems:
+        raise CheckError(f"{'; '.join(problems)}: {remedy}")
+
+
+def raise_on(problems: list[str]) -> None:
+    """Raise CheckError with the first few of the problems, if there are any."""
+    if problems:
+        more = f" (and {len(problems) - _MOST_SHOWN} more)" if len(problems) > _MOST_SHOWN else ""
+        raise CheckError("; ".join(problems[:_MOST_SHOWN]) + more)

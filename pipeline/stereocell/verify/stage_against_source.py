@@ -1,0 +1,244 @@
+"""Hold a stage against its source: the surfaces and volumes of each unit, made anew from voxels.
+
+Surfaces: the iso-surface of the unit's own voxels, before any level of detail is made of it, and
+from it, and to it, the distance of each level: by the same measure as a level's stated distance
+(the 99th percentile over both areas), and the largest of all, vertices too, as the unit's record
+has it. They face as it does; normals, occlusion, maps and the places in them are the unit's.
+Volumes: every voxel in 8 bits, and the .vdb that the stage names byte by byte.
+"""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from stereocell.building.open_source import open_source
+from stereocell.building.tasks import UnitTask
+from stereocell.building.unit import find_surface, to_eight_bit
+from stereocell.building.unit_files import load_lods, load_quality, load_record
+from stereocell.formats.exr import read_atlas
+from stereocell.formats.vdb import write_vdb
+from stereocell.meshes.distance import Nearest, measure_distance, measure_spread
+from stereocell.model.channel import APRON
+from stereocell.model.errors import StereoCellError
+from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.rigid_transform import Matrix
+from stereocell.storage.object_store import at_hand
+from stereocell.usd.read_stage import (
+    ComposedLod,
+    ComposedVolume,
+    loaded,
+    open_stage,
+    read_lods,
+    read_volume,
+)
+
+# what float32 and another order of the same triangles may do to a distance
+_SHARE, _HAIR_UM = 0.02, 1e-3
+_STEP = 1e-6  # of what is 0 to 1
+_ALONG = 1 - 1e-6  # the cosine between two normals that are alike: .08 degrees
+
+
+@dataclass(frozen=True, slots=True)
+class SourceTask:
+    """One unit, and the tile of the stage that holds it.
+
+    first_um   (z, y, x), centre of its first own voxel; own_shape: its voxels without apron
+    placement  from the voxels' world to where the stage's tiles stand
+    samples    points spread over each surface
+    """
+
+    unit: UnitTask
+    stage_file: Path
+    tile_id: str
+    channel_id: str
+    first_um: tuple[float, float, float]
+    own_shape: tuple[int, int, int]
+    spacing_um: tuple[float, float, float]
+    placement: Matrix
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class UnitFinding:
+    """What was seen of one unit: problems, and for each level (stated, found, largest) in um."""
+
+    name: str
+    levels: tuple[tuple[float, float, float], ...]
+    problems: tuple[str, ...]
+
+
+def hold_unit(task: SourceTask) -> UnitFinding:
+    """Return how a unit's part of the stage agrees with its voxels. Raises StereoCellError."""
+    given = task.unit.given
+    dataset = open_source(task.unit.ref)
+    volume = dataset.read(task.unit.channel, given.window, task.unit.level)
+    fine = find_surface(volume, given)
+    problems = []
+    stage = open_stage(task.stage_file)
+    with at_hand(task.unit.directory), loaded(stage, task.tile_id) as (tile, _):
+        lods = list(read_lods(tile, task.channel_id))
+        composed = read_volume(tile, task.channel_id)
+        record = load_record(task.unit.directory)
+        levels, faults = _hold_lods(_placed(fine, task.placement), lods, record, task.samples)
+        problems += faults
+        problems += _hold_shading(lods, load_lods(task.unit.directory), task.placement)
+        if composed is None:
+            problems.append("no volume in the stage")
+        else:
+            eight_bit = to_eight_bit(volume.voxels, given)
+            problems += _hold_volume(eight_bit, composed, task)
+    return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
+
+
+def _placed(mesh: Mesh, placement: Matrix) -> Mesh:
+    move = np.array(placement)
+    positions = mesh.positions.astype(np.float64) @ move[:3, :3].T + move[:3, 3]
+    return Mesh(positions.astype(np.float32), mesh.triangles, mesh.normals)
+
+
+def _hold_lods(
+    fine: Mesh, lods: list[ComposedLod], record: dict[str, Any], samples: int
+) -> tuple[tuple[tuple[float, float, float], ...], list[str]]:
+    if not len(fine.triangles) or not lods:
+        if len(fine.triangles):
+            return (), [
+                f"the source has a surface of {len(fine.triangles)} triangles, the stage none"
+            ]
+        return (), ["the source has no surface, the stage has one"] if lods else []
+    problems = []
+    if len(lods) < len(record["lods"]):
+        problems.append(f"{len(lods)} levels of detail, {len(record['lods'])} were built")
+    levels = []
+    to_fine = Nearest(fine, samples)
+    for lod in lods:
+        stored = record["lods"][min(lod.level, len(record["lods"]) - 1)]
+        to_mesh = Nearest(lod.mesh, samples)
+        found = measure_distance(to_fine, to_mesh)
+        there, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
+        largest = max(there.max, back.max)
+        levels.append((lod.distance_um, found, largest))
+        quality = load_quality(stored["quality"])
+        bound = max(quality.away.max, quality.back.max)
+        name = f"lod{lod.level}"
+        if found > _slack(lod.distance_um):
+            problems.append(
+                f"{name}: {found:.4g} um from the iso-surface, the stage states "
+                f"{lod.distance_um:.4g}"
+            )
+        if largest > _slack(bound):
+            problems.append(f"{name}: up to {largest:.4g} um away, {bound:.4g} when it was built")
+        if _facing(lod.mesh, to_fine) < 0:
+            problems.append(f"{name}: its triangles face inwards")
+        built_um = stored["distance_um"]
+        if abs(lod.distance_um - built_um) > _HAIR_UM + 1e-5 * built_um:
+            problems.append(
+                f"{name}: the stage states {lod.distance_um:.4g} um, the unit {built_um:.4g}"
+            )
+    return tuple(levels), problems
+
+
+def _facing(mesh: Mesh, fine: Nearest) -> float:
+    """Return how far a mesh faces as the finest surface does where it is near: 1 all of it, to -1.
+
+    The mean over its area of the cosine between its normal and the nearest triangle's.
+    """
+    near = fine.nearest_triangles(mesh.positions.astype(np.float64)[mesh.triangles].mean(axis=1))
+    own, other = (
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for corners in (
+            mesh.positions.astype(np.float64)[mesh.triangles],
+            fine.vertices[fine.triangles[near]],
+        )
+    )
+    lengths = np.maximum(np.linalg.norm(other, axis=1), np.finfo(np.float64).tiny)
+    area = float(np.linalg.norm(own, axis=1).sum())
+    return float(((own * other).sum(axis=1) / lengths).sum()) / area
+
+
+def _hold_shading(lods: list[ComposedLod], built: tuple[Lod, ...], placement: Matrix) -> list[str]:
+    """Return what of a level's normals, occlusion and maps is not as the unit has it."""
+    odd = []
+    for lod in lods:
+        wanted = built[min(lod.level, len(built) - 1)]
+        for part in _odd_shading(lod, wanted, placement):
+            odd.append(f"lod{lod.level}: its {part} not the unit's")
+    return odd
+
+
+def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[str]:
+    mesh, maps, baked = lod.mesh, lod.maps, wanted.baked
+    if mesh.normals.shape != wanted.mesh.normals.shape:
+        if maps.normal is not None and mesh.uvs is not None and wanted.mesh.uvs is not None:
+            yield "UVs are"
+        return  # other vertices: their places tell
+    turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
+    if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:
+        yield "normals are"
+    if wanted.normal_map is None:
+        if baked is not None and not _is_like(mesh.openness, baked.openness / 255.0):
+            yield "occlusion at vertices is"
+        return
+    if not _is_like(mesh.uvs, wanted.mesh.uvs):
+        yield "UVs are"
+    if not _is_image(maps.normal, wanted.normal_map):
+        yield "normal map is"
+    if baked is not None and not _is_image(maps.occlusion, baked.openness):
+        yield "occlusion map is"
+
+
+def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
+    wide = vectors.astype(np.float64)
+    return np.asarray(wide / np.maximum(np.linalg.norm(wide, axis=1, keepdims=True), 1e-12))
+
+
+def _is_like(found: NDArray[Any] | None, wanted: NDArray[Any] | None) -> bool:
+    if found is None or wanted is None:
+        return found is wanted
+    return found.shape == wanted.shape and bool(np.abs(found - wanted).max(initial=0) <= _STEP)
+
+
+def _is_image(file: Path | None, wanted: NDArray[np.uint8]) -> bool:
+    """Return whether a file is an image of these pixels, uint8 (y, x) or (y, x, 3)."""
+    if file is None:
+        return False
+    try:
+        with Image.open(file) as image:
+            found = np.asarray(image)
+    except OSError as error:
+        raise StereoCellError(f"{file}: can't be read as an image: {error}") from error
+    return np.array_equal(found, wanted)
+
+
+def _slack(um: float) -> float:
+    return um * (1 + _SHARE) + _HAIR_UM
+
+
+def _hold_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) -> list[str]:
+    problems = []
+    atlas, vdb = composed.atlas, composed.field
+    stored = read_atlas(atlas)
+    if stored.shape != eight_bit.shape:
+        return [
+            f"{atlas.name}: {stored.shape} voxels (z, y, x), the source gives {eight_bit.shape}"
+        ]
+    wrong = int((stored != eight_bit).sum())
+    if wrong:
+        problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels are not the source's")
+    own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
+    if vdb is None:
+        return [*problems, "its volume has no field with a file"]
+    with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
+        anew = Path(folder) / vdb.name
+        write_vdb(anew, own, task.first_um, task.spacing_um)
+        try:
+            if vdb.read_bytes() != anew.read_bytes():
+                problems.append(f"{vdb.name}: not the file that the source gives")
+        except OSError as error:
+            raise StereoCellError(f"{vdb}: {error.strerror}") from error
+    return problems

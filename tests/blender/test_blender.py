@@ -1,0 +1,349 @@
+"""The Blender add-on in headless Blender, from the import to the bundle of what was exported.
+
+`make test-blender` runs it: Blender's Python is an environment of its own, named by
+STEREOCELL_BLENDER. See blender/session.py for what happens there.
+"""
+
+import json
+import os
+import re
+import subprocess
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Sdf, Usd, UsdGeom
+
+from stereocell.bundle.write import write_bundle
+from stereocell.engine.run import Engine
+from stereocell.usd.validate import validate_stage
+from support.bundles import load
+from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, leaf, write_whole
+
+PYTHON = os.environ.get("STEREOCELL_BLENDER", "")
+SESSION = Path(__file__).parent / "blender" / "session.py"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not PYTHON, reason="needs Blender's Python: run `make test-blender`"),
+]
+_turns = count()
+
+
+@pytest.fixture(scope="module")
+def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_whole(tmp_path_factory.mktemp("stage"))
+
+
+def run(step: str, folder: Path, **arguments: Any) -> Any:
+    """Run one step in a Blender of its own and return what it found."""
+    turn = next(_turns)
+    result, file = folder / f"result{turn}.json", folder / f"arguments{turn}.json"
+    file.write_text(json.dumps({**arguments, "result": str(result)}, default=str))
+    command = [PYTHON, str(SESSION), step, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[-3000:]
+    found = json.loads(result.read_text())
+    # how an operator's report reaches a terminal
+    told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", done.stdout, re.MULTILINE)
+    return {**found, "told": told} if step == "edit" else found
+
+
+def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Path) -> None:
+    found = run("import", tmp_path, stage=stage_path, lod="lod0")
+    meshes = found["meshes"]
+    assert set(meshes) == {leaf(t, c) for t in ("r0_c0", "r0_c1") for c in (F_ID, BALL_ID)}
+    assert not found["volumes"]  # as the stage selects
+    for path, mesh in meshes.items():
+        color = COLORS[0] if F_ID in path else COLORS[1]
+        assert mesh["color"] == pytest.approx(color, abs=1e-6)
+    stage = Usd.Stage.Open(str(stage_path))
+    for tile in ("r0_c0", "r0_c1"):
+        stage.GetPrimAtPath(f"/Specimen/Tiles/{tile}").GetVariantSet("lod").SetVariantSelection(
+            "lod0"
+        )
+        points = np.array(stage.GetPrimAtPath(leaf(tile, F_ID)).GetAttribute("points").Get())
+        mesh = meshes[leaf(tile, F_ID)]
+        assert np.allclose(
+            [mesh["low"], mesh["high"]], [points.min(axis=0), points.max(axis=0)], atol=1e-4
+        )
+        # 1 unit is 1 um, and what is up stays up: Blender's z
+        assert mesh["world"] == pytest.approx(np.ptp(points, axis=0), abs=1e-4)
+    assert found["unit"] == pytest.approx(1e-6)
+
+
+def test_true_size_is_metres(stage_path: Path, tmp_path: Path) -> None:
+    found = run("import", tmp_path, stage=stage_path, size="TRUE", representation="both")
+    assert found["root_scale"] == pytest.approx([1e-6] * 3)
+    assert found["unit"] == pytest.approx(1)
+    height = (
+        found["meshes"][leaf("r0_c0", F_ID)]["high"][1]
+        - found["meshes"][leaf("r0_c0", F_ID)]["low"][1]
+    )
+    assert height == pytest.approx(36 * 0.25, rel=0.03)  # in the stage's own um
+    assert not [volume["error"] for volume in found["volumes"].values() if volume["error"]]
+
+
+def test_tiles_and_variants_are_chosen_at_the_import(stage_path: Path, tmp_path: Path) -> None:
+    found = run(
+        "import", tmp_path, stage=stage_path, tiles="x*, r0_c1", lod="lod3",
+        representation="both", transfer_function="sharp",
+    )  # fmt: skip
+    assert set(found["meshes"]) == {leaf("r0_c1", c) for c in (F_ID, BALL_ID)}
+    assert len(found["volumes"]) == 3
+    stage = Usd.Stage.Open(str(stage_path))
+    tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c1")
+    tile.GetVariantSet("lod").SetVariantSelection("lod2")  # the coarsest that it has
+    faces = stage.GetPrimAtPath(leaf("r0_c1", F_ID)).GetAttribute("faceVertexCounts").Get()
+    assert found["meshes"][leaf("r0_c1", F_ID)]["faces"] == len(faces)
+    assert np.allclose(found["functions"][F_ID], FUNCTIONS["sharp"])
+
+
+def test_volumes_have_their_grid_place_and_transfer_function(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    found = run("import", tmp_path, stage=stage_path, representation="volume")
+    assert not found["meshes"]
+    assert found["volumes"][leaf("r0_c0", F_ID, "_volume")]["grids"] == ["density"]
+    assert all(volume["error"] == "" for volume in found["volumes"].values())
+    # Blender bounds the blocks of 8^3 voxels that are not empty: rows 0 to 47 of the F's 6 to 41
+    # (5.0 bounds the voxels, 4.5 their centres)
+    box = found["volumes"][leaf("r0_c0", F_ID, "_volume")]
+    assert [box["low"][1], box["high"][1]] == pytest.approx([-47.5 * 0.25, 0.5 * 0.25], abs=0.126)
+    assert box["low"][0] == pytest.approx(-0.5 * 0.25, abs=0.126)
+    assert [box["low"][2], box["high"][2]] == pytest.approx([-0.5 * 0.5, 15.5 * 0.5], abs=0.251)
+    assert np.allclose(found["functions"][F_ID], FUNCTIONS["default"])
+    assert found["colors"][F_ID] == pytest.approx(COLORS[0])
+
+
+def test_cameras_are_a_stereo_pair(stage_path: Path, tmp_path: Path) -> None:
+    cameras = run("import", tmp_path, stage=stage_path)["cameras"]
+    left, mono, right = (cameras[name] for name in ("left", "mono", "right"))
+    assert mono["lens"] == pytest.approx(35)
+    assert mono["sensor"] == pytest.approx(36)
+    assert mono["eyes"] == pytest.approx(right["at"][0] - left["at"][0])
+    assert left["shift"] == pytest.approx(-right["shift"])
+    # off-axis: both windows are centred on the same point, at the distance of convergence
+    window = mono["convergence"] * mono["sensor"] / mono["lens"]
+    assert left["shift"] * window == pytest.approx(mono["eyes"] / 2, rel=1e-3)
+    assert mono["clip"][0] < mono["convergence"] < mono["clip"][1]
+
+
+def test_what_can_not_be_imported_is_one_clear_line(stage_path: Path, tmp_path: Path) -> None:
+    text = run("refuse", tmp_path, stage=stage_path, tiles="r9_*")
+    assert "no tile fits 'r9_*'; there are r0_c0, r0_c1" in text
+    other = tmp_path / "other.usda"
+    other.write_text('#usda 1.0\n(defaultPrim = "A")\ndef Xform "A"\n{\n}\n')
+    assert "no prim /Specimen/Tiles, expected a StereoCell stage" in run(
+        "refuse", tmp_path, stage=other
+    )
+
+
+def test_nothing_changed_is_an_empty_layer(stage_path: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "edit.usda"
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, representation="AS_STAGED", size="TRUE"
+    )
+    assert found["told"] == [("Info", "0 edits: ")]
+    layer = Sdf.Layer.FindOrOpen(str(overlay))
+    assert not layer.GetPrimAtPath("/Specimen").nameChildren
+    assert not Path(layer.subLayerPaths[0]).is_absolute()
+    assert validate_stage(overlay) == []
+
+
+@pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
+def test_edits_reach_the_bundle(stage_path: Path, tmp_path: Path, size: str) -> None:
+    overlay, bundle = tmp_path / "edit.usda", tmp_path / "bundle"
+    points = [[0.0, 0.0], [0.25, 0.125], [1.0, 0.5]]
+    offset = [3.0, -2.0, 1.0] if size == "MICROMETRES" else [300.0, -2000.0, 10.0]
+    run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, lod="lod2",
+        representation="both", transfer_function="sharp", color=[F_ID, [0.25, 0.5, 0.75]],
+        points=[BALL_ID, points], hide=["/Specimen/Tiles/r0_c1"],
+        delete=[leaf("r0_c0", BALL_ID)], move={"/Specimen/Tiles/r0_c0": offset},
+    )  # fmt: skip
+    assert validate_stage(overlay) == []
+    write_bundle(overlay, bundle, None, Engine(0))
+    manifest = load(bundle / "manifest.json")
+    letter, ball, _ = manifest["channels"]
+    assert letter["color"] == [0.25, 0.5, 0.75]
+    assert ball["color"] == pytest.approx(COLORS[1])
+    assert {channel["transfer_function"] for channel in manifest["channels"]} == {"sharp"}
+    assert [tile["id"] for tile in manifest["tiles"]] == ["r0_c0"]
+    (box,) = [tile["bounds_um"] for tile in manifest["tiles"]]
+    assert box["min"] == pytest.approx(np.array([0, -11.75, 0]) + offset, rel=1e-4)
+    assert letter["tileset"] is not None
+    assert ball["tileset"] is None  # one half deleted, the other in the hidden tile
+    stage = Usd.Stage.Open(str(overlay))
+    prim = stage.GetPrimAtPath(f"/Specimen/Channels/{BALL_ID}")
+    functions = prim.GetVariantSet("transferFunction")
+    for name in FUNCTIONS:  # only the chosen one was edited
+        functions.SetVariantSelection(name)
+        found = np.array(prim.GetAttribute("stereocell:opacityPoints").Get())
+        assert np.allclose(found, points if name == "sharp" else FUNCTIONS[name])
+    tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+    assert tile.GetVariantSet("lod").GetVariantSelection() == "lod2"
+    assert tile.GetVariantSet("representation").GetVariantSelection() == "both"
+
+
+LETTER = leaf("r0_c0", F_ID)
+
+
+def mesh_at(layer: Path, path: str, lod: str) -> UsdGeom.Mesh:
+    """Return a mesh of a composed stage in one level of detail; it lives as long as the stage."""
+    stage = Usd.Stage.Open(str(layer))
+    tile = stage.GetPrimAtPath(Sdf.Path(path).GetParentPath().GetParentPath())
+    tile.GetVariantSet("lod").SetVariantSelection(lod)
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(path))
+    mesh.stage = stage
+    return mesh
+
+
+def array(attribute: Usd.Attribute) -> Any:
+    return np.array(attribute.Get())
+
+
+@pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
+@pytest.mark.parametrize("lod", ["lod0", "lod2"])
+def test_moved_points_are_carried_with_all_that_follows_from_them(
+    stage_path: Path, tmp_path: Path, size: str, lod: str
+) -> None:
+    overlay = tmp_path / "an artist's edit.usda"
+    top = -4.0  # um, of y: the upper strokes of the F
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, lod=lod,
+        pull={LETTER: [1, top, 1.5]},
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Info"
+    assert f"CD3_x3b5__r0_c0: points at {lod}" in told
+    assert ("finer levels keep their shape" in told) == (lod != "lod0")
+    assert validate_stage(overlay) == []
+    built, edited = (mesh_at(path, LETTER, lod) for path in (stage_path, overlay))
+    before, after = (array(mesh.GetPointsAttr()) for mesh in (built, edited))
+    expected = before + np.where(before[:, 1] > top, 1.5, 0)[:, None] * [0, 1, 0]
+    assert np.allclose(after, expected, atol=1e-5)  # the tile's own um
+    assert np.allclose(edited.GetExtentAttr().Get(), [after.min(axis=0), after.max(axis=0)])
+    normals, kept = (array(mesh.GetNormalsAttr()) for mesh in (edited, built))
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-3)
+    triangles = array(built.GetFaceVertexIndicesAttr()).reshape(-1, 3)
+    far = ~np.isin(
+        np.arange(len(before)), triangles[(before != after).any(axis=1)[triangles].any(axis=1)]
+    )
+    # along a seam of UVs the twin of a touched vertex is touched as well
+    far &= (before[:, 1] < top - 1) | (before[:, 1] > top + 1)
+    assert far.any()
+    assert np.array_equal(normals[far], kept[far])
+    # a wall that was stretched lies flatter: its normals follow the triangles
+    stretched = (before[triangles, 1].max(axis=1) > top) & (before[triangles, 1].min(axis=1) <= top)
+    corners = after[triangles[stretched]]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    def agreement(vectors: Any) -> float:
+        return float((vectors[triangles[stretched]].mean(axis=1) * facing).sum())
+
+    assert agreement(normals) > agreement(kept)
+    if lod == "lod2":  # the level that has them
+        tangents = array(UsdGeom.PrimvarsAPI(edited).GetPrimvar("tangents"))
+        across = (tangents[:, :3] * normals).sum(axis=1)
+        before_it = array(UsdGeom.PrimvarsAPI(built).GetPrimvar("tangents"))[:, :3]
+        assert np.allclose(across, (before_it * kept).sum(axis=1), atol=1e-4)
+    other = "lod2" if lod == "lod0" else "lod0"
+    assert np.array_equal(
+        array(mesh_at(overlay, LETTER, other).GetPointsAttr()),
+        array(mesh_at(stage_path, LETTER, other).GetPointsAttr()),
+    )
+
+
+def test_points_that_are_still_in_edit_mode_are_carried(stage_path: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "edit.usda"
+    run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, lod="lod0", tiles="r0_c0",
+        odd=["work_in_edit_mode"],
+    )  # fmt: skip
+    built, edited = (mesh_at(path, LETTER, "lod0") for path in (stage_path, overlay))
+    away = array(edited.GetPointsAttr()) - array(built.GetPointsAttr())
+    assert np.allclose(away, [0, 0, 0.5], atol=1e-5)
+
+
+@pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
+def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, size: str) -> None:
+    overlay = tmp_path / "edit.usda"
+    volume = leaf("r0_c1", BALL_ID, "_volume")
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, representation="both",
+        move={LETTER: [1.0, 2.0, 3.0], volume: [0.0, -4.0, 0.0]},
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Info"
+    assert "CD3_x3b5__r0_c0: moved" in told
+    assert validate_stage(overlay) == []
+    stage = Usd.Stage.Open(str(overlay))
+    for path, expected in ((LETTER, (1, 2, 3)), (volume, (0, -4, 0)), (leaf("r0_c1", F_ID), None)):
+        prim = UsdGeom.Xformable(stage.GetPrimAtPath(path))
+        found_at = prim.GetLocalTransformation().ExtractTranslation()
+        assert np.allclose(found_at, expected or (0, 0, 0), atol=1e-5)
+        assert prim.GetXformOpOrderAttr().HasAuthoredValue() == (expected is not None)
+    write_bundle(overlay, tmp_path / "bundle", None, Engine(0))
+    ball = load(tmp_path / "bundle" / "manifest.json")["channels"][1]
+    entries = load(tmp_path / "bundle" / ball["volumes"]["path"])["volumes"]
+    assert entries[1]["matrix"][12:] == pytest.approx([0, -4, 0, 1])
+
+
+NAME = "CD3_x3b5__r0_c0"
+
+
+@pytest.mark.parametrize(
+    ("odd", "words"),
+    [
+        ("drop_a_face", f"{NAME}: topology changed"),
+        ("add_a_vertex", f"{NAME}: topology changed"),
+        ("rename", f"{NAME}: renamed to it's mine"),
+        ("copy", f"{NAME}.001: a copy, or new"),
+        ("add_new", "arrow: a copy, or new"),
+        ("smooth_by_modifier", f"{NAME}: modifier Smooth, not applied"),
+        ("rewire_a_material", f"material {NAME}_look: its nodes changed"),
+        ("replace_a_material", f"{NAME}: another material"),
+        ("color_a_ramp", "volume: its nodes changed"),
+        ("move_a_camera", "mono: moved"),
+        ("move_a_light", "key: moved"),
+        ("take_out", f"{NAME}: taken out of the specimen"),
+        ("add_shape_keys", f"{NAME}: shape keys"),
+        ("animate", f"{NAME}: animation"),
+        ("paint_other_uvs", f"{NAME}: UVs changed"),
+    ],
+)
+def test_an_edit_that_no_layer_carries_is_named(
+    stage_path: Path, tmp_path: Path, odd: str, words: str
+) -> None:
+    found = run(
+        "edit", tmp_path, stage=stage_path, overlay=tmp_path / "edit.usda", lod="lod2",
+        representation="both", tiles="r0_c0", odd=[odd],
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Warning"
+    carried, lost = told.split(". Not carried: ")
+    assert words in lost
+    assert lost.count("; ") == 0, lost
+    assert "points" not in carried
+
+
+def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "picture.png"
+    run(
+        "render", tmp_path, stage=stage_path, representation="both", transfer_function="sharp",
+        lod="lod0", colors={BALL_ID: [0.05, 0.9, 0.1]}, picture=picture, samples=8,
+        pixels=[160, 90],
+        hide=[leaf("r0_c0", F_ID), leaf("r0_c0", BALL_ID), leaf("r0_c1", F_ID, "_volume"),
+              leaf("r0_c1", BALL_ID, "_volume")],
+    )  # fmt: skip
+    image = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    red, green, blue = (image[..., k] for k in range(3))
+    letter = (red > 1.5 * green) & (red > 1.5 * blue)
+    ball = (green > 1.5 * red) & (green > 1.5 * blue)
+    left, right = slice(0, 80), slice(80, 160)
+    for half in (left, right):  # volumes on the left, meshes on the right
+        assert letter[:, half].sum() > 50
+        assert ball[:, half].sum() > 50

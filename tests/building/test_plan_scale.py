@@ -1,0 +1,42 @@
+"""The plan of a whole CyCIF dataset: 22 x 11 tiles and 70 channels, 16 940 units."""
+
+import time
+from pathlib import Path
+
+import zarr
+
+from stereocell.building.out_folder import Store
+from stereocell.cli.__main__ import main
+from support import phantoms
+
+SHAPE, TILE = (194, 5508, 10908), (194, 512, 512)
+PLANS_S = 5.0
+
+
+def write_empty(path: Path, channels: int) -> Path:
+    """An OME-Zarr of SHAPE that has its metadata alone: no chunk of it was ever written."""
+    labels = [{"label": f"stain {n}", "color": "FF0000"} for n in range(channels)]
+    phantoms.write_ome_zarr(
+        path, [phantoms.f_phantom()[None]], "czyx", version="0.4", channels=labels
+    )
+    zarr.create_array(
+        path / "0",
+        shape=(channels, *SHAPE),
+        chunks=(1, *TILE),
+        dtype="uint16",
+        zarr_format=2,
+        chunk_key_encoding={"name": "v2", "separator": "/"},
+        overwrite=True,
+    )
+    return path
+
+
+def test_the_plan_of_16940_units_takes_seconds(tmp_path: Path) -> None:
+    source = write_empty(tmp_path / "whole.ome.zarr", 70)
+    size = ",".join(map(str, TILE))
+    start = time.process_time()  # whatever else this machine does meanwhile
+    told = ["--preset", "cycif", "--level", "0", "--tile-size", size]
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), *told]) == 0
+    assert time.process_time() - start < PLANS_S
+    plan = Store(tmp_path / "out").plan()
+    assert (len(plan.tiles), len(plan.channels)) == (242, 70)

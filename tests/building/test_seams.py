@@ -1,0 +1,284 @@
+"""Tiles against their neighbours: what two units make of the plane, and the voxels, they share.
+
+The scene (`phantoms.seam_scene`) has on every face between two tiles what could make them disagree:
+a change of brightness, and fragments, gaps and cavities of which a window without a halo would see
+only a part. Once more with four times the brightness from tile to tile: there the iso-value at a
+face lies far from what was found on either side.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Plan
+from stereocell.building.unit_files import load_lods, load_record, load_volume
+from stereocell.cli.__main__ import main
+from stereocell.isosurface.extract import extract_surface
+from stereocell.meshes.validity import certify
+from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.tiling import Box, Tile, cut
+from support import phantoms
+
+TILE = phantoms.SEAM_TILE
+LODS = 4
+SETTINGS = """
+[surface]
+smoothing_um = 0.5
+alpha_um = 3.0
+min_diagonal_um = 10.0
+max_cavity_um = 12.0
+[unwrap]
+first_lod = 9
+"""
+
+
+@dataclass(frozen=True)
+class Built:
+    plan: Plan
+    iso_values: dict[str, float]
+    lods: dict[str, tuple[Lod, ...]]
+    volumes: dict[str, NDArray[np.uint8]]
+    repaired: dict[str, tuple[int, int]]  # fragments, cavities
+    window: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Seam:
+    """Two tiles that share a face, the later one second."""
+
+    first: Tile
+    second: Tile
+    axis: int
+    plane: int
+
+    def rim(self, lod: Lod, plan: Plan) -> dict[bytes, NDArray[np.float32]]:
+        """Return the normals of the vertices on the common plane by their float32 position."""
+        column, sign = ((2, 1), (1, -1), (0, 1))[self.axis]
+        at = np.float32(sign * self.plane * plan.spacing_um[self.axis])
+        on_plane = lod.mesh.positions[:, column] == at
+        return {
+            position.tobytes(): normal
+            for position, normal in zip(
+                lod.mesh.positions[on_plane], lod.mesh.normals[on_plane], strict=True
+            )
+        }
+
+
+@pytest.fixture(scope="module")
+def scene() -> NDArray[np.uint16]:
+    return phantoms.seam_scene()
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, scene: NDArray[np.uint16]) -> Built:
+    return _build(tmp_path_factory.mktemp("seams"), scene, SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def stepped(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    return _build(tmp_path_factory.mktemp("steps"), phantoms.seam_scene(4.0, 800.0), SETTINGS)
+
+
+def _build(folder: Path, scene: NDArray[np.uint16], settings: str) -> Built:
+    source, out = folder / "scene.ome.tif", folder / "out"
+    phantoms.write_ome_tiff(source, scene, spacing=(1.0, 1.0, 1.0), names=["cells"])
+    (folder / "settings.toml").write_text(settings)
+    flags = ["--tile-size", f"{TILE},{TILE},{TILE}", "--config", str(folder / "settings.toml")]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    store = Store(out)
+    plan, index, survey = store.plan(), store.index(), store.survey()["cells"]
+    folders = {t.id: store.unit_dir(t.id, "cells", index[f"{t.id}/cells"]) for t in plan.tiles}
+    records = {tile: load_record(unit) for tile, unit in folders.items()}
+    return Built(
+        plan,
+        {tile: found["value"] for tile, found in survey["iso"].items()},
+        {tile: load_lods(unit) for tile, unit in folders.items()},
+        {tile: np.array(load_volume(unit)) for tile, unit in folders.items()},
+        {t: (r["fragments_dropped"], r["cavities_filled"]) for t, r in records.items()},
+        tuple(survey["display"]["window"]),
+    )
+
+
+def _seams(plan: Plan) -> list[Seam]:
+    seams = []
+    for a, b in combinations(plan.tiles, 2):
+        apart = [axis for axis in range(3) if a.box.start[axis] != b.box.start[axis]]
+        if len(apart) == 1:
+            first, second = sorted((a, b), key=lambda tile: tile.box.start)
+            seams.append(Seam(first, second, apart[0], second.box.start[apart[0]]))
+    return seams
+
+
+def _chessboard(built: Built, even: int, odd: int) -> Mesh:
+    """Return one mesh of all tiles, in turn at one level and at the other."""
+    meshes = [
+        built.lods[tile.id][(even, odd)[sum(start // TILE for start in tile.box.start) % 2]].mesh
+        for tile in built.plan.tiles
+    ]
+    whole = _welded(meshes)
+    assert len(whole.triangles) == sum(len(mesh.triangles) for mesh in meshes)
+    return whole
+
+
+def _assert_same_rims(built: Built, level: int) -> None:
+    for seam in _seams(built.plan):
+        ours, theirs = (built.lods[tile.id] for tile in (seam.first, seam.second))
+        rim = seam.rim(ours[level], built.plan)
+        # a face is crossed by a body of 18 voxels or more
+        assert len(rim) > 40, seam
+        assert set(rim) == set(seam.rim(theirs[level], built.plan)), seam
+        # and at any other level: viewers show neighbours at different ones
+        assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
+
+
+def _welded(meshes: list[Mesh]) -> Mesh:
+    """Return one mesh of all, with one vertex at each place."""
+    places, number = np.unique(
+        np.concatenate([mesh.positions for mesh in meshes]), axis=0, return_inverse=True
+    )
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])[:-1]
+    triangles = np.concatenate(
+        [
+            mesh.triangles.astype(np.int64) + start
+            for mesh, start in zip(meshes, starts, strict=True)
+        ]
+    )
+    return Mesh(places, number.ravel()[triangles].astype(np.uint32), np.zeros_like(places))
+
+
+def test_scene_could_tell_neighbours_apart(built: Built) -> None:
+    """Else the tests below would show nothing."""
+    seams = _seams(built.plan)
+    assert len(seams) == 12
+    # a unit doesn't see all of its neighbour: what it needs of it comes from the halo
+    assert max(built.plan.halo) + 1 < TILE
+    for seam in seams:
+        dim, bright = sorted(built.iso_values[tile.id] for tile in (seam.first, seam.second))
+        assert bright > 1.2 * dim
+    for dropped, filled in built.repaired.values():
+        assert dropped > 0
+        assert filled > 0
+
+
+@pytest.mark.parametrize("level", range(LODS))
+def test_neighbours_have_the_same_vertices_on_their_common_plane(built: Built, level: int) -> None:
+    _assert_same_rims(built, level)
+
+
+@pytest.mark.parametrize(("even", "odd"), list(product(range(LODS), repeat=2)))
+def test_tiles_make_one_sound_surface_at_any_two_levels(built: Built, even: int, odd: int) -> None:
+    """As on a chessboard: each face between two tiles lies between the two levels.
+
+    Nothing is left open, and nothing crosses or doubles: no crack, and no wall in the planes.
+    """
+    whole = _chessboard(built, even, odd)
+    assert not certify(whole).total, certify(whole).counts
+
+
+@pytest.mark.slow
+def test_scene_with_steps_has_iso_values_far_apart(stepped: Built) -> None:
+    """Else the two tests below would show no more than those above."""
+    for seam in _seams(stepped.plan):
+        dim, bright = sorted(stepped.iso_values[tile.id] for tile in (seam.first, seam.second))
+        assert bright > 3 * dim
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", [0, LODS - 1])
+def test_neighbours_of_other_brightness_have_the_same_vertices(stepped: Built, level: int) -> None:
+    _assert_same_rims(stepped, level)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("even", "odd"), [(0, 0), (0, LODS - 1)])
+def test_tiles_of_other_brightness_make_one_sound_surface(
+    stepped: Built, even: int, odd: int
+) -> None:
+    whole = _chessboard(stepped, even, odd)
+    assert not certify(whole).total, certify(whole).counts
+
+
+@pytest.mark.slow
+def test_tiles_make_one_sound_surface_on_thinned_planes(
+    tmp_path: Path, scene: NDArray[np.uint16]
+) -> None:
+    """Every third plane carries the surface; three divides no tile."""
+    built = _build(tmp_path, scene, SETTINGS.replace("[surface]", "[surface]\ngrid_um = 3.0"))
+    assert TILE % 3
+    assert built.plan.step == (3, 3, 3)
+    meshes = [lods[0].mesh for lods in built.lods.values()]
+    whole = _welded(meshes)
+    assert len(np.unique(whole.triangles)) < sum(len(mesh.positions) for mesh in meshes)
+    assert not certify(whole).total, certify(whole).counts
+
+
+@pytest.mark.parametrize("level", range(LODS))
+def test_neighbours_have_the_same_normals_on_their_common_plane(built: Built, level: int) -> None:
+    for seam in _seams(built.plan):
+        ours, theirs = (
+            seam.rim(built.lods[tile.id][level], built.plan) for tile in (seam.first, seam.second)
+        )
+        for position, normal in ours.items():
+            np.testing.assert_allclose(normal, theirs[position], atol=1e-5)
+
+
+def test_nothing_is_left_of_fragments_gaps_and_cavities(built: Built) -> None:
+    """On a common plane, each face shows one outline: that of its ball or of its slabs."""
+    for seam in _seams(built.plan):
+        rim = seam.rim(built.lods[seam.first.id][0], built.plan)
+        zyx = np.array([np.frombuffer(p, np.float32)[[2, 1, 0]] for p in rim]) * [1, -1, 1]
+        across = np.delete(zyx, seam.axis, axis=1)
+        across = np.minimum(across, 2 * TILE - 1 - across)  # as in the first quadrant
+        at_bodies = across[(across < TILE - 8).all(axis=1)]  # without the ball in the middle
+        assert len(at_bodies) > 40
+        assert np.abs(at_bodies - 13).max() < 13  # no fragment
+        assert np.abs(at_bodies - 13).max(axis=1).min() > 6  # no cavity; no gap: a whole outline
+
+
+def test_apron_is_the_neighbours_own_voxels(built: Built, scene: NDArray[np.uint16]) -> None:
+    plan = built.plan
+    own = np.zeros(scene.shape, np.uint8)
+    for tile in plan.tiles:
+        z, y, x = tile.box.shape
+        own[tile.box.slices] = built.volumes[tile.id][1 : z + 1, 1 : y + 1, 1 : x + 1]
+    low, high = built.window
+    expected = np.clip((scene.astype(np.float64) - low) / (high - low), 0, 1) * 255
+    assert np.abs(own - expected).max() < 0.51
+    padded = np.pad(own, 1, mode="edge")
+    for tile in plan.tiles:
+        lattice = tile.lattice(plan.region)
+        part = tuple(slice(a, b + 2) for a, b in zip(lattice.start, lattice.stop, strict=True))
+        np.testing.assert_array_equal(built.volumes[tile.id], padded[part])
+    # the apron is a plane of its own, not one of the tile's once more
+    for seam in _seams(plan):
+        ours = np.moveaxis(built.volumes[seam.first.id], seam.axis, 0)
+        theirs = np.moveaxis(built.volumes[seam.second.id], seam.axis, 0)
+        assert (ours[-1] != ours[-2]).mean() > 0.2
+        assert (theirs[0] != theirs[1]).mean() > 0.2
+
+
+def test_lattice_points_on_the_iso_value_make_no_degenerate_triangle() -> None:
+    """Whole numbers as distances: every second crossing falls on a lattice point."""
+    region = Box((0, 0, 0), (13, 13, 25))
+    z, y, x = np.indices(region.shape)
+    distance = np.clip(5 - abs(z - 6) - abs(y - 6) - abs(x - 12), -2, 2).astype(np.float32)
+    assert (distance == 0).sum() > 50
+    rims = []
+    for tile in cut(region, (13, 13, 12)):
+        lattice = tile.lattice(region)
+        part = distance[lattice.slices]
+        mesh = extract_surface(part, lattice, lattice, region, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+        a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        assert area.min() > 1e-5
+        assert len(np.unique(mesh.positions, axis=0)) == len(mesh.positions)
+        on_plane = mesh.positions[:, 0] == 12
+        rims.append({position.tobytes() for position in mesh.positions[on_plane]})
+    assert len(rims[0]) > 10
+    assert rims[0] == rims[1]

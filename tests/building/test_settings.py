@@ -1,0 +1,129 @@
+"""Settings: presets, files, flags; and what is wrong with them."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from stereocell.building import settings as settings_module
+from stereocell.model.errors import UsageError
+
+
+def test_printed_settings_are_the_defaults_again() -> None:
+    text = settings_module.to_toml(settings_module.Settings())
+    assert (
+        settings_module.apply(settings_module.Settings(), tomllib.loads(text), "here")
+        == settings_module.Settings()
+    )
+    keys = [line for line in text.splitlines() if " = " in line and not line.startswith("#")]
+    assert keys
+    assert all("  # " in line for line in keys)
+
+
+def test_the_header_says_whether_the_file_is_to_be_edited() -> None:
+    template = settings_module.to_toml(settings_module.Settings(), settings_module.TEMPLATE)
+    assert template.startswith("# StereoCell settings. Every key may be left out")
+    record = settings_module.to_toml(settings_module.Settings())
+    assert record.startswith("# The settings that this build used")
+    assert "copy this file and pass the copy with --config" in record
+    assert tomllib.loads(record) == tomllib.loads(template)
+
+
+def test_any_channel_name_survives_the_file() -> None:
+    odd = 'a"b\\c\n\t\x00\x7f\u6f22'
+    settings = settings_module.apply(settings_module.Settings(), {"iso_values": {odd: 1.5}}, "here")
+    assert settings_module.from_dict(tomllib.loads(settings_module.to_toml(settings))) == settings
+
+
+def test_a_later_tile_size_replaces_an_earlier_grid(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('[plan]\ngrid = "5x2"\ntile_size = [64, 100, 100]\n')
+    assert settings_module.load("mri", file, {}).plan.grid == "5x2"
+    plan = settings_module.load(None, file, {"plan": {"tile_size": [8, 9, 9]}}).plan
+    assert (plan.grid, plan.tile_size) == ("", (8, 9, 9))
+
+
+@pytest.mark.parametrize("preset", ["cycif", "lightsheet", "mri"])
+def test_presets_load(preset: str) -> None:
+    settings = settings_module.load(preset, None, {})
+    assert settings != settings_module.Settings()
+    assert settings_module.from_dict(settings_module.to_dict(settings)) == settings
+
+
+def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[window]\nlow_percentile = 3\n[surface]\nalpha_um = 2.5\n[plan]\nlevel = 1\n")
+    settings = settings_module.load("cycif", file, {"plan": {"level": 2}})
+    assert settings.plan.level == 2
+    assert settings.window.low_percentile == 3.0
+    assert settings.surface.alpha_um == 2.5
+    assert settings.surface.min_diagonal_um == 1.5  # from the preset
+
+
+def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
+    file = tmp_path / "ours.toml"
+    file.write_text('[isovalue]\ncriterion = "pekar-mean"\n[iso_values]\n"Hoechst 33342" = 800\n')
+    settings = settings_module.load(str(file), None, {})
+    assert settings.isovalue.criterion == "pekar-mean"
+    assert settings.iso_values == {"Hoechst 33342": 800.0}
+    assert settings_module.from_dict(tomllib.loads(settings_module.to_toml(settings))) == settings
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[plan]\nlevle = 1\n", "unknown key 'levle'; did you mean 'level'"),
+        ("[surfaces]\n", "unknown section 'surfaces'; did you mean 'surface'"),
+        ("[plan]\nlevel = 1.5\n", "plan.level is 1.5, expected a whole number or 'auto'"),
+        ("[window]\nlow_percentile = true\n", "low_percentile is True, expected a number"),
+        ("[window]\nlow_percentile = 100\n", "expected 0 <= low < high <= 100"),
+        ("[isovalue]\nbins = 3\n", "bins is 3, expected at least 16"),
+        ("[plan]\nchannels = 3\n", "channels is 3, expected a list"),
+        ("[plan]\nmax_voxels = 0\n", "plan.max_voxels is 0, expected at least 1"),
+        ("[plan]\ntime = -1\n", "plan.time is -1, expected 0 or more"),
+        ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um: found 1,0,1, expected z,y,x in um"),
+        ("[plan]\nspacing_um = [1, 2]\n", "spacing_um: found 1,2, expected z,y,x in um"),
+        ('[plan]\nmodality = "MRI"\n', "plan.modality is 'MRI', expected one of AR, AU, BDUS"),
+        ("[surface]\nclosed_tiles = 1\n", "closed_tiles is 1, expected true or false"),
+        ("[surface]\nwrap = 3\n", "surface.wrap is 3, expected text"),
+        ('[surface]\ngrid_um = "auto"\n', "surface.grid_um is 'auto', expected a number"),
+        ("[surface]\nalpha_um = true\n", "alpha_um is True, expected a number or 'auto'"),
+        ("[unwrap]\npadding = 1.5\n", "unwrap.padding is 1.5, expected a whole number"),
+        ("[unwrap]\npadding = 200\n", "unwrap.padding is 200, expected 3 to 24"),
+        ("plan = 3\n", "plan is 3, expected a table"),
+        ("[plan\n", "not TOML"),
+    ],
+)
+def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(UsageError) as raised:
+        settings_module.load(None, file, {})
+    assert message in str(raised.value)
+    assert ("'auto'" in str(raised.value)) == ("'auto'" in message)
+    assert "\n" not in str(raised.value)
+
+
+def test_unknown_preset_lists_the_known() -> None:
+    with pytest.raises(UsageError, match=r"one of cycif, lightsheet, mri or a \.toml file"):
+        settings_module.load("confocal", None, {})
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none\.toml: No such file"):
+        settings_module.load(None, tmp_path / "none.toml", {})
+
+
+def test_auto_lengths_follow_the_spacing() -> None:
+    resolved = settings_module.SurfaceOptions().resolved((5.0, 2.0, 2.0))
+    assert (resolved.smoothing_um, resolved.max_alpha_um) == (2.0, 10.0)
+    assert resolved.alpha_um == "auto"  # by the channel's solids
+    with pytest.raises(UsageError, match="alpha_um is -1"):
+        settings_module.SurfaceOptions(alpha_um=-1.0).resolved((1.0, 1.0, 1.0))
+
+
+def test_whole_number_without_end_is_wrong_usage(tmp_path: Path) -> None:
+    file = tmp_path / "huge.toml"
+    file.write_text("[isovalue]\nmin_confidence = " + "9" * 400)
+    with pytest.raises(UsageError, match=r"isovalue\.min_confidence is 9"):
+        settings_module.load(None, file, {})

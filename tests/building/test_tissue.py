@@ -1,0 +1,169 @@
+"""`stereocell tissue OUT`: classes become channels, and nothing else is built anew."""
+
+import json
+import shutil
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+import zarr
+from test_network import write_model
+
+from stereocell.building.out_folder import Store
+from stereocell.building.plan_file import from_json, to_json
+from stereocell.cli.__main__ import main
+from stereocell.samples.head import make_head
+from stereocell.samples.head_dicom import PATIENT, write_dicom
+from stereocell.storage.assets import find_asset
+from stereocell.storage.json_files import read_json
+from stereocell.verify.formats import check
+from support.bundles import channel, load
+
+SHAPE = (48, 40, 44)
+HEAD = ["CSF", "grey matter", "white matter"]
+QUICK = """
+[lod]
+errors = [1.0]
+[unwrap]
+max_texture = 64
+"""
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plan of the head from DICOM, nothing built."""
+    folder = tmp_path_factory.mktemp("tissue")
+    write_dicom(folder / "head", make_head(SHAPE, bias=0.3, seed=4), 4)
+    out = folder / "out"
+    given = ["--preset", "mri", "--level", "0"]
+    assert main(["plan", str(folder / "head"), "-o", str(out), *given]) == 0
+    return out
+
+
+def add(out: Path, *flags: str) -> Store:
+    """Add the classes to the plan; nothing is built."""
+    from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
+
+    values = dict(zip(flags[::2], flags[1::2], strict=True))
+    request = TissueRequest(
+        parse_classes(values["--classes"]) if "--classes" in values else None,
+        values.get("--channel", ""),
+        Path(values["--model"]) if "--model" in values else None,
+    )
+    add_tissue(out, request)
+    return Store(out)
+
+
+def test_each_class_is_a_channel_of_eight_bits_that_sum_to_one(planned: Path) -> None:
+    plan = add(planned, "--classes", "3").plan()
+    own, *added = plan.channels
+    assert [channel.name for channel in added] == HEAD
+    assert (own.name, own.source) == ("MR", "")
+    assert len({channel.color for channel in plan.channels}) == 4
+    assert [plan.settings.iso_values[name] for name in HEAD] == [127.5] * 3
+    voxels = np.asarray(zarr.open_group(added[0].source, mode="r")["0"])
+    assert voxels.dtype == np.uint8
+    assert voxels.shape[1:] == plan.region.shape
+    total = voxels.astype(int).sum(axis=0)
+    brain = total > 0
+    assert np.abs(total[brain] - 255).max() <= 2  # each is rounded by itself
+    assert 0.1 < brain.mean() < 0.6
+
+
+def test_the_record_fits_its_schema_and_names_nobody(planned: Path) -> None:
+    add(planned, "--classes", "3")
+    record = read_json(planned / "tissue" / "tissue.json", "tissue.schema.json", "")
+    assert [one["name"] for one in record["classes"]] == HEAD
+    # made of the phantom's levels: fluid is darker than grey, grey than white matter
+    csf, grey, white = (one["intensity"] for one in record["classes"])
+    assert csf < grey < white
+    for file in (planned / "tissue").rglob("*"):
+        if file.is_file():
+            content = file.read_bytes()
+            assert PATIENT.encode() not in content
+            assert str(planned).encode() not in content
+    provenance = json.loads((planned / "provenance.json").read_text())
+    assert set(provenance["added_channels"]) == set(HEAD)
+
+
+def test_the_plan_with_classes_survives_its_file_and_passes_its_schema(planned: Path) -> None:
+    plan = add(planned, "--classes", "3").plan()
+    content = json.loads(json.dumps(to_json(plan)))
+    jsonschema.validate(content, json.loads(find_asset("schemas/plan.schema.json").read_text()))
+    assert from_json(content) == plan
+
+
+def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: Path) -> None:
+    here = add(planned, "--classes", "3").plan()
+    copy = Store(shutil.copytree(planned, tmp_path / "moved"))
+    there = copy.plan()
+    for before, after in zip(here.channels[1:], there.channels[1:], strict=True):
+        voxels = tmp_path.resolve() / "moved" / "tissue" / "classes.ome.zarr"
+        assert (Path(after.source), after.fingerprint) == (voxels, before.fingerprint)
+    assert str(planned.resolve()) not in copy.plan_file.read_text()
+    assert copy.save_plan(there) is False
+
+
+def test_classes_take_the_place_of_earlier_ones(planned: Path, tmp_path: Path) -> None:
+    add(planned, "--classes", "3")
+    assert [c.name for c in add(planned, "--classes", "2").plan().channels] == [
+        "MR", "tissue 1", "tissue 2",
+    ]  # fmt: skip
+    model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 0.0, 1.0), names=["", "dim", "bright"])
+    plan = add(planned, "--model", str(model)).plan()
+    assert [channel.name for channel in plan.channels] == ["MR", "dim", "bright"]
+    assert set(plan.settings.iso_values) == {"dim", "bright"}
+    voxels = np.asarray(zarr.open_group(plan.channels[1].source, mode="r")["0"])
+    assert voxels.shape[0] == 2
+
+
+def test_the_same_again_learns_nothing_anew(
+    planned: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    add(planned, "--classes", "3")
+    capsys.readouterr()
+    add(planned, "--classes", "3")
+    assert "up to date" in capsys.readouterr().err
+
+
+def test_wrong_use_is_said_in_a_line(planned: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for flags, message in (
+        (["--classes", "many"], "--classes is 'many', expected 2 to 6, or auto"),
+        (["--channel", "CD8"], "--channel is 'CD8', expected one of MR"),
+        (["--model", "none.onnx"], "none.onnx: No such file"),
+    ):
+        code = main(["tissue", str(planned), *flags])
+        error = capsys.readouterr().err
+        assert code in (1, 2)
+        assert message in error
+        assert error.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_a_build_gains_the_classes_and_keeps_what_was_built(planned: Path, tmp_path: Path) -> None:
+    (tmp_path / "quick.toml").write_text(QUICK)
+    out, source = tmp_path / "out", planned.parent / "head"
+    given = ["--preset", "mri", "--config", str(tmp_path / "quick.toml"), "--workers", "0"]
+    assert main(["build", str(source), "-o", str(out), *given]) == 0
+
+    def built() -> dict[str, int]:
+        files = (out / "units" / "r0_c0" / "MR").rglob("*")
+        return {str(file): file.stat().st_mtime_ns for file in files if file.is_file()}
+
+    before = built()
+    assert main(["tissue", str(out), "--classes", "3", "--workers", "0"]) == 0
+    assert built() == before
+    assert len(list((out / "units").glob("window-MR-*.json"))) == 1
+    assert [f"{line.name}: {line.detail}" for line in check(out) if not line.ok] == []
+
+    names = [one["name"] for one in load(out / "bundle" / "manifest.json")["channels"]]
+    assert names == ["MR", *HEAD]
+    for name in HEAD:
+        found = channel(out / "bundle", name)
+        assert found["window"] == [0, 255]
+        assert found["iso_value"] == pytest.approx(127.5)
+        assert found["iso_normalized"] == pytest.approx(0.5)
+    page = (out / "report" / "index.html").read_text()
+    assert "Tissue classes" in page
+    assert all(name in page for name in HEAD)

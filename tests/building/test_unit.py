@@ -1,0 +1,58 @@
+"""One unit in memory: its 8-bit volume and the range of voxel values that it bears."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stereocell.building.settings import Settings
+from stereocell.building.unit import UnitInput, build_unit, to_eight_bit
+from stereocell.isosurface.repair import RepairOptions
+from stereocell.model.channel import APRON
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+from support.phantoms import blurred_ball
+
+SPACING = (0.28, 0.14, 0.14)
+SHAPE = (20, 40, 40)
+BOX = Box((0, 0, 0), SHAPE)
+
+
+def _given(scale: float) -> UnitInput:
+    settings = Settings()
+    settings = replace(settings, surface=settings.surface.resolved(SPACING))
+    iso = LatticeField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
+    repair, step = RepairOptions(0.6, 0.9, 1.2), (1, 1, 1)
+    return UnitInput(
+        BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, None, repair, step, (0.0, scale), settings
+    )
+
+
+@pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])
+def test_voxels_whose_squares_leave_float32_give_the_same_unit(scale: float) -> None:
+    ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
+    plain = build_unit(Volume(ball, SPACING), _given(1.0))
+    scaled = build_unit(Volume(ball * np.float32(scale), SPACING), _given(scale))
+    np.testing.assert_array_equal(scaled.volume, plain.volume)
+    assert len(plain.lods) == len(scaled.lods) == 4
+    for a, b in zip(plain.lods, scaled.lods, strict=True):
+        np.testing.assert_array_equal(a.mesh.positions, b.mesh.positions)
+        np.testing.assert_array_equal(a.mesh.triangles, b.mesh.triangles)
+
+
+def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end() -> None:
+    voxels = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE) % 251
+    lattice = Box((0, 10, 20), (10, 20, 40))
+    given = replace(_given(1.0), lattice=lattice, display=(0.0, 255.0))
+    eight_bit = to_eight_bit(voxels, given)
+    padded = np.pad(voxels, APRON, mode="edge")
+    np.testing.assert_array_equal(eight_bit, padded[0:12, 10:22, 20:42])
+
+
+def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:
+    given = replace(_given(1.0), step=(1, 3, 3))
+    unwrap = replace(given.settings.unwrap, texel_um=0.02)
+    given = replace(given, settings=replace(given.settings, unwrap=unwrap.resolved(SPACING)))
+    ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
+    assert build_unit(Volume(ball, SPACING), given).lods[1].mesh.uvs is not None

@@ -1,0 +1,285 @@
+"""What the docs show works as they show it: code, commands, links, tables, the workflow.
+
+Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages, in one
+folder with small sources under the names that the docs use; what is in PARSED is only held against
+the program's own parser, `make` against the Makefile by `make -n`, `dask` against its own help.
+"""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import stereocell
+from stereocell.building import phases
+from stereocell.cli import __main__ as cli
+from stereocell.model.errors import UsageError
+from stereocell.read import open_dataset
+from stereocell.samples.head import make_head
+from stereocell.samples.head_dicom import write_dicom
+from stereocell.storage.location import Location
+from support import phantoms
+from support.dicom_series import write_enhanced, write_f_nifti, write_series
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+FIRST = [DOCS / name for name in ("index.md", "own-data.md", "blender.md")]  # the others need these
+PAGES = [*FIRST, *sorted({*DOCS.rglob("*.md"), ROOT / "README.md"} - set(FIRST))]
+
+# Only parsed: what it takes that is not at hand here, and where it is run
+PARSED = {
+    "view": "does not end: test_serve.py",
+    "serve": "does not end: test_serve.py, test_serve_bricks.py",
+    "tissue": "half a minute: test_tissue_channels.py",
+    "build big.ome.zarr": "a cluster: test_cluster.py",
+    "build s3://": "object storage: test_mirror.py",
+}
+# ... and run, but on less
+SMALLER = {
+    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,96,96",
+    "--grid 5x2": "--grid 2x1",
+}
+
+
+def blocks(page: Path, language: str = r"\w*") -> list[str]:
+    """Return what stands in the page's fences."""
+    return re.findall(rf"^ *```{language}\n(.*?)^ *```", page.read_text(), re.DOTALL | re.MULTILINE)
+
+
+def commands(page: Path, program: str) -> Iterator[str]:
+    """Yield the page's commands without what precedes the program and remarks behind it."""
+    for block in blocks(page):
+        for line in block.splitlines():
+            if found := re.match(rf"(?:\$ )?(?:\.venv/bin/)?({program} .*)", line):
+                yield re.split(r"\s+#|\s{3,}", found[1])[0]
+
+
+def is_parsed_only(command: str) -> bool:
+    return any(command.startswith(f"stereocell {start}") for start in PARSED)
+
+
+def parse(command: str) -> Any:
+    """Return the command's options. Fails where the program does not take it."""
+    try:
+        return cli._parser().parse_args(shlex.split(command.partition(" > ")[0])[1:])
+    except UsageError as error:
+        pytest.fail(f"not a command of this version: {command}: {error}")
+
+
+@pytest.fixture
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to be in, with sources and the files that the pages tell to write."""
+    monkeypatch.chdir(tmp_path)
+    body = phantoms.f_phantom()
+    voxels = np.stack([body, body[:, :, ::-1]])
+    names = ["CD31", "MART1"]
+    phantoms.write_ome_tiff(tmp_path / "my.ome.tif", voxels, "CZYX", names=names)
+    labels = [{"label": name, "color": "00FF80"} for name in names]
+    phantoms.write_ome_zarr(tmp_path / "my.ome.zarr", [voxels], "czyx", channels=labels)
+    write_dicom(tmp_path / "scans" / "head", make_head((24, 20, 22), seed=4), 4)
+    write_series(tmp_path / "scans" / "head" / "other", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
+    write_enhanced(tmp_path / "frames.dcm", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
+    write_f_nifti(tmp_path / "brain.nii.gz", body, (500, 200, 200))
+    for name in ("edited.usda", "edits.usda"):
+        (tmp_path / name).write_text(blocks(DOCS / "blender.md", "usda")[0])
+    (tmp_path / "organoid.toml").write_text(blocks(DOCS / "extending.md", "toml")[0])
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_commands_run(
+    sources: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report: Callable[[Path], None] = phases.run_report
+    drawn: list[Path] = []
+
+    def draw(out: Path) -> None:  # seconds each time: the first that is built, and where asked for
+        if not drawn or command.startswith("stereocell report "):
+            report(out)
+            drawn.append(out)
+
+    monkeypatch.setattr(phases, "run_report", draw)
+    ran = []
+    for page in PAGES:
+        for command in commands(page, "stereocell"):
+            options = parse(command)
+            if is_parsed_only(command):
+                continue
+            for given, smaller in SMALLER.items():
+                command = command.replace(given, smaller)
+            if hasattr(options, "workers"):
+                command += " --workers 0"
+            words, _, file = command.partition(" > ")
+            with (
+                open(sources / (file or "stdout.txt").split()[0], "w") as stdout,
+                redirect_stdout(stdout),
+            ):
+                code = cli.main(shlex.split(words)[1:])
+            assert code == 0, f"{page.name}: {command}: {capsys.readouterr().err}"
+            ran.append(options.command)
+    # those that are left out of this test are named in PARSED, and no others
+    assert set(ran) == set(cli.COMMANDS) - {"view", "serve", "tissue"}
+    assert set(drawn) == {Path("out/mine")}
+    assert len(drawn) == 1 + [c for p in PAGES for c in commands(p, "stereocell")].count(
+        "stereocell report out/mine"
+    )
+    for folder in ("head", "second", "frames", "brain"):  # of the page about DICOM
+        assert (sources / f"out/{folder}/bundle/manifest.json").is_file()
+    assert (sources / "out/mine/report/index.html").is_file()
+    _runs_the_workflow(sources)
+
+
+def _runs_the_workflow(folder: Path) -> None:
+    """The example for CI, its last step in a shell as a runner starts it."""
+    workflow = yaml.safe_load((DOCS / "examples" / "check-bundle.yml").read_text())
+    job = workflow["jobs"]["check"]
+    *_, install, check = job["steps"]
+    assert install["run"] == "pip install wheels/stereocell-*.whl"  # test_wheel.py installs one
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    command = ["bash", "-e", "-c", check["run"]]
+    answer = subprocess.run(
+        command, cwd=folder, env={**os.environ, **job["env"], "PATH": path}, check=False
+    )
+    assert answer.returncode == 0
+    (folder / "out/mine/bundle/manifest.json").write_text("{}")
+    answer = subprocess.run(
+        command, cwd=folder, env={**os.environ, **job["env"], "PATH": path}, check=False
+    )
+    assert answer.returncode == 1
+
+
+def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() -> None:
+    used = set()
+    for page in PAGES:
+        spans = re.findall(r"`(?:\.venv/bin/)?(stereocell [a-z]+ [^`]+)`", page.read_text())
+        for command in [*commands(page, "stereocell"), *spans]:
+            if "..." not in command:
+                parse(" ".join(command.split()))
+            used |= {start for start in PARSED if command.startswith(f"stereocell {start}")}
+    assert used == set(PARSED)  # what the docs no longer show is no excuse
+
+
+def test_other_programs_are_those_that_other_tests_run() -> None:
+    """`dask` by test_cluster.py, `pip install` of a wheel by test_wheel.py."""
+    found = {line for page in PAGES for block in blocks(page, "sh") for line in block.splitlines()}
+    others = {line.split()[0] for line in found if line.strip() and line.lstrip()[0] != "#"}
+    others -= {"stereocell", ".venv/bin/stereocell", "make"}
+    assert others == {"dask", "pip"}
+    told = " ".join(line for line in found if line.startswith("dask "))
+    for command in ("scheduler", "worker"):
+        takes = subprocess.run(
+            [sys.executable, "-m", "dask", command, "--help"], capture_output=True, text=True
+        ).stdout
+        (line,) = re.findall(rf"dask {command} (.*?)(?:\s{{3,}}#|$|dask)", told)
+        flags = re.findall(r"--[a-z-]+", line)
+        assert flags
+        assert all(re.search(rf"{flag}\b", takes) for flag in flags), line
+
+
+def test_python_in_the_docs_compiles() -> None:
+    for page in PAGES:
+        for text in blocks(page, "python"):
+            compile(text, str(page), "exec")
+
+
+def test_targets_exist() -> None:
+    if shutil.which("make") is None:
+        pytest.skip("no make")
+    found = {command for page in PAGES for command in commands(page, "make")}
+    assert len(found) >= 7
+    for command in sorted(found):
+        words = shlex.split(command)
+        answer = subprocess.run(
+            [words[0], "-n", *words[1:]], cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        assert answer.returncode == 0, f"{command}: {answer.stderr}"
+
+
+@pytest.mark.slow
+def test_python_runs(sources: Path) -> None:
+    texts = blocks(DOCS / "python.md", "python")
+    assert len(texts) == 3
+    names: dict[str, object] = {}
+    for text in texts:
+        exec(compile(text, "docs/python.md", "exec"), names)
+    assert (sources / "out" / "mine" / "bundle" / "manifest.json").is_file()
+
+
+def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names: dict[str, Any] = {}
+    exec(compile(blocks(DOCS / "extending.md", "python")[0], "docs/extending.md", "exec"), names)
+    body = phantoms.f_phantom()
+    np.save(tmp_path / "f.npy", body)
+    monkeypatch.setattr(Location, "format", property(lambda location: "npy"))
+    monkeypatch.setitem(open_dataset.READERS, "npy", names["read_image"])
+    dataset = stereocell.open_volume(tmp_path / "f.npy", spacing_um=(0.5, 0.2, 0.2))
+    assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
+    np.save(tmp_path / "f.npy", body[0])
+    with pytest.raises(stereocell.StereoCellError, match="expected z, y, x"):
+        stereocell.open_volume(tmp_path / "f.npy")
+
+
+def test_functions_that_are_named_exist() -> None:
+    text = (DOCS / "python.md").read_text()
+    named = re.findall(r"`([a-z][\w.]*)\.(\w+)`", text.partition("| step |")[2])
+    assert len(named) > 12
+    for module, function in named:
+        assert callable(getattr(import_module(f"stereocell.{module}"), function))
+
+
+def test_files_that_are_named_exist() -> None:
+    path = re.compile(r"`((?:tests|schemas|usd_assets|pipeline|viewer_gltf)/[\w/.]+)`")
+    for page in PAGES:
+        for name in path.findall(page.read_text()):
+            assert (ROOT / name).exists(), f"{page.name}: {name}"
+
+
+def test_links_lead_somewhere(reference: Any) -> None:
+    made = {DOCS / path for path in [*reference.pages(), "notebook.md"]}
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
+            if "://" not in target:
+                path = (page.parent / target.strip()).resolve()
+                assert path.exists() or path in made, f"{page.name}: {target}"
+
+
+def test_every_field_of_every_schema_is_in_the_reference(reference: Any) -> None:
+    def names(schema: Any) -> Iterator[str]:
+        if isinstance(schema, dict):
+            yield from schema.get("properties", ())
+            for value in schema.values():
+                yield from names(value)
+        elif isinstance(schema, list):
+            for value in schema:
+                yield from names(value)
+
+    pages = reference.pages()
+    shown = "\n".join(pages.values())
+    for path in sorted((ROOT / "schemas").glob("*.json")):
+        for name in names(json.loads(path.read_bytes())):
+            assert re.search(rf"`[^`\n]*{re.escape(name)}`", shown), f"{path.name}: {name}"
+    for name in cli.COMMANDS:
+        assert f"usage: stereocell {name} " in pages["commands.md"]
+    row = "| `lods[].distance_um` | number, at least 0 |"
+    assert row in pages["formats/units.md"]
+    assert "| `plan` |" not in pages["formats/plan.md"]
+
+
+@pytest.fixture(scope="module")
+def reference() -> Any:
+    """docs/reference.py, as MkDocs loads it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(DOCS))
+        return import_module("reference")

@@ -1,0 +1,254 @@
+"""A cluster that others have started does the work of `--workers`, to the same bytes."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from stereocell.cli.__main__ import main
+from stereocell.engine.cluster import ClusterError, able, join
+from stereocell.engine.run import Engine, TasksFailedError
+from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.lock import LOCK, alone_in
+from support import ctrl_c, phantoms
+from support.object_store import ObjectStore, serving
+from support.server.timeouts import PATIENCE_S
+from support.validators import make_assets
+
+GRID = "2x1"
+Cluster = tuple[str, ObjectStore]
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """The scheduler file of two workers, which stand in another folder, and an object store."""
+    folder = tmp_path_factory.mktemp("cluster")
+    (folder / "objects").mkdir()
+    file = folder / "scheduler.json"
+    with serving(folder / "objects") as store, pytest.MonkeyPatch.context() as patch:
+        for name, value in store.environment.items():
+            patch.setenv(name, value)
+        store.files().mkdir("bucket")
+        told = ["--scheduler-file", str(file), "--no-dashboard"]
+        processes = [_start("scheduler", "--port", "0", *told, cwd=folder)]
+        try:
+            processes += [_start("worker", "--nthreads", "1", *told, cwd=folder) for _ in range(2)]
+            end = time.monotonic() + 60
+            while not file.exists() and time.monotonic() < end:
+                time.sleep(0.05)
+            yield str(file), store
+        finally:
+            for process in reversed(processes):
+                process.kill()
+                process.wait()
+
+
+def _start(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "dask", *arguments]
+    quiet = subprocess.DEVNULL
+    # workers find what is to be run in this file
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    return subprocess.Popen(command, cwd=cwd, env=environment, stdout=quiet, stderr=quiet)
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("volume") / "f.ome.zarr"
+    return phantoms.write_ome_zarr(path, [phantoms.f_phantom()])
+
+
+@pytest.fixture(scope="module")
+def alone(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What one process leaves in a folder."""
+    out = tmp_path_factory.mktemp("alone") / "out"
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    found = results(out)
+    assert len(found) > 20
+    return found
+
+
+def results(out: Path) -> dict[str, str]:
+    return {
+        key: hashlib.sha256((out / key).read_bytes()).hexdigest()
+        for key in sorted(file.relative_to(out).as_posix() for file in out.rglob("*"))
+        if is_result(key) and (out / key).is_file()
+    }
+
+
+def is_result(key: str) -> bool:
+    """Whether it must be the same whoever built it: no times, and not where the source lies."""
+    name = key.rpartition("/")[2]
+    return key.startswith(("units/", "stage/", "bundle/")) and name not in (
+        "seconds.json",
+        "plan.key",
+    )
+
+
+@pytest.mark.slow
+def test_a_cluster_builds_the_same_bytes_as_one_process(
+    cluster: Cluster,
+    volume: Path,
+    alone: dict[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)  # OUT is told from here; the workers stand elsewhere
+    assert make_assets(volume, "out", GRID, "--scheduler", cluster[0]) == 0
+    assert results(tmp_path / "out") == alone
+
+
+@pytest.mark.slow
+def test_a_cluster_reads_from_and_writes_to_an_object_store(
+    cluster: Cluster, volume: Path, alone: dict[str, str]
+) -> None:
+    scheduler, store = cluster
+    print(f"object store: {store.kind}")
+    fs = store.files()
+    fs.put(str(volume), "bucket/f.ome.zarr", recursive=True)
+    told = ["-o", "s3://bucket/out", "--scheduler", scheduler, "--grid", GRID]
+    assert main(["build", "s3://bucket/f.ome.zarr", *told]) == 0
+    keys = [name.removeprefix("bucket/out/") for name in fs.find("bucket/out")]
+    assert {
+        key: hashlib.sha256(fs.cat_file(f"bucket/out/{key}")).hexdigest()
+        for key in keys
+        if is_result(key)
+    } == alone
+    assert not [key for key in keys if "/." in f"/{key}"]
+
+
+@pytest.mark.slow
+def test_a_cluster_that_does_not_see_out_is_refused(cluster: Cluster, tmp_path: Path) -> None:
+    with pytest.raises(ClusterError, match=r"worker tcp://.* on .*: does not see /nowhere/.lock;"):
+        join(cluster[0], Path("/nowhere/.lock"))
+    join(cluster[0], tmp_path).close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "ours", "said"),
+    [
+        ("version", lambda _: "99", r"on .*: has StereoCell .*, expected 99"),
+        ("libraries_of", lambda _: {"numpy": "99"}, r"on .*: has numpy .*, expected 99"),
+        ("key_of", lambda *_: "other", "runs other code than this command: expected the same"),
+    ],
+)
+def test_workers_that_would_make_other_bytes_are_refused(
+    cluster: Cluster, monkeypatch: pytest.MonkeyPatch, name: str, ours: object, said: str
+) -> None:
+    monkeypatch.setattr(f"stereocell.engine.cluster.{name}", ours)
+    with pytest.raises(ClusterError, match=rf"worker tcp://.* {said}"):
+        join(cluster[0], None)
+
+
+@pytest.mark.slow
+def test_a_worker_that_came_later_is_held_to_the_same(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine = Engine(0, cluster[0], tmp_path)
+    try:
+        assert engine.run("good", str, [("a", 1), ("b", 2)]) == ["1", "2"]
+        monkeypatch.setattr("stereocell.engine.cluster.version", lambda _: "99")
+        with pytest.raises(TasksFailedError, match=r"a worker on .*: has StereoCell .*expected 99"):
+            engine.run("bad", str, [("a", 1), ("b", 2)])
+    finally:
+        engine.close()
+    with pytest.raises(ClusterError, match=r"does not see /nowhere/.lock; expected OUT in"):
+        able(str, Path("/nowhere/.lock"))(1)
+
+
+def wait_for(file: Path) -> None:
+    """Wait for a file as long as a test has patience."""
+    end = time.monotonic() + PATIENCE_S
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.05)
+
+
+def write_when(task: tuple[Path, Path, Path]) -> None:
+    begun, told, file = task
+    begun.touch()
+    wait_for(told)
+    try:
+        write_bytes(file, b"late")
+    finally:
+        told.with_suffix(".over").touch()
+
+
+@pytest.mark.slow
+def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
+    cluster: Cluster, tmp_path: Path
+) -> None:
+    out, begun, told = tmp_path / "out", tmp_path / "begun", tmp_path / "told"
+
+    def interrupt() -> None:
+        wait_for(begun)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def build() -> None:
+        with alone_in(out, "build"):
+            engine = Engine(0, cluster[0], out / LOCK)
+            threading.Thread(target=interrupt).start()
+            try:
+                engine.run("late", write_when, [("a", (begun, told, out / "tile" / "a"))])
+            finally:
+                engine.close()
+
+    with ctrl_c.heeded(), pytest.raises(KeyboardInterrupt):
+        build()
+    assert not out.exists()
+    told.touch()
+    wait_for(told.with_suffix(".over"))
+    assert told.with_suffix(".over").exists()
+    assert not out.exists()
+
+
+@pytest.mark.slow
+def test_a_cluster_whose_workers_are_all_killed_is_not_waited_for_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stereocell.engine.run._LOOK_S", 0.5)
+    monkeypatch.setattr("stereocell.engine.run._LOOKS", 3)
+    file = tmp_path / "scheduler.json"
+    told = ["--scheduler-file", str(file), "--no-dashboard"]
+    processes = [_start("scheduler", "--port", "0", *told, cwd=tmp_path)]
+    # without a nanny: it would start a worker that was killed again
+    worker = _start("worker", "--nthreads", "1", "--no-nanny", *told, cwd=tmp_path)
+    begun = tmp_path / "begun"
+
+    def kill() -> None:
+        while not begun.exists():
+            time.sleep(0.05)
+        worker.kill()
+
+    threading.Thread(target=kill).start()
+    try:
+        while not file.exists():
+            time.sleep(0.05)
+        engine = Engine(0, str(file), tmp_path)
+        never = tmp_path / "never"
+        tasks = [(name, (begun, never, tmp_path / name)) for name in "ab"]
+        with pytest.raises(TasksFailedError, match="a, b: its workers are gone and did not come"):
+            engine.run("none", write_when, tasks)
+        engine.close()
+    finally:
+        for process in (*processes, worker):
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x"])
+def test_what_is_no_scheduler_is_said_in_a_line(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stereocell.engine.cluster._ANSWER_S", 1)
+    with pytest.raises(ClusterError) as raised:
+        join(address, None)
+    (line,) = str(raised.value).splitlines()
+    assert line.startswith(f"--scheduler {address}: ")
+    assert "expected the address of a Dask scheduler" in line

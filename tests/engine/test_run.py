@@ -1,0 +1,111 @@
+"""The engine runs everything, in order of the tasks, whatever fails."""
+
+import os
+
+import dask
+import pytest
+
+from stereocell.engine.cluster import ClusterError
+from stereocell.engine.run import _AHEAD, Engine, TasksFailedError, _outcome_of
+from stereocell.model.errors import SourceError
+
+
+def double(value: int) -> int:
+    if value in (3, 6):
+        raise SourceError("it is\nbroken")
+    if value == 4:
+        raise ValueError("four is a bug")
+    return 2 * value
+
+
+@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
+def test_results_come_in_the_tasks_order_and_failures_at_the_end(workers: int) -> None:
+    engine = Engine(workers)
+    try:
+        tasks = [(f"t{n}", n) for n in (9, 8, 1)]
+        assert engine.run("good", double, tasks) == [18, 16, 2]
+        with pytest.raises(TasksFailedError) as raised:
+            engine.run("bad", double, [(f"t{n}", n) for n in (1, 3, 4, 5, 6)])
+    finally:
+        engine.close()
+    assert str(raised.value).splitlines() == [
+        "t3, t6: it is broken",
+        "t4: ValueError: four is a bug",
+        "bad: 3 of 5 failed",
+    ]
+
+
+@pytest.mark.slow
+def test_few_tasks_wait_at_a_time_however_many_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, open_ = Engine(2), []
+    try:
+        assert engine.run("first", double, [("a", 1), ("b", 2)]) == [2, 4]
+        client = engine._client
+        submit = client.submit
+
+        def count(*arguments: object, **how: object) -> object:
+            open_.append(len(client.futures))
+            return submit(*arguments, **how)
+
+        monkeypatch.setattr(client, "submit", count)
+        numbers = range(10, 10 + 5 * _AHEAD)
+        doubled = engine.run("many", double, [(str(n), n) for n in numbers])
+    finally:
+        engine.close()
+    assert doubled == [2 * n for n in numbers]
+    assert len(open_) == len(numbers)
+    assert max(open_) <= _AHEAD + 2
+
+
+def die(value: int) -> int:
+    if value == 1:
+        os._exit(9)  # as when the system takes a process's memory back
+    return value
+
+
+@pytest.mark.slow
+def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
+    # as on a machine so busy that a new worker takes longer than distributed waits for one
+    dask.config.set({"distributed.deploy.lost-worker-timeout": "1ms"})
+    engine = Engine(2)
+    try:
+        with pytest.raises(TasksFailedError) as raised:
+            engine.run("bad", die, [(f"t{n}", n) for n in range(4)])
+    finally:
+        engine.close()
+    (line,) = str(raised.value).splitlines()
+    assert line.startswith("t1: its worker process was killed each time")
+    assert "fewer --workers" in line
+
+
+class Gone:
+    """A client and a task of its whose workers are gone: before the task ended, or after."""
+
+    def __init__(self, ended: bool) -> None:
+        self.ended = ended
+
+    def exception(self, timeout: float) -> None:
+        if not self.ended:
+            raise TimeoutError
+
+    def result(self, timeout: float) -> None:
+        raise TimeoutError  # it lay on a worker
+
+    def scheduler_info(self) -> dict[str, dict[str, str]]:
+        return {"workers": {}}
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_workers_that_are_gone_are_not_waited_for_for_ever(ended: bool) -> None:
+    result, failure = _outcome_of(Gone(ended), Gone(ended))
+    assert result is None
+    assert "its workers are gone and did not come back" in str(failure)
+
+
+def test_workers_that_do_not_answer_are_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(**_: object) -> None:
+        raise TimeoutError  # as distributed does, without a word
+
+    monkeypatch.setattr("distributed.Client", never)
+    with pytest.raises(ClusterError, match="--workers: the processes did not answer within 300 s"):
+        Engine(2).run("slow", double, [("a", 1), ("b", 2)])

@@ -1,0 +1,42 @@
+"""The background is found under bodies, lies where it was, and is one for all tiles."""
+
+import numpy as np
+import pytest
+
+from stereocell.filters.background import find_background
+from stereocell.model.tiling import Box
+from support.phantoms import blurred_ball
+
+SPACING = (0.28, 0.14, 0.14)
+REGION = Box((10, 200, 300), (58, 328, 428))
+
+
+def _ramp() -> np.ndarray:
+    z, y, x = np.indices(REGION.shape)
+    return (100 + 2 * z + 0.5 * y + 1.0 * x).astype(np.float32)
+
+
+def test_ramp_under_noise_and_bodies_is_found_where_it_lies() -> None:
+    rng = np.random.default_rng(0)
+    ball = blurred_ball(REGION.shape, SPACING, (6.7, 9.0, 9.0), 2.0, 0.3)
+    counts = (_ramp() + 500 * ball + rng.normal(0, 5, REGION.shape)).astype(np.float32)
+    found = find_background(counts, REGION, SPACING, 4.5).at(REGION)
+    inner = (slice(12, 36), slice(24, 104), slice(24, 104))
+    # a low percentile of a ramp lies below its middle: a constant, which no threshold sees
+    error = found[inner] - _ramp()[inner]
+    assert np.ptp(np.percentile(error, [2, 98])) < 25  # of a ramp that rises by 280
+    assert abs(np.median(error)) < 35
+
+
+def test_coarser_voxels_give_the_same_background() -> None:
+    fine = find_background(_ramp(), REGION, SPACING, 4.5)
+    coarse = find_background(_ramp()[:, ::2, ::2], REGION, SPACING, 4.5)
+    for found, expected in zip(coarse.centres, fine.centres, strict=True):
+        assert found == pytest.approx(expected)
+    np.testing.assert_allclose(coarse.at(REGION), fine.at(REGION), atol=3)
+
+
+def test_block_larger_than_the_region_is_one_constant() -> None:
+    found = find_background(_ramp(), REGION, SPACING, 1e6)
+    assert found.values.shape == (1, 1, 1)
+    assert found.at(REGION).shape == (1, 1, 1)

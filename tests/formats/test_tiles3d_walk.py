@@ -1,0 +1,163 @@
+"""Bundles whose finer surfaces are in external tilesets, and what is found where one is faulty."""
+
+import json
+import shutil
+
+import pytest
+
+from stereocell.bundle.write import write_bundle
+from stereocell.engine.run import Engine
+from stereocell.formats import tiles3d
+from stereocell.formats.tiles3d import content_hash
+from stereocell.formats.tiles3d_walk import walk
+from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
+from stereocell.verify.bundle_against_stage import BundleTask, hold_tile
+from stereocell.verify.formats import check
+from support import spheres
+
+CHANNEL = "channels/CD31"
+FINER = f"{CHANNEL}/r0_c0/finer.json"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A tile of three LODs, in a bundle that takes one tile for many."""
+    out = tmp_path_factory.mktemp("out")
+    tile = spheres.tile(0)
+    write_tile(out / "stage", tile)
+    looks = (spheres.RED, spheres.BLUE)
+    write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tiles3d, "MOST_WHOLE_TILES", 0)
+        write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0))
+    return out
+
+
+@pytest.fixture
+def bundle(made, tmp_path):
+    """A copy to be spoilt."""
+    return shutil.copytree(made / "bundle", tmp_path / "bundle")
+
+
+def found(bundle, name="tilesets"):
+    """The line of that name; those after it, which take long, are never made."""
+    return next(line for line in check(bundle.parent) if line.name == name)
+
+
+def test_what_the_pipeline_writes_passes(bundle):
+    assert (found(bundle).ok, found(bundle).detail) == (True, "3 contents")
+    assert found(bundle, "hashes").ok
+
+
+def test_external_tilesets_are_listed(bundle):
+    listed = json.loads((bundle / "files.json").read_bytes())
+    assert {path for path in listed if path.endswith(".json")} >= {FINER, f"{CHANNEL}/tileset.json"}
+
+
+def test_contents_come_coarse_ones_first_with_their_place(bundle):
+    names = [
+        (content.path.relative_to(bundle / CHANNEL).as_posix(), content.error_m <= content.limit_m)
+        for content in walk(bundle, bundle / CHANNEL / "tileset.json")
+    ]
+    files = ["lod2.glb", "finer.json", "lod1.glb", "lod0.glb"]
+    assert names == [(f"r0_c0/{name}", True) for name in files]
+
+
+def test_other_tiles_are_not_opened(bundle):
+    (bundle / FINER).unlink()
+    assert list(walk(bundle, bundle / CHANNEL / "tileset.json", "r0_c1")) == []
+
+
+def test_surfaces_behind_an_external_tileset_are_held_against_the_stage(made):
+    finding = hold_tile(BundleTask(made / "stage" / "stage.usda", made / "bundle", "r0_c0"))
+    assert (finding.surfaces, finding.problems) == (3, ())
+
+
+def test_changed_surface_behind_an_external_tileset_is_found(bundle):
+    path = bundle / CHANNEL / "r0_c0/lod0.glb"
+    path.write_bytes(path.read_bytes()[:-1] + b"?")
+    assert f"{FINER}: lod0.glb: expected sha-256-128 " in found(bundle).detail
+
+
+def test_spoilt_external_tileset_is_found(bundle):
+    path = bundle / FINER
+    path.write_bytes(path.read_bytes().replace(b"lod1.glb", b"lod9.glb"))
+    detail = found(bundle).detail
+    assert f"{CHANNEL}/tileset.json: r0_c0/finer.json: expected sha-256-128 " in detail
+    assert f"{FINER}: no file at lod9.glb" in detail
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b'{"asset": {', "damaged, no JSON"),
+        (b"[]", "no 3D Tiles tileset"),
+        (b'{"geometricError": 1}', "no 3D Tiles tileset"),
+    ],
+)
+def test_external_tileset_that_is_none_is_found(bundle, content, message):
+    (bundle / FINER).write_bytes(content)
+    detail = found(bundle).detail
+    assert f"{FINER}: {message}" in detail
+    assert "\n" not in detail
+
+
+def test_missing_external_tileset_is_found_once(bundle):
+    (bundle / FINER).unlink()
+    assert found(bundle).detail.count("finer.json") == 1
+    assert f"{FINER} is missing: run `stereocell bundle OUT`" in found(bundle).detail
+
+
+@pytest.mark.parametrize("uri", ["finer.json", "../tileset.json"])
+def test_tilesets_that_lead_back_to_themselves_are_refused(bundle, uri):
+    path = bundle / FINER
+    path.write_text(path.read_text().replace("lod1.glb", uri))
+    assert f"{FINER}: {uri} is a tileset that was named before" in found(bundle).detail
+
+
+@pytest.mark.parametrize("uri", ["../../../../secret.json", "/etc/passwd"])
+def test_what_lies_outside_the_bundle_is_not_opened(bundle, uri):
+    (bundle.parent / "secret.json").write_text("no JSON")
+    path = bundle / FINER
+    path.write_text(path.read_text().replace("lod1.glb", uri))
+    detail = found(bundle).detail
+    assert f"{FINER}: {uri} is outside the bundle" in detail
+    assert "no JSON" not in detail
+
+
+def test_a_tileset_that_links_to_itself_is_none(bundle):
+    (bundle / FINER).unlink()
+    (bundle / FINER).symlink_to(bundle / FINER)
+    assert FINER in found(bundle).detail
+    assert "\n" not in found(bundle).detail
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ('"lod1.glb"', f'"{"a" * 5000}.glb"', "over 1024 characters"),
+        ('"geometricError":', '"geometricError":"x","was":', "no 3D Tiles tileset: ValueError"),
+    ],
+)
+def test_what_no_tileset_says_is_one_line(bundle, before, after, message):
+    path = bundle / FINER
+    path.write_text(path.read_text().replace(before, after))
+    detail = found(bundle).detail
+    assert message in detail
+    assert "\n" not in detail
+    assert len(detail) < 1000
+
+
+def test_errors_that_grow_behind_an_external_tileset_are_found(bundle):
+    path = bundle / FINER
+    content = json.loads(path.read_bytes())
+    content["root"]["geometricError"] = 9.0
+    path.write_text(json.dumps(content))
+    assert f"{FINER}: lod1.glb has a larger geometricError" in found(bundle).detail
+
+
+def test_hash_of_an_external_tileset_is_that_of_its_bytes(bundle):
+    listed = json.loads((bundle / "files.json").read_bytes())
+    contents = walk(bundle, bundle / CHANNEL / "tileset.json")
+    (external,) = (content for content in contents if content.is_tileset)
+    assert external.named["extras"] == {"sha-256-128": content_hash(listed[FINER]["sha256"])}

@@ -1,0 +1,66 @@
+"""Fragments, gaps and cavities, at sizes on either side of the limits."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.isosurface.repair import RepairOptions, repair
+
+SPACING = (1.0, 1.0, 1.0)
+
+
+def _boxes(*boxes: tuple[slice, slice, slice], shape: int = 40) -> NDArray[np.float32]:
+    distance = np.full((shape,) * 3, -2.0, np.float32)
+    for box in boxes:
+        distance[box] = 2.0
+    return distance
+
+
+def test_small_fragment_goes_and_large_solid_stays() -> None:
+    small, large = np.s_[3:5, 3:5, 3:5], np.s_[15:30, 15:30, 15:30]
+    result = repair(_boxes(small, large), SPACING, RepairOptions(0.0, 4.0, 0.0))
+    assert result.fragments_dropped == 1
+    assert (result.distance[small] < 0).all()
+    assert (result.distance[large] > 0).all()
+
+
+def test_fragment_that_leaves_the_window_is_not_judged() -> None:
+    cut = np.s_[0:2, 3:5, 3:5]
+    result = repair(_boxes(cut), SPACING, RepairOptions(0.0, 4.0, 0.0))
+    assert result.fragments_dropped == 0
+    assert (result.distance[cut] > 0).all()
+
+
+def test_cavity_up_to_the_limit_is_filled() -> None:
+    distance = _boxes(np.s_[5:35, 5:35, 5:35])
+    little, big = np.s_[10:12, 10:12, 10:12], np.s_[18:30, 18:30, 18:30]
+    distance[little] = distance[big] = -2.0
+    result = repair(distance, SPACING, RepairOptions(0.0, 0.0, 4.0))
+    assert result.cavities_filled == 1
+    assert (result.distance[little] > 0).all()
+    assert (result.distance[big] < 0).all()
+
+
+def test_slit_narrower_than_the_ball_closes_and_a_wider_one_stays() -> None:
+    narrow, wide = np.s_[10:30, 19:21, 10:30], np.s_[10:30, 14:26, 10:30]
+    for slit, closes in ((narrow, True), (wide, False)):
+        distance = _boxes(np.s_[8:32, 8:32, 8:32])
+        distance[slit] = -2.0
+        distance[8:32, slit[1], 30:32] = -2.0  # open to one side
+        result = repair(distance, SPACING, RepairOptions(3.0, 0.0, 0.0))
+        middle = result.distance[20, 20, 20]
+        assert (middle > 0) == closes
+
+
+def test_closing_leaves_a_smooth_ball_where_it_is() -> None:
+    z, y, x = np.indices((40, 40, 40)) - 20.0
+    ball = np.clip(12 - np.sqrt(z**2 + y**2 + x**2), -2, 2).astype(np.float32)
+    closed = repair(ball, SPACING, RepairOptions(3.0, 0.0, 0.0)).distance
+    near = np.abs(ball) < 1
+    np.testing.assert_allclose(closed[near], ball[near], atol=1e-6)
+
+
+def test_argument_stays_as_it_is() -> None:
+    distance = _boxes(np.s_[3:5, 3:5, 3:5])
+    before = distance.copy()
+    repair(distance, SPACING, RepairOptions(2.0, 4.0, 4.0))
+    np.testing.assert_array_equal(distance, before)

@@ -1,0 +1,118 @@
+"""A channel's own lengths: by the first paper's rule, from the solids in all its tiles."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from test_plan import CHANNELS, Level
+from test_plan import _plan as plan_of
+
+from stereocell.building.plan import Plan
+from stereocell.isosurface.components import find_solids
+from stereocell.isosurface.extract import extract_surface
+from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.isosurface.repair_rules import choose_repair, sum_solids
+from stereocell.model.tiling import Box
+
+SPACING = (0.5, 0.25, 0.25)
+SHAPE = (40, 80, 120)
+RADII = {(5.0, 5.0, 5.0): 3.0, (10.0, 12.0, 14.0): 4.0, (16.0, 15.0, 25.0): 1.2}
+
+
+def _distance() -> NDArray[np.float32]:
+    """Three balls, um."""
+    places = [i * h for i, h in zip(np.indices(SHAPE), SPACING, strict=True)]
+    away = [
+        np.sqrt(sum((p - c) ** 2 for p, c in zip(places, centre, strict=True))) - radius
+        for centre, radius in RADII.items()
+    ]
+    return np.clip(-np.minimum.reduce(away), -1, 1).astype(np.float32)
+
+
+def test_faces_are_those_of_the_extracted_surface() -> None:
+    distance, whole = _distance(), Box((0, 0, 0), SHAPE)
+    solids = find_solids(distance > 0, SPACING, 26)
+    mesh = extract_surface(distance, whole, whole, whole, SPACING, (0, 0, 0))
+    assert len(solids.diagonal_um) == len(RADII)
+    # twice the vertices, and four less for each ball
+    assert solids.faces().sum() - 4 * len(RADII) == len(mesh.triangles)
+    for diagonal, radius in zip(sorted(solids.diagonal_um), sorted(RADII.values()), strict=True):
+        assert diagonal == pytest.approx(2 * 3**0.5 * radius, rel=0.2)
+    assert solids.whole.all()
+
+
+def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
+    distance = _distance()
+    sums = sum_solids(distance > 0, SPACING, 1.0)
+    assert (sums.count, sums.kept) == (3, 2)
+    options = choose_repair(_plan(max_fragment_um=4.0), "clear", [asdict(sums)])
+    dropped = repair(distance, SPACING, options)
+    assert dropped.fragments_dropped == 1
+    assert dropped.distance[32, 60, 100] < 0  # the small one's centre
+    assert dropped.distance[10, 20, 20] > 0
+
+
+def test_rule_ends_where_the_halo_does_and_can_be_left_out() -> None:
+    sums = asdict(sum_solids(_distance() > 0, SPACING, 1.0))
+    # what would go is larger than what a unit is sure to see whole
+    for length in (3.0, 0.0):
+        options = choose_repair(_plan(max_fragment_um=length), "clear", [sums])
+        assert repair(_distance(), SPACING, options).fragments_dropped == 0
+        assert options.min_diagonal_um <= max(1.5, length)
+
+
+def test_specks_do_not_rule_the_means() -> None:
+    rng = np.random.default_rng(0)
+    inside = _distance() > 0
+    specks = inside | (rng.random(SHAPE) > 0.999)
+    assert sum_solids(specks, SPACING, 1.5).count == sum_solids(inside, SPACING, 1.5).count
+    assert sum_solids(np.zeros(SHAPE, bool), SPACING, 1.5).count == 0
+
+
+def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:
+    plan = _plan(max_alpha_um=2.0)
+    plain = {"count": 4, "faces": 4 * 4000, "diagonal_um": 4 * 12.0}
+    plain |= {"kept": 4, "kept_faces": 4 * 4000, "kept_diagonal_um": 4 * 12.0}
+    alpha = choose_repair(plan, "clear", [plain]).alpha_um
+    assert alpha == pytest.approx(6 * 12 / 4000**0.5)
+    # the same over two tiles
+    halves = [{key: value / 2 for key, value in plain.items()}] * 2
+    assert choose_repair(plan, "clear", halves).alpha_um == pytest.approx(alpha)
+    frayed = plain | {"kept_faces": 4 * 10_000}
+    assert choose_repair(plan, "clear", [frayed]).alpha_um == pytest.approx(6 * 12 / 100)
+    assert choose_repair(plan, "clear", [plain | {"kept_faces": 10**9}]).alpha_um == 0.5
+    assert choose_repair(plan, "clear", [plain | {"kept_faces": 4}]).alpha_um == 2.0
+    assert choose_repair(plan, "clear", []).alpha_um == 2.0
+
+
+def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
+    assert choose_repair(_plan(alpha_um=0.8), "clear", []).alpha_um == 0.8
+    assert choose_repair(_plan(alpha_um=0.8), "clear", []).offset_um == 0.0
+    tenth = choose_repair(_plan(alpha_um=0.8, offset_um="auto"), "clear", []).offset_um
+    assert tenth == pytest.approx(0.08)
+    assert choose_repair(_plan(alpha_um=0.8, offset_um=0.3), "clear", []).offset_um == 0.3
+    # nothing is bridged where no gap is known to be one
+    assert choose_repair(_plan(alpha_um=0.8), "unclear", []).alpha_um == 0.0
+
+
+def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
+    distance = _distance()
+    options = RepairOptions(0.0, 5.0, 0.0, offset_um=0.3)
+    moved = repair(distance, SPACING, options)
+    assert moved.fragments_dropped == 1
+    whole = Box((0, 0, 0), SHAPE)
+    mesh = extract_surface(moved.distance, whole, whole, whole, SPACING, (0, 0, 0))
+    x, y, z = mesh.positions.T
+    away = [
+        np.sqrt((z - c) ** 2 + (-y - b) ** 2 + (x - a) ** 2) - radius
+        for (c, b, a), radius in RADII.items()
+        if radius > 2
+    ]
+    np.testing.assert_allclose(np.minimum.reduce(away), 0.3, atol=0.03)
+    without = repair(distance, SPACING, replace(options, min_diagonal_um=0.0))
+    assert without.distance[32, 60, 100] > 0
+
+
+def _plan(**surface: object) -> Plan:
+    return plan_of(levels=(Level(SHAPE, SPACING),), channels=CHANNELS[:1], surface=surface)

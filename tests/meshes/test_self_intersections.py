@@ -1,0 +1,174 @@
+"""Triangles that meet: each kind by hand, and random ones against rational arithmetic."""
+
+from fractions import Fraction
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+
+from stereocell.meshes.self_intersections import are_collinear, find_crossings, orient_2d, orient_3d
+
+CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+KINDS = {
+    "apart": (0, [[5, 5, 5], [6, 5, 5], [5, 6, 5]], [3, 4, 5]),
+    "through each other": (1, [[0.2, 0.2, -1], [0.2, 0.2, 1], [0.3, 0.2, 1]], [3, 4, 5]),
+    "a corner on the other's face": (1, [[0.2, 0.2, 0], [0.2, 0.2, 1], [0.3, 0.2, 1]], [3, 4, 5]),
+    "a corner on the other's edge": (1, [[0.5, 0, 0], [0.5, 0, 1], [0.5, -1, 1]], [3, 4, 5]),
+    "corners in one place": (1, [[0, 0, 0], [0, 0, 1], [-1, 0, 1]], [3, 4, 5]),
+    "edges that cross": (1, [[0.5, 0, -1], [0.5, 0, 1], [0.5, -1, 0]], [3, 4, 5]),
+    "one inside the other": (1, [[0.1, 0.1, 0], [0.2, 0.1, 0], [0.1, 0.2, 0]], [3, 4, 5]),
+    "coplanar, overlapping": (1, [[0.1, 0.1, 0], [1.1, 0.1, 0], [0.1, 1.1, 0]], [3, 4, 5]),
+    "coplanar, beside": (0, [[1.1, 0.1, 0], [2.1, 0.1, 0], [1.1, 1.1, 0]], [3, 4, 5]),
+    "an edge, folded flat": (1, [[0.5, 0.9, 0]], [1, 0, 3]),
+    "an edge, folded nearly flat": (0, [[0.5, 0.9, 1e-12]], [1, 0, 3]),
+    "an edge, unfolded": (0, [[0.5, -0.9, 0]], [1, 0, 3]),
+    "the same triangle, turned over": (1, [], [0, 2, 1]),
+    "a corner, through": (1, [[0.3, 0.3, 1], [0.3, 0.3, -1]], [0, 3, 4]),
+    "a corner, past": (0, [[-0.3, -0.3, 1], [-0.3, -0.3, -1]], [0, 3, 4]),
+    "a corner, coplanar, overlapping": (1, [[0.3, 0.6, 0], [0.6, 0.3, 0]], [0, 3, 4]),
+    "a corner, coplanar, around": (1, [[9, -1, 0], [-1, 9, 0]], [0, 3, 4]),
+    "a corner, coplanar, across": (0, [[-1, 0, 0], [0, -1, 0]], [0, 3, 4]),
+    "a corner, coplanar, edge on edge": (1, [[2, 0, 0], [0, -1, 0]], [0, 3, 4]),
+    "a corner, edge on edge": (1, [[2, 0, 0], [0, 0, 1]], [0, 3, 4]),
+    "a corner, edge by edge": (0, [[2, 0, 1e-12], [0, 0, 1]], [0, 3, 4]),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pairs_by_hand(kind: str) -> None:
+    expected, more, second = KINDS[kind]
+    positions = np.array(CORNER + more, float)
+    for axes in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):  # in all three planes of projection
+        for turn in range(3):
+            triangles = np.array([[0, 1, 2], np.roll(second, turn)], np.int64)
+            assert len(find_crossings(positions[:, axes], triangles)) == expected
+            assert len(find_crossings(positions[:, axes], triangles[::-1])) == expected
+
+
+Point = tuple[Fraction, ...]
+
+
+def _plus(a: Point, b: Point, t: Fraction) -> Point:
+    return tuple(x + t * (y - x) for x, y in zip(a, b, strict=True))
+
+
+def _solve(rows: list[list[Fraction]]) -> list[Fraction] | None:
+    """Gauss on a square system with its right side; None if it is singular."""
+    n = len(rows)
+    rows = [list(row) for row in rows]
+    for k in range(n):
+        pivot = next((r for r in range(k, n) if rows[r][k]), None)
+        if pivot is None:
+            return None
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        for r in range(n):
+            if r != k:
+                factor = rows[r][k] / rows[k][k]
+                rows[r] = [x - factor * y for x, y in zip(rows[r], rows[k], strict=True)]
+    return [rows[k][n] / rows[k][k] for k in range(n)]
+
+
+def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
+    """The corners of what two triangles share: where edges of one meet the other, and edges meet.
+
+    Rational arithmetic, by brute force over edges and faces, edges and edges, corners and faces.
+    """
+    found: set[Point] = set()
+    for first, second in ((one, other), (other, one)):
+        a, b, c = second
+        for p, q in combinations(first, 2):
+            # p + t (q - p) = a + u (b - a) + v (c - a)
+            system = [[q[k] - p[k], a[k] - b[k], a[k] - c[k], a[k] - p[k]] for k in range(3)]
+            solved = _solve(system)
+            if solved is not None:
+                t, u, v = solved
+                if 0 <= t <= 1 and u >= 0 and v >= 0 and u + v <= 1:
+                    found.add(_plus(p, q, t))
+        for point in first:  # corners in the other's plane
+            for i, j in combinations(range(3), 2):
+                solved = _solve([[b[k] - a[k], c[k] - a[k], point[k] - a[k]] for k in (i, j)])
+                if solved is not None:
+                    u, v = solved
+                    at = tuple(a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) for k in range(3))
+                    if at == point and u >= 0 and v >= 0 and u + v <= 1:
+                        found.add(point)
+                    break
+    for (p, q), (r, s) in product(combinations(one, 2), combinations(other, 2)):
+        for i, j in combinations(range(3), 2):
+            solved = _solve([[q[k] - p[k], r[k] - s[k], r[k] - p[k]] for k in (i, j)])
+            if solved is not None:
+                t, u = solved
+                if 0 <= t <= 1 and 0 <= u <= 1 and _plus(p, q, t) == _plus(r, s, u):
+                    found.add(_plus(p, q, t))
+    return found
+
+
+@pytest.mark.parametrize("shared", [0, 1, 2])
+def test_random_triangles_on_a_coarse_grid_against_rational_arithmetic(shared: int) -> None:
+    """On 4 x 4 x 3 points, most pairs are special: coplanar, collinear, touching."""
+    rng = np.random.default_rng(shared)
+    met = 0
+    for _ in range(200):
+        positions = rng.integers(0, [4, 4, 3], (6 - shared, 3)).astype(float)
+        triangles = np.array([[0, 1, 2], [0, 1, 2]])
+        triangles[1, shared:] = np.arange(3, 6 - shared)
+        corners = positions[triangles]
+        if are_collinear(*corners.transpose(1, 0, 2)).any():
+            continue
+        one, other = ([tuple(map(Fraction, p)) for p in t] for t in corners.astype(int).tolist())
+        common = _common_points(one, other)
+        beside = common - {one[k] for k in range(shared)}
+        found = find_crossings(positions, triangles)
+        assert len(found) == bool(beside), (positions, beside)
+        met += bool(beside)
+    assert 10 < met < 190
+
+
+def test_signs_are_exact_where_floats_round() -> None:
+    """Kettner et al. 2008: points near a line, of which naive determinants are wrong."""
+    a = np.array([[0.5, 0.5]]) + np.arange(64)[:, None] * 2.0**-53
+    b, c = np.full((64, 2), 12.0), np.full((64, 2), 24.0)
+    assert (orient_2d(a, b, c) == 0).all()
+    a[:, 1] += 2.0**-53
+    signs = set(orient_2d(a, b, c).tolist())
+    assert len(signs) == 1
+    assert signs != {0}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-4, 1e6])
+@pytest.mark.parametrize("kind", ["anywhere", "on a grid", "nearly in a plane"])
+def test_side_of_a_plane_is_as_in_exact_arithmetic(kind: str, scale: float) -> None:
+    """Rationals of Python against floats that are trusted where they may be."""
+    rng = np.random.default_rng(1)
+    points = scale * rng.normal(size=(4, 300, 3))
+    if kind == "on a grid":
+        points = np.round(2 * points / scale) * scale / 2
+    if kind == "nearly in a plane":
+        weights = rng.dirichlet([1, 1, 1], 300)
+        points[3] = np.einsum("nk,knd->nd", weights, points[:3])
+    signs = orient_3d(*points)
+    assert {"on a grid": {-1, 0, 1}}.get(kind, {-1, 1}) <= set(signs.tolist())
+    for found, rows in zip(signs.tolist(), points.transpose(1, 0, 2), strict=True):
+        a, b, c, d = ([Fraction(x) for x in row] for row in rows.tolist())
+        u, v, w = ([x - y for x, y in zip(p, d, strict=True)] for p in (a, b, c))
+        volume = sum(
+            u[i] * (v[(i + 1) % 3] * w[(i + 2) % 3] - v[(i + 2) % 3] * w[(i + 1) % 3])
+            for i in range(3)
+        )
+        assert found == (volume > 0) - (volume < 0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
+    """Of triangles in a crowd, some with common corners, every share of which is fresh."""
+    rng = np.random.default_rng(seed)
+    positions = rng.integers(0, 9, (120, 3)).astype(float)
+    triangles = np.array([rng.permutation(120)[:3] for _ in range(250)])
+    flat = are_collinear(*positions[triangles].transpose(1, 0, 2))
+    triangles = np.ascontiguousarray(triangles[~flat])
+    everything = find_crossings(positions, triangles)
+    assert len(everything) > 500
+    for share in (0.0, 0.02, 0.5, 1.0):
+        fresh = rng.random(len(triangles)) < share
+        found = find_crossings(positions, triangles, None, fresh)
+        np.testing.assert_array_equal(found, everything[fresh[everything].any(axis=1)])

@@ -1,0 +1,211 @@
+"""The check of meshes: sound ones pass, and each kind of fault, put in by hand, is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.typing import NDArray
+
+from stereocell.isosurface.extract import extract_surface
+from stereocell.meshes.validity import Faults, border, certify
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+
+
+def to_mesh(surface: pv.PolyData) -> Mesh:
+    positions = np.asarray(surface.points, np.float32)
+    triangles = surface.regular_faces.astype(np.uint32)
+    return Mesh(positions, triangles, np.zeros_like(positions))
+
+
+def ball(radius: float = 5.0, sides: int = 24) -> Mesh:
+    return to_mesh(pv.Sphere(radius=radius, theta_resolution=sides, phi_resolution=sides))
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])
+    return Mesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate(
+            [m.triangles + np.uint32(start) for m, start in zip(meshes, starts[:-1], strict=True)]
+        ),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )
+
+
+def turned(mesh: Mesh) -> Mesh:
+    return replace(mesh, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]))
+
+
+def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
+    return replace(mesh, positions=mesh.positions + np.float32(by))
+
+
+def kinds(faults: Faults) -> set[str]:
+    return {kind for kind, count in faults.counts.items() if count}
+
+
+def _with(mesh: Mesh, triangles: NDArray[np.integer]) -> Mesh:
+    return replace(mesh, triangles=triangles.astype(np.uint32))
+
+
+SOUND = {
+    "ball": ball(),
+    "torus": to_mesh(pv.ParametricTorus(u_res=40, v_res=20).triangulate().clean()),
+    "box": to_mesh(pv.Box((0, 1, 0, 2, 0, 3)).triangulate().clean()),
+    "ball with a cavity": joined(ball(), turned(ball(3.0))),
+    "ball in the cavity of a ball": joined(ball(), turned(ball(3.0)), ball(2.0)),
+    "two balls": joined(ball(), moved(ball(), (11.0, 0.0, 0.0))),
+    "nothing": _with(ball(), np.zeros((0, 3))),
+}
+
+
+@pytest.mark.parametrize("name", SOUND)
+def test_sound_meshes_have_no_faults(name: str) -> None:
+    assert kinds(certify(SOUND[name])) == set()
+
+
+def test_missing_triangle_leaves_a_hole() -> None:
+    faults = certify(_with(ball(), ball().triangles[1:]))
+    assert kinds(faults) == {"open"}
+    assert len(faults.open) == 3
+
+
+def test_turned_triangle_is_crowded_along_its_edges() -> None:
+    triangles = ball().triangles.copy()
+    triangles[100] = triangles[100, ::-1]
+    faults = certify(_with(ball(), triangles))
+    assert kinds(faults) >= {"crowded"}
+    assert len(faults.crowded) == 3
+
+
+def test_triangle_that_comes_twice() -> None:
+    triangles = np.concatenate([ball().triangles, ball().triangles[50:51]])
+    faults = certify(_with(ball(), triangles))
+    assert kinds(faults) >= {"crowded", "crossings"}
+
+
+def test_edge_of_four_triangles() -> None:
+    """Two boxes that share an edge, and its vertices."""
+    a = SOUND["box"]
+    b = moved(a, (1.0, 2.0, 0.0))
+    both = joined(a, b)
+    places, number = np.unique(both.positions, axis=0, return_inverse=True)
+    welded = Mesh(places, number[both.triangles].astype(np.uint32), np.zeros_like(places))
+    faults = certify(welded)
+    assert len(faults.crowded) == 1
+    assert (welded.positions[faults.crowded[0], :2] == [1, 2]).all()
+
+
+def test_bow_tie_of_two_boxes_at_a_corner() -> None:
+    a = SOUND["box"]
+    both = joined(a, moved(a, (1.0, 2.0, 3.0)))
+    places, number = np.unique(both.positions, axis=0, return_inverse=True)
+    welded = Mesh(places, number[both.triangles].astype(np.uint32), np.zeros_like(places))
+    faults = certify(welded)
+    assert kinds(faults) == {"pinched"}
+    np.testing.assert_array_equal(welded.positions[faults.pinched], [[1, 2, 3]])
+    # with a vertex for each box they are sound by numbers, and touch all the same
+    assert kinds(certify(both)) == {"crossings"}
+
+
+def test_wall_in_a_cut_plane() -> None:
+    """A ball cut open at x = 0, and a triangle of three vertices of its rim."""
+    mesh = ball()
+    x = mesh.positions[:, 0].copy()
+    x[np.abs(x) < 1e-3] = 0
+    mesh = replace(mesh, positions=np.column_stack([x, mesh.positions[:, 1:]]))
+    half = _with(mesh, mesh.triangles[(x[mesh.triangles] >= 0).all(axis=1)])
+    plane = (0, 0.0)
+    assert kinds(certify(half, (plane,))) == set()
+    rim = border(half.triangles)
+    after = dict(rim.tolist())
+    first = int(rim[0, 0])
+    second = after[first]
+    lid = [[after[second], second, first]]
+    faults = certify(_with(half, np.concatenate([half.triangles, lid])), (plane,))
+    assert kinds(faults) == {"walls"}
+    assert faults.walls.tolist() == [len(half.triangles)]
+
+
+def test_vertex_pushed_through_the_other_side() -> None:
+    positions = ball().positions.copy()
+    top = int(positions[:, 2].argmax())
+    positions[top, 2] = -6
+    faults = certify(replace(ball(), positions=positions))
+    assert kinds(faults) == {"crossings"}
+
+
+def test_coplanar_fold() -> None:
+    """A vertex of a box's flat face drawn over the next edge, within the face."""
+    grid = pv.Box((0, 4, 0, 4, 0, 1), level=3).triangulate().clean()
+    mesh = to_mesh(grid)
+    assert kinds(certify(mesh)) == set()
+    positions = mesh.positions.copy()
+    inner = int(np.flatnonzero((positions == [1, 1, 1]).all(axis=1))[0])
+    positions[inner] = [2.5, 1.25, 1]
+    assert kinds(certify(replace(mesh, positions=positions))) == {"crossings"}
+
+
+def test_sliver_without_area() -> None:
+    """Three corners on a line, of which floats make an area that isn't zero."""
+    box = SOUND["box"]
+    positions = np.concatenate([box.positions, box.positions[:1]])
+    a, b, c = box.triangles[0]
+    positions[-1] = (positions[a] + positions[b]) / 2
+    new = len(positions) - 1
+    split = np.array([[new, b, c], [a, new, c], [a, b, new]])
+    faults = certify(Mesh(positions, np.concatenate([box.triangles[1:], split]), positions))
+    assert kinds(faults) >= {"degenerate"}
+    np.testing.assert_array_equal(faults.degenerate, [len(box.triangles) + 1])
+
+
+def test_body_inside_out_and_a_cavity_without_a_solid() -> None:
+    assert kinds(certify(turned(ball()))) == {"inside_out"}
+    aside = joined(ball(), moved(turned(ball(2.0)), (20.0, 0.0, 0.0)))
+    assert kinds(certify(aside)) == {"inside_out"}
+
+
+def test_vertices_of_faults_are_where_they_are() -> None:
+    mesh = _with(ball(), ball().triangles[1:])
+    np.testing.assert_array_equal(
+        certify(mesh).vertices(mesh.triangles), np.sort(ball().triangles[0])
+    )
+
+
+def _half(at: int) -> tuple[Mesh, Box, Box]:
+    region = Box((0, 0, 0), (20, 20, 20))
+    lattice = Box((0, 0, 0), (20, 20, at + 1))
+    z, y, x = np.indices(region.shape)
+    distance = 6.3 - np.sqrt((z - 9.5) ** 2 + (y - 9.5) ** 2 + (x - 9.5) ** 2)
+    part = np.clip(distance, -2, 2).astype(np.float32)[lattice.slices]
+    origin = (0.0, 0.0, 0.0)
+    return extract_surface(part, lattice, lattice, region, (1.0,) * 3, origin), lattice, region
+
+
+@pytest.mark.parametrize("at", [5, 10, 14])
+def test_mesh_may_be_open_on_its_cut_planes_only(at: int) -> None:
+    mesh, _, _ = _half(at)
+    assert kinds(certify(mesh, ((0, float(at)),))) == set()
+    assert kinds(certify(mesh)) >= {"open"}
+    assert kinds(certify(mesh, ((0, float(at) + 1e-5),))) >= {"open"}
+    assert len(border(mesh.triangles)) == len(certify(mesh).open)
+
+
+@pytest.mark.parametrize("at", [5, 10, 14])
+def test_cut_body_inside_out_is_found(at: int) -> None:
+    """Its volume is that between it and the plane: a small cap as well as all but a cap."""
+    mesh, _, _ = _half(at)
+    assert kinds(certify(turned(mesh), ((0, float(at)),))) == {"inside_out"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_iso_surface_of_noise_is_sound(seed: int) -> None:
+    """All of marching cubes' cases, beside each other in all ways."""
+    noise = np.random.default_rng(seed).normal(size=(24, 24, 24))
+    distance = np.clip(noise, -2, 2).astype(np.float32)
+    box = Box((0, 0, 0), (24, 24, 24))
+    mesh = extract_surface(distance, box, box, box, (1.0,) * 3, (0.0,) * 3)
+    assert len(mesh.triangles) > 30_000
+    assert kinds(certify(mesh)) == set()

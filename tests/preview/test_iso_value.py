@@ -1,0 +1,157 @@
+"""`stereocell iso`: a picture and a table of one tile's candidates, and nothing else."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from stereocell.building.settings import load
+from stereocell.cli.__main__ import main
+from stereocell.isosurface.isovalue import CRITERIA
+from stereocell.preview.iso_value import COLORS, Candidate, preview, table
+from support import phantoms
+
+SPACING = (1.0, 1.0, 1.0)
+CONSTANT = 100
+LOW, HEIGHT = 100, 1000  # of the ball
+RADIUS_UM, BLUR_UM = 8.0, np.sqrt(2)  # its own 1 um, and as much by the smoothing
+SLICES_AT = (14 + 14 + 21, 14)  # in the picture: margin, title, margin
+SCALE = 900 / 32  # pixels a um, in slices
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ball on a level of 100 + 1000 in the left tile of channel 0; channel 1 is constant."""
+    ball = phantoms.blurred_ball((24, 32, 64), SPACING, (12.0, 16.0, 16.0), 8.0, 1.0)
+    counts = phantoms.as_counts(ball, 100, 1100, noise=10.0)
+    channels = np.stack([counts, np.full_like(counts, CONSTANT)])
+    path = tmp_path_factory.mktemp("preview") / "ball.ome.zarr"
+    scales = [{"c": 1.0, **dict.fromkeys("zyx", 1.0)}]
+    return phantoms.write_ome_zarr(path, [channels], "czyx", scales=scales)
+
+
+def _iso(source: Path, *flags: str) -> int:
+    return main(["iso", str(source), "--tile-size", "24,32,32", *flags])
+
+
+def test_the_table_names_every_criterion_with_levels_and_shares(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "ball.png"
+    assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(out)) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert rows[0][0] == "candidate"
+    assert rows[1][:2] == ["edges", "*"]
+    assert {row[0] for row in rows[1:-2]} == set(CRITERIA)
+    assert " ".join(rows[-2]) == "* found; a build may draw it towards its neighbours'"
+    assert rows[-1] == ["wrote", str(out)]
+    _, _, above, raw, inside, confidence = rows[1]
+    ball = 4 / 3 * np.pi * 8**3 / (24 * 32 * 32)
+    # a ball blurred by s has .5 - s / (R sqrt(2 pi)) of its height at R; the smoothing adds 1 um
+    height = 0.5 - BLUR_UM / (RADIUS_UM * np.sqrt(2 * np.pi))
+    assert float(above) == pytest.approx(1000 * height, rel=0.1)
+    assert float(raw) - float(above) == pytest.approx(100, abs=10)
+    assert float(inside.rstrip("%")) / 100 == pytest.approx(ball, rel=0.1)
+    assert float(confidence) > 0.9
+
+
+def test_the_legend_has_every_candidate_s_colour_and_nothing_else_is_written(
+    source: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "ball.png"
+    flags = ("--iso-value", "0=600", "--iso-criterion", "pekar-mean")
+    assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(out), *flags) == 0
+    assert list(tmp_path.iterdir()) == [out]
+    legend = np.asarray(Image.open(out))[SLICES_AT[0] + round((32 + 24) * SCALE) :]
+    assert set(COLORS.values()) <= {tuple(p) for p in legend.reshape(-1, 3).tolist()}
+
+
+def _radius_um(candidate: Candidate) -> float:
+    """Return where the blurred ball has the candidate's level."""
+    along = phantoms.blurred_ball((1, 1, 1500), (1, 1, 0.01), (0, 0, 0), RADIUS_UM, float(BLUR_UM))
+    return 0.01 * int(np.abs(along[0, 0] - (candidate.raw - LOW) / HEIGHT).argmin())
+
+
+def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
+    source: Path, tmp_path: Path
+) -> None:
+    """Each candidate's line is a circle, whole, in its own colour, and at its own radius."""
+    flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 800.0}}
+    settings = load(None, None, flags)
+    candidates, path = preview(str(source), "0", "r0_c0", tmp_path / "a.png", settings)
+    top, left = SLICES_AT
+    xy = np.asarray(Image.open(path))[top : top + 900, left : left + 900]
+    outlining = [c for c in candidates if 0.01 < c.inside < 0.5]  # others hardly cut this plane
+    assert {"given", "edges"} < {c.name for c in outlining}
+    radii = {c.name: _radius_um(c) for c in outlining}
+    assert np.ptp(list(radii.values())) > 1
+    for name, radius in radii.items():
+        rows, columns = np.nonzero((xy == COLORS[name]).all(axis=-1))
+        down, right = (pixels + 0.5 - 16.5 * SCALE for pixels in (rows, columns))
+        away = np.hypot(down, right)
+        # words, the scale bar and the brightest voxels are white too
+        beside = (away > 6 * SCALE) & (away < 11 * SCALE)
+        assert beside.any(), name
+        assert np.abs(away[beside] - radius * SCALE).max() < 8, name
+        assert away[beside].mean() == pytest.approx(radius * SCALE, abs=4), name
+        sectors = np.floor(np.arctan2(down, right)[beside] / (2 * np.pi) * 36)
+        assert len(np.unique(sectors)) == 36, name
+
+
+def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
+    source: Path, tmp_path: Path
+) -> None:
+    flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 600.0}}
+    candidates, _ = preview(str(source), "0", "r0_c0", tmp_path / "a.png", load(None, None, flags))
+    chosen = next(c for c in candidates if c.is_chosen)
+    assert (chosen.name, chosen.level, chosen.raw, chosen.confidence) == ("given", 600, 600, None)
+    assert [c.is_chosen for c in candidates].count(True) == 1
+    assert table(candidates)[-1] == "* given; a build takes it"
+
+
+def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        flags = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / name))
+        assert _iso(source, *flags) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_picture_is_named_by_channel_and_tile_unless_told(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert _iso(source, "--channel", "0", "--tile", "r0_c0") == 0
+    (picture,) = tmp_path.iterdir()
+    assert picture.name.startswith("iso_")
+    assert picture.name.endswith("_r0_c0.png")
+
+
+@pytest.mark.parametrize(
+    ("flags", "code", "message"),
+    [
+        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31', expected one of "),
+        (
+            ("--channel", "0", "--tile", "r1_c0"),
+            2,
+            "--tile is 'r1_c0', expected a tile from r0_c0 to r0_c1",
+        ),
+        (("--channel", "1", "--tile", "r0_c0"), 1, "every voxel is 100: no surface to look at"),
+        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg', expected a file"),
+    ],
+)
+def test_errors_are_one_clear_line(
+    source: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    flags: tuple[str, ...],
+    code: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert _iso(source, *flags) == code
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,172 @@
+"""What makes one stack of DICOM frames, and what is said where a series falls apart."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pydicom
+import pytest
+from pydicom.uid import generate_uid
+from test_dicom import error
+
+from stereocell import read
+from stereocell.model.errors import SourceError
+from support.dicom_series import grid, turn, write_enhanced, write_series
+
+SHAPE = (10, 30, 26)
+AFFINE = grid(shape=SHAPE, spacing=(2.5, 2.0, 2.2))
+
+
+def two_stacks(path: Path, shift_mm: float) -> Path:
+    """Write an enhanced image of two stacks of 10 slices, 2.5 mm apart, one `shift_mm` higher."""
+    ds = pydicom.dcmread(write_enhanced(path, AFFINE, SHAPE))
+    lower = list(ds.PerFrameFunctionalGroupsSequence)
+    for name, shift in (("1", 0.0), ("2", shift_mm)):
+        for group in lower:
+            copy = pydicom.Dataset.from_json(group.to_json())
+            copy.FrameContentSequence[0].StackID = name
+            x, y, z = copy.PlanePositionSequence[0].ImagePositionPatient
+            copy.PlanePositionSequence[0].ImagePositionPatient = [x, y, z + shift]
+            ds.PerFrameFunctionalGroupsSequence.append(copy)
+    ds.PerFrameFunctionalGroupsSequence = list(ds.PerFrameFunctionalGroupsSequence)[10:]
+    ds.NumberOfFrames = 20
+    ds.PixelData = ds.PixelData * 2
+    ds.save_as(path)
+    return path
+
+
+@pytest.mark.parametrize("shift_mm", [50.0, 1.25])
+def test_stacks_of_an_enhanced_image_are_series_of_their_own(
+    tmp_path: Path, shift_mm: float
+) -> None:
+    path = two_stacks(tmp_path / "e.dcm", shift_mm)
+    lines = read.list_series(path)
+    assert len(lines) == 2
+    assert all("10 x 30 x 26 voxels (slices, rows, columns), 2.5 x 2 x 2.2 mm" in s for s in lines)
+    first, second = (read.open(path, series=number) for number in (1, 2))
+    assert first.levels[0].spacing_um == pytest.approx((2000, 2500, 2200))
+    rise = np.subtract(second.placement, first.placement)[:3, 3] / 1000
+    assert abs(rise[1]) == pytest.approx(shift_mm)
+    assert not any("missing" in note for note in first.notes)
+    among = [note for note in first.notes if "lie among these" in note]
+    assert len(among) == (shift_mm == 1.25)  # the others lie above
+    assert all("10 more images" in note and "StackID" in note for note in among)
+
+
+def alternating(name: str, values: list[Any]) -> Any:
+    """Return a change that gives slices the values in turn, in the order of instance numbers."""
+
+    def change(ds: pydicom.Dataset) -> None:
+        setattr(ds, name, values[int(ds.InstanceNumber) % len(values)])
+
+    return change
+
+
+def test_rounded_pixel_spacings_are_one_series(tmp_path: Path) -> None:
+    affine = grid(shape=SHAPE, spacing=(2.5, 0.48825, 0.48825))
+    spacings = [["0.48825", "0.488249"], ["0.488249", "0.48825"], ["0.4882", "0.4883"]]
+    write_series(tmp_path / "s", affine, SHAPE, change=alternating("PixelSpacing", spacings))
+    assert len(read.list_series(tmp_path / "s")) == 1
+    dataset = read.open(tmp_path / "s")
+    assert (dataset.levels[0].shape, dataset.notes) == ((30, 10, 26), ())
+    assert dataset.levels[0].spacing_um == pytest.approx((488.25, 2500, 488.25), rel=1e-4)
+
+
+def test_other_pixel_spacings_are_another_series_and_that_is_said(tmp_path: Path) -> None:
+    spacings = [["2", "2.2"], ["2.01", "2.2"]]
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=alternating("PixelSpacing", spacings))
+    assert len(read.list_series(tmp_path / "s")) == 2
+    notes = read.open(tmp_path / "s").notes
+    assert any("5 more images of the same series" in n and "PixelSpacing" in n for n in notes)
+
+
+def cosines(degrees: float, axis: tuple[int, int, int]) -> list[str]:
+    turned = turn(axis, degrees) @ AFFINE[:3, :3]
+    row, column = turned[:, 2] / 2.2, turned[:, 1] / 2.0
+    return [f"{value:.8f}" for value in (*row, *column)]
+
+
+@pytest.mark.parametrize("wobble", [8e-4, 9.5e-4])
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0)])
+def test_orientations_that_wobble_are_one_series_of_their_mean(
+    tmp_path: Path, wobble: float, axis: tuple[int, int, int]
+) -> None:
+    """To and fro about a mean; the first alone is off by the wobble."""
+    degrees = float(np.degrees(wobble))
+    turned = alternating(
+        "ImageOrientationPatient", [cosines(degrees, axis), cosines(-degrees, axis)]
+    )
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=turned)
+    assert len(read.list_series(tmp_path / "s")) == 1
+    dataset = read.open(tmp_path / "s")
+    assert not any("missing" in note or "uneven" in note for note in dataset.notes)
+    assert np.array(dataset.placement)[:3, :3] == pytest.approx(np.eye(3), abs=1e-6)
+    assert error(dataset) <= 0.51
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0, 1, 0)])
+def test_planes_that_wobble_about_their_middles_make_no_tilt(
+    tmp_path: Path, axis: tuple[int, int, int]
+) -> None:
+    """The first pixels of 256 x 256 move by a tenth of a millimetre, to and fro."""
+    shape = (10, 256, 256)
+    affine = grid(shape=shape, spacing=(3.0, 0.9, 0.9))
+
+    def change(ds: pydicom.Dataset) -> None:
+        rotation = turn(axis, float(np.degrees(8e-4)) * (-1) ** int(ds.InstanceNumber))
+        row, column = (rotation @ affine[:3, k] / 0.9 for k in (2, 1))
+        ds.ImageOrientationPatient = [f"{value:.6f}" for value in (*row, *column)]
+        middle = np.array([0, 0, float(ds.ImagePositionPatient[2])])
+        corner = middle + rotation @ (np.array(ds.ImagePositionPatient, float) - middle)
+        ds.ImagePositionPatient = [f"{value:.4f}" for value in corner]
+
+    write_series(tmp_path / "s", affine, shape, change=change)
+    dataset = read.open(tmp_path / "s")
+    assert dataset.notes == ()
+    assert error(dataset) <= 0.51 + 0.01 * 1000 / 3.5  # um, by the steepest body's slope
+
+
+def test_truly_different_orientations_stay_apart(tmp_path: Path) -> None:
+    turned = alternating(
+        "ImageOrientationPatient", [cosines(0, (0, 0, 1)), cosines(0.5, (0, 0, 1))]
+    )
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=turned)
+    assert len(read.list_series(tmp_path / "s")) == 2
+    notes = read.open(tmp_path / "s").notes
+    assert any("5 more images" in n and "ImageOrientationPatient" in n for n in notes)
+
+
+def test_localizers_of_one_series_are_not_said_to_interleave(tmp_path: Path) -> None:
+    for plane in ("axial", "coronal"):
+        write_series(
+            tmp_path / plane,
+            grid(plane, shape=SHAPE),
+            SHAPE,
+            series="1.2.3",
+            name=f"{plane}{{}}".format,
+        )
+    lines = read.list_series(tmp_path)
+    assert len(lines) == 2
+    assert not any("among" in line for line in lines)
+
+
+@pytest.mark.parametrize("name", ["SeriesInstanceUID", "FrameOfReferenceUID"])
+def test_a_series_or_frame_of_reference_for_each_slice_is_said(tmp_path: Path, name: str) -> None:
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=lambda ds: setattr(ds, name, generate_uid()))
+    with pytest.raises(SourceError) as caught:
+        read.open(tmp_path / "s")
+    line = str(caught.value)
+    assert f"found 10 stacks of one slice each, told apart by {name}; expected" in line
+
+
+def test_points_in_time_do_not_hide_that_each_slice_is_a_stack(tmp_path: Path) -> None:
+    for time in range(2):
+
+        def change(ds: pydicom.Dataset, time: int = time) -> None:
+            ds.FrameOfReferenceUID = f"1.2.{round(float(ds.ImagePositionPatient[2]) * 10) + 999}"
+            ds.PixelData = bytes([time]) + ds.PixelData[1:]
+
+        folder = tmp_path / "s" / str(time)
+        write_series(folder, AFFINE, SHAPE, series="1.2.3", seed=time, change=change)
+    with pytest.raises(SourceError, match="10 stacks of one slice each, told apart by FrameOf"):
+        read.open(tmp_path / "s")

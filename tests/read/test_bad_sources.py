@@ -1,0 +1,367 @@
+"""Sources that can't be built: one line says what, where, and what was expected."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numcodecs
+import numpy as np
+import pytest
+import tifffile
+from zarr.codecs import BloscCodec, GzipCodec, ZstdCodec
+
+from conftest import Server
+from stereocell import read
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.tiling import Box
+from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
+
+Maker = Callable[[Path], Path]
+
+SMALL = np.random.default_rng(0).integers(0, 1000, (6, 48, 48), dtype=np.uint16)
+
+
+def read_whole(source: str | Path, **options: Any) -> None:
+    dataset = read.open(source, **options)
+    for index, level in enumerate(dataset.levels):
+        dataset.read(0, level.box, index)
+
+
+def refusal(source: str | Path, **options: Any) -> str:
+    """Open `source`, read it whole, and return the line of the SourceError that must come."""
+    with pytest.raises(SourceError) as caught:
+        read_whole(source, **options)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert len(line) < 500
+    assert " at 0x" not in line
+    assert "expected" in line or "needs" in line
+    assert Path(str(source).split("?")[0]).name in line
+    return line
+
+
+def edit(file: Path, change: Callable[[Any], None]) -> None:
+    """Change a JSON file in place."""
+    content = json.loads(file.read_text())
+    change(content)
+    file.write_text(json.dumps(content))
+
+
+def zarr_with(change: Callable[[Any], None], file: str = "zarr.json") -> Maker:
+    """Return a maker of an OME-Zarr 0.5 whose JSON `file` is changed."""
+
+    def make(folder: Path) -> Path:
+        path = write_ome_zarr(folder / "bad.zarr", [SMALL])
+        edit(path / file, change)
+        return path
+
+    return make
+
+
+def multiscale(change: Callable[[Any], None]) -> Maker:
+    """Return a maker of an OME-Zarr 0.5 whose first multiscale is changed."""
+    return zarr_with(lambda content: change(content["attributes"]["ome"]["multiscales"][0]))
+
+
+def scale(*values: float) -> Maker:
+    """Return a maker of an OME-Zarr with that scale (z, y, x)."""
+
+    def change(image: Any) -> None:
+        image["datasets"][0]["coordinateTransformations"][0]["scale"] = list(values)
+
+    return multiscale(change)
+
+
+def zarr_of(voxels: np.ndarray[Any, Any], axes: str = "zyx", **options: Any) -> Maker:
+    return lambda folder: write_ome_zarr(folder / "bad.zarr", [voxels], axes=axes, **options)
+
+
+def tiff_of(voxels: np.ndarray[Any, Any], axes: str = "ZYX", **options: Any) -> Maker:
+    return lambda folder: write_ome_tiff(folder / "bad.ome.tif", voxels, axes, **options)
+
+
+def text_file(name: str) -> Maker:
+    def make(folder: Path) -> Path:
+        (folder / name).write_text("this is not an image")
+        return folder / name
+
+    return make
+
+
+def folder_named(name: str) -> Maker:
+    def make(folder: Path) -> Path:
+        (folder / name).mkdir()
+        return folder / name
+
+    return make
+
+
+def plain_tiff(folder: Path) -> Path:
+    tifffile.imwrite(folder / "plain.tif", SMALL)
+    return folder / "plain.tif"
+
+
+def rgb_tiff(folder: Path) -> Path:
+    pixels = np.zeros((4, 16, 16, 3), np.uint8)
+    options = {"axes": "ZYXS", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 1.0}
+    tifffile.imwrite(folder / "rgb.ome.tif", pixels, ome=True, photometric="rgb", metadata=options)
+    return folder / "rgb.ome.tif"
+
+
+def incomplete_tiff(folder: Path) -> Path:
+    """An OME-XML that promises two planes more than the file holds."""
+    path = write_ome_tiff(folder / "few.ome.tif", SMALL)
+    xml = tifffile.tiffcomment(path).replace('SizeZ="6"', 'SizeZ="8"')
+    tifffile.tiffcomment(path, xml.encode())
+    return path
+
+
+def missing_level(folder: Path) -> Path:
+    path = write_ome_zarr(folder / "bad.zarr", [SMALL])
+    shutil.rmtree(path / "0")
+    return path
+
+
+def growing_levels(folder: Path) -> Path:
+    scales = [{"z": 1, "y": 1, "x": 1}] * 2
+    return write_ome_zarr(folder / "bad.zarr", [SMALL[:, ::2, ::2], SMALL], scales=scales)
+
+
+def mixed_dtypes(folder: Path) -> Path:
+    scales = [{"z": 1, "y": 1, "x": 1}] * 2
+    return write_ome_zarr(folder / "bad.zarr", [SMALL, SMALL.astype(np.float32)], scales=scales)
+
+
+CASES: dict[str, tuple[Maker, str]] = {
+    "nothing there": (lambda folder: folder / "nothing.zarr", "not found"),
+    "unknown format": (text_file("notes.txt"), "unknown format"),
+    "text as TIFF": (text_file("bad.ome.tif"), "not a TIFF file"),
+    "text as Zarr": (text_file("bad.zarr"), "not found"),
+    "empty folder as Zarr": (folder_named("bad.zarr"), "zarr.json"),
+    "folder as TIFF": (folder_named("bad.ome.tif"), "directory"),
+    "TIFF without OME-XML": (plain_tiff, "OME-XML"),
+    "RGB TIFF": (rgb_tiff, "SamplesPerPixel: found 3"),
+    "TIFF with missing planes": (incomplete_tiff, "found 6 planes, expected 8"),
+    "TIFF of one plane": (tiff_of(SMALL[:1]), "at least 2 planes: found 1 along z"),
+    "flat TIFF": (tiff_of(SMALL[0], "YX", spacing=None), "at least 2 planes: found 1 along z"),
+    "flat TIFF with channels": (tiff_of(SMALL, "CYX", spacing=None), "at least 2 planes"),
+    "int8 TIFF": (tiff_of(SMALL.astype(np.int8)), "dtype of level 0: found int8"),
+    "TIFF, negative spacing": (tiff_of(SMALL, spacing=(-1.0, 1.0, 1.0)), "physical_size_z"),
+    "TIFF, zero spacing": (tiff_of(SMALL, spacing=(1.0, 0.0, 1.0)), "physical_size_y"),
+    "TIFF, NaN spacing": (tiff_of(SMALL, spacing=(1.0, 1.0, float("nan"))), "physical_size_x"),
+    "TIFF, spacing in pixels": (tiff_of(SMALL, unit="pixel"), "voxel size: not found"),
+    "no multiscales": (
+        zarr_with(lambda content: content["attributes"]["ome"].pop("multiscales")),
+        "no multiscales: not found",
+    ),
+    "empty multiscales": (
+        zarr_with(lambda content: content["attributes"]["ome"].update(multiscales=[])),
+        "no multiscales",
+    ),
+    "no attributes": (zarr_with(lambda content: content.pop("attributes")), "no multiscales"),
+    "plate": (
+        zarr_with(lambda content: content.update(attributes={"ome": {"plate": {}}})),
+        "no multiscales: found a plate",
+    ),
+    "many series": (
+        zarr_with(lambda content: content.update(attributes={"ome": {"bioformats2raw.layout": 3}})),
+        "bioformats2raw",
+    ),
+    "no axes": (multiscale(lambda image: image.pop("axes")), "multiscales.0.*'axes' is missing"),
+    "axes of 0.3": (multiscale(lambda image: image.update(axes=["z", "y", "x"])), "axes"),
+    "axis twice": (
+        multiscale(lambda image: image["axes"].__setitem__(0, image["axes"][1])),
+        "axes y, y, x name one twice",
+    ),
+    "axes too few": (multiscale(lambda image: image["axes"].pop(0)), "axes"),
+    "no levels": (multiscale(lambda image: image.update(datasets=[])), "datasets: found none"),
+    "level not there": (missing_level, "level '0'"),
+    "levels that grow": (growing_levels, "shape .* of level 1"),
+    "levels of two dtypes": (mixed_dtypes, "dtype of level 1: found float32"),
+    "flat Zarr": (zarr_of(SMALL[0], "yx"), "at least 2 planes: no axis z"),
+    "Zarr of one plane": (zarr_of(SMALL[:1]), "at least 2 planes: found 1 along z"),
+    "int32 Zarr": (
+        zarr_of(SMALL.astype(np.int32)),
+        "found int32, expected uint8, uint16, int16 or",
+    ),
+    "negative spacing": (scale(-0.5, 1, 1), "voxel size z of level 0: found -0.5 um"),
+    "zero spacing": (scale(1, 0, 1), "voxel size y of level 0: found 0 um"),
+    "NaN spacing": (scale(1, 1, float("nan")), "voxel size x of level 0: found nan um"),
+    "scale of two numbers": (scale(1, 1), "found scale of 2 numbers for 3 axes"),
+    "unknown unit": (zarr_of(SMALL, units={"z": "furlong"}), "voxel size: not found .*--spacing"),
+    "scale that is no list": (
+        multiscale(
+            lambda image: image["datasets"][0].update(
+                coordinateTransformations=[{"type": "scale", "scale": "big"}]
+            )
+        ),
+        "multiscales.0.",
+    ),
+    "more names than channels": (
+        zarr_of(SMALL, channels=[{"label": "A"}, {"label": "B"}]),
+        "omero.channels: found 2 entries, expected 1",
+    ),
+    "array without shape": (
+        zarr_with(lambda content: content.pop("shape"), "0/zarr.json"),
+        "level '0'",
+    ),
+    "unknown codec": (
+        zarr_with(lambda content: content["codecs"].append({"name": "brotli9"}), "0/zarr.json"),
+        "brotli9",
+    ),
+    "chunk of a terabyte": (
+        zarr_with(
+            lambda content: content.update(
+                shape=[10000, 10000, 10000],
+                chunk_grid={
+                    "name": "regular",
+                    "configuration": {"chunk_shape": [10000, 10000, 10000]},
+                },
+            ),
+            "0/zarr.json",
+        ),
+        "expected at most 4 GiB",
+    ),
+    "NaN": (
+        zarr_of(np.where(SMALL[3, 7, 9] == SMALL, np.nan, SMALL).astype(np.float32)),
+        r"channel 'Channel0', level 0, voxels 0:6,0:48,0:48: found \d+ NaN or infinite",
+    ),
+    "infinity": (
+        tiff_of(np.where(SMALL[3, 7, 9] == SMALL, np.inf, SMALL).astype(np.float32)),
+        "NaN or infinite",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    make, message = CASES[name]
+    assert re.search(message, refusal(make(tmp_path)))
+
+
+@pytest.mark.parametrize("time", [-1, 3])
+def test_time_out_of_range(tmp_path: Path, time: int) -> None:
+    path = write_ome_zarr(tmp_path / "t.zarr", [np.stack([SMALL] * 3)], axes="tzyx")
+    with pytest.raises(UsageError, match=f"--time: found {time}, expected 0 to 2"):
+        read.open(path, time=time)
+
+
+def early_xml_tiff(path: Path, **options: Any) -> Path:
+    """OME-TIFF with its XML in front, so that a cut costs planes and not the metadata."""
+    depth, height, width = SMALL.shape
+    xml = (
+        '<OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image ID="Image:0">'
+        '<Pixels ID="Pixels:0" DimensionOrder="XYZCT" Type="uint16" SizeC="1" SizeT="1" '
+        f'SizeX="{width}" SizeY="{height}" SizeZ="{depth}" '
+        'PhysicalSizeX="1" PhysicalSizeY="1" PhysicalSizeZ="1">'
+        f'<Channel ID="Channel:0:0"/><TiffData IFD="0" PlaneCount="{depth}"/>'
+        "</Pixels></Image></OME>"
+    )
+    with tifffile.TiffWriter(path) as writer:
+        for index, plane in enumerate(SMALL):
+            description = xml if index == 0 else None
+            writer.write(plane, description=description, metadata=None, contiguous=False, **options)
+    return path
+
+
+@pytest.mark.parametrize("compression", [None, "zlib", "zstd", "lzw", "jpeg2000"])
+@pytest.mark.parametrize("tile", [None, (16, 16)])
+def test_tiff_cut_short_anywhere(
+    tmp_path: Path, compression: str | None, tile: tuple[int, int] | None
+) -> None:
+    whole = early_xml_tiff(tmp_path / "whole.ome.tif", compression=compression, tile=tile)
+    np.testing.assert_array_equal(
+        read.open(whole).read(0, Box((0, 0, 0), SMALL.shape)).voxels, SMALL
+    )
+    content = whole.read_bytes()
+    short = tmp_path / "short.ome.tif"
+    for kept in (0, 2, 9, 200, *range(900, len(content), 3571), len(content) - 1):
+        short.write_bytes(content[:kept])
+        refusal(short)
+
+
+def test_tiff_that_ends_with_its_xml_cut_short(tmp_path: Path) -> None:
+    content = write_ome_tiff(tmp_path / "whole.ome.tif", SMALL).read_bytes()
+    short = tmp_path / "short.ome.tif"
+    for kept in (len(content) // 2, len(content) - 40, len(content) - 1):
+        short.write_bytes(content[:kept])
+        refusal(short)
+
+
+def test_tiff_with_garbled_tiles(tmp_path: Path) -> None:
+    path = early_xml_tiff(tmp_path / "x.ome.tif", compression="zlib", tile=(16, 16))
+    with tifffile.TiffFile(path) as tiff:
+        start = tiff.pages[3].dataoffsets[4]  # type: ignore[union-attr]
+    content = bytearray(path.read_bytes())
+    content[start : start + 40] = bytes(byte ^ 0x5A for byte in content[start : start + 40])
+    path.write_bytes(content)
+    assert "channel 'Channel0', level 0" in refusal(path)
+
+
+COMPRESSORS = {
+    "0.4 none": ("0.4", None),
+    "0.4 blosc": ("0.4", numcodecs.Blosc()),
+    "0.4 zstd": ("0.4", numcodecs.Zstd()),
+    "0.4 zlib": ("0.4", numcodecs.Zlib()),
+    "0.4 gzip": ("0.4", numcodecs.GZip()),
+    "0.4 lz4": ("0.4", numcodecs.LZ4()),
+    "0.5 none": ("0.5", None),
+    "0.5 blosc": ("0.5", BloscCodec(shuffle="shuffle", cname="lz4")),
+    "0.5 zstd": ("0.5", ZstdCodec()),
+    "0.5 gzip": ("0.5", GzipCodec()),
+}
+
+
+@pytest.mark.parametrize("name", COMPRESSORS)
+def test_zarr_chunk_cut_short(tmp_path: Path, name: str) -> None:
+    version, compressor = COMPRESSORS[name]
+    path = write_ome_zarr(
+        tmp_path / "c.zarr", [SMALL], version=version, compressors=compressor, chunks=(3, 24, 24)
+    )
+    chunk = path / ("0/1/0/1" if version == "0.4" else "0/c/1/0/1")
+    content = chunk.read_bytes()
+    dataset = read.open(path)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, SMALL)
+    for kept in (0, 3, len(content) // 2, len(content) - 1):
+        chunk.write_bytes(content[:kept])
+        assert "channel 'Channel0', level 0" in refusal(path)
+        dataset.read(0, Box((0, 0, 0), (3, 24, 24)))  # the chunks beside it are well
+
+
+@pytest.mark.parametrize("version", ["0.4", "0.5"])
+def test_zarr_metadata_cut_short(tmp_path: Path, version: str) -> None:
+    files = ("zarr.json", "0/zarr.json") if version == "0.5" else (".zattrs", "0/.zarray")
+    for file in files:
+        path = write_ome_zarr(tmp_path / "m.zarr", [SMALL], version=version)
+        content = (path / file).read_bytes()
+        for kept in (0, 10, len(content) // 2):
+            (path / file).write_bytes(content[:kept])
+            refusal(path)
+
+
+@pytest.mark.parametrize("name", ["missing.zarr", "missing.ome.tif"])
+def test_addresses_without_an_image(
+    tmp_path: Path, serve: Callable[[Path], Server], name: str
+) -> None:
+    assert "not found, or not reachable" in refusal(f"{serve(tmp_path).url}/{name}")
+    refusal(f"http://127.0.0.1:9/{name}")  # nobody answers
+    refusal(f"nosuchprotocol://host/{name}")
+
+
+def test_s3_without_the_object(s3_bucket: Path) -> None:
+    assert s3_bucket.is_dir()
+    refusal("s3://bucket/missing.zarr")
+    refusal("s3://bucket/missing.ome.tif")
+
+
+def test_a_source_without_rights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_ome_tiff(tmp_path / "secret.ome.tif", f_phantom())
+
+    def refuse(*args: Any, **kwargs: Any) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(tifffile.TiffFile, "__init__", refuse)  # tests may run as root
+    assert "Permission denied" in refusal(path)

@@ -1,0 +1,478 @@
+"""The report: its cross-sections against geometry, its choices, and the page as a whole."""
+
+import io
+import json
+import re
+import shutil
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from PIL import Image
+
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Channel
+from stereocell.building.unit_files import is_whole
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import OutputError
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box, Tile
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.preview.draw_slices import (
+    OUTLINE,
+    VIEWS,
+    Slice,
+    cross_section,
+    cut_unit,
+    draw_slices,
+    voxels_of,
+)
+from stereocell.report import charts, draw_scenes, page, select_units, write_report
+from stereocell.report.facts import LodFacts, StepFacts, UnitFacts, gather, sum_up
+from stereocell.report.remarks import find_remarks
+from support import phantoms
+
+NASTY = 'F <b> & "body"'
+
+
+def _ball(center_zyx: NDArray[np.float64], radius: float) -> Mesh:
+    """Return a ball's mesh in world um: 64 meridians, 33 parallels."""
+    polar, azimuth = np.meshgrid(np.linspace(0, np.pi, 33), np.arange(64) * (2 * np.pi / 64))
+    directions = [np.cos(polar), np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth)]
+    points = center_zyx + radius * np.stack(directions, axis=-1).reshape(-1, 3)
+    i, j = (a.ravel() for a in np.indices((64, 32)))
+    corner = [i * 33 + j, i * 33 + j + 1, (i + 1) % 64 * 33 + j, (i + 1) % 64 * 33 + j + 1]
+    triangles = np.concatenate(
+        [np.stack([corner[k] for k in c], 1) for c in ((0, 1, 2), (2, 1, 3))]
+    )
+    positions = zyx_to_xyz(points).astype(np.float32)
+    return Mesh(positions, triangles.astype(np.uint32), np.zeros_like(positions))
+
+
+# --- slices
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_cross_section_of_a_ball_is_a_circle(axis: int) -> None:
+    center, radius, off = np.array([3.0, 5.0, 8.0]), 2.0, 0.7
+    ball = _ball(center, radius)
+    points = voxels_of(ball, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    segments = cross_section(points, ball.triangles, axis, center[axis] + off)
+    assert np.allclose(segments[:, :, axis], center[axis] + off)
+    away = np.linalg.norm(segments - center, axis=-1)
+    assert away.max() <= radius + 1e-6
+    assert away.min() > 0.99 * radius  # facets lie inside the ball by a hair
+    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=-1).sum()
+    assert length == pytest.approx(2 * np.pi * np.sqrt(radius**2 - off**2), rel=0.01)
+
+
+def test_cross_section_of_a_closed_mesh_is_closed_though_vertices_lie_on_the_plane() -> None:
+    ball = _ball(np.zeros(3), 2.0)
+    segments = cross_section(voxels_of(ball, (0, 0, 0), (1, 1, 1)), ball.triangles, 0, 0.0)
+    ends = np.round(segments[:, :, 1:], 5) + 0.0
+    long = (ends[:, 0] != ends[:, 1]).any(axis=1)  # others are points: the plane met a vertex
+    _, counts = np.unique(ends[long].reshape(-1, 2), axis=0, return_counts=True)
+    assert (counts == 2).all()
+
+
+def test_plane_beside_the_mesh_gives_no_cross_section() -> None:
+    ball = _ball(np.zeros(3), 1.0)
+    assert cross_section(voxels_of(ball, (0, 0, 0), (1, 1, 1)), ball.triangles, 2, 5.0).shape == (
+        0, 2, 3,
+    )  # fmt: skip
+
+
+def test_world_positions_turn_back_into_voxels() -> None:
+    first, spacing = (1.0, -2.0, 0.5), (0.5, 0.2, 0.25)
+    index = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 7.0]])
+    world = zyx_to_xyz(index * spacing + np.array(first)).astype(np.float32)
+    mesh = Mesh(world, np.zeros((0, 3), np.uint32), world)
+    assert voxels_of(mesh, first, spacing) == pytest.approx(index, abs=1e-5)
+
+
+def _slices() -> list[Slice]:
+    """Return a black unit of 12 x 40 x 60 voxels with a ball where y is small and x is large."""
+    lattice, first, spacing = Box((2, 10, 20), (14, 50, 80)), (1.0, 2.0, 4.0), (0.5, 0.2, 0.2)
+    center = np.array(first) + np.array([6, 8, 48]) * spacing
+    volume = np.zeros(lattice.shape, np.uint8)
+    return cut_unit(volume, lattice, first, spacing, _ball(center, 1.0), 0.2, None)
+
+
+def test_mid_slices_meet_the_mesh_where_it_lies() -> None:
+    xy, xz, yz = _slices()
+    assert xy.outline.reshape(-1, 2).mean(axis=0) == pytest.approx([8, 48], abs=0.1)
+    assert np.ptp(xy.outline[:, :, 1]) == pytest.approx(10, rel=0.02)  # 2 um of 0.2 um
+    assert not len(xz.outline)  # y = 20 and x = 30 pass beside the ball
+    assert not len(yz.outline)
+
+
+def test_picture_shows_the_outline_unmirrored_and_in_proportion() -> None:
+    data, width, height = draw_slices(_slices())
+    # 12 x 8 x 6 um at 25 pixels a um
+    assert (width, height) == (300 + 6 + 150, 200 + 6 + 150)
+    picture = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+    amber = picture[:, :, 0] - picture[:, :, 2] > (OUTLINE[0] - OUTLINE[2]) / 4
+    rows, columns = np.nonzero(amber)
+    assert rows.mean() == pytest.approx(8.5 * 5, abs=2)
+    assert columns.mean() == pytest.approx(48.5 * 5, abs=2)
+
+
+def test_field_minus_iso_value_is_zero_on_a_ramps_own_level() -> None:
+    lattice = Box((0, 0, 0), (9, 16, 16))
+    ramp = np.broadcast_to(np.arange(16, dtype=np.uint8) * 10, lattice.shape)
+    slices = cut_unit(
+        ramp, lattice, (0, 0, 0), (1, 1, 1), None, 0.7,
+        lambda box: np.full(box.shape, 70, np.float32),
+    )  # fmt: skip
+    by_name = {s.name: s.above for s in slices}
+    assert list(by_name) == list(VIEWS)
+    xy, yz = by_name["xy"], by_name["yz"]
+    assert xy is not None
+    assert yz is not None
+    assert xy[:, 7] == pytest.approx(0, abs=1e-3)
+    assert (xy[:, 8] > 5).all()
+    assert yz.shape == (16, 9)  # y down, z right
+    assert yz == pytest.approx(10, abs=1e-3)  # x = 8
+
+
+# --- choices
+
+
+@given(st.integers(1, 400), st.integers(1, 90), st.integers(1, 80))
+def test_chosen_units_exist_once_and_stay_within_the_cap(
+    tiles: int, channels: int, most: int
+) -> None:
+    chosen = select_units.choose_units(tiles, channels, most)
+    units = [(tile, channel) for tile, shown in chosen for channel in shown]
+    assert len(set(units)) == len(units) <= max(most, 1)
+    assert len({tile for tile, _ in chosen}) == len(chosen)
+    assert all(0 <= t < tiles and 0 <= c < channels for t, c in units)
+    if tiles * channels <= most:
+        assert len(units) == tiles * channels
+
+
+def test_whole_slide_shows_tiles_from_all_over_and_most_channels() -> None:
+    chosen = select_units.choose_units(242, 70, 60)
+    assert len(chosen) == 6
+    assert chosen[0][0] < 30
+    assert chosen[-1][0] > 210
+    assert len({channel for _, shown in chosen for channel in shown}) > 50
+
+
+def test_finest_level_within_the_budget_is_drawn() -> None:
+    meshes = [[1000, 100, 10], [500, 50]]
+    assert select_units.choose_level(meshes, 2000) == (0, 1)
+    assert select_units.choose_level(meshes, 200) == (1, 1)
+    assert select_units.choose_level(meshes, 60) == (2, 1)
+    assert select_units.choose_level(meshes, 20) == (2, 3)
+
+
+def test_thinning_out_keeps_the_share_and_all_channels() -> None:
+    assert select_units.thin_out(5, 1) == [0, 1, 2, 3, 4]
+    kept = select_units.thin_out(70 * 242, 7)
+    assert len(kept) == pytest.approx(70 * 242 / 7, rel=0.01)
+    assert {i % 70 for i in kept} == set(range(70))
+
+
+# --- curves
+
+
+def test_curve_marks_what_was_taken_and_what_was_found() -> None:
+    svg = charts.criterion([0.0, 50.0, 100.0], [0.0, 1.0, 0.0], 75.0, 25.0)
+    assert 'class="mark" d="M240.0,' in svg
+    assert 'class="found" d="M80.0,' in svg
+    assert "found" not in charts.criterion([0.0, 100.0], [0.0, 1.0], 75.0, 75.0)
+    refused = charts.criterion([0.0, 100.0], [0.0, 1.0], None, 25.0)
+    assert "found" in refused
+    assert "mark" not in refused
+
+
+def test_value_beyond_the_axis_is_marked_at_its_end() -> None:
+    assert 'class="mark" d="M320.0,' in charts.criterion([0.0, 1.0], [0.0, 1.0], 9.0, None)
+
+
+def test_histogram_draws_every_transfer_function() -> None:
+    svg = charts.histogram([5] * 256, {"default": ((0.0, 0.0), (1.0, 0.5))}, None)
+    assert 'class="tf tf-default" d="M0.0,120.0L320.0,62.0"' in svg
+    assert "mark" not in svg
+
+
+# --- remarks and sums
+
+
+def _unit(**changed: object) -> UnitFacts:
+    values = {
+        "tile": Tile("r0_c0", Box((0, 0, 0), (2, 2, 2))),
+        "channel": Channel(0, "CD31", (1.0, 0.0, 0.0)),
+        "directory": Path("unit"),
+        "iso_file": "iso.json",
+        "iso_value": 100.0,
+        "background": 0.0,
+        "confidence": 0.5,
+        "iso_reason": "",
+        "reason": "",
+        "lods": (LodFacts(10, 0.1, 1000), LodFacts(5, 0.3, 400)),
+        "voxels": (4, 4, 4),
+        "volume_bytes": 64,
+        "ktx2_bytes": 30,
+        "fragments_dropped": 0,
+        "cavities_filled": 0,
+        "seconds": {"read": 1.0},
+    }
+    return UnitFacts(**{**values, **changed})  # type: ignore[arg-type]
+
+
+def test_sums_add_triangles_and_keep_the_largest_distance() -> None:
+    total = sum_up([_unit(), _unit(lods=(LodFacts(1, 0.7, 10),)), _unit(lods=())])
+    assert total.lods == (LodFacts(11, 0.7, 1010), LodFacts(5, 0.3, 400))
+    assert (total.units, total.voxels, total.volume_bytes, total.ktx2_bytes) == (3, 192, 192, 90)
+
+
+# --- the page
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An F (its iso-value given), the same left to the criterion, and an empty channel; 2 tiles."""
+    folder = tmp_path_factory.mktemp("report")
+    body = phantoms.f_phantom()
+    voxels = np.stack([body, body + np.uint16(7), np.full_like(body, 300)])
+    source = phantoms.write_ome_tiff(
+        folder / "<i>f.ome.tif", voxels, axes="CZYX", names=[NASTY, "twin", "empty"]
+    )
+    out = folder / "out"
+    arguments = ["--grid", "2x1", "--iso-value", f"{NASTY}=500"]
+    assert main(["plan", str(source), "-o", str(out), *arguments]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    return out
+
+
+@pytest.fixture
+def no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "draw_scenes", lambda scenes: ([], "as the test has it"))
+
+
+class _Page(HTMLParser):
+    """Tags, attributes and text of a page."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+        self.alts: list[str] = []
+        self.texts: list[str] = []
+        self.tags: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name in ("src", "href"):
+                self.addresses.append(value or "")
+            if name == "alt":
+                self.alts.append(value or "")
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(" ".join(data.split()))
+
+
+def _write(out: Path) -> tuple[str, _Page]:
+    write_report(out)
+    html = Store(out).report_file.read_text()
+    return html, _Page(html)
+
+
+def test_page_holds_its_pictures_and_draws_the_meshes_or_says_why_not(built: Path) -> None:
+    html, parsed = _write(built)
+    inside = [a for a in parsed.addresses if a.startswith(("data:image/webp;base64,", "#"))]
+    assert inside == parsed.addresses
+    assert "url(" not in html
+    assert "@import" not in html
+    drawn = [alt for alt in parsed.alts if alt.startswith(("Surfaces", "All surfaces"))]
+    if "this machine can't draw them" in html.replace("&#39;", "'"):
+        assert not drawn
+    else:
+        assert drawn == ["All surfaces of <i>f", "Surfaces of tile r0_c0", "Surfaces of tile r0_c1"]
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_page_tells_of_each_unit(built: Path) -> None:
+    html, parsed = _write(built)
+    for channel in (NASTY, "twin", "empty"):
+        for tile in ("r0_c0", "r0_c1"):
+            assert f"Slices of {channel} in tile {tile}" in parsed.alts
+    assert any(re.match(r"\(given; found [\d.]+\)", text) for text in parsed.texts)
+    assert any(text.startswith("above a background of") for text in parsed.texts)
+    assert "1 channel without a surface in any tile" in parsed.texts
+    assert "empty: every voxel is 300" in parsed.texts
+    assert "as the test has it" not in html  # it starts a sentence
+    assert "As the test has it." in html
+    assert "there is no bundle yet" in html
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_page_says_of_each_channel_why_its_2d_function_is_empty(
+    built: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+
+    survey = json.loads(Store(out).survey_file.read_text())
+    proposals = [entry["display"]["proposal"] for entry in survey.values()]
+    triangle = {
+        "kind": "triangle",
+        "values": [0.0, 1.0],
+        "gradients": [0.2, 1.0],
+        "tip": 0.45,
+        "color": [1.0, 1.0, 1.0],
+        "opacity": 0.7,
+        "softness": 0.5,
+    }
+    proposals[0].update(shapes=[], reason="too <dim>")
+    proposals[1].update(shapes=[triangle] * 2, reason="")
+    Store(out).survey_file.write_text(json.dumps(survey))
+    _, parsed = _write(out)
+    assert [b for a, b in pairwise(parsed.texts) if a == "2D function"] == [
+        "none: too <dim>",
+        "2 boundaries between materials",
+        # one value is one material, and a boundary takes two
+        "none: materials found: 1, expected at least 2",
+    ]
+
+
+@pytest.mark.usefixtures("no_drawing")
+@pytest.mark.parametrize(("factor", "is_drawn"), [(1 + 1e-9, False), (1.1, True)])
+def test_value_is_said_to_be_drawn_if_that_shows(
+    built: Path, tmp_path: Path, factor: float, is_drawn: bool
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    survey = json.loads(Store(out).survey_file.read_text())
+    iso = survey["twin"]["iso"]["r0_c0"]
+    found = json.loads((out / iso["file"]).read_text())["found"]
+    for tile in survey["twin"]["iso"].values():
+        other = json.loads((out / tile["file"]).read_text())["found"]
+        tile["value"] = other * (factor if tile is iso else 1)
+    Store(out).survey_file.write_text(json.dumps(survey))
+    texts = _write(out)[1].texts
+    said = [text for text in texts if "drawn to its neighbours" in text]
+    assert len(said) == is_drawn
+    assert all(f"found {found:.5g}, drawn" in text for text in said)
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_names_of_data_are_text_and_never_markup(built: Path) -> None:
+    html, parsed = _write(built)
+    assert "<i>f" not in html
+    assert "F <b>" not in html
+    assert "script" not in parsed.tags
+    assert NASTY in parsed.texts
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_same_results_give_the_same_page(built: Path) -> None:
+    assert _write(built)[0] == _write(built)[0]
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_page_with_too_many_units_shows_some_and_says_so(
+    built: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page, "MOST_PICTURED", 4)
+    monkeypatch.setattr(page, "MOST_ROWS", 5)
+    html, parsed = _write(built)
+    shown = sum(alt.startswith("Slices") for alt in parsed.alts)
+    assert 0 < shown <= 4
+    assert f"Pictures of {shown} of 6 units, evenly chosen" in html
+    assert "(5 of 6 units, evenly chosen)" in html
+
+
+def test_machine_without_opengl_is_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(draw_scenes, "COMMAND", (sys.executable, "-c", "import os; os.abort()"))
+    pictures, reason = draw_scenes.draw_scenes([])
+    assert pictures == []
+    assert reason.startswith("the drawing process was ended by SIGABRT")
+
+
+def test_fault_in_the_drawing_itself_is_not_taken_for_a_missing_opengl(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(draw_scenes, "COMMAND", (sys.executable, "-c", "raise ValueError('a bug')"))
+    with pytest.raises(RuntimeError, match="ValueError: a bug"):
+        draw_scenes.draw_scenes([])
+
+
+def test_report_before_units_names_the_command(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="run `stereocell plan"):
+        write_report(tmp_path)
+    assert not (tmp_path / "report").exists()
+
+
+def test_doubtful_units_are_remarked(built: Path) -> None:
+    facts = gather(Store(built))
+    assert [step.name for step in facts.steps][:2] == ["read", "volume"]
+    assert all(isinstance(step, StepFacts) for step in facts.steps)
+    units = (
+        _unit(confidence=0.1),
+        _unit(iso_value=None, iso_reason="every voxel is 3"),
+        _unit(reason="no voxel crosses the iso-value", iso_reason="every voxel is 4"),
+        _unit(reason="dark", channel=Channel(2, "dim", (0.0, 0.0, 1.0))),
+        _unit(fragments_dropped=1200, cavities_filled=3),
+    )
+    doubtful = replace(facts, units=units)
+    titles = {r.title: r.lines for r in find_remarks(doubtful)}
+    assert titles == {
+        "1 channel without a surface in any tile": ("dim: dark",),
+        "1 unit without a surface, in channels that have some": (
+            "r0_c0/CD31: no voxel crosses the iso-value (every voxel is 4)",
+        ),
+        "1 unit without an iso-value of their own": (
+            "r0_c0/CD31: every voxel is 3; built with the mean of the channel's other tiles",
+        ),
+        "1 unit with low confidence in their iso-value (below 0.2)": (
+            "r0_c0/CD31: 0.10 at iso-value 100",
+        ),
+        "1,200 fragments dropped": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
+        "3 cavities filled": ("CD31: 3 in 1 tile, most in r0_c0 (3)",),
+    }
+
+
+def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
+    angles = (13.0, 11.0, 9.5)
+    units = tuple(
+        _unit(
+            tile=Tile(f"r0_c{i}", Box((0, 0, 0), (2, 2, 2))),
+            lods=(LodFacts(10, 0.1, 1000, angle_deg=angle), LodFacts(5, 0.3, 40, angle_deg=1.0)),
+        )
+        for i, angle in enumerate(angles)
+    )
+    (remark,) = find_remarks(replace(gather(Store(built)), units=units))
+    assert remark.is_note
+    assert remark.title.startswith("1 channel with thin triangles in lod0")
+    assert remark.lines == ("CD31: 9.5° in r0_c2, 2 tiles below",)
+    assert not find_remarks(replace(gather(Store(built)), units=units[:1]))
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_report_goes_without_seconds_that_were_lost(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    for file in (out / "units").rglob("seconds.json"):
+        file.unlink()
+    _write(out)
+    facts = gather(Store(out))
+    assert facts.steps == ()
+    assert all(is_whole(unit.directory) for unit in facts.units)
+
+
+def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:
+    one = LodFacts(10, 0.1, 100, 0.02, 0.05, 0.4, 0, 2, 9.0, 0.6)
+    other = LodFacts(5, 0.3, 40, 0.01, 0.2, 0.3, 1, 0, 4.0, 0.9)
+    total = sum_up([_unit(lods=(one,)), _unit(lods=(other,))])
+    assert total.lods == (LodFacts(15, 0.3, 140, 0.02, 0.2, 0.4, 1, 2, 4.0, 0.6),)

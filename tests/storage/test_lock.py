@@ -1,0 +1,185 @@
+"""Two commands never write into one OUT at once, and none is kept out by one that is gone."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import OutputError
+from stereocell.storage.atomic_write import replacing, replacing_folder, write_bytes
+from stereocell.storage.lock import LOCK, alone_in, held, working_for
+from stereocell.storage.processes import machine
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from stereocell.storage.lock import alone_in
+with alone_in(Path(sys.argv[1]), "build"):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def hold(out: Path) -> subprocess.Popen[str]:
+    """Start a process that holds OUT, and wait until it does."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(out)], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    with process.stdout:
+        assert process.stdout.readline() == "held\n"
+    return process
+
+
+def test_the_second_is_refused_by_name_of_the_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    first = hold(out)
+    try:
+        for command in (["plan", str(tmp_path / "none.tif"), "-o", str(out)], ["units", str(out)]):
+            assert main(command) == 1
+            (line,) = capsys.readouterr().err.splitlines()
+            assert line.startswith(
+                f"stereocell: {out}: `stereocell build` (process {first.pid} on "
+            )
+            assert line.endswith(" is writing here: wait until it has ended")
+        assert [file.name for file in out.iterdir()] == [LOCK]
+        assert main(["check", str(out)]) == 1  # whoever only reads is let in
+        assert "is writing here" not in capsys.readouterr().out
+    finally:
+        first.kill()
+        first.wait()
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
+def test_what_a_killed_command_held_is_free(tmp_path: Path, end: signal.Signals) -> None:
+    first = hold(tmp_path)
+    os.kill(first.pid, end)
+    first.wait()
+    assert (tmp_path / LOCK).exists()
+    with alone_in(tmp_path, "stage"):
+        assert b'"stage"' in (tmp_path / LOCK).read_bytes()
+    assert not (tmp_path / LOCK).exists()
+
+
+def test_a_lock_that_can_not_be_removed_is_free_and_hides_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, missing_ok: bool = False) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    def fail() -> None:
+        with monkeypatch.context() as patch, alone_in(tmp_path, "build"):
+            patch.setattr(Path, "unlink", refuse)
+            raise ValueError("the fault")
+
+    with pytest.raises(ValueError, match="the fault"):
+        fail()
+    assert (tmp_path / LOCK).exists()
+    with alone_in(tmp_path, "stage"):
+        pass
+    assert not (tmp_path / LOCK).exists()
+
+
+def test_work_for_a_command_that_has_ended_leaves_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with alone_in(out, "build"):
+        claim = held()
+        assert claim is not None
+        with working_for(claim):
+            write_bytes(out / "in_time", b"x")
+        (out / "in_time").unlink()
+    refused = r"out: the command that asked for this has ended"
+    with working_for(claim), pytest.raises(OutputError, match=refused):
+        write_bytes(out / "late", b"x")
+    assert not out.exists()
+    with alone_in(out, "build"), working_for(claim):  # another one
+        with pytest.raises(OutputError, match=refused), replacing_folder(out / "late"):
+            pass
+        assert [path.name for path in out.iterdir()] == [LOCK]
+
+
+def test_what_ends_while_a_file_is_written_leaves_the_old_one(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a", b"old")
+    with alone_in(tmp_path, "build"):
+        claim = held()
+    assert claim is not None
+    (tmp_path / LOCK).write_bytes(claim.content)
+
+    def write() -> None:
+        with working_for(claim), replacing(tmp_path / "a") as temporary:
+            temporary.write_bytes(b"new")
+            (tmp_path / LOCK).write_bytes(b"another's")
+
+    with pytest.raises(OutputError, match="the command that asked for this has ended"):
+        write()
+    assert (tmp_path / "a").read_bytes() == b"old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [LOCK, "a"]
+
+
+def test_another_machine_of_the_same_name_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = machine()
+    assert machine() == here
+    monkeypatch.setattr(Path, "read_text", lambda _: "started at another time")
+    assert (machine() != here) == Path("/proc/sys/kernel/random/boot_id").exists()
+
+
+def test_of_many_at_once_one_is_in_at_a_time(tmp_path: Path) -> None:
+    inside, most, refused = 0, 0, 0
+    count = threading.Lock()
+
+    def work() -> None:
+        nonlocal inside, most, refused
+        for _ in range(50):
+            try:
+                with alone_in(tmp_path, "units"):
+                    with count:
+                        inside += 1
+                        most = max(most, inside)
+                    with count:
+                        inside -= 1
+            except OutputError:
+                with count:
+                    refused += 1
+
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (most, inside) == (1, 0)
+    assert refused < 400  # somebody came in
+
+
+def test_nothing_is_left_of_a_command_that_wrote_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a" / "b" / "out"
+    assert main(["build", str(tmp_path / "none.ome.tif"), "-o", str(out)]) == 1
+    assert list(tmp_path.iterdir()) == []
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    assert main(["units", str(kept)]) == 1
+    assert list(kept.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_of_somebody_else_is_said_in_a_line(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    expected = r"can't be written .* expected a folder of your own"
+    with pytest.raises(OutputError, match=expected), alone_in(tmp_path / "out", "build"):
+        pass
+    tmp_path.chmod(0o700)
+
+
+def test_a_file_in_its_place_is_said_in_a_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="can't be written"), alone_in(tmp_path / "file", "build"):
+        pass

@@ -1,0 +1,416 @@
+"""An OUT on object storage: the same bytes as in a folder, object by object, and refusals."""
+
+import hashlib
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_tissue import blobs
+
+from stereocell.building.tissue import TissueRequest, add_tissue
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import OutputError
+from stereocell.storage import object_store
+from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.lock import alone_at
+from stereocell.storage.processes import machine, start_of
+from support import phantoms
+from support.digests import digests_of
+from support.faulty_object_store import before
+from support.object_store import ObjectStore, serving
+from support.validators import make_assets
+
+GRID = "2x1"
+ARGUMENTS = ["--grid", GRID, "--workers", "0"]
+PARTS = ("units", "stage", "bundle")
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
+    with serving(tmp_path_factory.mktemp("objects")) as store, pytest.MonkeyPatch.context() as m:
+        for name, value in store.environment.items():
+            m.setenv(name, value)
+        store.files().mkdir("bucket")
+        yield store
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("volume") / "f.ome.tif"
+    phantoms.write_ome_tiff(path, phantoms.f_phantom()[None], "CZYX")
+    return path
+
+
+@pytest.fixture(scope="module")
+def local(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The SHA-256 of the assets that a build leaves in a folder."""
+    out = tmp_path_factory.mktemp("local") / "out"
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    return {name: sha for name, sha in digests_of(out).items() if name.split("/")[0] in PARTS}
+
+
+@pytest.fixture(scope="module")
+def there(store: ObjectStore, volume: Path) -> str:
+    """A build on the store."""
+    assert main(["build", str(volume), "-o", "s3://bucket/there", *ARGUMENTS]) == 0
+    return "s3://bucket/there"
+
+
+def kept(store: ObjectStore, prefix: str) -> dict[str, str]:
+    """The SHA-256 of every object of a build; seconds differ, and nothing is made of them."""
+    fs = store.files()
+    return {
+        name.removeprefix(f"{prefix}/"): hashlib.sha256(fs.cat_file(name)).hexdigest()
+        for name in fs.find(prefix)
+    }
+
+
+def of_parts(found: dict[str, str]) -> dict[str, str]:
+    return {
+        key: digest
+        for key, digest in found.items()
+        if key.split("/")[0] in PARTS and not key.endswith("seconds.json")
+    }
+
+
+@pytest.mark.slow
+def test_objects_are_the_files_of_a_folder(
+    store: ObjectStore,
+    volume: Path,
+    local: dict[str, str],
+    there: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    print(f"object store: {store.kind}")
+    found = kept(store, "bucket/there")
+    assert of_parts(found) == of_parts(local)
+    assert {"plan.json", "phases.json", "report/index.html"} <= found.keys()
+    assert not [key for key in found if "/." in f"/{key}"]
+    # nothing to do, and nothing done
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    told = capsys.readouterr()
+    assert "stage    s3://bucket/there/stage/stage.usda\n" in told.out
+    for phase in ("plan", "units", "stage", "bundle", "report"):
+        assert f"{phase}: up to date" in told.err
+    assert kept(store, "bucket/there") == found
+
+
+@pytest.mark.slow
+def test_what_is_lost_or_half_made_there_is_made_again(
+    store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs = store.files()
+    before = of_parts(kept(store, "bucket/there"))
+    (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
+    fs.rm(f"bucket/there/{unit}")
+    fs.pipe_file("bucket/there/bundle/index.html", b"cut")
+    capsys.readouterr()
+    assert main(["check", there]) == 1
+    assert "FAIL hashes: index.html: not the bytes that files.json" in capsys.readouterr().out
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert of_parts(kept(store, "bucket/there")) == before
+    capsys.readouterr()
+    assert main(["check", there, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"]
+    manifest = fs.cat_file("bucket/there/bundle/manifest.json")
+    fs.rm("bucket/there/bundle/manifest.json")
+    assert main(["check", there]) == 1
+    assert f"FAIL manifest: {there}/bundle/manifest.json is missing" in capsys.readouterr().out
+    fs.pipe_file("bucket/there/bundle/manifest.json", manifest)
+
+
+@pytest.mark.slow
+def test_flipped_bits_there_are_named_and_get_no_further(
+    store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs = store.files()
+    before = of_parts(kept(store, "bucket/there"))
+    (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
+    (atlas,) = [key for key in before if key.startswith("stage/tiles/r0_c0/") and ".exr" in key]
+    for key, phase in ((unit, "stage"), (atlas, "bundle")):
+        whole = fs.cat_file(f"bucket/there/{key}")
+        middle = len(whole) // 2
+        flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
+        fs.pipe_file(f"bucket/there/{key}", flipped)
+        capsys.readouterr()
+        assert main(["check", there]) == 1
+        assert f": {key}: damaged: remove what is damaged and run" in capsys.readouterr().out
+        if phase == "stage":
+            fs.rm("bucket/there/stage/tiles/r0_c0", recursive=True)
+        assert main([phase, there, "--workers", "0"]) == 1
+        assert f"{there}/{key}: damaged" in capsys.readouterr().err
+        fs.rm(f"bucket/there/{key}")
+        assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+        assert of_parts(kept(store, "bucket/there")) == before
+
+
+@pytest.mark.slow
+def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_alone(
+    store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs, out = store.files(), "bucket/there"
+    before = of_parts(kept(store, out))
+    phases = json.loads(fs.cat_file(f"{out}/phases.json"))
+    phases["bundle"]["key"] = ""  # begun
+    fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
+    fs.rm(f"{out}/bundle/manifest.json")  # it comes last
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert of_parts(kept(store, out)) == before
+    fs.rm(f"{out}/bundle", recursive=True)
+    del phases["bundle"]
+    fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
+    fs.pipe_file(f"{out}/bundle/thesis.tex", b"years of work")
+    for _ in range(2):
+        capsys.readouterr()
+        assert main(["bundle", there, "--workers", "0"]) == 1
+        assert f"{there}/bundle: exists and is no bundle: no manifest" in capsys.readouterr().err
+        assert fs.cat_file(f"{out}/bundle/thesis.tex") == b"years of work"
+    fs.rm(f"{out}/bundle/thesis.tex")
+    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert of_parts(kept(store, out)) == before
+
+
+@pytest.mark.slow
+def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
+    store: ObjectStore, volume: Path, local: dict[str, str]
+) -> None:
+    fs, out = store.files(), "s3://bucket/killed"
+    finished: dict[str, object] = {}  # objects of finished units: when they were put there
+    for part in ("units/r0_c", "bundle/volumes/"):
+        command = [sys.executable, "-m", "stereocell.cli", "build", str(volume), "-o", out]
+        build = subprocess.Popen(
+            [*command, *ARGUMENTS], stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        while build.poll() is None and not _objects(fs, f"bucket/killed/{part}"):
+            time.sleep(0.01)
+        os.killpg(build.pid, signal.SIGKILL)
+        assert build.wait() == -signal.SIGKILL
+        for name, found in _objects(fs, "bucket/killed/units/r0_c").items():
+            finished.setdefault(name, found)
+    assert finished
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    assert of_parts(kept(store, "bucket/killed")) == of_parts(local)
+    now = _objects(fs, "bucket/killed/units/r0_c")
+    assert {name: now[name] for name in finished} == finished
+
+
+def _objects(fs: Any, start: str) -> dict[str, object]:
+    """When each object was put there whose name starts so."""
+    fs.invalidate_cache()
+    return {
+        name: found["LastModified"]
+        for name, found in fs.find("bucket/killed", detail=True).items()
+        if name.startswith(start)
+    }
+
+
+def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
+    store: ObjectStore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fs, lock = store.files(), "bucket/held/.lock"
+    owner = {"process": 7, "host": "elsewhere", "command": "build", "since": "2026-01-01T00:00:00"}
+    fs.pipe_file(lock, json.dumps(owner).encode())
+    assert main(["units", "s3://bucket/held"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == (
+        "stereocell: s3://bucket/held: `stereocell build` (process 7 on elsewhere, since "
+        "2026-01-01T00:00:00) is writing here: wait until it has ended"
+    )
+    here = {**owner, "process": os.getpid(), "machine": machine()}
+    for own in ({}, {"start": start_of(os.getpid())}):
+        fs.pipe_file(lock, json.dumps({**here, **own}).encode())
+        assert main(["units", "s3://bucket/held"]) == 1
+        assert " is writing here: " in capsys.readouterr().err
+    dead, ended = (subprocess.Popen([sys.executable, "-c", ""]) for _ in range(2))
+    dead.wait()
+    os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)  # its id is not free yet
+    for gone in (
+        {"process": dead.pid},
+        {"process": dead.pid, "start": "another"},
+        {"process": ended.pid, "start": "another"},
+        {"start": "another"},  # its id has been given away again: to us
+    ):
+        fs.pipe_file(lock, json.dumps({**here, **gone}).encode())
+        assert main(["units", "s3://bucket/held"]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line == (
+            "stereocell: s3://bucket/held/plan.json is missing: run `stereocell plan INPUT -o OUT`"
+            " first"
+        )
+        assert not fs.exists(lock)
+    ended.wait()
+
+
+def test_a_lock_whose_putting_was_done_and_not_told_is_held(store: ObjectStore) -> None:
+    with before(store.endpoint) as faults:
+        fs = ObjectStore(store.kind, faults.endpoint).files()
+        faults.once["PUT", "/.lock"] = "lost"
+        with alone_at(fs, "bucket/untold/.lock", "there", "build"):
+            assert faults.seen["lost"] == 1
+            refused = pytest.raises(OutputError, match=r"`stereocell build` .* is writing here")
+            with refused, alone_at(fs, "bucket/untold/.lock", "there", "units"):
+                pass
+        assert not fs.exists("bucket/untold/.lock")
+
+
+def test_who_reads_leaves_what_a_command_is_making_there(store: ObjectStore) -> None:
+    fs = store.files()
+    owner = {"process": os.getpid(), "machine": machine(), "start": start_of(os.getpid())}
+    made = {
+        "bucket/read/.lock": json.dumps(owner).encode(),
+        "bucket/read/units/r0_c0/F/.0123456789.deadbeef.partial/volume.npy": b"half",
+        "bucket/read/plan.json": b"{}",
+    }
+    fs.pipe(made)
+    for command in (["check"], ["check", "--deep", "--workers", "0"]):
+        assert main([*command, "s3://bucket/read"]) == 1
+        assert set(fs.find("bucket/read")) == set(made)
+
+
+def _put_slowly(file: Path) -> None:
+    write_bytes(file, b"x")
+    time.sleep(0.2)
+
+
+def test_each_thread_of_a_worker_tells_what_it_put_itself(store: ObjectStore) -> None:
+    with (
+        object_store.opened("s3://bucket/threads", "build") as root,
+        ThreadPoolExecutor(2) as threads,
+    ):
+        work, _ = object_store.carried(_put_slowly)
+        told = list(threads.map(work, [root / "a", root / "b"]))
+    assert told == [(None, {"a": 1}), (None, {"b": 1})]
+
+
+def test_work_for_a_command_that_has_ended_puts_nothing_there(store: ObjectStore) -> None:
+    fs = store.files()
+    with object_store.opened("s3://bucket/late", "build") as root:
+        work, _ = object_store.carried(_put_slowly)
+    carried = pickle.dumps(work)  # to a cluster's worker
+    for lock in (None, b"another's"):
+        if lock is not None:
+            fs.pipe_file("bucket/late/.lock", lock)
+        with pytest.raises(OutputError, match=r"bucket/late: the command that asked .* has ended"):
+            pickle.loads(carried)(root / "a")
+        assert "bucket/late/a" not in fs.find("bucket/late")
+    object_store._forget(root)
+
+
+def _wait_for(fault: Callable[[], None]) -> None:
+    for _ in range(1000):
+        fault()
+        time.sleep(0.02)
+
+
+def test_a_lock_that_was_not_renewed_is_taken_over(
+    store: ObjectStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stereocell.storage.lock._SETTLE_S", 0.0)
+    fs, path = store.files(), "bucket/renewed/.lock"
+    monkeypatch.setattr("stereocell.storage.lock.BEAT_S", 0.05)
+    with alone_at(fs, path, "there", "build") as require:
+        refused = pytest.raises(OutputError, match="there: `stereocell build`")
+        with refused, alone_at(fs, path, "there", "units"):
+            pass
+        monkeypatch.setattr("stereocell.storage.lock.STALE_S", -1e6)
+        with alone_at(fs, path, "there", "units"):
+            assert json.loads(fs.cat_file(path))["command"] == "units"
+            with pytest.raises(OutputError, match=r"there: was taken over by .*: start it again"):
+                _wait_for(require)
+            assert json.loads(fs.cat_file(path))["command"] == "units"  # and stays so
+        assert not fs.exists(path)
+    assert not fs.exists(path)
+
+
+@pytest.mark.slow
+def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[set[str]] = []
+
+    def serve(out: Path, *_: object, **__: object) -> None:
+        seen.append({path.name for path in out.iterdir()})
+        assert (out / "bundle" / "manifest.json").is_file()
+
+    monkeypatch.setattr("stereocell.serve.server.serve", serve)
+    assert main(["serve", there]) == 0
+    assert seen == [{"bundle"}]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (
+            ["units", "https://me:secret@x.org/out?sig=secret"],
+            2,
+            "OUT is https://x.org/out: expected a folder or an s3:// address",
+        ),
+        (["iso", "x.nii", "-o", "s3://a:b@c/x", "--channel", "0", "--tile", "r"], 2, "s3://c/x"),
+        (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
+        (["slices", "x.nii", "-o", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (["sample", "mri", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (
+            ["iso", "x.nii", "--channel", "0", "--tile", "r0_c0", "-o", "s3://bucket/x.png"],
+            2,
+            "expected a folder or file of this",
+        ),
+        (["bundle", "s3://bucket/x", "--stage", "my.usda"], 2, "/x is on object storage, expected"),
+        (["units", "nothing://x"], 1, "nothing://x: Protocol not known: nothing"),
+    ],
+)
+def test_what_is_no_place_is_said_in_a_line(
+    store: ObjectStore,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    code: int,
+    message: str,
+) -> None:
+    assert main(arguments) == code
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+    assert "secret" not in line
+
+
+@pytest.mark.slow
+def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: Path) -> None:
+    voxels, _ = blobs(2)
+    source = phantoms.write_ome_tiff(tmp_path / "blobs.ome.tif", voxels[None], "CZYX")
+    for out in (str(tmp_path / "out"), "s3://bucket/classes"):
+        assert main(["plan", str(source), "-o", out]) == 0
+    assert main(["tissue", "s3://bucket/classes", "--classes", "2", "--workers", "0"]) == 0
+    found = kept(store, "bucket/classes")
+    assert len([key for key in found if key.endswith("unit.json")]) == 3
+    add_tissue(tmp_path / "out", TissueRequest(2))
+    here = {key: sha for key, sha in digests_of(tmp_path / "out").items() if "tissue/" in key}
+    assert here == {key: sha for key, sha in found.items() if key.startswith("tissue/")}
+    assert main(["check", "s3://bucket/classes"]) == 0
+
+
+def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    ours, week_s = machine(), 7 * 24 * 3600
+    folders = {
+        f"stereocell.{ours}.{dead.pid}.killed": False,
+        f"stereocell.{ours}.{os.getpid()}.working": True,
+        f"stereocell.0000beef.{dead.pid}.ofanother": True,  # its process is on that machine
+        f"stereocell.0000beef.{dead.pid}.longago": False,
+        "stereocell.notes": True,
+    }
+    for name in folders:
+        (tmp_path / name / "units").mkdir(parents=True)
+    long_ago = time.time() - week_s - 60
+    os.utime(tmp_path / f"stereocell.0000beef.{dead.pid}.longago", (long_ago, long_ago))
+    object_store._clear_scratch()
+    assert {name: (tmp_path / name).exists() for name in folders} == folders

@@ -1,0 +1,41 @@
+"""A bundle of two tiles, and how tests read one."""
+
+import json
+
+from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
+from support import spheres
+from support.glbs import read
+
+TILES = (spheres.tile(0), spheres.tile(1))
+CD31 = "/Specimen/Channels/CD31"
+
+
+def write_tiles(folder, tiles=TILES):
+    for tile in tiles:
+        write_tile(folder, tile)
+    write_stage(
+        folder, "two tiles", (spheres.RED, spheres.BLUE), [TileExtent.of(t) for t in tiles], {}
+    )
+    return folder / "stage.usda"
+
+
+def load(path):
+    return json.loads(path.read_text())
+
+
+def channel(bundle, name="CD31"):
+    (found,) = (c for c in load(bundle / "manifest.json")["channels"] if c["name"] == name)
+    return found
+
+
+def volumes(bundle):
+    return load(bundle / channel(bundle)["volumes"]["path"])["volumes"]
+
+
+def factor(bundle, tile="r0_c0"):
+    document, _ = read((bundle / f"channels/CD31/{tile}/lod0.glb").read_bytes())
+    return document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"]
+
+
+def files(folder):
+    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}

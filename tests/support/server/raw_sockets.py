@@ -1,0 +1,321 @@
+"""What an attack on the server sends over a raw socket, and how its answers are judged."""
+
+import base64
+import os
+import re
+import select
+import socket
+import ssl
+import struct
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from urllib.parse import urljoin, urlsplit
+
+from stereocell.serve.server import BundleServer
+
+SECRET = b"what lies beside the bundle"
+LARGE = 256 << 20  # sparse: more than sockets hold
+DEADLINE_S = 2.0  # a busy machine is slow to shake hands
+WAIT_S = 32.0
+PROTECTION = (  # of every answer
+    b"x-content-type-options: nosniff",
+    b"referrer-policy: no-referrer",
+    b"cross-origin-resource-policy: same-origin",
+    b"cross-origin-opener-policy: same-origin",
+    b"content-security-policy: ",
+    b"frame-ancestors 'none'",
+)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A server that is attacked."""
+
+    server: BundleServer
+    shakes_hands: bool = True  # where there is TLS
+
+    def dial(self) -> socket.socket:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # before: its time is not the handshake's
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+        stream = socket.create_connection(("127.0.0.1", self.server.port), timeout=WAIT_S)
+        if self.server.gate is None or not self.shakes_hands:
+            return stream
+        return context.wrap_socket(stream)
+
+
+@dataclass(frozen=True)
+class Attack:
+    """right: the answers, of which one must come. "closed": the connection ends without a word."""
+
+    name: str
+    sent: str
+    act: Callable[[Target], str]
+    right: tuple[str, ...]
+    server: str = "plain"  # or "lan"; or "few", "few, lan": with small limits by number
+
+
+def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], bool]) -> bytes:
+    """Send all that the server takes; return all that it says before it ends the connection.
+
+    Returns early once a whole answer is here and nothing is left to send. Raises TimeoutError if
+    the server neither answers nor ends the connection.
+    """
+    said, left = b"", memoryview(data)
+    end = time.monotonic() + WAIT_S
+    stream.setblocking(False)
+    while not (left.nbytes == 0 and is_whole(said)):
+        rest = end - time.monotonic()
+        if rest < 0:
+            raise TimeoutError(f"no end after {WAIT_S:g} s")
+        pending = isinstance(stream, ssl.SSLSocket) and stream.pending()
+        select.select([stream], [stream] if left else [], [], 0 if pending else min(rest, 0.25))
+        try:
+            with suppress(BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
+                part = stream.recv(1 << 16)
+                if not part:
+                    break
+                said += part
+            with suppress(BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
+                if left:
+                    left = left[stream.send(left[: 1 << 16]) :]
+        except (ConnectionError, ssl.SSLError):
+            break
+    return said
+
+
+def is_answer(said: bytes) -> bool:
+    """Return whether an HTTP answer that is kept open is here with its body."""
+    head, _, body = said.partition(b"\r\n\r\n")
+    fields = dict(line.lower().split(b": ", 1) for line in head.split(b"\r\n")[1:] if b": " in line)
+    is_kept = fields.get(b"connection") != b"close" and b"content-length" in fields
+    return is_kept and len(body) >= int(fields[b"content-length"])
+
+
+def judge(said: bytes) -> str:
+    """Return the status of the last answer, or what is wrong with one."""
+    if not said:
+        return "closed"
+    if SECRET in said:
+        return "it told what lies outside"
+    statuses = []
+    for answer in said.split(b"HTTP/1.1 ")[1:]:
+        head = answer.partition(b"\r\n\r\n")[0].lower()
+        statuses.append(head[:3].decode())
+        missing = [one.decode() for one in PROTECTION if one not in head]
+        if missing:
+            return f"{statuses[-1]} without {missing[0]}"
+        if b"\r\nserver:" in head or b"uvicorn" in head:
+            return f"{statuses[-1]} with a banner"
+    return statuses[-1] if statuses else f"{said[:20]!r}"
+
+
+def get(path: str, *headers: str, method: str = "GET", host: str = "localhost") -> bytes:
+    lines = [f"{method} {path} HTTP/1.1", f"Host: {host}", *headers, "Connection: close"]
+    return "\r\n".join([*lines, "", ""]).encode("latin-1")
+
+
+def raw(data: bytes, count: int = 1) -> Callable[[Target], str]:
+    """Return an attack that sends bytes; count: of answers that may come."""
+
+    def act(target: Target) -> str:
+        with target.dial() as stream:
+            filled = data.replace(b"{port}", str(target.server.port).encode())
+            if target.server.gate is not None:
+                filled = filled.replace(b"{token}", target.server.gate.token.encode())
+            said = converse(stream, filled, is_answer)
+        if said.count(b"HTTP/1.1 ") > count:
+            return f"{said.count(b'HTTP/1.1 ')} answers to {count} request"
+        return judge(said)
+
+    return act
+
+
+def bare(data: bytes) -> Callable[[Target], str]:
+    """Return an attack whose answer must be a head alone, as that to a HEAD."""
+
+    def act(target: Target) -> str:
+        with target.dial() as stream:
+            said = converse(stream, data, lambda said: False)
+        _, _, body = said.partition(b"\r\n\r\n")
+        return f"a body of {len(body)} bytes" if body else judge(said)
+
+    return act
+
+
+def landing(path: str) -> Callable[[Target], str]:
+    """Return an attack that follows a redirect as browsers do: "own" is where it should lead."""
+
+    def act(target: Target) -> str:
+        assert target.server.gate is not None
+        head = get(path.replace("{token}", target.server.gate.token))
+        with target.dial() as stream:
+            said = converse(stream, head, is_answer)
+        if (status := judge(said)) != "303":
+            return status
+        place = re.search(rb"^location: (.*)\r$", said, re.IGNORECASE | re.MULTILINE)
+        assert place is not None
+        shown = re.sub(r"[\t\r\n]", "", place[1].decode()).replace("\\", "/")
+        base = urlsplit(target.server.address)
+        whole = urlsplit(urljoin(target.server.address, shown))
+        is_own = (whole.scheme, whole.netloc) == (base.scheme, base.netloc)
+        # and whose parts are taken out once more before they are read again
+        again = urljoin(target.server.address, whole.path)
+        return "own" if is_own and urlsplit(again).netloc == base.netloc else shown
+
+    return act
+
+
+def slowly(first: bytes, drip: bytes) -> Callable[[Target], str]:
+    """Return an attack that sends a byte every 50 ms."""
+
+    def act(target: Target) -> str:
+        with target.dial() as stream:
+            said = converse(stream, first, is_answer) if first else b""
+            stream.settimeout(0.05)
+            end = time.monotonic() + WAIT_S
+            for place in range(len(drip)):
+                try:
+                    stream.send(drip[place : place + 1])
+                    if not (part := stream.recv(1000)):
+                        return "closed" if time.monotonic() < end else "still open"
+                    said += part
+                except TimeoutError:
+                    continue
+                except ConnectionError:
+                    return "closed"
+        return "still open"
+
+    return act
+
+
+def never_reading(target: Target) -> str:
+    with target.dial() as stream:
+        stream.sendall(get("/large.bin"))
+        time.sleep(4 * DEADLINE_S)
+        size = 0
+        with suppress(ConnectionError, TimeoutError):
+            while part := stream.recv(1 << 20):
+                size += len(part)
+        return "closed" if size < LARGE else "all of it, late"
+
+
+def crowd(target: Target) -> str:
+    """Open more connections than a client may have; the next one is turned away."""
+    streams = [target.dial() for _ in range(20)]
+    try:
+        time.sleep(0.1)
+        return raw(get("/"))(target)
+    finally:
+        for stream in streams:
+            stream.close()
+        time.sleep(0.1)
+
+
+def without_tls(act: Callable[[Target], str]) -> Callable[[Target], str]:
+    """Return an attack that does not shake hands."""
+    return lambda target: act(replace(target, shakes_hands=False))
+
+
+def silent_crowd(target: Target) -> str:
+    """Open more connections than a client may have, and say nothing; the next one is cut off."""
+    streams = [replace(target, shakes_hands=False).dial() for _ in range(20)]
+    try:
+        time.sleep(0.05)
+        return raw(get("/"))(target)
+    except (ConnectionError, ssl.SSLError):
+        return "closed"
+    finally:
+        for stream in streams:
+            stream.close()
+        time.sleep(0.1)
+
+
+def flood(target: Target) -> str:
+    """Send more requests than a client may, on connections that are kept."""
+    for _ in range(80):
+        found = raw(get("/manifest.json"))(target)
+        if found != "200":
+            return found
+    return found
+
+
+def frame(
+    opcode: int, payload: bytes = b"", fin: int = 1, mask: int = 1, rsv: int = 0, length: int = -1
+) -> bytes:
+    """Return a frame (RFC 6455, section 5.2), masked with 0, right or wrong."""
+    size = len(payload) if length < 0 else length
+    head = struct.pack(">BBQ", fin << 7 | rsv << 4 | opcode, mask << 7 | 127, size)
+    if size < 126:
+        head = struct.pack(">BB", fin << 7 | rsv << 4 | opcode, mask << 7 | size)
+    return head + bytes(4 * mask) + payload
+
+
+def handshake(*headers: str, path: str = "/bricks", host: str = "localhost:{port}") -> bytes:
+    key = base64.b64encode(os.urandom(16)).decode()
+    lines = ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+    lines = [f"GET {path} HTTP/1.1", f"Host: {host}", *lines, f"Sec-WebSocket-Key: {key}"]
+    return "\r\n".join([*lines, *headers, "", ""]).encode()
+
+
+GOODBYE = frame(8, struct.pack(">H", 1000))
+HELLO = frame(1, b'{"type": "hello", "version": 1}')
+
+
+def open_socket(target: Target) -> tuple[socket.socket, bytes]:
+    """Return a stream with an open websocket, and what came behind the handshake."""
+    stream = target.dial()
+    stream.sendall(handshake().replace(b"{port}", str(target.server.port).encode()))
+    said = b""
+    while b"\r\n\r\n" not in said:
+        said += stream.recv(4096)
+    head, _, rest = said.partition(b"\r\n\r\n")
+    found = judge(head)
+    if found != "101":
+        raise ValueError(found)
+    return stream, rest
+
+
+def closing(said: bytes) -> str:
+    """Return the code of the close frame among frames of a server."""
+    while len(said) >= 2:
+        size, at = said[1] & 127, 2
+        if size == 126:
+            size, at = int.from_bytes(said[2:4], "big"), 4
+        payload, said, opcode = said[at : at + size], said[at + size :], said[0] & 15
+        if opcode == 8:
+            return str(int.from_bytes(payload[:2], "big"))
+    return "closed"
+
+
+def framed(*frames: bytes) -> Callable[[Target], str]:
+    """Return an attack that opens a websocket and sends frames."""
+
+    def act(target: Target) -> str:
+        stream, first = open_socket(target)
+        with stream:
+            rest = converse(
+                stream, b"".join(frames), lambda said: closing(first + said) != "closed"
+            )
+        return closing(first + rest)
+
+    return act
+
+
+def socket_crowd(target: Target) -> str:
+    opened = [open_socket(target)[0] for _ in range(4)]
+    try:
+        return framed()(target)
+    finally:
+        for stream in opened:
+            stream.close()
+
+
+def used_token(target: Target) -> str:
+    assert target.server.gate is not None
+    path = f"/?token={target.server.gate.token}"
+    if (first := raw(get(path))(target)) != "303":
+        return f"first {first}"
+    return raw(get(path))(target)

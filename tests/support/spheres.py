@@ -1,0 +1,89 @@
+"""Two tiles side by side, a sphere across their border: tiny content for stage and bundle."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.channel import ChannelContent, Look, TileContent
+from stereocell.model.mesh import Lod, Mesh
+
+SPACING = (1.0, 0.5, 0.5)  # um, (z, y, x)
+OWN_SHAPE = (9, 20, 20)
+CENTER = np.array([10.0, -5.0, 4.0])  # on the border of the two tiles
+RADIUS = 3.5
+LEVELS = ((24, 0.02), (16, 0.1), (8, 0.4))  # rings of the sphere, measured distance in um
+
+RED = Look(
+    "CD31",
+    (1.0, 0.2, 0.1),
+    (100.0, 4000.0),
+    1200.0,
+    0.9,
+    "clear",
+    {"default": ((0.0, 0.0), (1.0, 0.8)), "sharp": ((0.3, 0.0), (0.31, 1.0))},
+)
+BLUE = Look(
+    "Hoechst 33342",
+    (0.1, 0.3, 1.0),
+    (0.0, 255.0),
+    None,
+    0.0,
+    "none",
+    {"default": ((0.0, 0.0), (1.0, 0.5))},
+)
+
+
+def sphere(rings: int, keep: slice) -> Mesh:
+    """Return the half of a UV sphere whose longitudes are in `keep` (of 2 * rings), cut at x = 10.
+
+    The cut edge's vertices are the same floats in both halves.
+    """
+    u, v = np.meshgrid(np.linspace(0, 1, 2 * rings + 1), np.linspace(0, 1, rings + 1))
+    longitude, latitude = 2 * np.pi * u + np.pi / 2, np.pi * (1 - v)
+    out = np.stack(
+        [
+            np.sin(latitude) * np.cos(longitude),
+            np.cos(latitude),
+            -np.sin(latitude) * np.sin(longitude),
+        ],
+        axis=-1,
+    )
+    along = np.stack([-np.sin(longitude), 0 * longitude, -np.cos(longitude), 0 * u + 1], axis=-1)
+    positions = CENTER + RADIUS * out
+    positions[:, [0, rings, 2 * rings], 0] = CENTER[0]
+    grid = np.arange(u.size).reshape(u.shape)[:, keep]
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    quads = [np.stack(corners, -1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))]
+    used, triangles = np.unique(np.concatenate(quads), return_inverse=True)
+    return Mesh(
+        positions.reshape(-1, 3)[used].astype(np.float32),
+        triangles.reshape(-1, 3).astype(np.uint32),
+        out.reshape(-1, 3)[used].astype(np.float32),
+        np.stack([u, v], -1).reshape(-1, 2)[used].astype(np.float32),
+        along.reshape(-1, 4)[used].astype(np.float32),
+    )
+
+
+def ball(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """Return a window of the ball's voxels, bright inside; `origin` in voxels, (z, y, x)."""
+    z, y, x = np.indices(shape) + np.reshape(origin, (3, 1, 1, 1))
+    world = np.stack([x * SPACING[2], -y * SPACING[1], z * SPACING[0]])
+    distance = np.linalg.norm(world - CENTER[:, None, None, None], axis=0)
+    return np.clip(128 + 60 * (RADIUS - distance), 0, 255).astype(np.uint8)
+
+
+def tile(column: int, looks: tuple[Look, ...] = (RED, BLUE)) -> TileContent:
+    """Return tile r0_c0 (x 0 to 10 um) or r0_c1 (10 to 19.5 um); only CD31 has a surface."""
+    lattice = (9, 20, 21) if column == 0 else OWN_SHAPE
+    first = (0.0, 0.0, 10.0 * column)
+    last = tuple(a + (n - 1) * s for a, n, s in zip(first, lattice, SPACING, strict=True))
+    volume = ball((-1, -1, 20 * column - 1), tuple(n + 2 for n in lattice))
+    flat = np.full((32, 32, 3), (128, 128, 255), np.uint8)
+    lods = []
+    for level, (rings, distance) in enumerate(LEVELS):
+        # longitude 0 points to +z at x = 10: the first half of the longitudes lies left of it
+        keep = slice(0, rings + 1) if column == 0 else slice(rings, None)
+        lods.append(Lod(sphere(rings, keep), distance, flat if level else None))
+    contents = tuple(
+        ChannelContent(look.id, tuple(lods) if look.iso_value else (), volume) for look in looks
+    )
+    return TileContent(f"r0_c{column}", SPACING, first, last, OWN_SHAPE, contents)

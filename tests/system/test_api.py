@@ -1,0 +1,64 @@
+"""`stereocell.build` from Python does what the command does."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import stereocell
+from stereocell.cli.__main__ import main
+from support import phantoms
+
+
+@pytest.mark.slow
+def test_build_is_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")
+    built = stereocell.build(source, tmp_path / "a", settings={"plan": {"grid": "2x1"}})
+    assert built.stage == f"{tmp_path}/a/stage/stage.usda"
+    assert all(Path(path).exists() for path in (built.stage, built.bundle, built.report))
+    capsys.readouterr()
+    command = ["build", str(source), "-o", str(tmp_path / "a"), "--grid", "2x1", "--workers", "0"]
+    assert main(command) == 0
+    told = capsys.readouterr().err
+    for phase in ("plan", "units", "stage", "bundle", "report"):
+        assert f"{phase}: up to date" in told  # there is nothing that the command would do else
+
+
+def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
+    with pytest.raises(stereocell.StereoCellError, match=r"none.ome.tif: not found") as raised:
+        stereocell.build(tmp_path / "none.ome.tif", tmp_path / "out")
+    assert "\n" not in str(raised.value)
+    with pytest.raises(stereocell.StereoCellError, match="grids"):
+        stereocell.build(tmp_path, tmp_path / "out", settings={"plan": {"grids": "2x1"}})
+    with pytest.raises(stereocell.StereoCellError, match="workers is -1, expected"):
+        stereocell.build(tmp_path, tmp_path / "out", workers=-1)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"workers": "2"}, "workers is '2', expected a whole number, 0 or more"),
+        ({"workers": 2.5}, "workers is 2.5, expected a whole number, 0 or more"),
+        ({"settings": [1]}, "settings are [1], expected sections and keys, as {'plan'"),
+        ({"settings": {"plan": {"grid": 3}}}, "settings: plan.grid is 3"),
+        ({"preset": 3}, "preset is 3, expected a name or a TOML file's"),
+        ({"config": 3}, "config is 3, expected a TOML file"),
+        ({"out": None}, "out is None, expected a path or an address"),
+    ],
+)
+def test_an_argument_of_another_kind_is_named(
+    tmp_path: Path, arguments: dict[str, Any], line: str
+) -> None:
+    with pytest.raises(stereocell.StereoCellError, match=f"^{re.escape(line)}"):
+        stereocell.build(tmp_path / "f.ome.tif", **{"out": tmp_path / "out", **arguments})
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_source_is_read_where_it_is_asked_for(tmp_path: Path) -> None:
+    body = phantoms.f_phantom()
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body[None], "CZYX")
+    dataset = stereocell.open_volume(source)
+    volume = dataset.read(0, dataset.levels[0].box, 0)
+    assert (volume.voxels == body).all()

@@ -1,0 +1,338 @@
+"""Whole builds of small phantoms, by the command line, held against what the phantoms are."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+from threadpoolctl import threadpool_limits
+
+from stereocell.building.out_folder import Store
+from stereocell.building.unit_files import load_record
+from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
+from support import phantoms
+from support.digests import digests_of
+from support.validators import make_assets
+
+BUILD = ["--workers", "0", "--grid", "2x1"]
+
+
+def _two_channels() -> NDArray[np.uint16]:
+    body = phantoms.f_phantom()
+    return np.stack([body, np.full_like(body, 300)])
+
+
+def _source(path: Path) -> Path:
+    return phantoms.write_ome_tiff(
+        path / "f.ome.tif", _two_channels(), axes="CZYX", names=["F body", "empty"]
+    )
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("build")
+    with threadpool_limits(2):  # workers have one thread each
+        assert main(["build", str(_source(folder)), "-o", str(folder / "out"), *BUILD]) == 0
+    return folder / "out"
+
+
+def test_build_leaves_everything(built: Path) -> None:
+    parts = ("stage/stage.usda", "stage/specimen.usdz", "report/index.html")
+    for name in ("plan.json", "provenance.json", *parts):
+        assert (built / name).is_file(), name
+    assert (built / "bundle" / "manifest.json").is_file()
+    assert not [f for f in built.rglob("*") if f.name.startswith(".")]
+
+
+def test_empty_channel_has_no_surface_and_says_why(built: Path) -> None:
+    store = Store(built)
+    for name, key in store.index().items():
+        tile, channel = name.split("/")
+        record = load_record(store.unit_dir(tile, channel, key))
+        assert bool(record["reason"]) == (channel == "empty")
+    survey = store.survey()
+    assert survey["empty"]["iso"]["r0_c0"]["reason"] == "every voxel is 300"
+
+
+def test_f_is_upright_and_not_mirrored_in_the_composed_stage(built: Path) -> None:
+    stage = Usd.Stage.Open(str(built / "stage" / "stage.usda"))
+    points = []
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            matrix = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)
+            points += [matrix.Transform(p) for p in UsdGeom.Mesh(prim).GetPointsAttr().Get()]
+    x, y, z = np.array(points).T
+    # um: x 0.2, y 0.2, z 0.5 a voxel; stem voxels 6..13, arms to 30, rows 6..42, foot from plane 8
+    # half-way between the last voxel outside and the first inside, to about half a voxel
+    assert 5.5 * 0.2 - 0.11 < x.min() < 5.5 * 0.2 + 0.11
+    assert 29 * 0.2 - 0.2 < x.max() < 30 * 0.2 + 0.2
+    assert -42 * 0.2 - 0.2 < y.min() < -41 * 0.2 + 0.2
+    right = x > 26 * 0.2
+    assert y[right].min() > -14 * 0.2  # only the top arm reaches far right
+    foot = z > 9 * 0.5
+    assert y[foot].max() < -32 * 0.2  # the foot is at the bottom, nearer to the viewer
+    assert x[foot].max() < 14 * 0.2
+
+
+def test_tiff_and_zarr_of_the_same_voxels_give_the_same_surface(
+    built: Path, tmp_path: Path
+) -> None:
+    source = phantoms.write_ome_zarr(
+        tmp_path / "f.ome.zarr",
+        [_two_channels()],
+        axes="czyx",
+        version="0.5",
+        scales=[{"z": 0.5, "y": 0.2, "x": 0.2}],
+        channels=[{"label": "F body"}, {"label": "empty"}],
+    )
+    out = tmp_path / "out"
+    assert make_assets(source, out, "2x1", "--workers", "0") == 0
+    for lod in ("lod0.glb", "lod3.glb"):
+        file = f"bundle/channels/F_x20_body/r0_c0/{lod}"
+        assert (out / file).read_bytes() == (built / file).read_bytes()
+
+
+def asset_digests(out: Path) -> dict[str, str]:
+    return {
+        name: digest
+        for name, digest in digests_of(out).items()
+        if name.startswith(("units/", "stage/", "bundle/"))
+        and not name.endswith(("seconds.json", "plan.key"))  # the second: where the source lies
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_number_of_workers_does_not_change_the_bytes(
+    built: Path, tmp_path: Path, workers: str
+) -> None:
+    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", workers) == 0
+    assert asset_digests(tmp_path / "out") == asset_digests(built)
+
+
+def test_the_same_input_in_any_order_gives_the_same_bytes(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_order = Engine._outcomes
+    asked = []
+
+    def backwards(self, function, tasks):
+        asked.append(len(tasks))
+        last = len(tasks) - 1
+        for place, result, error in in_order(self, function, tasks[::-1]):
+            yield last - place, result, error
+
+    monkeypatch.setattr(Engine, "_outcomes", backwards)
+    assert make_assets(_source(tmp_path), tmp_path / "out", "2x1", "--workers", "0") == 0
+    assert max(asked) == 4
+    assert asset_digests(tmp_path / "out") == asset_digests(built)
+    names = {Path(name).name for name in asset_digests(built)}
+    assert names >= {"unit.json", "lod0.npz", "volume.npy", "stage.usda", "manifest.json"}
+    assert list((built / "units").rglob("seconds.json"))
+
+
+def test_same_build_again_does_nothing(
+    built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = _source(tmp_path), tmp_path / "out"
+    shutil.copytree(built, out)
+    units = {f: f.stat().st_mtime_ns for f in out.rglob("unit.json")}
+    assert units
+    for phase in ("units", "stage"):
+        assert main([phase, str(out), "--workers", "0"]) == 0
+        assert f"{phase}: up to date" in capsys.readouterr().err
+    assert main(["build", str(source), "-o", str(out), *BUILD]) == 0  # a copy of the same input
+    assert {f: f.stat().st_mtime_ns for f in out.rglob("unit.json")} == units
+
+
+def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    store = Store(out)
+    key = store.index()["r0_c1/F_x20_body"]
+    lost, kept = (store.unit_dir(tile, "F_x20_body", key_) for tile, key_ in
+                  (("r0_c1", key), ("r0_c0", store.index()["r0_c0/F_x20_body"])))  # fmt: skip
+    shutil.rmtree(lost)
+    stamp = (kept / "unit.json").stat().st_mtime_ns
+    plan = json.loads((out / "plan.json").read_text())
+    plan["source"] = str(_source(tmp_path))
+    (out / "plan.json").write_text(json.dumps(plan))
+    assert main(["units", str(out), "--workers", "0", "--only", "r0_c1/F body"]) == 0
+    assert (lost / "unit.json").is_file()
+    assert (kept / "unit.json").stat().st_mtime_ns == stamp
+
+
+def test_given_iso_value_is_used_and_the_found_one_kept(tmp_path: Path) -> None:
+    source, out = _source(tmp_path), tmp_path / "out"
+    flags = ["--grid", "1x1", "--iso-value", "F body=400"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    iso = Store(out).survey()["F_x20_body"]["iso"]["r0_c0"]
+    assert iso["value"] == 400
+    assert iso["background"] == 0
+    assert json.loads((out / iso["file"]).read_text())["found"] == pytest.approx(550, abs=250)
+
+
+# --- bad input: one line, exit code, nothing half-written
+
+
+def _one_line(capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the error that was printed, the phases' own lines apart."""
+    lines = capsys.readouterr().err.splitlines()
+    errors = [line for line in lines if line.startswith("stereocell: ")]
+    assert len(errors) == 1, lines
+    assert "Traceback" not in "\n".join(lines)
+    return errors[0]
+
+
+def test_build_of_another_input_into_a_used_out_is_refused(
+    built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = phantoms.write_ome_tiff(tmp_path / "other.ome.tif", _two_channels()[:, :, ::-1], "CZYX")
+    before = digests_of(built)
+    assert main(["build", str(other), "-o", str(built), *BUILD]) == 1
+    assert "holds a build of 'f'" in _one_line(capsys)
+    assert digests_of(built) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--grid", "99x99"], 2, "makes more tiles than"),
+        (["--level", "4"], 2, "--level is 4, expected 0 to 0"),
+        (["--channels", "F bodi"], 2, "did you mean 'F body'"),
+        (["--spacing-um", "1,2"], 2, "--spacing-um is '1,2', expected three numbers"),
+        (["--spacing-um=-1,1,1"], 2, "found -1,1,1, expected z,y,x in um, each above 0"),
+        (["--spacing-um", "0,1,1"], 2, "found 0,1,1"),
+        (["--iso-value", "CD31"], 2, "expected CHANNEL=VALUE"),
+        (["--preset", "none"], 2, "expected one of cycif"),
+        (["--time", "3"], 2, "--time: found 3, expected 0 to 0"),
+    ],
+)
+def test_wrong_flags_leave_nothing(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    code: int,
+    message: str,
+) -> None:
+    source, out = _source(tmp_path), tmp_path / "out"
+    assert main(["build", str(source), "-o", str(out), "--workers", "0", *arguments]) == code
+    assert message in _one_line(capsys)
+    assert not out.exists()
+
+
+def test_all_zero_volume_builds_without_a_surface(tmp_path: Path) -> None:
+    zeros = np.zeros((4, 24, 24), np.uint16)
+    source = phantoms.write_ome_tiff(tmp_path / "zero.ome.tif", zeros)
+    assert main(["build", str(source), "-o", str(tmp_path / "out"), "--workers", "0"]) == 0
+    manifest = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text())
+    assert manifest["channels"][0]["tileset"] is None
+
+
+def test_nan_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    voxels = np.ones((4, 24, 24), np.float32)
+    voxels[2, 3, 4] = np.nan
+    source = phantoms.write_ome_tiff(tmp_path / "nan.ome.tif", voxels)
+    assert main(["build", str(source), "-o", str(tmp_path / "out"), "--workers", "0"]) == 1
+    assert "NaN" in _one_line(capsys)
+
+
+@pytest.mark.parametrize("phase", ["units", "stage", "bundle", "report"])
+def test_phase_without_the_one_before_names_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], phase: str
+) -> None:
+    assert main([phase, str(tmp_path / "out")]) == 1
+    assert "stereocell " in _one_line(capsys)
+    assert not (tmp_path / "out").exists()
+
+
+def test_out_that_is_a_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    out.write_text("in the way")
+    assert main(["plan", str(_source(tmp_path)), "-o", str(out)]) == 1
+    assert str(out) in _one_line(capsys)
+    assert out.read_text() == "in the way"
+
+
+def test_read_only_out_is_named(
+    tmp_path: Path, small_disk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    assert main(["plan", str(_source(tmp_path)), "-o", str(small_disk / "out")]) == 1
+    assert "can't be written (Read-only file system)" in _one_line(capsys)
+
+
+def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    from stereocell.cli.__main__ import COMMANDS
+
+    for name in COMMANDS:
+        with pytest.raises(SystemExit) as stop:
+            main([name, "--help"])
+        assert stop.value.code == 0
+        assert f"example: stereocell {name}" in capsys.readouterr().out
+
+
+def test_fewer_channels_leave_no_stale_file_in_the_stage(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    source = str(_source(tmp_path))
+    assert main(["build", source, "-o", str(out), *BUILD, "--channels", "F body"]) == 0
+    assert list(out.rglob("empty*")) != []  # the units stay: they may be wanted again
+    for part in ("stage", "bundle"):
+        assert not list((out / part).rglob("*empty*"))
+
+
+@pytest.mark.parametrize("change", [["--grid", "1x1"], ["--iso-value", "F body=400"]])
+def test_stage_of_another_plan_than_the_units_is_refused(
+    built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: list[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    assert main(["plan", str(_source(tmp_path)), "-o", str(out), *change]) == 0
+    for phase in ("stage", "report"):
+        capsys.readouterr()
+        assert main([phase, str(out)]) == 1
+        assert "run `stereocell units OUT`" in _one_line(capsys)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_iso_value_must_be_finite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], value: str
+) -> None:
+    arguments = ["plan", str(_source(tmp_path)), "-o", str(tmp_path / "out")]
+    assert main([*arguments, "--iso-value", f"F body={value}"]) == 2
+    assert "expected a number" in _one_line(capsys)
+
+
+def test_readme_s_edit_layer_recolours_the_bundle(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    layer = readme.split("```usda\n")[1].split("```")[0]
+    layer = layer.replace("out/mine", str(out)).replace("CD31", "F_x20_body")
+    (tmp_path / "edited.usda").write_text(layer)
+    edited = ["--stage", str(tmp_path / "edited.usda")]
+    assert main(["bundle", str(out), "--workers", "0", *edited]) == 0
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+    assert manifest["channels"][0]["color"] == pytest.approx([1, 0.1, 0.1])
+
+
+def test_one_unit_alone_does_not_pass_for_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = _source(tmp_path), tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), "--grid", "2x1"]) == 0
+    assert main(["units", str(out), "--workers", "0", "--only", "r0_c1/F body"]) == 0
+    assert len(list(out.rglob("unit.json"))) == 1
+    assert not Store(out).index_file.exists()
+    capsys.readouterr()
+    assert main(["stage", str(out)]) == 1
+    assert "run `stereocell units OUT`" in _one_line(capsys)
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    assert main(["stage", str(out), "--workers", "0"]) == 0

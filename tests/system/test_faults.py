@@ -1,0 +1,377 @@
+"""What a build depends on goes away in the middle and comes back: one line, then the same bytes."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from shutil import which
+from threading import Event, Thread
+from typing import Any
+
+import fsspec
+import pytest
+from aiohttp import ClientTimeout
+
+from stereocell import read
+from stereocell.building import rounds
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import SourceError
+from stereocell.storage import location
+from stereocell.storage.location import Location
+from support import phantoms
+from support.faulty_object_store import FAULTS, Faults, before
+from support.object_store import ObjectStore, serving
+from support.torture import asset_digests
+from support.validators import make_assets
+
+GRID = "2x1"
+Fixture = tuple[ObjectStore, Faults]
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("volume") / "f.ome.zarr"
+    return phantoms.write_ome_zarr(path, [phantoms.f_phantom()])
+
+
+@pytest.fixture(scope="module")
+def undisturbed(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    return assets(asset_digests(out))
+
+
+def assets(digests: dict[str, str]) -> dict[str, str]:
+    """Stage and bundle: what does not name the source."""
+    return {name: digest for name, digest in digests.items() if not name.startswith("units/")}
+
+
+def only_line(capsys: pytest.CaptureFixture[str]) -> str:
+    printed = capsys.readouterr().err
+    assert "Traceback" not in printed
+    (line,) = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
+    return line
+
+
+@pytest.mark.slow
+def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
+    volume: Path,
+    undisturbed: dict[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    away, out = volume.with_name("away"), tmp_path / "out"
+    survey = rounds._survey
+
+    def vanish(*arguments: Any) -> Any:
+        found = survey(*arguments)
+        volume.rename(away)
+        return found
+
+    monkeypatch.setattr(rounds, "_survey", vanish)
+    assert make_assets(volume, out, GRID, "--workers", "0") == 1
+    assert "f.ome.zarr: " in only_line(capsys)
+    assert not list(out.rglob("unit.json"))
+    monkeypatch.undo()
+    away.rename(volume)
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    assert assets(asset_digests(out)) == undisturbed
+
+
+@pytest.mark.slow
+def test_a_source_that_vanishes_under_workers_is_named_and_their_units_are_made_when_it_is_back(
+    volume: Path, tmp_path: Path
+) -> None:
+    grid, away, out = "3x2", volume.with_name("away"), tmp_path / "out"
+    assert make_assets(volume, tmp_path / "whole", grid, "--workers", "0") == 0
+    command = [sys.executable, "-m", "stereocell.cli", "build", str(volume), "-o", str(out)]
+    told = ["--grid", grid, "--workers", "2"]
+    build = subprocess.Popen([*command, *told], stderr=subprocess.PIPE, text=True)
+    while build.poll() is None and not list(out.glob("units/r*/*/*/unit.json")):
+        time.sleep(0.01)
+    volume.rename(away)
+    _, printed = build.communicate()
+    away.rename(volume)
+    assert build.returncode == 1, printed
+    assert "Traceback" not in printed
+    lines = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
+    assert lines
+    assert all("f.ome.zarr: " in line or " failed" in line for line in lines), lines
+    finished = {file: file.stat().st_mtime_ns for file in out.glob("units/r*/*/*/*")}
+    assert 0 < len({file.parent for file in finished}) < 6
+    assert make_assets(volume, out, grid, "--workers", "2") == 0
+    assert {file: file.stat().st_mtime_ns for file in finished} == finished
+    assert asset_digests(out) == asset_digests(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
+    volume: Path,
+    undisturbed: dict[str, str],
+    small_disk: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def remount(options: str) -> None:
+        subprocess.run(["mount", "-o", f"remount,{options}", str(small_disk)], check=True)
+
+    out = small_disk / "out"
+    remount("size=64m")
+    for phase in (["plan", str(volume), "-o", str(out), "--grid", GRID], ["units", str(out)]):
+        remount("ro")
+        assert main(phase) == 1
+        line = only_line(capsys)
+        assert str(out) in line
+        assert "Read-only file system" in line
+        remount("rw")
+        assert main([*phase, *(["--workers", "0"] if phase[0] == "units" else [])]) == 0
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    assert assets(asset_digests(out)) == undisturbed
+
+
+# The command: killed, or with an OUT that can't be written, once the first tile of a phase is done
+IN_THE_MIDDLE = """
+import os, signal, sys
+from stereocell import engine
+from stereocell.cli.__main__ import main
+
+phase, out, fault = sys.argv[1:4]
+tell = engine.console.print
+
+def befall(text, **how):
+    tell(text, **how)
+    if text.startswith(f"{phase}: 1/"):
+        if fault == "killed":
+            os.kill(os.getpid(), signal.SIGKILL)
+        for folder, *_ in os.walk(out):
+            os.chmod(folder, 0o555)
+
+engine.console.print = befall
+sys.exit(main([phase, out, "--workers", "0"]))
+"""
+IN_THE_MIDDLE_OF = (sys.executable, "-c", IN_THE_MIDDLE)
+# root may write anywhere, but for this
+BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(BOUND) and which(BOUND[0]) is None, reason="root without setpriv")
+def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goes_on(
+    volume: Path, undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
+    for phase in ("units", "stage", "bundle"):
+        command = [*BOUND, *IN_THE_MIDDLE_OF, phase, str(out), "read-only"]
+        ended = subprocess.run(command, capture_output=True, text=True)
+        assert ended.returncode == 1, ended.stderr
+        (line,) = [line for line in ended.stderr.splitlines() if line.startswith("stereocell: ")]
+        assert str(out) in line
+        assert "Permission denied" in line
+        assert "/.lock" not in line  # that it can't be removed either is not the news
+        assert "Traceback" not in ended.stderr
+        finished = {file: file.stat().st_mtime_ns for file in out.glob("units/r*/*/*/*")}
+        assert finished
+        for folder, *_ in os.walk(out):
+            os.chmod(folder, 0o755)
+        assert main([phase, str(out), "--workers", "0"]) == 0
+        assert {file: file.stat().st_mtime_ns for file in finished} == finished
+    assert assets(asset_digests(out)) == undisturbed
+    assert not [path for path in out.rglob(".*") if path.name != ".nojekyll"]
+
+
+@pytest.mark.slow
+def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
+    volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    for phase, made in (("stage", "stage/tiles"), ("bundle", "bundle_parts/*")):
+        ended = subprocess.run([*IN_THE_MIDDLE_OF, phase, str(out), "killed"], check=False)
+        assert ended.returncode == -signal.SIGKILL
+        (tile,) = out.glob(f"{made}/r0_c[01]")
+        finished = {file.relative_to(tile): file.stat().st_mtime_ns for file in tile.rglob("*.*")}
+        assert len(finished) > 3
+        capsys.readouterr()
+        assert main([phase, str(out), "--workers", "0"]) == 0
+        (told,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]
+        assert told.startswith(f"{phase}: 1/1 r0_c")
+        assert tile.name not in told
+        final = tile if phase == "stage" else out / "bundle"
+        for name, written in finished.items():
+            if name.name != "tile.json":  # stays behind with the parts
+                assert (final / name).stat().st_mtime_ns == written
+    assert not (out / "bundle_parts").exists()
+    assert assets(asset_digests(out)) == undisturbed
+
+
+@pytest.mark.slow
+def test_a_finished_tile_that_is_damaged_or_of_other_settings_is_made_again(
+    volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert make_assets(volume, out, GRID, "--workers", "0") == 0
+    (grid,) = out.glob("stage/tiles/r0_c1/*.vdb")
+    grid.write_bytes(b"cut")
+    capsys.readouterr()
+    assert main(["stage", str(out), "--workers", "0"]) == 0
+    assert "stage: 1/1 r0_c1" in capsys.readouterr().err
+    subprocess.run([*IN_THE_MIDDLE_OF, "bundle", str(out), "killed"], check=False)
+    (part,) = out.glob("bundle_parts/*/r0_c[01]")
+    next(part.rglob("*.glb")).write_bytes(b"cut")
+    capsys.readouterr()
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    assert "bundle: 2/2" in capsys.readouterr().err
+    assert assets(asset_digests(out)) == undisturbed
+
+
+@pytest.fixture(scope="module")
+def store(
+    volume: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[ObjectStore, Faults]]:
+    with (
+        serving(tmp_path_factory.mktemp("objects")) as store,
+        before(store.endpoint) as faults,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        through = ObjectStore(store.kind, faults.endpoint)
+        for name, value in through.environment.items():
+            patch.setenv(name, value)
+        fs = through.files()
+        fs.mkdir("bucket")
+        fs.put(str(volume), "bucket/f.ome.zarr", recursive=True)
+        yield through, faults
+
+
+def kept(store: ObjectStore, out: str, folder: Path) -> dict[str, str]:
+    store.files().get(out, str(folder), recursive=True)
+    return assets(asset_digests(folder))
+
+
+@pytest.mark.slow
+def test_a_store_that_fails_now_and_then_is_asked_again(
+    store: Fixture, undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    files, faults = store
+    faults.seen.clear()
+    faults.rate = 0.15
+    try:
+        code = make_assets("s3://bucket/f.ome.zarr", "s3://bucket/often", GRID, "--workers", "0")
+    finally:
+        faults.rate = 0
+    assert code == 0
+    assert set(FAULTS) <= faults.seen.keys()
+    assert kept(files, "bucket/often", tmp_path / "often") == undisturbed
+
+
+@pytest.mark.slow
+def test_a_store_that_is_down_is_named_and_the_build_goes_on_when_it_is_up(
+    store: Fixture,
+    undisturbed: dict[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    files, faults = store
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    source, out = "s3://bucket/f.ome.zarr", "s3://bucket/down"
+    assert main(["plan", source, "-o", out, "--grid", GRID]) == 0
+    for kind in ("503", "cut"):
+        capsys.readouterr()
+        faults.rate, faults.only = 1.0, (kind,)
+        try:
+            assert main(["units", out, "--workers", "0"]) == 1
+        finally:
+            faults.rate, faults.only = 0, FAULTS
+        assert "s3://bucket/" in only_line(capsys)
+    assert make_assets(source, out, GRID, "--workers", "0") == 0
+    assert kept(files, "bucket/down", tmp_path / "down") == undisturbed
+
+
+@pytest.fixture
+def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The address of a host that takes connections and says nothing."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        host = f"127.0.0.1:{server.getsockname()[1]}"
+        # another file system than that of the tests before, which has an endpoint already
+        told = {"anon": True, "config_kwargs": {"user_agent_extra": host}}
+        monkeypatch.setitem(fsspec.config.conf, "s3", told)
+        yield host
+
+
+@pytest.mark.parametrize("source", ["s3://b/f.ome.zarr", "http://HOST/f.ome.zarr", ""])
+def test_a_silent_store_is_told_in_a_line(
+    source: str,
+    silent: str,
+    volume: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{silent}")
+    monkeypatch.setattr(location, "ANSWER_S", 1.0)
+    source = source.replace("HOST", silent)
+    out = tmp_path / "out" if source else "s3://b/out"
+    assert main(["plan", source or str(volume), "-o", str(out)]) == 1
+    where = source or out
+    assert only_line(capsys).startswith(f"stereocell: {where}: no answer within ")
+
+
+class Moody(SimpleHTTPRequestHandler):
+    """Serves files; of the finest level in drips, or not at all once `is_hushed`."""
+
+    is_hushed = Event()
+    is_over = Event()
+
+    def copyfile(self, source: Any, outputfile: Any) -> None:
+        if "/0/" not in self.path:
+            return super().copyfile(source, outputfile)
+        if self.is_hushed.is_set():
+            self.is_over.wait(30)
+            return
+        content = source.read()
+        for part in range(8):
+            outputfile.write(content[len(content) * part // 8 : len(content) * (part + 1) // 8])
+            outputfile.flush()
+            time.sleep(0.5)  # of a silence of 3 s: these cores are shared
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_web_host_may_be_slow_but_not_silent(
+    volume: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(location, "SILENCE_S", 3.0)
+    Moody.is_hushed.clear()
+    Moody.is_over.clear()
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Moody, directory=str(volume.parent)))
+    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    source = f"http://127.0.0.1:{server.server_address[1]}/{volume.name}"
+    try:
+        begin = time.monotonic()
+        dataset = read.open(source)  # the array's metadata drip, too
+        dataset.read(0, dataset.levels[0].box)
+        assert time.monotonic() - begin > 6.0
+        Moody.is_hushed.set()
+        with pytest.raises(SourceError, match=r"f\.ome\.zarr.*did not answer within 3 s"):
+            dataset.read(0, dataset.levels[0].box)
+    finally:
+        Moody.is_over.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def test_what_the_user_has_of_web_clients_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = {"timeout": ClientTimeout(total=7), "trust_env": True}
+    monkeypatch.setitem(fsspec.config.conf, "http", {"client_kwargs": told})
+    assert Location.of("https://a/b.ome.zarr").storage_options == {"client_kwargs": told}

@@ -1,0 +1,352 @@
+"""One bit that flipped in a file of a build, or a file that is gone: seen, named, and mended.
+
+Each flip keeps the file's size; a `silent` one keeps its time, too, as a worn disk does.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pxr import Sdf
+
+from stereocell.building.out_folder import Store
+from stereocell.building.unit_files import find_damage, is_whole
+from stereocell.cli.__main__ import main
+from stereocell.storage import file_list
+from stereocell.verify.formats import CheckLine, check
+from support import phantoms
+from support.digests import digests_of
+
+# names with a space and an apostrophe; the second has no surface
+NAMES = ["Alice's F", "empty"]
+F = "Alice_x27_s_x20_F"
+UNIT_FILES = ["unit.json", "volume.npy", "lod0.npz", "closed.stl"]
+STAGE_FILES = [
+    f"tiles/r0_c0/{F}.exr",
+    f"tiles/r0_c0/{F}.vdb",
+    f"tiles/r0_c0/{F}_closed.stl",
+    f"tiles/r0_c0/{F}_lod1_normal.png",
+    f"looks/{F}_default.exr",
+    "specimen.usdz",
+]
+FLAGS = ["--workers", "0"]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("a build's place")
+    body = phantoms.f_phantom()
+    voxels = np.stack([body, np.full_like(body, 300)])
+    source = phantoms.write_ome_tiff(folder / "f.ome.tif", voxels, "CZYX", names=NAMES)
+    plan = ["plan", str(source), "-o", str(folder / "out"), "--grid", "2x1", "--closed-tiles"]
+    assert main(plan) == 0
+    _go_on(folder / "out")
+    return folder / "out"
+
+
+@pytest.fixture
+def out(built: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(built, tmp_path / "out")
+
+
+def _go_on(out: Path) -> None:
+    for phase in ("units", "stage", "bundle"):
+        assert main([phase, str(out), *FLAGS]) == 0
+
+
+def _unit(out: Path) -> Path:
+    return Store(out).unit_dir("r0_c0", F, Store(out).index()[f"r0_c0/{F}"])
+
+
+def _flip(file: Path, *, silent: bool = False) -> None:
+    """Flip one bit in the middle of a file."""
+    status = file.stat()
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    if silent:
+        os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+def _line(out: Path, name: str) -> CheckLine:
+    return next(line for line in check(out) if line.name == name)
+
+
+def _assets(out: Path) -> dict[str, str]:
+    return {
+        name: digest
+        for part in ("units", "stage", "bundle")
+        for name, digest in digests_of(out / part).items()
+        if not name.endswith("seconds.json")
+    }
+
+
+# --- units
+
+
+@pytest.mark.parametrize("name", UNIT_FILES)
+@pytest.mark.parametrize("silent", [False, True])
+def test_flipped_bit_of_a_unit_is_named_by_check(out: Path, name: str, silent: bool) -> None:
+    assert _line(out, "units").ok
+    _flip(_unit(out) / name, silent=silent)
+    line = _line(out, "units")
+    assert not line.ok
+    assert f"{_unit(out).relative_to(out)}/{name}: damaged" in line.detail
+    assert "run `stereocell units OUT`" in line.detail
+
+
+@pytest.mark.parametrize("name", UNIT_FILES)
+def test_unit_with_a_flipped_bit_is_made_anew(out: Path, built: Path, name: str) -> None:
+    _flip(_unit(out) / name)
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+@pytest.mark.parametrize("name", UNIT_FILES)
+def test_no_flipped_bit_of_a_unit_gets_into_the_stage(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    shutil.rmtree(out / "stage")
+    _flip(_unit(out) / name, silent=True)
+    capfd.readouterr()
+    if name == "unit.json":  # is read by each command, and so found damaged whenever it was
+        assert not is_whole(_unit(out))
+    assert main(["stage", str(out), *FLAGS]) == 1
+    said = capfd.readouterr().err
+    assert f"{_unit(out) / name}: damaged" in said
+    assert f"remove {_unit(out)} and run `stereocell units OUT`" in said
+    assert "Traceback" not in said
+    shutil.rmtree(_unit(out))
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def test_lost_file_of_a_unit_is_named(out: Path) -> None:
+    (_unit(out) / "lod1.npz").unlink()
+    assert find_damage(_unit(out)) == {"lod1.npz": "missing"}
+    assert "lod1.npz: missing" in _line(out, "units").detail
+
+
+def test_each_damaged_file_is_named(out: Path) -> None:
+    folder = out / "stage" / "tiles" / "r0_c0"
+    files = sorted(folder.glob("*.png"))
+    assert len(files) > 3
+    for file in files:
+        _flip(file)
+    detail = _line(out, "stage hashes").detail
+    assert all(f"stage/tiles/r0_c0/{file.name}: damaged" in detail for file in files)
+
+
+# --- the stage
+
+
+def test_the_list_holds_all_that_the_stage_phase_wrote(built: Path) -> None:
+    listed = json.loads((built / "stage" / "files.json").read_bytes())
+    written = digests_of(built / "stage")
+    del written["files.json"]
+    assert {path: entry["sha256"] for path, entry in listed.items()} == written
+    assert set(STAGE_FILES) <= set(listed)
+    assert list(listed) == sorted(listed)
+
+
+@pytest.mark.parametrize("name", STAGE_FILES)
+@pytest.mark.parametrize("silent", [False, True])
+def test_flipped_bit_of_the_stage_is_named_by_check(out: Path, name: str, silent: bool) -> None:
+    assert _line(out, "stage hashes").ok
+    _flip(out / "stage" / name, silent=silent)
+    line = _line(out, "stage hashes")
+    assert not line.ok
+    assert f"stage/{name}: damaged" in line.detail
+    assert "remove what is damaged and run `stereocell stage OUT`" in line.detail
+    (out / "stage" / name).unlink()
+    assert f"stage/{name}: missing" in _line(out, "stage hashes").detail
+
+
+@pytest.mark.parametrize("name", STAGE_FILES)
+def test_file_of_the_stage_with_a_flipped_bit_is_made_anew(
+    out: Path, built: Path, name: str
+) -> None:
+    _flip(out / "stage" / name)
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+@pytest.mark.parametrize("name", [STAGE_FILES[0], STAGE_FILES[3]])
+def test_no_flipped_bit_of_the_stage_gets_into_the_bundle(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    shutil.rmtree(out / "bundle")
+    _flip(out / "stage" / name, silent=True)
+    capfd.readouterr()
+    assert main(["bundle", str(out), *FLAGS]) == 1
+    said = capfd.readouterr().err
+    assert f"{name}: damaged, not the bytes that files.json says: remove it and run" in said
+    assert "`stereocell stage OUT`" in said
+    assert "Traceback" not in said
+    assert not (out / "bundle").exists()
+    (out / "stage" / name).unlink()
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+@pytest.mark.parametrize("name", [f"volumes/r0_c0/{F}.ktx2", f"channels/{F}/r0_c0/lod0.glb"])
+def test_file_of_the_bundle_with_a_flipped_bit_is_made_anew(
+    out: Path, built: Path, name: str
+) -> None:
+    _go_on(out)  # of a copy, the bundle is of another stage
+    _flip(out / "bundle" / name)
+    assert f"{name}: not the bytes" in _line(out, "hashes").detail
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def _recolour(layer_file: Path) -> None:
+    layer = Sdf.Layer.OpenAsAnonymous(str(layer_file))
+    layer.GetAttributeAtPath(f"/Specimen/Channels/{F}.inputs:color").default = (1, 0, 0)
+    layer.Export(str(layer_file))
+
+
+def _retint(layer_file: Path) -> None:
+    layer = Sdf.Layer.OpenAsAnonymous(str(layer_file))
+    layer.comment = "moved by hand"
+    layer.Export(str(layer_file))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [("looks/channels.usda", _recolour), ("tiles/r0_c0/tile.usdc", _retint)],
+)
+def test_layer_edited_in_place_stays_and_is_called_edited_or_damaged(
+    out: Path, capfd: pytest.CaptureFixture[str], name: str, change: Callable[[Path], None]
+) -> None:
+    file = out / "stage" / name
+    change(file)
+    edited = file.read_bytes()
+    capfd.readouterr()
+    _go_on(out)
+    said = capfd.readouterr().err
+    assert f"{name}: changed since it was written: edited in place, or damaged: taken as" in said
+    assert file.read_bytes() == edited
+    line = _line(out, "stage hashes")
+    assert f"stage/{name}: changed since it was written: edited in place, or dam" in line.detail
+    assert "edits belong in a layer of your own" in line.detail
+
+
+@pytest.mark.parametrize("silent", [False, True])
+def test_binary_layer_with_a_flipped_bit_gets_into_no_bundle_and_is_not_overwritten(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str], silent: bool
+) -> None:
+    """USD opens it: somebody may have edited it, and left it as long as it was."""
+    file = out / "stage" / "tiles" / "r0_c0" / "tile.usdc"
+    shutil.rmtree(out / "bundle")
+    _flip(file, silent=silent)
+    flipped = file.read_bytes()
+    both = "tile.usdc: changed since it was written, not in size: damaged, or edited in place"
+    assert both in _line(out, "stage hashes").detail
+    assert main(["stage", str(out), *FLAGS]) == 0
+    capfd.readouterr()
+    assert main(["bundle", str(out), *FLAGS]) == 1
+    said = capfd.readouterr().err
+    assert f"{both}: remove it and run `stereocell stage OUT`" in said
+    assert file.read_bytes() == flipped
+    file.unlink()
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def test_layer_that_no_longer_opens_is_damaged(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    shutil.rmtree(out / "bundle")
+    file = out / "stage" / "tiles" / "r0_c0" / "tile.usdc"
+    status = file.stat()
+    data = bytearray(file.read_bytes())
+    data[:8] = bytes(8)  # PXR-USDC
+    file.write_bytes(data)
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert "tile.usdc: damaged" in _line(out, "stage hashes").detail
+    capfd.readouterr()
+    assert main(["bundle", str(out), *FLAGS]) == 1
+    assert "tile.usdc: damaged, not the bytes that files.json says" in capfd.readouterr().err
+    file.unlink()
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def test_files_that_an_artist_puts_there_are_no_damage_and_stay(out: Path, built: Path) -> None:
+    own = [out / "stage" / name for name in ("mine.usda", "tiles/r0_c0/my own.png")]
+    for file in own:
+        file.write_text("#usda 1.0\n")
+    assert _line(out, "stage hashes").ok
+    made = (out / "stage" / "stage.usda").stat().st_mtime_ns
+    _go_on(out)
+    assert all(file.is_file() for file in own)
+    assert (out / "stage" / "stage.usda").stat().st_mtime_ns == made
+
+
+@pytest.mark.parametrize("spoil", [lambda f: f.unlink(), _flip, lambda f: f.write_text("{}")])
+def test_list_that_is_lost_or_damaged_is_made_anew(
+    out: Path, built: Path, spoil: Callable[[Path], None]
+) -> None:
+    spoil(out / "stage" / "files.json")
+    line = _line(out, "stage hashes")
+    assert not line.ok
+    assert "files.json" in line.detail
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def test_layer_over_the_stage_elsewhere_reads_no_damaged_file(
+    out: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    edit = tmp_path / "edit.usda"
+    edit.write_text(f"#usda 1.0\n(\n    subLayers = [@{out}/stage/stage.usda@]\n)\n")
+    assert main(["bundle", str(out), *FLAGS, "--stage", str(edit)]) == 0
+    shutil.rmtree(out / "bundle")
+    _flip(out / "stage" / STAGE_FILES[0], silent=True)
+    assert main(["bundle", str(out), *FLAGS, "--stage", str(edit)]) == 1
+    assert f"{STAGE_FILES[0]}: damaged" in capfd.readouterr().err
+
+
+# --- what it costs
+
+
+def _count_hashed(hashed: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    measure = file_list.measure
+
+    def count(file: Path) -> dict[str, Any]:
+        hashed.append(file)
+        return measure(file)
+
+    monkeypatch.setattr(file_list, "measure", count)
+
+
+def test_a_build_with_nothing_to_do_reads_no_file_of_units_and_stage(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _go_on(out)  # of a copy, the bundle is of another stage
+    hashed: list[Path] = []
+    _count_hashed(hashed, monkeypatch)
+    _go_on(out)
+    assert hashed == []
+
+
+def test_a_copy_with_new_times_is_hashed_once(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = shutil.copytree(built, tmp_path / "out")
+    now = (_unit(out) / "unit.json").stat().st_mtime_ns + 10**9
+    for name in ("volume.npy", "lod0.npz"):
+        os.utime(_unit(out) / name, ns=(now, now))
+    hashed: list[Path] = []
+    _count_hashed(hashed, monkeypatch)
+    assert is_whole(_unit(out))
+    assert sorted(file.name for file in hashed) == ["lod0.npz", "volume.npy"]
+    hashed.clear()
+    assert is_whole(_unit(out))
+    assert hashed == []

@@ -1,0 +1,237 @@
+"""`make` takes what a person sets as it stands: a name with a quote is a name, and nothing runs."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stereocell.cli.__main__ import main
+from support.server.timeouts import PATIENCE_S
+
+ROOT = Path(__file__).parents[2]
+NAMES = (
+    "plain", "two words", "it's", 'say "x"', "a$b", "$HOME", "$(HOME)", "$(touch pwned)",
+    "$(shell touch pwned)", "`touch pwned`", "a; touch pwned", "a & touch pwned", "a | b > c",
+    "a#b", "50%", "a:b", "a\nb", "a\n\ttouch pwned", "-n", "--help", "a\\b", "a\\", "*", "~",
+    "a,b", "(", ")", "a=b", "a\tb ", "Gr\u00f6\u00dfe",
+)  # fmt: skip
+FAKE = r"""#!/bin/sh
+{ for word; do printf '%s\0' "$word"; done; printf '\1'; } >> calls
+for out; do :; done
+case "$1" in
+  plan | build) for word; do case "$word" in --out=*) out="${word#--out=}" ;; esac; done ;;
+esac
+make_file() { mkdir -p -- "$out/$1" && touch -- "$out/$1/$2"; }
+case "$1" in
+  plan) make_file . plan.json ;;
+  units) make_file units done.json ;;
+  stage) make_file stage stage.usda ;;
+  bundle) make_file bundle manifest.json ;;
+  report) make_file report index.html ;;
+  build) make_file stage a; make_file bundle a; make_file report a ;;
+esac
+"""
+Make = Callable[..., subprocess.CompletedProcess[str]]
+
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make")
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout, itself in a folder with a hard name, whose command is FAKE."""
+    folder = tmp_path / 'it\'s a "$(touch pwned)" check out'
+    folder.mkdir()
+    for name in ("Makefile", "pipeline", "schemas", ".venv"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "fake").write_text(FAKE)
+    (folder / "fake").chmod(0o755)
+    return folder
+
+
+@pytest.fixture
+def make(checkout: Path) -> Make:
+    """Runs make in the checkout, which counts as set up; variables by name."""
+    ours = ("MAKE", "MFLAGS", "INPUT", "OUT", "SAMPLE", "WORKERS", "ARGS", "CI", "RUN")
+
+    def run(
+        *words: str, environment: dict[str, str] | None = None, **set_: str
+    ) -> subprocess.CompletedProcess[str]:
+        inherited = {k: v for k, v in os.environ.items() if not k.startswith(ours)}
+        set_ = {"RUN": "./fake", **set_}
+        ready = ["-o", ".venv/.ready", "-o", "viewer_gltf/dist/index.html"]
+        return subprocess.run(
+            ["make", *ready, *words, *(f"{name}={value}" for name, value in set_.items())],
+            cwd=checkout,
+            env={**inherited, **(environment or {})},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_S,
+        )
+
+    return run
+
+
+def calls(checkout: Path) -> list[list[str]]:
+    """Return the words of each call of FAKE since the last time."""
+    file = checkout / "calls"
+    text = file.read_text() if file.exists() else ""
+    file.unlink(missing_ok=True)
+    return [call.split("\0")[:-1] for call in text.split("\1")[:-1]]
+
+
+def phases(source: str, out: str) -> list[list[str]]:
+    told = [[phase, "--workers=3", "--", out] for phase in ("units", "stage", "bundle")]
+    return [["plan", f"--out={out}", "--", source], *told, ["report", "--", out]]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_phases_take_names_as_they_stand_and_make_what_is_left(
+    checkout: Path, make: Make, name: str
+) -> None:
+    source, out = name, f"{name}.out"
+    (checkout / source).write_text("")
+    set_ = {"INPUT": source, "OUT": out, "WORKERS": "3"}
+    before = {path.name for path in checkout.iterdir()}
+    made = make("report", **set_)
+    assert (made.returncode, made.stderr) == (0, "")
+    assert calls(checkout) == phases(source, out)
+    assert {path.name for path in checkout.iterdir()} == before | {out, "out"}
+
+    again = make("report", **set_)
+    assert (again.returncode, calls(checkout)) == (0, [])
+    assert "fake" not in make("-n", "report", **set_).stdout
+    (checkout / out / "stage" / "stage.usda").unlink()
+    assert [phase in make("-n", "report", **set_).stdout for phase in ("units", "stage")] == [
+        False,
+        True,
+    ]
+    make("stage", **set_)
+    assert calls(checkout) == phases(source, out)[2:3]
+    # of the environment; with other ARGS the plan is made anew
+    del set_["WORKERS"]
+    make("plan", environment={**set_, "ARGS": "--grid 2x1"})
+    assert calls(checkout) == [["plan", f"--out={out}", "--grid", "2x1", "--", source]]
+
+    for target, words in (("check", ["check"]), ("view", ["view"]), ("serve", ["serve", "--lan"])):
+        make(target, OUT=out, ARGS="--lan")
+        assert calls(checkout) == [[*words, "--", out]]
+    assert not list(checkout.parent.rglob("pwned"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_goes_to_a_make_within_make_stays_as_it_is(
+    checkout: Path, make: Make, name: str
+) -> None:
+    ready = "-o .venv/.ready -o viewer_gltf/dist/index.html"
+    (checkout / "outer.mk").write_text(f"include Makefile\nagain:\n\t$(MAKE) {ready} serve\n")
+    assert make("-f", "outer.mk", "again", OUT=name, ARGS="--lan").returncode == 0
+    assert calls(checkout) == [["serve", "--lan", "--", name]]
+    assert not (checkout / "pwned").exists()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_demo_and_its_workers_too(checkout: Path, make: Make, name: str) -> None:
+    made = make("demo", OUT=name, WORKERS=name, ARGS="--grid 1x1", SAMPLE="mri")
+    assert (made.returncode, made.stderr) == (0, "")
+    sampled, built, checked = calls(checkout)
+    place = "out/samples/head"
+    assert sampled == ["sample", "mri", place]
+    assert built == [
+        *("build", place, f"--out={name}", f"--workers={name}", "--preset", "mri"),
+        *("--grid", "1x1"),
+    ]
+    assert checked == ["check", "--deep", f"--workers={name}", "--", name]
+    told = made.stdout.splitlines()[-1] if "\n" not in name else ""
+    if told:
+        shown = told.partition("OUT=")[2]
+        echoed = subprocess.run(
+            ["bash", "-c", f"printf %s {shown}"], capture_output=True, text=True, check=True
+        )
+        assert echoed.stdout == name
+    assert not (checkout / "pwned").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('--config "my file.toml"', ["--config", "my file.toml"]),
+        ("--config 'it\"s' a\\ b", ["--config", 'it"s', "a b"]),
+        ("$(touch pwned) `touch pwned`", ["$(touch", "pwned)", "`touch", "pwned`"]),
+        ("$(shell touch pwned)", ["$(shell", "touch", "pwned)"]),
+        ("a; touch pwned & # $HOME *", ["a;", "touch", "pwned", "&", "#", "$HOME", "*"]),
+        ("a\nb\tc", ["a", "b", "c"]),
+        ("", []),
+        ("ARGS ''", ["ARGS", ""]),
+    ],
+)
+def test_args_are_words_as_a_shell_has_them_and_nothing_runs(
+    checkout: Path, make: Make, text: str, words: list[str]
+) -> None:
+    assert make("plan", INPUT="ARGS", OUT="o", ARGS=text).returncode == 0
+    assert calls(checkout) == [["plan", "--out=o", *words, "--", "ARGS"]]
+    assert not (checkout / "pwned").exists()
+
+
+def test_another_request_for_the_same_out_is_planned_anew(checkout: Path, make: Make) -> None:
+    for name in ("a", "a b"):
+        (checkout / name).touch()
+    for source, text in (("a", "b c"), ("a b", "c"), ("a b", "")):
+        make("plan", INPUT=source, OUT="o", ARGS=text)
+        make("plan", INPUT=source, OUT="o", ARGS=text)
+        assert calls(checkout) == [["plan", "--out=o", *text.split(), "--", source]]
+    os.utime(checkout / "a b", (2e9, 2e9))  # the source is newer than its plan
+    assert "plan" in make("-n", "plan", INPUT="a b", OUT="o").stdout
+
+
+def test_what_can_not_be_is_told_in_a_line(checkout: Path, make: Make) -> None:
+    for set_, told in (
+        ({"INPUT": "a", "ARGS": 'say "x'}, 'ARGS is say "x: No closing quotation, expected words'),
+        ({}, "INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder"),
+        ({"INPUT": "a", "OUT": ""}, "OUT is empty, expected OUT=folder"),
+        ({"SAMPLE": "%"}, "SAMPLE is %, expected cycif, brain-cells or mri"),
+        ({"SAMPLE": "cycif mri"}, "SAMPLE is cycif mri, expected"),
+        ({"SAMPLE": "$(shell touch pwned)"}, "SAMPLE is $(shell touch pwned), expected"),
+    ):
+        refused = make("plan", **set_)
+        assert refused.returncode == 2
+        assert told in refused.stderr
+        assert calls(checkout) == []
+    assert not (checkout / "pwned").exists()
+
+
+def test_programs_and_folders_have_names_too(checkout: Path, make: Make) -> None:
+    name = 'it\'s $(touch pwned) "py"; x'
+    (checkout / name).write_text("#!/bin/sh\necho Python 3.9\nexit 1\n")
+    (checkout / name).chmod(0o755)
+    for file in ("requirements.lock", "pyproject.toml"):
+        (checkout / file).touch()
+    refused = make("none/.ready", VENV="none", PYTHON=f"./{name}")
+    assert refused.stderr.splitlines()[0] == (
+        f"setup: ./{name} is Python 3.9, expected 3.11 or newer (PYTHON=... names another)"
+    )
+    assert make("browser", CHROMIUM=name).stdout == ""
+    show = checkout / "show"
+    show.write_text('#!/bin/sh\nprintf %s "$STEREOCELL_DATA-$CHROMIUM" > shown\n')
+    show.chmod(0o755)
+    make("check", RUN="./show", STEREOCELL_DATA=name, CHROMIUM="$(HOME)")
+    assert (checkout / "shown").read_text() == f"{name}-$(HOME)"
+    assert not (checkout / "pwned").exists()
+
+
+@pytest.mark.slow
+def test_a_build_by_a_hard_name(checkout: Path, make: Make, tmp_path: Path) -> None:
+    source, out = "it's $(touch pwned); 100%.ome.zarr", '-my "out": `touch pwned` #1'
+    sample = ["sample", "cycif", str(checkout / source), "--grid", "1x1"]
+    assert main([*sample, "--tile-size", "16,48,48"]) == 0
+    (checkout / "my settings.toml").write_text('[plan]\nchannels = ["CD31"]\n')
+    set_ = {"INPUT": source, "OUT": out, "WORKERS": "0", "RUN": ".venv/bin/stereocell"}
+    set_["ARGS"] = '--config "my settings.toml"'
+    made = make("bundle", **set_)
+    assert made.returncode == 0, made.stderr
+    assert (checkout / out / "bundle" / "manifest.json").is_file()
+    assert "make: Nothing to be done" in make("bundle", **set_).stdout
+    assert make("check", **set_).returncode == 0
+    assert not list(checkout.glob("pwned"))

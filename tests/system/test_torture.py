@@ -1,0 +1,32 @@
+"""A little of what `make torture` does: two kills, in phases whose results are put together last.
+
+Of the command alone tells test_resume.py too, of a worker test_engine.py.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from support.torture import KINDS, PHASES, Folder, Torture, kills_of
+
+KILLS = {"session": "stage", "scheduler": "bundle"}
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_a_build_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+    torture = Torture(tmp_path, Folder(tmp_path / "out"), seed=3)
+    for kind, phase in KILLS.items():
+        torture.kill_in(kind, phase)
+    torture.end()
+    assert all(torture.outcomes[kind] for kind in KILLS)
+    assert all(torture.phases[phase] for phase in KILLS.values())
+    assert torture.outcomes["ended"] >= 1
+
+
+def test_kills_are_spread_evenly_over_phases_places_and_kinds() -> None:
+    kills = list(kills_of(60, ["folder", "bucket"]))
+    for place in ("folder", "bucket"):
+        for phase in PHASES:
+            kinds = [k for p, k, f in kills if (p, f) == (place, phase)]
+            assert len(kinds) == 5
+            assert set(kinds) == set(KINDS) - ({"worker"} if phase == "plan" else set())

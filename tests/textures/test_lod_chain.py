@@ -1,0 +1,207 @@
+"""Levels of detail as they are written: sound, with their borders, measured and recorded."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista as pv
+from scipy import ndimage
+from test_certify import ball, kinds, moved, to_mesh
+
+from stereocell.building.settings import Settings
+from stereocell.isosurface.extract import cut_planes, extract_surface
+from stereocell.meshes import simplify_valid
+from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
+from stereocell.meshes.simplify import simplify
+from stereocell.meshes.simplify_valid import Mended, simplify_soundly
+from stereocell.meshes.validity import border, certify
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+from stereocell.model.timing import Clock
+from stereocell.textures import lod_chain
+from stereocell.textures.lod_chain import make_levels, sharpest_angle
+
+SPACING = (1.0, 1.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
+REGION = Box((0, 0, 0), (40, 40, 60))
+LATTICE = Box((0, 0, 0), (40, 40, 31))
+PLANES = cut_planes(LATTICE, REGION, SPACING, ORIGIN)
+
+
+@pytest.fixture(scope="module")
+def sponge() -> Mesh:
+    """Smoothed noise: handles, thin walls and bodies side by side, cut by a plane."""
+    noise = np.random.default_rng(0).normal(size=REGION.shape)
+    field = ndimage.gaussian_filter(noise, 1.6)
+    distance = np.clip((field - 0.3 * field.std()) / field.std(), -2, 2).astype(np.float32)
+    part = distance[LATTICE.slices]
+    return extract_surface(part, LATTICE, LATTICE, REGION, SPACING, ORIGIN)
+
+
+def _chain(mesh: Mesh) -> Iterator[Mended]:
+    for error in (0.1, 0.5, 2.0, 4.0):
+        mended = simplify_soundly(mesh, PLANES, error)
+        yield mended
+        mesh = mended.mesh
+
+
+def _settings(errors: tuple[float, ...]) -> Settings:
+    """Return settings for levels of these errors, none with maps."""
+    settings = Settings()
+    return replace(
+        settings,
+        surface=settings.surface.resolved(SPACING),
+        lod=replace(settings.lod, errors=errors),
+        unwrap=replace(settings.unwrap, first_lod=9),
+    )
+
+
+def _rim(mesh: Mesh) -> set[bytes]:
+    return {ends.tobytes() for ends in mesh.positions[border(mesh.triangles)]}
+
+
+def test_simplification_alone_makes_faults_here(sponge: Mesh) -> None:
+    """Else the tests below would show nothing."""
+    assert kinds(certify(sponge, PLANES)) == set()
+    found = certify(simplify(sponge, 2.0), PLANES)
+    assert {"crowded", "pinched", "crossings"} <= kinds(found)
+
+
+def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
+    lod_chain = list(_chain(sponge))
+    for level in lod_chain:
+        assert kinds(certify(level.mesh, PLANES)) == set()
+        assert _rim(level.mesh) == _rim(sponge)
+        assert level.fallbacks == 0
+    assert lod_chain[1].mended > 0
+    counts = [len(sponge.triangles), *(len(level.mesh.triangles) for level in lod_chain)]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] < 0.1 * counts[0]
+
+
+def test_body_that_cannot_be_mended_keeps_its_surface_and_is_counted(
+    sponge: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alone = moved(ball(1.0), (15.0, -20.0, -9.0))
+    start = np.uint32(len(sponge.positions))
+    both = Mesh(
+        np.concatenate([sponge.positions, alone.positions]),
+        np.concatenate([sponge.triangles, alone.triangles + start]),
+        np.concatenate([sponge.normals, alone.normals]),
+    )
+    monkeypatch.setattr(simplify_valid, "ROUNDS", 0)
+    kept = simplify_soundly(both, PLANES, 2.0)
+    assert kept.fallbacks > 0
+    assert kinds(certify(kept.mesh, PLANES)) == set()
+    assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # the sponge is one body, mostly
+    assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)  # the ball isn't
+
+
+def test_mesh_with_faults_of_its_own_keeps_the_body_that_has_them() -> None:
+    """Nothing hides: what is at fault stays, and is found by whoever checks."""
+    holed = replace(ball(), triangles=ball().triangles[1:])
+    done = simplify_soundly(holed, (), 0.5)
+    assert done.fallbacks == 1
+    np.testing.assert_array_equal(done.mesh.triangles, holed.triangles)
+    assert kinds(certify(done.mesh)) == {"open"}
+
+
+@pytest.fixture(scope="module")
+def with_process() -> Mesh:
+    """A body of radius 9.5 at x = 15 with a process of radius 1.3 that ends at x = 71."""
+    shape = (40, 40, 80)
+    z, y, x = (axis.astype(np.float64) for axis in np.indices(shape))
+    body = 9.5 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - 15.3) ** 2)
+    along = np.clip(x, 15, 70)
+    process = 1.3 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - along) ** 2)
+    whole = Box((0, 0, 0), shape)
+    distance = np.clip(np.maximum(body, process), -2, 2).astype(np.float32)
+    return extract_surface(distance, whole, whole, whole, SPACING, ORIGIN)
+
+
+def _farthest(mesh: Mesh, simplified: Mesh) -> float:
+    """Return how far the vertex of `mesh` lies that is farthest from the other."""
+    return float(Nearest(simplified, 10).distances(mesh.positions.astype(np.float64)).max())
+
+
+def test_thin_process_is_cut_off_and_with_a_bound_it_stays(with_process: Mesh) -> None:
+    """The simplifier's error, a mean over planes, hardly feels it."""
+    assert _farthest(with_process, simplify_soundly(with_process, (), 2.0).mesh) > 10
+    bound = simplify_soundly(with_process, (), 2.0, 3.0)
+    assert _farthest(with_process, bound.mesh) <= 3.0
+    assert kinds(certify(bound.mesh)) == set()
+    assert bound.fallbacks == 0
+    assert len(bound.mesh.triangles) < 0.25 * len(with_process.triangles)
+
+
+def test_no_level_strays_from_the_one_before_and_the_process_stays(with_process: Mesh) -> None:
+    errors = (0.1, 0.5, 2.0)
+    lods = make_levels(with_process, (), SPACING, _settings(errors), Clock())
+    tip = float(with_process.positions[:, 0].max())
+    for before, lod, error in zip(lods, lods[1:], errors[1:], strict=False):
+        assert _farthest(before.mesh, lod.mesh) <= lod_chain.STRAY * error
+        assert lod.mesh.positions[:, 0].max() > tip - 8
+        assert lod.quality is not None
+        assert lod.quality.away.max < 8
+
+
+@pytest.mark.parametrize(("outward_um", "low", "high"), [(0.4, 0.95, 1.0), (-0.4, 0.0, 0.05)])
+def test_level_outside_the_surface_encloses_it_and_one_inside_does_not(
+    monkeypatch: pytest.MonkeyPatch, outward_um: float, low: float, high: float
+) -> None:
+    fine = ball(4.0, 60)
+    scaled = replace(fine, positions=fine.positions * np.float32(1 + outward_um / 4))
+    monkeypatch.setattr(lod_chain, "simplify_soundly", lambda *_: Mended(scaled, 0, 0))
+    *_, last = make_levels(fine, (), SPACING, _settings((0.1, 0.5)), Clock())
+    assert last.quality is not None
+    assert low <= last.quality.enclosed <= high
+    assert last.quality.away.mean == pytest.approx(abs(outward_um), abs=0.02)
+
+
+def test_every_share_of_enclosure_is_measured() -> None:
+    ball_ = Nearest(ball(4.0, 60), 2000)
+    assert measure_enclosure(ball_, Nearest(ball(5.0, 60), 10)) == 1.0
+    assert measure_enclosure(ball_, Nearest(ball(3.0, 60), 10)) == 0.0
+    assert measure_enclosure(ball_, ball_) == 1.0
+    aside = Nearest(moved(ball(4.0, 60), (0.0, 0.0, 1.0)), 10)
+    assert measure_enclosure(ball_, aside) == pytest.approx(0.5 - 0.5 / 8, abs=0.02)
+
+
+def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
+    first, second = (list(_chain(sponge)) for _ in range(2))
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a.mesh.triangles, b.mesh.triangles)
+        np.testing.assert_array_equal(a.mesh.positions, b.mesh.positions)
+
+
+def test_record_tells_distances_faults_and_angles(sponge: Mesh) -> None:
+    settings = Settings()
+    settings = replace(settings, surface=settings.surface.resolved(SPACING))
+    lods = make_levels(sponge, PLANES, SPACING, settings, Clock())
+    for lod in lods:
+        quality = lod.quality
+        assert quality is not None
+        assert quality.faults == 0
+        for spread in (quality.away, quality.back):
+            assert 0 < spread.mean <= spread.p95 <= spread.max
+        assert max(quality.away.p95, quality.back.p95) <= lod.distance_um
+        assert 0 < quality.angle_deg < 60
+
+
+def test_spread_between_concentric_balls_is_the_difference_of_radii() -> None:
+    near, far = Nearest(ball(4.0, 60), 2000), Nearest(ball(5.0, 60), 2000)
+    for spread in (measure_spread(near, far), measure_spread(far, near)):
+        np.testing.assert_allclose([spread.mean, spread.p95, spread.max], 1.0, atol=0.02)
+
+
+def test_largest_distance_counts_vertices_that_no_sample_meets() -> None:
+    spike = ball(5.0, 60)
+    positions = spike.positions.copy()
+    positions[int(positions[:, 2].argmax())] = [0, 0, 7]
+    found = measure_spread(Nearest(replace(spike, positions=positions), 50), Nearest(spike, 50))
+    assert found.max == pytest.approx(2.0, abs=0.01)
+
+
+def test_angle_of_equilateral_triangles_is_60_degrees() -> None:
+    assert sharpest_angle(to_mesh(pv.Tetrahedron())) == pytest.approx(60, abs=1e-3)

@@ -1,0 +1,181 @@
+"""Tissue classes against the head phantom's truth, and against volumes of known classes."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.filters import threshold_multiotsu
+
+from stereocell.model.errors import SourceError
+from stereocell.samples.head import CSF, GREY, WHITE, HeadPhantom, make_head
+from stereocell.tissue import brain_hull
+from stereocell.tissue.brain_hull import Hull, _icosphere, fill_hull
+from stereocell.tissue.classify import Tissue, TissueOptions, learn_tissue
+from stereocell.tissue.potts_prior import apply_potts_prior
+
+THREE = TissueOptions(classes=3, brain=True)
+SMALL = (80, 72, 72)
+Labels = NDArray[np.integer[Any]]
+
+
+def dice(found: NDArray[np.bool_], truth: NDArray[np.bool_]) -> float:
+    return float(2 * (found & truth).sum() / (found.sum() + truth.sum()))
+
+
+def labels_of(tissue: Tissue) -> Labels:
+    return np.where(tissue.mask, tissue.probabilities.argmax(axis=0) + 1, 0)
+
+
+def require_overlap(head: HeadPhantom, tissue: Tissue, least: float) -> None:
+    labels = labels_of(tissue)
+    otsu = np.digitize(head.voxels, threshold_multiotsu(head.voxels, 4, nbins=128))
+    inside = np.zeros(head.voxels.shape, int)
+    values = head.voxels[tissue.mask]
+    inside[tissue.mask] = 1 + np.digitize(values, threshold_multiotsu(values, 3, nbins=128))
+    for k in (CSF, GREY, WHITE):
+        truth = head.labels == k
+        ours = dice(labels == k, truth)
+        assert ours >= least
+        assert ours > dice(otsu == k, truth)
+        assert ours > dice(inside == k, truth)
+
+
+@pytest.fixture(scope="module")
+def learned() -> tuple[HeadPhantom, Tissue]:
+    # neither seed nor shape nor bias are those of tests/bench/tissue.py
+    head = make_head(SMALL, noise=0.05, bias=0.5, seed=23)
+    return head, learn_tissue(head.voxels, head.spacing_um, THREE)
+
+
+def blobs(count: int) -> tuple[NDArray[np.uint16], Labels]:
+    """Return blobs of `count` tissues, 200 apart from 400 on, noise and a bias; air around."""
+    rng = np.random.default_rng(count)
+    shape = (32, 40, 40)
+    field = ndimage.gaussian_filter(rng.standard_normal(shape), 5)
+    levels = np.quantile(field, np.linspace(0, 1, count + 1)[1:-1])
+    labels = np.pad((np.digitize(field, levels) + 1)[3:-3, 3:-3, 3:-3], 3)
+    signal = 200.0 * (labels + (labels > 0)) * (1 + 0.15 * np.linspace(-1, 1, shape[2]))
+    return np.abs(signal + rng.normal(0, 30, shape)).astype(np.uint16), labels
+
+
+def test_each_class_overlaps_the_truth_and_beats_multi_otsu(
+    learned: tuple[HeadPhantom, Tissue],
+) -> None:
+    require_overlap(*learned, 0.9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("shape", "bias", "noise"),
+    [
+        ((112, 96, 96), 0.4, 0.08),
+        ((112, 48, 96), 0.6, 0.05),  # y twice as coarse
+    ],
+)
+def test_it_does_in_other_shapes_noises_and_biases(
+    shape: tuple[int, int, int], bias: float, noise: float
+) -> None:
+    head = make_head(shape, noise, bias, seed=31)
+    require_overlap(head, learn_tissue(head.voxels, head.spacing_um, THREE), 0.9)
+
+
+def test_probabilities_sum_to_one_in_the_mask_and_to_nothing_outside(
+    learned: tuple[HeadPhantom, Tissue],
+) -> None:
+    tissue = learned[1]
+    total = tissue.probabilities.sum(axis=0)
+    np.testing.assert_allclose(total[tissue.mask], 1, atol=1e-5)
+    assert not total[~tissue.mask].any()
+
+
+def test_probabilities_are_what_they_say(learned: tuple[HeadPhantom, Tissue]) -> None:
+    """Of the voxels that are called a class with p, about a share p is of it, and the more the
+    larger p is: the expected calibration error of Naeini et al., AAAI 2015.
+    """
+    head, tissue = learned
+    brain = tissue.mask & np.isin(head.labels, (CSF, GREY, WHITE))
+    for k in (CSF, GREY, WHITE):
+        p = tissue.probabilities[k - 1][brain]
+        truth = head.labels[brain] == k
+        bins = np.digitize(p, (0.1, 0.5, 0.9))
+        counts = np.bincount(bins, minlength=4)
+        said, found = (np.bincount(bins, values, 4) / counts for values in (p, truth))
+        assert (np.abs(said - found) * counts).sum() / counts.sum() < 0.03
+        assert (np.diff(found) > 0).all()
+
+
+def test_the_bias_field_found_leaves_half_of_it_at_most(
+    learned: tuple[HeadPhantom, Tissue],
+) -> None:
+    head, tissue = learned
+    where = np.argwhere(tissue.mask)
+    box = tuple(slice(a, b + 1) for a, b in zip(where.min(axis=0), where.max(axis=0), strict=True))
+    inside, truth = tissue.mask[box], np.log(head.bias[box])
+    left = truth - np.log(tissue.bias.whole())
+    assert left[inside].std() < truth[inside].std() / 2
+
+
+def test_the_mask_is_the_brain_with_its_fluid_and_no_scalp(
+    learned: tuple[HeadPhantom, Tissue],
+) -> None:
+    head, tissue = learned
+    assert dice(tissue.mask, np.isin(head.labels, (CSF, GREY, WHITE))) > 0.95
+
+
+def test_the_same_voxels_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(brain_hull, "ITERATIONS", 60)
+    head = make_head((56, 48, 48), bias=0.4, seed=5)
+    first, second = (learn_tissue(head.voxels, head.spacing_um, THREE) for _ in range(2))
+    assert first.probabilities.tobytes() == second.probabilities.tobytes()
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_auto_finds_how_many_classes_there_are(count: int) -> None:
+    voxels, labels = blobs(count)
+    tissue = learn_tissue(
+        voxels, (1000.0, 1000.0, 1000.0), TissueOptions(sample=15_000, bias_rounds=4)
+    )
+    assert len(tissue.means) == count
+    np.testing.assert_allclose(tissue.means[:, 0], 200 * np.arange(2, count + 2), rtol=0.12)
+    inner = ndimage.binary_erosion(labels > 0, iterations=2)
+    assert (labels_of(tissue)[inner] == labels[inner]).mean() > 0.9
+
+
+def test_neighbours_far_away_vote_less() -> None:
+    """Planes of two classes in turn, seen through noise: votes across them are all wrong."""
+    rng = np.random.default_rng(0)
+    truth = np.zeros((16, 24, 24), int)
+    truth[::2] = 1
+    seen = truth + rng.normal(0, 0.5, truth.shape)
+    likelihood = np.stack([-2 * (seen - k) ** 2 for k in (0, 1)]).astype(np.float32)
+    mask = np.ones(truth.shape, np.bool_)
+    right = {
+        depth: (apply_potts_prior(likelihood, mask, (depth, 1.0, 1.0), 0.6, 5)[1] > 0.5) == truth
+        for depth in (1.0, 6.0)
+    }
+    alone = ((seen > 0.5) == truth).mean()
+    assert right[6.0].mean() > alone + 0.05
+    assert right[6.0].mean() > right[1.0].mean() + 0.05
+
+
+def test_a_hull_holds_its_volume() -> None:
+    points, triangles = _icosphere(3)
+    ball = Hull(20 * points + 30, triangles)
+    filled = fill_hull(ball, (60, 60, 40), (1.0, 1.0, 1.5))
+    # voxels that the surface passes count as inside: half a voxel more all round
+    assert filled.sum() * 1.5 == pytest.approx(4 / 3 * np.pi * 20.5**3, rel=0.05)
+    assert filled[30, 30, 20]
+    assert not filled[30, 30, 36]
+
+
+def test_a_constant_volume_has_no_tissue() -> None:
+    with pytest.raises(SourceError, match="every voxel is 7"):
+        learn_tissue(np.full((8, 8, 8), 7, np.uint8), (1.0, 1.0, 1.0), THREE)
+
+
+def test_a_volume_without_a_brain_is_refused_in_a_line() -> None:
+    voxels, _ = blobs(3)
+    with pytest.raises(SourceError, match="no brain"):
+        learn_tissue(voxels, (100.0, 100.0, 100.0), THREE)  # 4 mm in all

@@ -1,0 +1,139 @@
+"""A network of the user's own: patches, blending, and what is wrong said in one line."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.tissue import onnx_classifier as module
+from stereocell.tissue.brain_mask import find_foreground
+from stereocell.tissue.onnx_classifier import Network, apply_network
+
+Shape = Sequence[int | str]
+
+
+def write_model(
+    path: Path,
+    *,
+    slopes: Sequence[float] = (-2.0, 3.0),
+    shape: Shape = (1, 1, "D", "H", "W"),
+    names: object = None,
+    has_softmax: bool = False,
+) -> Path:
+    """Write a 1 x 1 x 1 convolution: logit k is slopes[k] times the voxel."""
+    weights = np.array(slopes, np.float32).reshape(-1, 1, 1, 1, 1)
+    nodes = [helper.make_node("Conv", ["voxels", "w"], ["logits"])]
+    if has_softmax:
+        nodes.append(helper.make_node("Softmax", ["logits"], ["out"], axis=1))
+    last = "out" if has_softmax else "logits"
+    outputs = (shape[0], len(slopes), *shape[2:])
+    graph = helper.make_graph(
+        nodes,
+        "tissue",
+        [helper.make_tensor_value_info("voxels", TensorProto.FLOAT, list(shape))],
+        [helper.make_tensor_value_info(last, TensorProto.FLOAT, list(outputs))],
+        [numpy_helper.from_array(weights, "w")],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    if names is not None:
+        text = names if isinstance(names, str) else json.dumps(names)
+        helper.set_model_props(model, {module.NAMES_KEY: text})
+    onnx.save(model, path)
+    return path
+
+
+def volume(shape: tuple[int, int, int] = (20, 30, 26)) -> np.ndarray[Any, Any]:
+    rng = np.random.default_rng(0)
+    voxels = np.zeros(shape)
+    voxels[2:-2, 2:-2, 2:-2] = 500 + rng.normal(0, 80, [n - 4 for n in shape])
+    return voxels.clip(0).astype(np.uint16)
+
+
+def expected(voxels: np.ndarray[Any, Any], slopes: Sequence[float]) -> np.ndarray[Any, Any]:
+    """The softmax of the whole volume at once: a convolution of one voxel knows no patches."""
+    from scipy import ndimage
+
+    values = voxels.astype(np.float64)
+    inside = find_foreground(ndimage.gaussian_filter(voxels.astype(np.float32), 0.8))
+    scored = (values - values[inside].mean()) / values[inside].std()
+    logits = np.array(slopes).reshape(-1, 1, 1, 1) * scored
+    shares = np.exp(logits - logits.max(axis=0))
+    return np.asarray(shares / shares.sum(axis=0))
+
+
+@pytest.mark.parametrize("has_softmax", [False, True])
+@pytest.mark.parametrize("patch", [(1, 1, 8, 8, 8), (1, 1, 16, 64, 9), (1, 1, "D", "H", "W")])
+def test_patches_blend_to_what_the_whole_would_be(
+    tmp_path: Path, patch: Shape, has_softmax: bool
+) -> None:
+    path = write_model(tmp_path / "m.onnx", shape=patch, has_softmax=has_softmax)
+    network = Network.load(path)
+    assert network.classes == ("tissue 1", "tissue 2")
+    voxels = volume()
+    found = apply_network(network, voxels)
+    np.testing.assert_allclose(found, expected(voxels, (-2.0, 3.0)), atol=2e-4)
+    np.testing.assert_allclose(found.sum(axis=0), 1, atol=1e-5)
+    assert apply_network(network, voxels).tobytes() == found.tobytes()
+
+
+def test_a_model_may_name_its_classes_and_leave_some_out(tmp_path: Path) -> None:
+    path = write_model(tmp_path / "m.onnx", slopes=(0, 1, 2), names=["", "bone", "marrow"])
+    network = Network.load(path)
+    assert network.classes == ("", "bone", "marrow")
+    assert network.count == 2
+
+
+def test_a_network_is_known_by_its_bytes_and_not_by_its_name(tmp_path: Path) -> None:
+    one = Network.load(write_model(tmp_path / "Jane_Doe.onnx"))
+    same = Network.load(write_model(tmp_path / "b.onnx"))
+    other = Network.load(write_model(tmp_path / "c.onnx", slopes=(1, 2)))
+    assert one.settings() == same.settings() != other.settings()
+    assert "Jane" not in json.dumps(one.settings())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"shape": (1, 2, 8, 8, 8)}, r"input 'voxels' is tensor\(float\) of shape"),
+        ({"shape": (1, 1, 9999, 8, 8)}, "asks for patches of 9999 x 8 x 8"),
+        ({"slopes": (1.0,)}, "with K from 2 to 32"),
+        ({"names": ["a"]}, "expected a JSON list of 2"),
+        ({"names": "no JSON"}, "expected a JSON list of 2"),
+        ({"names": ["a", "a"]}, "different names"),
+        ({"slopes": (float("nan"), 1.0)}, "NaN or infinity"),
+    ],
+)
+def test_what_does_not_fit_is_said_in_a_line(
+    tmp_path: Path, options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(SourceError, match=message) as error:
+        Network.load(write_model(tmp_path / "m.onnx", **options))
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "m.onnx"
+    with pytest.raises(SourceError, match=r"m\.onnx: No such file"):
+        Network.load(path)
+    for content in (b"root:x:0:0:root:/root:/bin/bash\n", b"", b"GIF89a"):
+        path.write_bytes(content)
+        with pytest.raises(SourceError) as error:
+            Network.load(path)
+        assert str(error.value) == f"{path}: found another kind of file, expected an ONNX model"
+
+
+def test_without_onnxruntime_the_remedy_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(name: str) -> None:
+        raise ImportError(name)
+
+    monkeypatch.setattr(module, "import_module", missing)
+    with pytest.raises(UsageError, match=r"pip install 'stereocell\[onnx\]'"):
+        Network.load(write_model(tmp_path / "m.onnx"))

@@ -1,0 +1,241 @@
+"""Boundaries found in the histogram of bodies whose materials and blur are known."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from stereocell.samples.head import make_head
+from stereocell.transfer.boundaries import Boundaries, find_boundaries, propose, propose_shapes
+from stereocell.transfer.edge_model import Plane, count_edge, find_steepest
+from stereocell.transfer.joint_histogram import (
+    COLUMNS,
+    FINE_ROWS,
+    ROWS,
+    STEEPEST,
+    choose_gradient_max,
+    count_joint,
+    rebin,
+    to_eight_bits,
+)
+from stereocell.transfer.shapes2d import evaluate2d, find_fault
+from support.phantoms import blurred_ball
+
+Spacing = tuple[float, float, float]
+EVEN: Spacing = (1.0, 1.0, 1.0)
+
+
+def nested(
+    values: tuple[float, ...],
+    radii_um: tuple[float, ...],
+    sigma_um: float,
+    noise: float,
+    spacing: Spacing = EVEN,
+) -> NDArray[np.uint8]:
+    """Return balls in each other, 72 um a side; values[0] is what is around them."""
+    shape = tuple(round(72 / h) for h in spacing)
+    center = tuple((n - 1) * h / 2 for n, h in zip(shape, spacing, strict=True))
+    field = np.full(shape, values[0])
+    for before, after, radius in zip(values, values[1:], radii_um, strict=False):
+        field += (after - before) * blurred_ball(shape, spacing, center, radius, sigma_um)
+    field += np.random.default_rng(0).normal(0, noise, shape)
+    return to_eight_bits(field, (0, 1))
+
+
+def fine_counts(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> NDArray[np.int64]:
+    return count_joint(voxels, spacing, STEEPEST, FINE_ROWS)
+
+
+def boundaries(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> tuple[Boundaries, float]:
+    fine = fine_counts(voxels, spacing)
+    gradient_max = choose_gradient_max(fine)
+    return find_boundaries(rebin(fine, gradient_max), gradient_max, spacing), gradient_max
+
+
+@pytest.mark.parametrize("spacing", [EVEN, (2.0, 1.0, 1.0)])
+@pytest.mark.parametrize("noise", [0.01, 0.02, 0.03])
+@pytest.mark.parametrize("sigma", [0.7, 1.0, 1.5])
+def test_arcs_of_three_nested_materials_end_at_the_materials(
+    sigma: float, noise: float, spacing: Spacing
+) -> None:
+    truth = (0.15, 0.5, 0.85)
+    found, gradient_max = boundaries(nested(truth, (28, 18), sigma, noise, spacing), spacing)
+    assert found.reason == ""
+    assert found.materials == pytest.approx(truth, abs=noise)
+    assert [(arc.low, arc.high) for arc in found.arcs] == [
+        (pytest.approx(0.15, abs=noise), pytest.approx(0.5, abs=noise)),
+        (pytest.approx(0.5, abs=noise), pytest.approx(0.85, abs=noise)),
+    ]
+    for arc in found.arcs:
+        assert arc.blur == pytest.approx(sigma, rel=0.35)
+        # the step of an ideal edge over two voxels: from theory
+        step = 0.35 * erf(1 / (sigma * np.sqrt(2)))
+        assert arc.apex * gradient_max == pytest.approx(step, rel=0.2)
+        assert arc.apex <= arc.steepest <= arc.apex * np.sqrt(3)
+        assert 0 < arc.share < 0.2
+
+
+def test_materials_that_do_not_touch_have_no_arc() -> None:
+    """Around the bright shell is 0.1, inside of it 0.45: nothing goes from 0.1 to 0.45."""
+    found, _ = boundaries(nested((0.1, 0.8, 0.45), (30, 20), 1.2, 0.015))
+    assert [(round(arc.low, 1), round(arc.high, 1)) for arc in found.arcs] == [
+        (0.1, 0.8),
+        (0.5, 0.8),
+    ]
+
+
+def test_a_source_of_few_values_has_its_materials_all_the_same() -> None:
+    coarse = np.rint(nested((0.15, 0.5, 0.85), (28, 18), 1.2, 0.02) / 6.0) * 6
+    found, _ = boundaries(coarse.astype(np.uint8))
+    assert found.materials == pytest.approx((0.15, 0.5, 0.85), abs=0.02)
+    assert len(found.arcs) == 2
+
+
+@pytest.mark.parametrize(
+    ("voxels", "reason"),
+    [
+        (np.zeros((0, 4, 4), np.uint8), "no voxels were counted"),
+        (np.full((20, 20, 20), 7, np.uint8), "materials found: 1, expected at least 2"),
+        (np.zeros((1, 20, 2), np.uint8), "materials found: 1, expected at least 2"),
+        (np.full((9, 9, 9), 255, np.uint8), "materials found: 1, expected at least 2"),
+        (nested((0.4,), (), 1, 0.03), "materials found: 1, expected at least 2"),
+        (
+            np.random.default_rng(0).integers(0, 256, (40, 40, 40)).astype(np.uint8),
+            "materials found: 1, expected at least 2",
+        ),
+    ],
+    ids=["nothing", "constant", "a row", "saturated", "one material", "noise alone"],
+)
+def test_without_a_boundary_nothing_is_proposed_and_it_is_said(
+    voxels: NDArray[np.uint8], reason: str
+) -> None:
+    proposal = propose(fine_counts(voxels) if voxels.size else np.zeros((FINE_ROWS, COLUMNS), int))
+    assert (proposal.shapes, proposal.reason) == ((), reason)
+    assert proposal.gradient_max > 0
+
+
+def test_the_proposal_takes_the_boundaries_and_leaves_the_materials() -> None:
+    voxels = nested((0.15, 0.5, 0.85), (28, 18), 1.2, 0.02)
+    fine = fine_counts(voxels)
+    proposal = propose(fine)
+    assert proposal == propose(fine)
+    assert [shape.kind for shape in proposal.shapes] == ["triangle", "triangle"]
+    assert not any(find_fault(shape) for shape in proposal.shapes)
+    outer, inner = proposal.shapes
+    assert (outer.tip, inner.tip) == (
+        pytest.approx(0.325, abs=0.02),
+        pytest.approx(0.675, abs=0.02),
+    )
+    assert outer.opacity < inner.opacity
+
+    opacity = evaluate2d(proposal.shapes)[..., 3] > 12
+    apex = 0.35 * erf(1 / (1.2 * np.sqrt(2))) / proposal.gradient_max
+    for middle in (0.325, 0.675):
+        assert opacity[round(0.95 * apex * (ROWS - 1)), round(255 * middle)]
+    # of the voxels far inside of a material all but the noisiest stay clear
+    counts = rebin(fine, proposal.gradient_max)
+    for material in (0.15, 0.5, 0.85):
+        near = np.abs(np.arange(COLUMNS) / 255 - material) < 0.03
+        assert counts[opacity & near].sum() < 0.01 * counts[:, near].sum()
+
+
+def test_a_triangle_ends_below_an_arc_that_passes_over_it() -> None:
+    """From 0.1 to 0.8 it is steeper at 0.625 than from 0.45 to 0.8."""
+    found, _ = boundaries(nested((0.1, 0.8, 0.45), (30, 20), 1.2, 0.015))
+    lower, upper = propose_shapes(found)
+    assert lower.tip < upper.tip
+    assert lower.gradients[1] == 1
+    inner = found.arcs[1]
+    assert inner.apex < upper.gradients[1] < 1.5 * inner.apex
+
+
+def test_the_head_has_the_levels_of_its_tissues() -> None:
+    """Signals of the phantom: background, CSF 300, grey 620, white 1000, in noise of 50."""
+    head = make_head()
+    low, high = (float(v) for v in np.percentile(head.voxels, (0.5, 99.95)))
+    fine = fine_counts(to_eight_bits(head.voxels, (low, high)), head.spacing_um)
+    gradient_max = choose_gradient_max(fine)
+    found = find_boundaries(rebin(fine, gradient_max), gradient_max)
+    counts = [low + material * (high - low) for material in found.materials]
+    assert counts[1:] == pytest.approx([300, 620, 1000], abs=50)
+    assert 0 < counts[0] < 100  # Rician noise alone
+    assert found.arcs
+    assert not any(find_fault(shape) for shape in propose_shapes(found))
+
+
+AIR, FLUID, GREY_MATTER, SKIN, WHITE_MATTER = 0.0, 300.0, 620.0, 750.0, 1000.0
+
+
+def head_boundaries(noise: float) -> tuple[Boundaries, tuple[float, float]]:
+    """Return what is found in the phantom in the window of the preset mri."""
+    head = make_head(noise=noise)
+    low, high = (float(v) for v in np.percentile(head.voxels, (1, 99.8)))
+    found, _ = boundaries(to_eight_bits(head.voxels, (low, high)), head.spacing_um)
+    return found, (low, high)
+
+
+@pytest.mark.parametrize(
+    ("noise", "expected"),
+    [
+        (0.02, [(AIR, SKIN), (FLUID, GREY_MATTER), (GREY_MATTER, WHITE_MATTER)]),
+        # the phantom's skin is no peak of its own then: its arc goes to what lies next to it
+        (0.05, [(AIR, WHITE_MATTER), (FLUID, GREY_MATTER), (GREY_MATTER, WHITE_MATTER)]),
+    ],
+)
+def test_tissues_of_the_head_that_touch_have_arcs_of_their_own(
+    noise: float, expected: list[tuple[float, float]]
+) -> None:
+    found, (low, high) = head_boundaries(noise)
+    ends = [(low + arc.low * (high - low), low + arc.high * (high - low)) for arc in found.arcs]
+    for dark, bright in expected:
+        near = [e for e in ends if abs(e[0] - dark) < 70 and abs(e[1] - bright) < 40]
+        assert len(near) == 1, (dark, bright, ends)
+    # fluid lies at the cortex alone, white matter inside of it: neither touches skin
+    assert not [e for e in ends if abs(e[0] - FLUID) < 40 and abs(e[1] - SKIN) < 40]
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.05])
+def test_no_shape_reaches_the_values_of_its_materials(noise: float) -> None:
+    """Rician noise of sigma: a voxel inside of a material lies within one of it, two in three."""
+    found, (low, high) = head_boundaries(noise)
+    sigma = noise * 1000 / (high - low)
+    arcs = sorted(found.arcs, key=lambda arc: (arc.low + arc.high, arc.low))
+    for arc, shape in zip(arcs, propose_shapes(found), strict=True):
+        room = 1.0 * sigma if arc.low > 0.1 else 0.6 * sigma  # air's: sigma sqrt(2 - pi / 2)
+        assert shape.values[0] >= arc.low + room
+        assert shape.values[1] <= arc.high - room
+        assert (evaluate2d((shape,))[:, round(255 * arc.low), 3] == 0).all()
+        assert (evaluate2d((shape,))[:, round(255 * arc.high), 3] == 0).all()
+
+
+def test_an_edge_that_is_sharper_than_a_voxel_is_steeper_where_it_lies_aslant() -> None:
+    """A step between two voxels, met along the diagonal: each axis sees all of it. sqrt 3 times."""
+    assert find_steepest(0.05, (1, 1, 1)) == pytest.approx(np.sqrt(3), rel=0.01)
+    # blurred over many voxels it is the same from everywhere
+    assert find_steepest(6.0, (1, 1, 1)) == pytest.approx(erf(1 / (6 * np.sqrt(2))), rel=0.01)
+
+
+@pytest.mark.parametrize("spacing", [EVEN, (2.0, 1.0, 1.0)])
+def test_an_edge_counts_as_the_voxels_of_a_ball_do(spacing: Spacing) -> None:
+    """An independent count: of a ball's voxels, which lie about its surface in all directions."""
+    sigma, radius, noise = 0.8, 25.0, 0.03
+    voxels = nested((0.2, 0.8), (radius,), sigma, noise, spacing)
+    counted = count_joint(voxels, spacing, 1.0).reshape(ROWS, COLUMNS // 4, 4).sum(axis=2)
+    plane = Plane(ROWS, COLUMNS // 4, 1.0, spacing)
+    area = 4 * np.pi * radius**2 / spacing[0]  # voxels in a layer one finest spacing thick
+    expected = area * count_edge(0.2, 0.8, sigma, noise, plane)
+    # above the noise, by rows and by columns
+    steep = slice(20, None)
+    for axis in (0, 1):
+        a, b = counted[steep].sum(axis), expected[steep].sum(axis)
+        assert a.sum() == pytest.approx(b.sum(), rel=0.05)
+        assert np.abs(np.cumsum(a) - np.cumsum(b)).max() < 0.04 * a.sum()
+
+
+def test_a_shape_is_proposed_for_every_arc_wherever_it_lies() -> None:
+    found, _ = boundaries(nested((0.02, 0.98), (20,), 0.8, 0.01))
+    (arc,) = found.arcs
+    assert (arc.low, arc.high) == (pytest.approx(0.02, abs=0.01), pytest.approx(0.98, abs=0.01))
+    (shape,) = propose_shapes(found)
+    assert find_fault(shape) == ""
+    assert shape.gradients[1] > 0.9

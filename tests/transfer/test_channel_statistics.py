@@ -1,0 +1,139 @@
+"""Windows, histograms and transfer functions."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stereocell.building import tasks
+from stereocell.building.out_folder import Store
+from stereocell.building.settings import WindowOptions
+from stereocell.cli.__main__ import main
+from stereocell.model.channel import evaluate
+from stereocell.transfer.channel_statistics import find_display, make_look
+from stereocell.transfer.opacity import NAMES, make_transfer_functions
+from support import phantoms
+
+
+def test_window_lies_at_the_percentiles() -> None:
+    voxels = np.arange(10001, dtype=np.uint16)
+    display = find_display(voxels, WindowOptions(10, 90))
+    assert display.window == (1000, 9000)
+    assert sum(display.histogram) == voxels.size
+
+
+def test_constant_channel_has_a_window_and_no_division_by_zero() -> None:
+    assert find_display(np.full(100, 7, np.uint8), WindowOptions()).window == (7, 8)
+
+
+def test_sparse_channel_keeps_its_few_bright_voxels() -> None:
+    voxels = np.zeros(100_000, np.uint16)
+    voxels[:5] = 900
+    assert find_display(voxels, WindowOptions(1, 99)).window == (0, 900)
+
+
+@pytest.mark.parametrize(
+    ("limit", "levels", "seen"),
+    [
+        (16_000_000, 2, (0, np.s_[2:14, 4:32, 8:32])),
+        (5000, 2, (1, np.s_[1:7, 2:16, 4:16])),  # too many voxels: the coarser level's
+        (5000, 1, (0, np.s_[2:14:2, 4:32, 8:32])),  # and where there is none, some planes
+    ],
+)
+def test_window_is_that_of_the_region_alone(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    limit: int,
+    levels: int,
+    seen: tuple[int, tuple[slice, slice, slice]],
+) -> None:
+    """The data are dim to the left and bright to the right; a part of the left is built."""
+    monkeypatch.setattr(tasks, "SURVEY_VOXELS", limit)
+    fine = np.random.default_rng(0).integers(100, 200, (16, 40, 80)).astype(np.uint16)
+    fine[:, :, 36:] *= 10
+    coarse = fine.reshape(8, 2, 20, 2, 40, 2).mean(axis=(1, 3, 5)).astype(np.uint16)
+    pyramid = [fine, coarse][:levels]
+    scales = [dict.fromkeys("zyx", 1.0), dict.fromkeys("zyx", 2.0)]
+    source = phantoms.write_ome_zarr(tmp_path / "halves.ome.zarr", pyramid, scales=scales)
+    out = tmp_path / "out"
+    flags = ["--level", "0", "--region", "2:14,4:32,8:32"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = Store(out).survey().values()
+    level, part = seen
+    options = WindowOptions()
+    expected = np.percentile(
+        pyramid[level][part], (options.low_percentile, options.high_percentile)
+    )
+    assert channel["display"]["window"] == pytest.approx(expected)
+    assert sum(channel["display"]["histogram"]) == pyramid[level][part].size
+    # the threshold is read from every voxel, however few tell the window
+    low, high = channel["display"]["window"]
+    whole = fine[2:14, 4:32, 8:32]
+    inside = (whole >= low) & (whole <= high)
+    assert sum(channel["display"]["values"]["counts"]) == np.count_nonzero(inside)
+
+
+def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tasks, "SURVEY_VOXELS", 4000)
+    monkeypatch.setattr(tasks, "COUNTED_VOXELS", 7999)
+    voxels = np.random.default_rng(0).integers(100, 200, (20, 20, 20)).astype(np.uint16)
+    source = phantoms.write_ome_zarr(tmp_path / "one.ome.zarr", [voxels])
+    out = tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out)]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = Store(out).survey().values()
+    low, high = channel["display"]["window"]
+    seen = voxels[::2]
+    inside = (seen >= low) & (seen <= high)
+    assert sum(channel["display"]["values"]["counts"]) == np.count_nonzero(inside)
+
+
+@pytest.mark.parametrize("iso", [None, 0.0, 0.02, 0.3, 0.97, 1.0, 1.7])
+@pytest.mark.parametrize("histogram", [np.eye(1, 256, 0)[0], np.ones(256), np.eye(1, 256, 255)[0]])
+def test_every_function_is_legal_for_any_histogram(
+    iso: float | None, histogram: np.ndarray
+) -> None:
+    functions = make_transfer_functions((1000 * histogram).astype(np.int64), iso)
+    assert tuple(functions) == NAMES
+    for points in functions.values():
+        x, opacity = np.array(points).T
+        assert (np.diff(x) >= 0).all()
+        assert x[0] == 0
+        assert x[-1] == 1
+        assert opacity.min() >= 0
+        assert 0 < opacity.max() <= 1
+        table = evaluate(points)
+        assert table[0] == 0
+        assert np.isfinite(table).all()
+
+
+def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
+    histogram = np.exp(-((np.arange(256) - 30) ** 2) / 50) * 1e5
+    functions = make_transfer_functions(histogram.astype(np.int64), 0.5)
+    sharp = evaluate(functions["sharp"])
+    assert sharp[int(0.45 * 255)] == 0
+    assert sharp[int(0.55 * 255)] > 0.7
+    for name in NAMES:
+        assert evaluate(functions[name])[30] == 0, name
+
+
+def test_look_means_over_the_tiles_that_have_a_surface() -> None:
+    display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
+    values = {"a": 20.0, "b": 40.0, "c": None}
+    look = make_look("CD31", (0, 1, 0), display, values, 0.75, "clear")
+    assert look.iso_value == 30
+    assert look.iso_confidence == 0.75
+    assert look.iso_normalized == pytest.approx(0.3)
+
+
+def test_opacity_of_an_unclear_channel_does_not_begin_at_its_level() -> None:
+    display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
+    clear, unclear, none = (
+        make_look("CD31", (0, 1, 0), display, {"a": value}, 0.3, verdict).transfer_functions
+        for value, verdict in ((30.0, "clear"), (30.0, "unclear"), (None, "none"))
+    )
+    assert unclear == none
+    assert unclear["sharp"] != clear["sharp"]

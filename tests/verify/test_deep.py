@@ -1,0 +1,496 @@
+"""`check --deep` passes what was built, and names each fault that is put in by hand."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Sdf, Usd, Vt
+
+from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
+from stereocell.formats.exr import read_atlas, write_atlas
+from stereocell.formats.ktx2 import encode_2d, encode_3d
+from stereocell.model.errors import SourceError
+from stereocell.usd.written_files import write_list
+from stereocell.verify import deep
+from stereocell.verify.bundle_against_stage import _texels
+from stereocell.verify.deep import check_deep
+from stereocell.verify.formats import CheckLine
+from support import phantoms
+from support.validators import make_assets
+
+TILE = "stage/tiles/r0_c0/tile.usdc"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("deep")
+    body = phantoms.f_phantom(2)
+    source = phantoms.write_ome_tiff(folder / "f.ome.tif", body[None], "CZYX", names=["F"])
+    assert make_assets(source, folder / "out", "2x1", "--workers", "0") == 0
+    return folder / "out"
+
+
+@pytest.fixture
+def out(built: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(built, tmp_path / "out")
+
+
+def lines_of(out: Path) -> dict[str, CheckLine]:
+    return {line.name: line for line in check_deep(out, Engine(0))}
+
+
+def failures(out: Path) -> dict[str, str]:
+    return {name: line.detail for name, line in lines_of(out).items() if not line.ok}
+
+
+def edit_mesh(
+    out: Path, change: Callable[[Sdf.AttributeSpec], None], name: str, within: str = "lod=lod0"
+) -> None:
+    """Change an attribute of the finest mesh of r0_c0, or of another prim, in its own layer."""
+    layer = Sdf.Layer.FindOrOpen(str(out / TILE))
+    found: list[Sdf.Path] = []
+    layer.Traverse(
+        Sdf.Path.absoluteRootPath,
+        lambda path: found.append(path) if path.name == name and within in str(path) else None,
+    )
+    assert len(found) == 1, found
+    change(layer.GetAttributeAtPath(found[0]))
+    assert layer.Save()
+    layer.Reload(True)
+
+
+def move_a_vertex(out: Path) -> None:
+    def change(points: Sdf.AttributeSpec) -> None:
+        moved = np.array(points.default)
+        moved[len(moved) // 2] += (0, 0, 9)
+        points.default = Vt.Vec3fArray.FromNumpy(moved)
+
+    edit_mesh(out, change, "points")
+
+
+def swap_axes(out: Path) -> None:
+    def change(points: Sdf.AttributeSpec) -> None:
+        swapped = np.ascontiguousarray(np.array(points.default)[:, [1, 0, 2]])
+        points.default = Vt.Vec3fArray.FromNumpy(swapped)
+
+    edit_mesh(out, change, "points")
+
+
+def state_half_the_distance(out: Path) -> None:
+    def change(distance: Sdf.AttributeSpec) -> None:
+        distance.default = distance.default / 2
+
+    edit_mesh(out, change, "stereocell:distance")
+
+
+def turn_inside_out(out: Path) -> None:
+    def turn(indices: Sdf.AttributeSpec) -> None:
+        turned = np.ascontiguousarray(np.array(indices.default).reshape(-1, 3)[:, ::-1].ravel())
+        indices.default = Vt.IntArray.FromNumpy(turned)
+
+    def flip(normals: Sdf.AttributeSpec) -> None:
+        normals.default = Vt.Vec3fArray.FromNumpy(-np.array(normals.default))
+
+    edit_mesh(out, turn, "faceVertexIndices")
+    edit_mesh(out, flip, "normals")
+
+
+def shade_by_other_normals(out: Path) -> None:
+    def turn(normals: Sdf.AttributeSpec) -> None:
+        turned = np.ascontiguousarray(np.array(normals.default)[:, [1, 2, 0]])
+        normals.default = Vt.Vec3fArray.FromNumpy(turned)
+
+    edit_mesh(out, turn, "normals")
+
+
+def hide_all_vertices(out: Path) -> None:
+    def change(openness: Sdf.AttributeSpec) -> None:
+        openness.default = Vt.FloatArray.FromNumpy(np.zeros_like(np.array(openness.default)))
+
+    edit_mesh(out, change, "primvars:occlusion")
+
+
+def mirror_the_uvs(out: Path) -> None:
+    def change(uvs: Sdf.AttributeSpec) -> None:
+        mirrored = np.ascontiguousarray(np.array(uvs.default)[:, ::-1])
+        uvs.default = Vt.Vec2fArray.FromNumpy(mirrored)
+
+    edit_mesh(out, change, "primvars:st", "lod=lod1")
+
+
+def name_another_vdb(out: Path) -> None:
+    def change(path: Sdf.AttributeSpec) -> None:
+        path.default = Sdf.AssetPath("../r0_c1/F.vdb")
+
+    edit_mesh(out, change, "filePath", "F_r0_c0_volume")
+
+
+def double_the_iso_value(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
+    value = stage.GetPrimAtPath("/Specimen/Channels/F").GetAttribute("stereocell:isoValue")
+    value.Set(2 * value.Get())
+    stage.GetRootLayer().Save()
+
+
+def double_the_threshold_and_window(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
+    prim = stage.GetPrimAtPath("/Specimen/Channels/F")
+    for name in ("threshold", "volumeWindow"):
+        value = prim.GetAttribute(f"stereocell:{name}")
+        value.Set(2 * value.Get())
+    stage.GetRootLayer().Save()
+
+
+def edit_tileset(out: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change every tile of the channel's tileset."""
+    file = out / "bundle" / "channels" / "F" / "tileset.json"
+    tileset = json.loads(file.read_bytes())
+    waiting = [tileset["root"]]
+    while waiting:
+        tile = waiting.pop()
+        waiting += tile.get("children", [])
+        change(tile)
+    file.write_text(json.dumps(tileset))
+
+
+def turn_the_tileset(out: Path) -> None:
+    matrix = [0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    edit_tileset(out, lambda tile: tile.update(transform=matrix))
+
+
+def shrink_the_boxes(out: Path) -> None:
+    box = [1, 1, 1, 1e-7, 0, 0, 0, 1e-7, 0, 0, 0, 1e-7]
+    edit_tileset(out, lambda tile: tile.update(boundingVolume={"box": box}))
+
+
+def overstate_the_errors(out: Path) -> None:
+    edit_tileset(out, lambda tile: tile.update(geometricError=1000 * tile["geometricError"]))
+
+
+def move_the_bounds(out: Path) -> None:
+    file = out / "bundle" / "manifest.json"
+    manifest = json.loads(file.read_bytes())
+    manifest["tiles"][0]["bounds_um"]["min"][0] -= 1
+    file.write_text(json.dumps(manifest))
+
+
+def empty_the_bricks(out: Path) -> None:
+    file = out / "bundle" / "volumes" / "r0_c0" / "F_bricks.ktx2"
+    (bricks,) = _texels(file)
+    file.write_bytes(encode_3d([np.zeros_like(bricks)]).data)
+
+
+def empty_the_histogram(out: Path) -> None:
+    file = out / "bundle" / "channels" / "F" / "histogram2d.ktx2"
+    file.write_bytes(encode_2d(np.zeros_like(_texels(file)[0][0])).data)
+
+
+def invert_the_lookup_table(out: Path) -> None:
+    file = out / "bundle" / "luts" / "F.ktx2"
+    rows = _texels(file)[0][0].copy()
+    rows[..., 0] = 255 - rows[..., 0]
+    file.write_bytes(encode_2d(rows).data)
+
+
+def narrow_the_lookup_table(out: Path) -> None:
+    file = out / "bundle" / "luts" / "F.ktx2"
+    file.write_bytes(encode_2d(np.ascontiguousarray(_texels(file)[0][0][:, :-1])).data)
+
+
+def drop_a_tile(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"), Usd.Stage.LoadNone)
+    stage.RemovePrim("/Specimen/Tiles/r0_c1")
+    stage.GetRootLayer().Save()
+
+
+def change_a_colour(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "looks" / "channels.usda"))
+    stage.GetPrimAtPath("/Specimen/Channels/F").GetAttribute("inputs:color").Set((0.2, 0.9, 0.1))
+    stage.GetRootLayer().Save()
+
+
+def leave_a_texture_stale(out: Path) -> None:
+    file = out / "stage" / "tiles" / "r0_c0" / "F_lod1_normal.png"
+    with Image.open(file) as image:
+        mirrored = image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)
+    mirrored.save(file)
+    # as if the build had written it so: bundles are made of nothing that is damaged
+    (out / "stage" / "files.json").unlink()
+    write_list(out / "stage", {}, out / "stage")
+
+
+def spoil_a_voxel(out: Path) -> None:
+    file = out / "stage" / "tiles" / "r0_c0" / "F.exr"
+    volume = read_atlas(file).copy()
+    volume[5, 6, 7] ^= 1
+    write_atlas(file, volume)
+
+
+def rename_a_channel(out: Path) -> None:
+    file = out / "bundle" / "manifest.json"
+    manifest = json.loads(file.read_bytes())
+    manifest["channels"][0]["name"] = "G"
+    file.write_text(json.dumps(manifest))
+
+
+def choose_the_volume(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
+    tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+    tile.GetVariantSet("representation").SetVariantSelection("volume")
+    stage.GetRootLayer().Save()
+
+
+def lose_a_level(out: Path) -> None:
+    for file in (out / "bundle" / "channels" / "F").rglob("tileset.json"):
+        tileset = json.loads(file.read_bytes())
+        waiting = [tileset["root"]]
+        while waiting:
+            tile = waiting.pop()
+            waiting += tile.get("children", [])
+            if "r0_c1/lod2.glb" in tile.get("content", {}).get("uri", ""):
+                del tile["content"]
+        file.write_text(json.dumps(tileset))
+
+
+@pytest.mark.slow
+def test_what_was_built_is_as_it_says(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(built), "--deep", "--workers", "0"]) == 0
+    told = capsys.readouterr().out
+    assert "ok   F lod0 against source: 2 surfaces within " in told
+    assert "ok   F against source: 2 units: surfaces as stated, volumes equal to 8 bits" in told
+    assert "2 volumes, every voxel of every level" in told
+    found = lines_of(built)["F lod3 against source"].detail.split()
+    within, stated = float(found[3]), float(found[5])
+    assert 0 < within <= stated * 1.02
+
+
+FINEST = "F lod0 against source"
+SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest against stage"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (
+            move_a_vertex,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "r0_c0/F: lod0: ",
+                BUNDLE: "r0_c0/F: lod0: a vertex is ",
+            },
+        ),
+        (
+            swap_axes,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "um from the iso-surface, the stage states",
+                BUNDLE: "lod0: a vertex is",
+            },
+        ),
+        (state_half_the_distance, {FINEST: " stated; at most ", SOURCE: "lod0: "}),
+        (
+            drop_a_tile,
+            {
+                "tiles of the stage": "r0_c1 is missing",
+                MANIFEST: "tiles are r0_c0, r0_c1, the stage's r0_c0",
+                BUNDLE: "F: its histogram of value and gradient is not its volumes'",
+            },
+        ),
+        (
+            shade_by_other_normals,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "r0_c0/F: lod0: its normals are not the unit's",
+                BUNDLE: "of its area is shaded by other normals",
+            },
+        ),
+        (
+            hide_all_vertices,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "r0_c0/F: lod0: its occlusion at vertices is not the unit's",
+                BUNDLE: "of its area has other colours or occlusion at its",
+            },
+        ),
+        (
+            double_the_threshold_and_window,
+            {
+                SOURCE: "F: volumeWindow is ",
+                MANIFEST: "F: threshold_normalized is ",
+                BUNDLE: "F.ktx2: level 0: ",
+            },
+        ),
+        (change_a_colour, {MANIFEST: "F: color is ", BUNDLE: "drawn in "}),
+        (
+            leave_a_texture_stale,
+            {
+                "F lod1 against source": " stated; at most ",
+                SOURCE: "r0_c0/F: lod1: its normal map is not the unit's",
+                BUNDLE: "F_lod1_normal.png is another image in the stage",
+            },
+        ),
+        (
+            spoil_a_voxel,
+            {SOURCE: "F.exr: 1 of ", BUNDLE: "F.ktx2: level 0: 1 of "},
+        ),
+        (choose_the_volume, {BUNDLE: "r0_c0: representation is 'mesh', the stage's 'volume'"}),
+        (lose_a_level, {BUNDLE: "r0_c1/F: the bundle lacks lod2"}),
+        (rename_a_channel, {MANIFEST: "F: name is 'G', the stage's 'F'"}),
+        (
+            turn_inside_out,
+            {
+                FINEST: " stated; at most ",
+                SOURCE: "lod0: its triangles face inwards",
+                BUNDLE: "lod0: 100% of its area faces the other way",
+            },
+        ),
+        (
+            mirror_the_uvs,
+            {
+                "F lod1 against source": " stated; at most ",
+                SOURCE: "lod1: its UVs are not the unit's",
+                BUNDLE: "of its area lies elsewhere in the maps",
+            },
+        ),
+        (name_another_vdb, {SOURCE: "F.vdb: not the file that the source gives"}),
+        (double_the_iso_value, {SOURCE: "F: isoValue is ", MANIFEST: "F: iso_value is "}),
+        (turn_the_tileset, {BUNDLE: "tileset.json: found a tile with a transform"}),
+        (shrink_the_boxes, {BUNDLE: "a box of the tileset is not round the surfaces"}),
+        (overstate_the_errors, {BUNDLE: "lod1: the tileset states "}),
+        (
+            move_the_bounds,
+            {MANIFEST: "specimen: bounds_um is ", BUNDLE: "r0_c0: bounds_um is "},
+        ),
+        (empty_the_bricks, {BUNDLE: "F_bricks.ktx2: not the least and most"}),
+        (empty_the_histogram, {BUNDLE: "F: its histogram of value and gradient is not"}),
+        (invert_the_lookup_table, {MANIFEST: "F: the lookup table of 'default' is not"}),
+        (narrow_the_lookup_table, {MANIFEST: "F: its lookup table has 5 x 255 x 4 values"}),
+    ],
+)
+def test_a_fault_put_in_by_hand_is_named(
+    out: Path, spoil: Callable[[Path], None], expected: dict[str, str]
+) -> None:
+    spoil(out)
+    found = failures(out)
+    assert found.keys() == expected.keys(), found
+    for name, part in expected.items():
+        assert part in found[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spoil", "part"),
+    [
+        (leave_a_texture_stale, "r0_c0/F: lod1: its normal map is not the unit's"),
+        (shade_by_other_normals, "r0_c0/F: lod0: its normals are not the unit's"),
+        (hide_all_vertices, "r0_c0/F: lod0: its occlusion at vertices is not the unit's"),
+    ],
+)
+def test_a_fault_of_the_stage_is_named_when_the_bundle_has_it_too(
+    out: Path, spoil: Callable[[Path], None], part: str
+) -> None:
+    spoil(out)
+    os.utime(out / "stage" / "tiles" / "r0_c0" / "tile.usdc")  # an edit
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    found = failures(out)
+    assert found.keys() <= {FINEST, "F lod1 against source", SOURCE}
+    assert part in found[SOURCE]
+
+
+@pytest.mark.slow
+def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
+    out: Path, tmp_path: Path
+) -> None:
+    layer = tmp_path / "edit.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths.append(str(out / "stage" / "stage.usda"))
+    prim = stage.GetPrimAtPath("/Specimen/Channels/F")
+    variants = prim.GetVariantSet("transferFunction")
+    chosen = variants.GetVariantSelection()
+    variants.AddVariant("mine")
+    variants.SetVariantSelection("mine")
+    with variants.GetVariantEditContext():
+        points = Vt.Vec2fArray([(0, 0), (1, 0.5)])
+        prim.GetAttribute("stereocell:opacityPoints").Set(points)
+    variants.SetVariantSelection(chosen)
+    stage.GetRootLayer().Save()
+    told = ["--stage", str(layer)]
+    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    found = failures(out)
+    assert found.keys() == {MANIFEST}
+    assert "F: transfer_functions is ['default', 'mine'" in found[MANIFEST]
+    assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+
+
+def push_the_finest(stage: Usd.Stage) -> None:
+    tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+    variants = tile.GetVariantSet("lod")
+    variants.SetVariantSelection("lod0")
+    with variants.GetVariantEditContext():
+        points = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/F/F_r0_c0.points")
+        moved = np.array(points.Get(), np.float64)
+        moved[:, 2] += 3 * np.exp(-(((moved[:, 1] - moved[:, 1].mean()) / 3) ** 2))
+        points.Set(Vt.Vec3fArray.FromNumpy(moved.astype(np.float32)))
+    variants.ClearVariantSelection()
+
+
+@pytest.mark.slow
+def test_a_bundle_of_an_edited_mesh_is_held_against_the_edited_one(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    layer = tmp_path / "an artist's edit.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths.append(str(out / "stage" / "stage.usda"))
+    push_the_finest(stage)
+    stage.GetRootLayer().Save()
+    told = ["--stage", str(layer)]
+    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    edit = "r0_c0/F: edited by hand: lod0 (sound); made anew from lod0: lod1 within "
+    assert f"bundle: {edit}" in capsys.readouterr().err
+    assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+    assert edit in capsys.readouterr().out
+    assert "lod1: " in failures(out)[BUNDLE]  # against the stage as it was built
+    # the bundle of the edit with the coarser levels and errors as they were is a fault
+    file = out / "bundle" / "channels" / "F" / "r0_c0" / "lod1.glb"
+    edited = file.read_bytes()
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    as_built = file.read_bytes()
+    assert as_built != edited
+    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    file.write_bytes(as_built)
+    line = {line.name: line for line in check_deep(out, Engine(0), layer)}[BUNDLE]
+    assert not line.ok
+    assert "r0_c0/F: lod1: " in line.detail
+
+
+@pytest.mark.slow
+def test_without_its_source_the_bundle_is_held_against_the_stage_all_the_same(
+    built: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise SourceError("f.ome.tif: not found")
+
+    monkeypatch.setattr(deep, "require_input", refuse)
+    found = lines_of(out)
+    assert {name: line.detail for name, line in found.items() if not line.ok} == {
+        "stage against source": "f.ome.tif: not found"
+    }
+    assert {MANIFEST, BUNDLE} <= found.keys()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["channels/F/r0_c0/lod0.glb", "volumes/r0_c1/F.ktx2"])
+def test_a_cut_file_is_named_in_a_line(out: Path, name: str) -> None:
+    file = out / "bundle" / name
+    file.write_bytes(file.read_bytes()[:300])
+    line = failures(out)[BUNDLE]
+    assert f"{file}: can't be decoded: " in line
+    assert "\n" not in line

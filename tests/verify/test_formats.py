@@ -1,0 +1,283 @@
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from stereocell.building import settings as settings_module
+from stereocell.building.out_folder import Store
+from stereocell.building.plan import Channel, make_plan
+from stereocell.bundle.write import write_bundle
+from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
+from stereocell.formats.stl import write_stl
+from stereocell.model.errors import OutputError
+from stereocell.read import Level
+from stereocell.storage.assets import find_asset
+from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
+from stereocell.usd.written_files import write_list
+from stereocell.verify.formats import check
+from support import spheres
+
+GLB = "channels/CD31/r0_c0/lod0.glb"
+VOLUME = "volumes/r0_c0/CD31.ktx2"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    tile = spheres.tile(0)
+    write_tile(out / "stage", tile)
+    looks = (spheres.RED, spheres.BLUE)
+    write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
+    write_list(out / "stage", {}, out / "stage")
+    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0))
+    return out
+
+
+@pytest.fixture
+def out(made, tmp_path):
+    """A copy to be spoilt."""
+    return shutil.copytree(made, tmp_path / "out")
+
+
+def lines(out):
+    return {line.name: line for line in check(out)}
+
+
+def failed(out):
+    """Names of the lines that fail, but for the plan, which these folders don't have."""
+    return {name for name, line in lines(out).items() if not line.ok} - {"plan"}
+
+
+def change_byte(path):
+    """Change one byte near the file's end; its length stays."""
+    data = bytearray(path.read_bytes())
+    data[-40] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.fixture(scope="module")
+def node():
+    """Skip where node or its packages are missing; `make test` installs them."""
+    packages = find_asset("viewer_gltf/tools").parent / "node_modules"
+    if shutil.which("node") is None or not (packages / "gltf-validator").is_dir():
+        pytest.skip("needs Node 20 and its packages: `make setup`")
+
+
+@pytest.mark.usefixtures("node")
+def test_what_the_pipeline_writes_passes_all_checks(made):
+    assert failed(made) == set()
+    assert lines(made)["glTF validator"].detail == "3 files"
+
+
+def test_what_needs_no_node_passes(made):
+    assert failed(made) <= {"glTF validator", "KTX2 textures"}
+
+
+@pytest.mark.parametrize("name", [".", "missing"])
+def test_a_folder_without_a_build_is_one_error(tmp_path, name):
+    with pytest.raises(
+        OutputError, match=r"holds no build, expected plan\.json, stage/ and bundle/, or a bundle's"
+    ):
+        lines(tmp_path / name)
+
+
+def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
+    whole, alone = lines(out), lines(out / "bundle")
+    assert alone == {name: whole[name] for name in alone}
+    assert set(whole) - set(alone) == {"plan", "stage hashes", "stage", "stage files", "usdz"}
+    change_byte(out / "bundle" / VOLUME)
+    assert "hashes" in failed(out / "bundle")
+
+
+def test_a_bundle_by_itself_has_no_source_to_be_held_against(out, capfd):
+    assert main(["check", str(out / "bundle"), "--deep", "--workers", "0"]) == 1
+    *_, last = capfd.readouterr().err.splitlines()
+    assert "plan.json" in last
+
+
+def test_a_build_without_anything_in_it_fails_in_every_line(tmp_path):
+    (tmp_path / "bundle").mkdir()
+    found = lines(tmp_path)
+    assert not any(line.ok for line in found.values())
+    assert "is missing" in found["manifest"].detail
+    assert all("\n" not in line.detail for line in found.values())
+
+
+@pytest.mark.parametrize("name", [GLB, VOLUME])
+def test_changed_byte_is_found(out, name):
+    change_byte(out / "bundle" / name)
+    assert "hashes" in failed(out)
+    assert f"{name}: not the bytes" in lines(out)["hashes"].detail
+
+
+def test_changed_byte_of_a_surface_is_not_what_its_tileset_says(out):
+    change_byte(out / "bundle" / GLB)
+    assert "tilesets" in failed(out)
+    detail = lines(out)["tilesets"].detail
+    assert "CD31/tileset.json: r0_c0/lod0.glb: expected sha-256-128 " in detail
+    assert "lod1.glb" not in detail
+
+
+def test_changed_byte_of_a_level_is_not_what_its_list_says(out):
+    """The finest level lies last."""
+    change_byte(out / "bundle" / VOLUME)
+    assert "volume lists" in failed(out)
+    detail = lines(out)["volume lists"].detail
+    assert f"{VOLUME}: level 0: expected SHA-256 " in detail
+    assert "level 1" not in detail
+
+
+def test_surface_without_a_hash_is_found(out):
+    path = out / "bundle" / "channels/CD31/tileset.json"
+    path.write_text(path.read_text().replace("sha-256-128", "md5", 1))
+    assert "has no hash, expected extras.sha-256-128" in lines(out)["tilesets"].detail
+
+
+def test_level_without_a_hash_is_found(out):
+    path = out / "bundle" / "channels/CD31/volumes.json"
+    path.write_text(re.sub(r'("length":\d+),"sha256":"\w+"', r"\1", path.read_text(), count=1))
+    assert "'sha256' is a required property" in lines(out)["volume lists"].detail
+
+
+def test_missing_and_unlisted_files_are_found(out):
+    (out / "bundle" / GLB).rename(out / "bundle" / "lost.glb")
+    assert {"hashes", "tilesets"} <= failed(out)
+    assert f"{GLB}: missing" in lines(out)["hashes"].detail
+    assert "lost.glb: not in files.json" in lines(out)["hashes"].detail
+    assert "no file at r0_c0/lod0.glb" in lines(out)["tilesets"].detail
+
+
+def test_reference_to_other_bytes_is_found(out):
+    manifest = out / "bundle" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"sha256": "', '"sha256": "00000000', 1))
+    assert "hashes" in failed(out)
+
+
+def test_unknown_version_is_found(out):
+    manifest = out / "bundle" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
+    assert lines(out)["manifest"].detail.count("$.version: 1 was expected") == 1
+
+
+def test_broken_json_is_found(out):
+    (out / "bundle" / "files.json").write_text("{")
+    assert "no JSON" in lines(out)["file list"].detail
+
+
+def test_level_that_lies_elsewhere_is_found(out):
+    path = out / "bundle" / "channels/CD31/volumes.json"
+    text = path.read_text()
+    offset = text.split('"offset":')[1].split(",")[0]
+    path.write_text(text.replace(f'"offset":{offset}', f'"offset":{int(offset) + 1}', 1))
+    assert "lie elsewhere" in lines(out)["volume lists"].detail
+
+
+def test_tileset_whose_errors_grow_is_found(out):
+    path = out / "bundle" / "channels/CD31/tileset.json"
+    path.write_text(path.read_text().replace('"geometricError":0.0', '"geometricError":9.0'))
+    assert "larger geometricError" in lines(out)["tilesets"].detail
+
+
+@pytest.mark.usefixtures("node")
+def test_a_build_without_any_surface_passes(tmp_path):
+    tile = spheres.tile(0, (spheres.BLUE,))
+    write_tile(tmp_path / "stage", tile)
+    write_stage(tmp_path / "stage", "empty", [spheres.BLUE], [TileExtent.of(tile)], {})
+    write_list(tmp_path / "stage", {}, tmp_path / "stage")
+    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, Engine(0))
+    assert failed(tmp_path) == set()
+    assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"
+
+
+def test_lost_meshes_are_not_taken_for_a_build_without_any_surface(out):
+    for path in (out / "bundle").rglob("*.glb"):
+        path.unlink()
+    assert "glTF validator" in failed(out)
+
+
+@pytest.mark.parametrize(
+    "path", ["tiles/r0_c0/CD31.vdb", "tiles/r0_c0/CD31.exr", "looks/CD31_default.exr"]
+)
+def test_cut_file_of_the_stage_is_found(out, path, capfd):
+    spoilt = out / "stage" / path
+    spoilt.write_bytes(spoilt.read_bytes()[:-20])
+    assert "stage files" in failed(out)
+    assert f"{path}: can't be read as" in lines(out)["stage files"].detail
+    assert capfd.readouterr().err == ""
+
+
+@pytest.fixture
+def with_copies(out):
+    """A build whose plan asks for closed copies: of CD31, which has a surface."""
+    settings = settings_module.load(None, None, {"surface": {"closed_tiles": True}})
+    channels = tuple(
+        Channel(k, name, (1, 0, 0)) for k, name in enumerate(("CD31", "Hoechst 33342"))
+    )
+    level = Level((8, 8, 8), (1.0, 1.0, 1.0))
+    plan = make_plan(
+        "in", "in", "ab" * 32, (level,), (0.0, 0.0, 0.0), channels, (0, "asked for"), settings
+    )
+    Store(out).save_plan(plan)
+    copy = out / "stage" / "tiles" / "r0_c0" / "CD31_closed.stl"
+    write_stl(copy, spheres.tile(0).channels[0].lods[0].mesh)
+    return copy
+
+
+def test_closed_copies_are_counted(out, with_copies):
+    line = lines(out)["stage files"]
+    assert line.ok, line.detail
+    assert line.detail.endswith("and 1 closed .stl are whole")
+
+
+def test_cut_closed_copy_is_found(out, with_copies):
+    data = with_copies.read_bytes()
+    with_copies.write_bytes(data[:-50])
+    detail = lines(out)["stage files"].detail
+    assert f"CD31_closed.stl: can't be read as STL: {len(data) - 50} bytes, expected" in detail
+    with_copies.write_bytes(data[:60])
+    assert "its header was cut short" in lines(out)["stage files"].detail
+
+
+def test_lost_closed_copy_is_found(out, with_copies):
+    with_copies.unlink()
+    detail = lines(out)["stage files"].detail
+    assert detail.startswith(f"{with_copies}: missing, expected as surface.closed_tiles is on")
+    assert "Hoechst" not in detail
+
+
+def test_stage_with_a_lost_file_is_found(out):
+    (out / "stage" / "tiles" / "r0_c0" / "CD31.vdb").unlink()
+    assert "CD31.vdb" in lines(out)["stage"].detail
+
+
+@pytest.mark.usefixtures("node")
+def test_positions_that_leave_their_bounds_are_found_inside_the_compression(out):
+    path = out / "bundle" / GLB
+    data = path.read_bytes()
+    at = data.index(b'"max":[') + len(b'"max":[')
+    digit = b"1" if data[at : at + 1] != b"1" else b"2"
+    path.write_bytes(data[:at] + digit + data[at + 1 :])
+    detail = lines(out)["glTF validator"].detail
+    assert "decompressed: ACCESSOR_MAX_MISMATCH" in detail
+
+
+@pytest.mark.usefixtures("node")
+def test_cut_texture_is_found(out):
+    path = out / "bundle" / "volumes/r0_c0/CD31.ktx2"
+    path.write_bytes(path.read_bytes()[:-100])
+    assert "CD31.ktx2" in lines(out)["KTX2 textures"].detail
+
+
+def test_missing_node_is_named(made, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    found = lines(made)["glTF validator"]
+    assert not found.ok
+    assert "install Node 20.19 or newer" in found.detail
+
+
+def test_missing_packages_are_named(made, monkeypatch):
+    answer = subprocess.CompletedProcess([], 1, "", "Error [ERR_MODULE_NOT_FOUND]: no package")
+    monkeypatch.setattr(subprocess, "run", lambda *args, **options: answer)
+    assert "run `make setup`" in lines(made)["glTF validator"].detail
