@@ -249,7 +249,8 @@ def settings_page() -> str:
         "# Settings",
         "What `stereocell settings` prints. A file of these, or of some of them, goes to "
         "`--config`; flags go before the file, and the file before the preset.",
-        f"```toml\n{settings_module.to_toml(settings_module.Settings(), settings_module.TEMPLATE)}```",
+        "```toml\n"
+        f"{settings_module.to_toml(settings_module.Settings(), settings_module.TEMPLATE)}```",
     ]
     for path in sorted(settings_module.PRESETS.glob("*.toml")):
         parts += [f"## Preset {path.stem}", f"```toml\n{path.read_text()}```"]
@@ -292,9 +293,9 @@ def on_files(files: Any, config: Any) -> Any:
     """Add the pages that are made to those that are written: MkDocs calls this."""
     from mkdocs.structure.files import File
 
-    notebook, pictures = run_notebook(Path(settings_module.docs_dir) / NOTEBOOK)
+    notebook, pictures = run_notebook(Path(config.docs_dir) / NOTEBOOK)
     for path, text in (pages() | {"notebook.md": notebook}).items():
-        files.append(File.generated(settings_module, path, content=text))
+        files.append(File.generated(config, path, content=text))
     for path, content in pictures.items():
-        files.append(File.generated(settings_module, path, content=content))
+        files.append(File.generated(config, path, content=content))
     return files

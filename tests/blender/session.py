@@ -1,4 +1,4 @@
-"""Run one step of tests/blender/test_blender.py inside Blender's Python: session.py STEP ARGUMENTS.JSON.
+"""Run one step of test_blender.py inside Blender's Python: session.py STEP ARGUMENTS.JSON.
 
 The step's findings go to the file that the arguments name as `result`, as JSON: Blender writes
 lines of its own to standard output.

@@ -56,12 +56,12 @@ def _forget() -> None:
 @pytest.mark.parametrize(
     ("file", "reached"),
     [
-        ("pipeline/stereocell/cli.py", set()),
-        ("pipeline/stereocell/lod.py", {"units", "stage", "bundle", "report"}),
+        ("pipeline/stereocell/cli/__main__.py", set()),
+        ("pipeline/stereocell/meshes/simplify.py", {"units", "stage", "report"}),
         ("pipeline/stereocell/read/ome_zarr.py", {"units", "report"}),
-        ("pipeline/stereocell/write/exr.py", {"stage", "bundle"}),
-        ("pipeline/stereocell/write/gltf.py", {"bundle"}),
-        ("pipeline/stereocell/staging.py", {"stage"}),
+        ("pipeline/stereocell/formats/exr.py", {"stage", "bundle"}),
+        ("pipeline/stereocell/formats/gltf.py", {"bundle"}),
+        ("pipeline/stereocell/building/stage_tasks.py", {"stage"}),
         ("usd_assets/lights.usda", {"stage"}),
         ("schemas/usd/schema.usda", {"stage", "bundle"}),
         ("pipeline/stereocell/report/charts.py", {"report"}),

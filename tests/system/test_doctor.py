@@ -49,7 +49,7 @@ def test_on_a_bare_machine(tmp_path: Path) -> None:
 def test_where_no_package_is_installed_they_are_named_without_a_traceback(tmp_path: Path) -> None:
     about = Path(str(metadata.distribution("stereocell")._path))  # type: ignore[attr-defined]
     shutil.copytree(about, tmp_path / about.name)
-    code = Path(doctor.__file__).parents[1]
+    code = Path(doctor.__file__).parents[2]
     told = {}
     for name in ("doctor", "settings", "plan"):
         command = [sys.executable, "-S", "-m", "stereocell.cli", name]

@@ -136,7 +136,7 @@ def _look_at(shared: str) -> _Sight:
 
 def _look() -> _Sight:
     # by their names: what a cluster is asked belongs to no result's lineage
-    makers = [import_module(f"stereocell.{name}") for name in ("tasks", "staging")]
+    makers = [import_module(f"stereocell.building.{name}") for name in ("tasks", "stage_tasks")]
     versions = {"StereoCell": version("stereocell")}
     for maker in makers:
         versions |= libraries_of(maker)

@@ -15,7 +15,7 @@ from PIL import Image
 from stereocell.preview.draw_slices import encode
 
 # by its path, and -P: it needs nothing of this package
-COMMAND = (sys.executable, "-P", str(Path(__file__).with_name("draw_meshes.py")))
+COMMAND = (sys.executable, "-P", str(Path(__file__).with_name("draw_meshes_process.py")))
 _SECONDS = 120.0, 30.0  # given to the process, and on top for each picture
 _REMEDY = "pictures of meshes need off-screen OpenGL, as Debian's libegl1 and libgl1-mesa-dri give"
 

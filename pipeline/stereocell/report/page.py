@@ -38,7 +38,7 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.textures.unwrap import mip_levels_apart
 from stereocell.transfer.channel_statistics import display_from_json, look_from
 
-TEMPLATE = Path(__file__).parents[1] / "templates" / "report.html.j2"
+TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 MOST_PICTURED = 60  # units
 MOST_ROWS = 400  # units in a table
 _TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # drawn in one picture

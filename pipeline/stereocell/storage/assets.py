@@ -8,7 +8,7 @@ while two levels above an installed package lies a folder that is not ours.
 
 from pathlib import Path
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _HOMES = (_PACKAGE, _PACKAGE.parents[1])
 
 

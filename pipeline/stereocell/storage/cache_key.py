@@ -18,7 +18,7 @@ from typing import Any
 
 from stereocell.storage.assets import find_asset
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _NAME = _PACKAGE.name
 _FINDER = find_asset.__name__
 

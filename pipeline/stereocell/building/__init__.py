@@ -1,0 +1,1 @@
+"""Plan, units and phases: the only package that knows their order."""

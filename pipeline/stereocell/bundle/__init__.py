@@ -1,0 +1,1 @@
+"""The web bundle, made from a composed stage."""

@@ -1,0 +1,1 @@
+"""The command `stereocell`: the only package that prints."""

@@ -1,0 +1,1 @@
+"""Voxels in, voxels out: noise, background, minima and maxima of bricks."""

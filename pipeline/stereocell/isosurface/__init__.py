@@ -1,0 +1,1 @@
+"""From voxels to a surface: iso-value, distance field, repair, extraction."""

@@ -1,0 +1,1 @@
+"""Triangle meshes: simplification, exact validity, fairing, distances."""

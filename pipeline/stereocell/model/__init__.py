@@ -1,0 +1,1 @@
+"""Nouns: frozen dataclasses that every package speaks in. No file, no algorithm."""

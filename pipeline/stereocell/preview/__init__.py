@@ -1,0 +1,1 @@
+"""Pictures of a source, before anything is built."""

@@ -1,0 +1,1 @@
+"""UVs of a mesh, and the maps that are baked into them."""

@@ -1,0 +1,1 @@
+"""Tissue classes that are learned from a volume."""

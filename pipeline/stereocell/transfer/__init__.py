@@ -1,0 +1,1 @@
+"""Histograms, thresholds, and transfer functions of one and two dimensions."""

@@ -1,0 +1,1 @@
+"""The USD stage: written, and read back composed."""
