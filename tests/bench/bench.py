@@ -16,8 +16,6 @@ from scipy import ndimage
 from skimage import measure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from test_usd_scale import CHANNELS, COLUMNS, ROWS, open_unloaded, write_many
-
 from stereocell.building import phases
 from stereocell.building import settings as settings_module
 from stereocell.engine.run import Engine
@@ -26,6 +24,7 @@ from stereocell.isosurface import extract, repair
 from stereocell.meshes import simplify
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from support.many_tiles import CHANNELS, COLUMNS, ROWS, open_unloaded, write_many
 from support.phantoms import blurred_ball, write_ome_tiff
 
 SPACING = (0.28, 0.14, 0.14)

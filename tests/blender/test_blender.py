@@ -24,7 +24,7 @@ from support.bundles import load
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, leaf, write_whole
 
 PYTHON = os.environ.get("STEREOCELL_BLENDER", "")
-SESSION = Path(__file__).parent / "blender" / "session.py"
+SESSION = Path(__file__).with_name("session.py")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not PYTHON, reason="needs Blender's Python: run `make test-blender`"),

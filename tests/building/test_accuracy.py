@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_surface import enclosed_volume, open_edges
 
 from stereocell.building import phases
 from stereocell.building import settings as settings_module
@@ -16,6 +15,7 @@ from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
 from stereocell.samples import write_cycif
 from support import phantoms
+from support.meshes import enclosed_volume, open_edges
 
 VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
 

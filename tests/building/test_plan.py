@@ -9,35 +9,16 @@ import numpy as np
 import pytest
 
 from stereocell.building import settings as settings_module
-from stereocell.building.plan import Channel, Plan, choose_level, make_plan
+from stereocell.building.plan import Channel
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.read import Level
 from stereocell.storage.assets import find_asset
-
-LEVELS = (
-    Level((64, 256, 640), (0.28, 0.14, 0.14)),
-    Level((64, 128, 320), (0.28, 0.28, 0.28)),
-    Level((64, 64, 160), (0.28, 0.56, 0.56)),
-)
-CHANNELS = (Channel(0, "Hoechst 33342", (0, 0, 1)), Channel(2, "CD3ε", (0, 1, 0)))
-
-
-def _plan(
-    flags: dict[str, object] | None = None,
-    levels: tuple[Level, ...] = LEVELS,
-    channels: tuple[Channel, ...] = CHANNELS,
-    **sections: dict[str, object],
-) -> Plan:
-    settings = settings_module.load(None, None, {"plan": flags or {}, **sections})
-    level = choose_level(levels, len(channels), settings)
-    return make_plan(
-        "in.ome.zarr", "in", "ab" * 32, levels, (0.0, 0.0, 0.0), channels, level, settings
-    )
+from support.plans import CHANNELS, plan_of
 
 
 def test_plan_survives_its_file_and_passes_its_schema() -> None:
-    plan = _plan({"grid": "5x2"}, iso_values={"CD3ε": 700.0})
+    plan = plan_of({"grid": "5x2"}, iso_values={"CD3ε": 700.0})
     content = json.loads(json.dumps(to_json(plan)))
     jsonschema.validate(content, json.loads(find_asset("schemas/plan.schema.json").read_text()))
     assert from_json(content) == plan
@@ -45,29 +26,29 @@ def test_plan_survives_its_file_and_passes_its_schema() -> None:
 
 
 def test_without_a_level_the_finest_within_the_limit_is_taken_and_said() -> None:
-    plan = _plan({"max_voxels": 2 * 64 * 128 * 320})
+    plan = plan_of({"max_voxels": 2 * 64 * 128 * 320})
     assert plan.level == 1
     assert plan.spacing_um == (0.28, 0.28, 0.28)
     assert "5,242,880" in plan.level_reason
-    assert _plan().level == 0
+    assert plan_of().level == 0
     with pytest.raises(UsageError, match="coarsest level holds"):
-        _plan({"max_voxels": 10})
+        plan_of({"max_voxels": 10})
 
 
 def test_the_limit_counts_the_region_of_the_level_that_is_built() -> None:
     limit = {"max_voxels": 2 * 64 * 100 * 100}
-    assert _plan({"region": ":,0:100,:100", **limit}).level == 0
+    assert plan_of({"region": ":,0:100,:100", **limit}).level == 0
     # an open end is the level's own: 640 columns of level 0, 320 of level 1, 160 of level 2
-    assert _plan({"region": ":,0:60,:", **limit}).level == 2
-    assert _plan({"region": ":,0:30,:", **limit}).level == 1
+    assert plan_of({"region": ":,0:60,:", **limit}).level == 2
+    assert plan_of({"region": ":,0:30,:", **limit}).level == 1
     with pytest.raises(
         UsageError, match=r"--region :,0:200,:300 holds 7,680,000 voxels, more than"
     ):
-        _plan({"region": ":,0:200,:300", **limit})  # no coarser level holds it
+        plan_of({"region": ":,0:200,:300", **limit})  # no coarser level holds it
 
 
 def test_halo_covers_what_decides_on_a_voxel() -> None:
-    plan = _plan()
+    plan = plan_of()
     reach = plan.repair.reach_um(plan.spacing_um)
     reach += 4 * plan.settings.surface.smoothing_um  # type: ignore[operator]
     for voxels, step in zip(plan.halo, plan.spacing_um, strict=True):
@@ -75,26 +56,26 @@ def test_halo_covers_what_decides_on_a_voxel() -> None:
 
 
 def test_tiles_are_clipped_to_the_data() -> None:
-    assert _plan().settings.plan.tile_size == (64, 256, 512)
-    assert [tile.id for tile in _plan().tiles] == ["r0_c0", "r0_c1"]
+    assert plan_of().settings.plan.tile_size == (64, 256, 512)
+    assert [tile.id for tile in plan_of().tiles] == ["r0_c0", "r0_c1"]
 
 
 def test_a_grid_is_kept_and_its_plan_repeats() -> None:
-    plan = _plan({"grid": "4x3", "region": ":,0:10,0:9"})
+    plan = plan_of({"grid": "4x3", "region": ":,0:10,0:9"})
     sizes = {tile.box.shape for tile in plan.tiles}
     assert len(plan.tiles) == 12
     assert sizes == {(64, 3, 2), (64, 3, 3), (64, 4, 2), (64, 4, 3)}
     assert (plan.settings.plan.grid, plan.settings.plan.tile_size) == ("4x3", (64, 4, 3))
     assert from_json(json.loads(json.dumps(to_json(plan)))) == plan
     used = tomllib.loads(settings_module.to_toml(plan.settings))
-    again = _plan(used.pop("plan"), **used)
+    again = plan_of(used.pop("plan"), **used)
     assert dataclasses.replace(again, level_reason=plan.level_reason) == plan
 
 
 @pytest.mark.parametrize("preset", ["cycif", "lightsheet", None])
 def test_lengths_that_suit_the_voxels_make_a_plan(preset: str | None) -> None:
     surface = settings_module.load(preset, None, {}).surface
-    _plan(surface=dataclasses.asdict(surface))
+    plan_of(surface=dataclasses.asdict(surface))
 
 
 @pytest.mark.parametrize(
@@ -107,7 +88,7 @@ def test_lengths_that_suit_the_voxels_make_a_plan(preset: str | None) -> None:
 )
 def test_presets_and_defaults_suit_their_data(preset: str | None, level: Level) -> None:
     settings = settings_module.to_dict(settings_module.load(preset, None, {}))
-    _plan(settings.pop("plan"), levels=(level,), channels=CHANNELS[:1], **settings)
+    plan_of(settings.pop("plan"), levels=(level,), channels=CHANNELS[:1], **settings)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +102,7 @@ def test_presets_and_defaults_suit_their_data(preset: str | None, level: Level) 
 )
 def test_lengths_for_other_voxels_are_wrong_usage(surface: dict[str, object]) -> None:
     with pytest.raises(UsageError) as raised:
-        _plan({"grid": "5x2"}, surface=surface)
+        plan_of({"grid": "5x2"}, surface=surface)
     message = str(raised.value)
     assert "don't suit voxels of 0.28 x 0.14 x 0.14 um" in message
     assert f"alpha_um = {surface.get('alpha_um', 0.56):g} um" in message
@@ -142,14 +123,14 @@ def test_lengths_of_maps_that_would_exhaust_the_machine_are_wrong_usage(
     unwrap: dict[str, object], message: str
 ) -> None:
     with pytest.raises(UsageError) as raised:
-        _plan(unwrap=unwrap)
+        plan_of(unwrap=unwrap)
     assert message in str(raised.value)
     assert "\n" not in str(raised.value)
 
 
 def test_lengths_of_maps_at_their_limits_make_a_plan() -> None:
     at_limit = {"texel_um": 0.014, "occlusion_um": 17.92, "paint_um": 17.92, "padding": 24}
-    assert _plan(unwrap=at_limit).settings.unwrap.texel_um == 0.014
+    assert plan_of(unwrap=at_limit).settings.unwrap.texel_um == 0.014
 
 
 @pytest.mark.parametrize(
@@ -162,35 +143,35 @@ def test_lengths_of_maps_at_their_limits_make_a_plan() -> None:
 )
 def test_planes_too_far_apart_for_a_tile_are_wrong_usage(grid_um: float, message: str) -> None:
     with pytest.raises(UsageError) as raised:
-        _plan(surface={"grid_um": grid_um})
+        plan_of(surface={"grid_um": grid_um})
     assert message in str(raised.value)
     assert "auto" not in str(raised.value)
 
 
 def test_a_grid_with_four_planes_in_a_tile_makes_a_plan() -> None:
-    assert _plan(surface={"grid_um": 16 * 0.28}).step == (16, 32, 32)
+    assert plan_of(surface={"grid_um": 16 * 0.28}).step == (16, 32, 32)
     thin = {"region": "0:3,:,:"}
-    assert _plan(thin, surface={"grid_um": 0.28}).step == (1, 2, 2)  # all of the few there are
+    assert plan_of(thin, surface={"grid_um": 0.28}).step == (1, 2, 2)  # all of the few there are
 
 
 def test_a_long_reach_is_fine_where_little_is_read() -> None:
     surface: dict[str, object] = {"min_diagonal_um": 10000.0}
-    assert _plan({"region": "0:16,0:48,0:36"}, surface=surface).halo == (20, 52, 40)
+    assert plan_of({"region": "0:16,0:48,0:36"}, surface=surface).halo == (20, 52, 40)
     endless: dict[str, object] = {"min_diagonal_um": 1e308, "max_cavity_um": 1e308}
-    assert _plan({"region": "0:16,0:48,0:36"}, surface=endless).halo == (20, 52, 40)
+    assert plan_of({"region": "0:16,0:48,0:36"}, surface=endless).halo == (20, 52, 40)
     wide = (Level((64, 3000, 3000), (0.28, 0.14, 0.14)),)
     with pytest.raises(UsageError, match="for a tile of 64 x 512 x 512"):
-        _plan(levels=wide, surface=surface)
+        plan_of(levels=wide, surface=surface)
 
 
 def test_region_may_leave_ends_open() -> None:
-    plan = _plan({"region": "0:10,:,100:"})
+    plan = plan_of({"region": "0:10,:,100:"})
     assert plan.region.start == (0, 0, 100)
     assert plan.region.stop == (10, 256, 640)
 
 
 def test_positions_are_voxel_centres() -> None:
-    np.testing.assert_allclose(_plan().position_um((1, 2, 3)), (0.28, 0.28, 0.42))
+    np.testing.assert_allclose(plan_of().position_um((1, 2, 3)), (0.28, 0.28, 0.42))
 
 
 @pytest.mark.parametrize(
@@ -210,36 +191,36 @@ def test_positions_are_voxel_centres() -> None:
 )
 def test_what_does_not_fit_is_wrong_usage(flags: dict[str, object], message: str) -> None:
     with pytest.raises(UsageError) as raised:
-        _plan(flags)
+        plan_of(flags)
     assert message in str(raised.value)
 
 
 def test_single_plane_can_not_be_built() -> None:
     with pytest.raises(SourceError, match="expected at least 2 each way"):
-        _plan({"region": "3:4,:,:"})
+        plan_of({"region": "3:4,:,:"})
 
 
 def test_iso_value_for_an_unknown_channel_names_the_known() -> None:
     with pytest.raises(StereoCellError, match="'CD4', expected one of Hoechst 33342, CD3ε"):
-        _plan(iso_values={"CD4": 3.0})
+        plan_of(iso_values={"CD4": 3.0})
 
 
 def test_iso_values_go_by_name_or_by_index() -> None:
-    assert _plan(iso_values={"2": 3.0}).settings.iso_values == {"CD3ε": 3.0}
-    plan = _plan(iso_values={"Hoechst 33342": 1.0, "2": 3.0})
+    assert plan_of(iso_values={"2": 3.0}).settings.iso_values == {"CD3ε": 3.0}
+    plan = plan_of(iso_values={"Hoechst 33342": 1.0, "2": 3.0})
     assert plan.settings.iso_values == {"Hoechst 33342": 1.0, "CD3ε": 3.0}
     with pytest.raises(UsageError, match=r"channel '1', expected one of .*, or an index of 0, 2"):
-        _plan(iso_values={"1": 3.0})
+        plan_of(iso_values={"1": 3.0})
     with pytest.raises(UsageError, match="'CD3ε' by name and by index"):
-        _plan(iso_values={"2": 3.0, "CD3ε": 4.0})
+        plan_of(iso_values={"2": 3.0, "CD3ε": 4.0})
 
 
 def test_an_iso_value_s_name_goes_before_its_index() -> None:
     channels = (Channel(0, "488", (0, 0, 1)), Channel(1, "0", (0, 1, 0)))
-    plan = _plan(channels=channels, iso_values={"0": 5.0})
+    plan = plan_of(channels=channels, iso_values={"0": 5.0})
     assert plan.settings.iso_values == {"0": 5.0}
 
 
 def test_plan_is_frozen() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
-        _plan().level = 2  # type: ignore[misc]
+        plan_of().level = 2  # type: ignore[misc]

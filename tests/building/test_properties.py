@@ -15,8 +15,6 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from jsonschema import Draft202012Validator
-from test_ktx2 import parse
-from test_vdb import read_vdb, value_at
 
 from stereocell.building import settings as settings_module
 from stereocell.building.plan import Channel, Plan, choose_level, make_plan
@@ -32,6 +30,8 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import from_identifier, to_identifier
 from stereocell.read import Level
 from stereocell.storage.assets import schema_path
+from support.ktx2_parser import parse
+from support.vdb_reader import read_vdb, value_at
 
 FEW = settings(
     max_examples=25,

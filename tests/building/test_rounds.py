@@ -7,7 +7,6 @@ import pytest
 import pyvista as pv
 from numpy.typing import NDArray
 from pxr import Usd
-from test_surface import enclosed_volume
 
 from stereocell.building.out_folder import Store
 from stereocell.building.unit_files import load_lods
@@ -15,6 +14,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.volume import zyx_to_xyz
 from support import phantoms
+from support.meshes import enclosed_volume
 
 SPACING = (1.0, 1.0, 1.0)
 

@@ -8,7 +8,6 @@ import jsonschema
 import numpy as np
 import pytest
 import zarr
-from test_network import write_model
 
 from stereocell.building.out_folder import Store
 from stereocell.building.plan_file import from_json, to_json
@@ -19,6 +18,7 @@ from stereocell.storage.assets import find_asset
 from stereocell.storage.json_files import read_json
 from stereocell.verify.formats import check
 from support.bundles import channel, load
+from support.onnx_models import write_model
 
 SHAPE = (48, 40, 44)
 HEAD = ["CSF", "grey matter", "white matter"]

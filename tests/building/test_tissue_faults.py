@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_network import write_model
 
 from stereocell.building import input_unchanged, phases
 from stereocell.building import tissue as tissue_channels
@@ -30,6 +29,7 @@ from stereocell.storage.lock import LOCK
 from stereocell.tissue.classify import TissueOptions
 from stereocell.verify import formats as check_module
 from support import phantoms
+from support.onnx_models import write_model
 
 Kill = Callable[[Path, list[str], tuple[str, str]], None]
 REPORT = phases.run_report

@@ -25,6 +25,10 @@ from support.validators import make_assets
 GRID = "2x1"
 Cluster = tuple[str, ObjectStore]
 
+# where workers find the tests' functions, and what these import
+ROOT = Path(__file__).parents[2]
+PATHS = os.pathsep.join([str(ROOT), str(ROOT / "tests"), str(ROOT / "pipeline")])
+
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
@@ -54,7 +58,7 @@ def _start(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "dask", *arguments]
     quiet = subprocess.DEVNULL
     # workers find what is to be run in this file
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    environment = {**os.environ, "PYTHONPATH": PATHS}
     return subprocess.Popen(command, cwd=cwd, env=environment, stdout=quiet, stderr=quiet)
 
 

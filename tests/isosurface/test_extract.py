@@ -10,6 +10,7 @@ from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
 from stereocell.model.volume import Volume, zyx_to_xyz
+from support.meshes import enclosed_volume, open_edges
 from support.phantoms import blurred_ball, f_phantom
 
 SPACING = (0.28, 0.14, 0.14)
@@ -28,20 +29,6 @@ def _extract(
 def _whole(voxels: NDArray[np.float32], iso: float) -> Mesh:
     region = Box((0, 0, 0), voxels.shape)  # type: ignore[arg-type]
     return _extract(voxels, region, region, region, iso)
-
-
-def enclosed_volume(mesh: Mesh) -> float:
-    """The divergence theorem: signed tetrahedra from the origin; positive if wound outwards."""
-    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    return float((a * np.cross(b, c)).sum() / 6)
-
-
-def open_edges(mesh: Mesh) -> int:
-    """Directed edges without their opposite."""
-    t = mesh.triangles.astype(np.int64)
-    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-    count = len(mesh.positions)
-    return len(np.setdiff1d(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]))
 
 
 def test_blurred_ball_gives_its_volume_within_two_percent() -> None:

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
-from test_surface import enclosed_volume
 
 from stereocell.filters.denoise import smooth
 from stereocell.isosurface.extract import extract_surface, signed_distance
@@ -21,6 +20,7 @@ from stereocell.isosurface.isovalue import (
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from support.meshes import enclosed_volume
 from support.phantoms import blurred_ball
 
 SPACING = (0.28, 0.14, 0.14)

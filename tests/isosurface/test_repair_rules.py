@@ -5,8 +5,6 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_plan import CHANNELS, Level
-from test_plan import _plan as plan_of
 
 from stereocell.building.plan import Plan
 from stereocell.isosurface.components import find_solids
@@ -14,6 +12,8 @@ from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.isosurface.repair_rules import choose_repair, sum_solids
 from stereocell.model.tiling import Box
+from stereocell.read import Level
+from support.plans import CHANNELS, plan_of
 
 SPACING = (0.5, 0.25, 0.25)
 SHAPE = (40, 80, 120)
@@ -46,7 +46,7 @@ def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
     distance = _distance()
     sums = sum_solids(distance > 0, SPACING, 1.0)
     assert (sums.count, sums.kept) == (3, 2)
-    options = choose_repair(_plan(max_fragment_um=4.0), "clear", [asdict(sums)])
+    options = choose_repair(_plan_with(max_fragment_um=4.0), "clear", [asdict(sums)])
     dropped = repair(distance, SPACING, options)
     assert dropped.fragments_dropped == 1
     assert dropped.distance[32, 60, 100] < 0  # the small one's centre
@@ -57,7 +57,7 @@ def test_rule_ends_where_the_halo_does_and_can_be_left_out() -> None:
     sums = asdict(sum_solids(_distance() > 0, SPACING, 1.0))
     # what would go is larger than what a unit is sure to see whole
     for length in (3.0, 0.0):
-        options = choose_repair(_plan(max_fragment_um=length), "clear", [sums])
+        options = choose_repair(_plan_with(max_fragment_um=length), "clear", [sums])
         assert repair(_distance(), SPACING, options).fragments_dropped == 0
         assert options.min_diagonal_um <= max(1.5, length)
 
@@ -71,7 +71,7 @@ def test_specks_do_not_rule_the_means() -> None:
 
 
 def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:
-    plan = _plan(max_alpha_um=2.0)
+    plan = _plan_with(max_alpha_um=2.0)
     plain = {"count": 4, "faces": 4 * 4000, "diagonal_um": 4 * 12.0}
     plain |= {"kept": 4, "kept_faces": 4 * 4000, "kept_diagonal_um": 4 * 12.0}
     alpha = choose_repair(plan, "clear", [plain]).alpha_um
@@ -87,13 +87,13 @@ def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:
 
 
 def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
-    assert choose_repair(_plan(alpha_um=0.8), "clear", []).alpha_um == 0.8
-    assert choose_repair(_plan(alpha_um=0.8), "clear", []).offset_um == 0.0
-    tenth = choose_repair(_plan(alpha_um=0.8, offset_um="auto"), "clear", []).offset_um
+    assert choose_repair(_plan_with(alpha_um=0.8), "clear", []).alpha_um == 0.8
+    assert choose_repair(_plan_with(alpha_um=0.8), "clear", []).offset_um == 0.0
+    tenth = choose_repair(_plan_with(alpha_um=0.8, offset_um="auto"), "clear", []).offset_um
     assert tenth == pytest.approx(0.08)
-    assert choose_repair(_plan(alpha_um=0.8, offset_um=0.3), "clear", []).offset_um == 0.3
+    assert choose_repair(_plan_with(alpha_um=0.8, offset_um=0.3), "clear", []).offset_um == 0.3
     # nothing is bridged where no gap is known to be one
-    assert choose_repair(_plan(alpha_um=0.8), "unclear", []).alpha_um == 0.0
+    assert choose_repair(_plan_with(alpha_um=0.8), "unclear", []).alpha_um == 0.0
 
 
 def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
@@ -114,5 +114,5 @@ def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
     assert without.distance[32, 60, 100] > 0
 
 
-def _plan(**surface: object) -> Plan:
+def _plan_with(**surface: object) -> Plan:
     return plan_of(levels=(Level(SHAPE, SPACING),), channels=CHANNELS[:1], surface=surface)

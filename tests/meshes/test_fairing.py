@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_certify import ball, joined, kinds, moved, turned
 
 from stereocell.isosurface.extract import RIM_SNAP, extract_surface
 from stereocell.meshes import fairing
@@ -13,6 +12,7 @@ from stereocell.meshes.validity import border, certify
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.textures.lod_chain import sharpest_angle
+from support.meshes import ball, joined, kinds, moved, turned
 
 FLAT = np.array([[0, 0, 0], [8, 0, 0], [4, 1, 0], [4, -1, 0], [4, 0, -3]], np.float32)
 # two slivers along the long diagonal 0-1, closed by a point below

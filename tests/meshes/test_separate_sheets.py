@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from test_certify import SOUND, ball, joined, kinds, moved
 
 from stereocell.meshes.separate_sheets import part_sheets
 from stereocell.meshes.validity import bodies, border, certify
 from stereocell.model.mesh import Mesh
+from support.meshes import SOUND, ball, joined, kinds, moved
 
 BOX = SOUND["box"]  # 1 x 2 x 3
 

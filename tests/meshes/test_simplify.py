@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import pyvista as pv
-from test_surface import open_edges
 
 from stereocell.meshes.distance import Nearest, measure_distance
 from stereocell.meshes.simplify import FEWEST, LodOptions, drop_doubles, simplify
 from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
+from support.meshes import open_edges
 
 
 def _sphere(radius: float = 5.0, sides: int = 96) -> Mesh:

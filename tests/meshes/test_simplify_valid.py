@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
-from test_certify import ball, kinds
 
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import simplify_valid
@@ -13,6 +12,7 @@ from stereocell.meshes.simplify_valid import simplify_soundly
 from stereocell.meshes.validity import Faults, certify
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
+from support.meshes import ball, kinds
 
 SHAPE = (32, 32, 32)
 

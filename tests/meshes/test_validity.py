@@ -5,60 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import pyvista as pv
-from numpy.typing import NDArray
 
 from stereocell.isosurface.extract import extract_surface
-from stereocell.meshes.validity import Faults, border, certify
+from stereocell.meshes.validity import border, certify
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
-
-
-def to_mesh(surface: pv.PolyData) -> Mesh:
-    positions = np.asarray(surface.points, np.float32)
-    triangles = surface.regular_faces.astype(np.uint32)
-    return Mesh(positions, triangles, np.zeros_like(positions))
-
-
-def ball(radius: float = 5.0, sides: int = 24) -> Mesh:
-    return to_mesh(pv.Sphere(radius=radius, theta_resolution=sides, phi_resolution=sides))
-
-
-def joined(*meshes: Mesh) -> Mesh:
-    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])
-    return Mesh(
-        np.concatenate([mesh.positions for mesh in meshes]),
-        np.concatenate(
-            [m.triangles + np.uint32(start) for m, start in zip(meshes, starts[:-1], strict=True)]
-        ),
-        np.concatenate([mesh.normals for mesh in meshes]),
-    )
-
-
-def turned(mesh: Mesh) -> Mesh:
-    return replace(mesh, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]))
-
-
-def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
-    return replace(mesh, positions=mesh.positions + np.float32(by))
-
-
-def kinds(faults: Faults) -> set[str]:
-    return {kind for kind, count in faults.counts.items() if count}
-
-
-def _with(mesh: Mesh, triangles: NDArray[np.integer]) -> Mesh:
-    return replace(mesh, triangles=triangles.astype(np.uint32))
-
-
-SOUND = {
-    "ball": ball(),
-    "torus": to_mesh(pv.ParametricTorus(u_res=40, v_res=20).triangulate().clean()),
-    "box": to_mesh(pv.Box((0, 1, 0, 2, 0, 3)).triangulate().clean()),
-    "ball with a cavity": joined(ball(), turned(ball(3.0))),
-    "ball in the cavity of a ball": joined(ball(), turned(ball(3.0)), ball(2.0)),
-    "two balls": joined(ball(), moved(ball(), (11.0, 0.0, 0.0))),
-    "nothing": _with(ball(), np.zeros((0, 3))),
-}
+from support.meshes import SOUND, _with, ball, joined, kinds, moved, to_mesh, turned
 
 
 @pytest.mark.parametrize("name", SOUND)

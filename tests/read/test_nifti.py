@@ -9,35 +9,16 @@ import nibabel
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_dicom import error, interpolation_bound, lps_mm, whole
 
 from stereocell import read
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
+from support.dicom_reading import error, interpolation_bound, lps_mm, whole
 from support.dicom_series import grid, sample, tilted, turn
+from support.nifti_files import RAS, write
 
 SHAPE = (22, 30, 26)
 OBLIQUE = turn((1, 2, -0.5), 23.0)
-RAS = np.diag([-1.0, -1.0, 1.0, 1.0])  # to and from LPS
-
-
-def write(
-    path: Path,
-    affine_lps: NDArray[np.float64],
-    voxels: NDArray[Any],
-    form: str = "sform",
-    unit: str = "mm",
-) -> Path:
-    """Write (slice, row, column) voxels as NIfTI does: the first index is the fastest."""
-    nifti = nibabel.Nifti1Image(voxels, None)
-    nifti.header.set_xyzt_units(unit)
-    if form == "sform":
-        nifti.header.set_sform(RAS @ affine_lps, 1)
-        nifti.header["pixdim"][1:4] = np.linalg.norm(affine_lps[:3, :3], axis=0)
-    elif form == "qform":
-        nifti.header.set_qform(RAS @ affine_lps, 1)
-    nibabel.save(nifti, path)
-    return path
 
 
 def scene_on(affine: NDArray[np.float64], dtype: Any = np.int16) -> NDArray[Any]:

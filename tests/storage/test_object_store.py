@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_tissue import blobs
 
 from stereocell.building.tissue import TissueRequest, add_tissue
 from stereocell.cli.__main__ import main
@@ -28,6 +27,7 @@ from support import phantoms
 from support.digests import digests_of
 from support.faulty_object_store import before
 from support.object_store import ObjectStore, serving
+from support.tissue_volumes import blobs
 from support.validators import make_assets
 
 GRID = "2x1"

@@ -2,8 +2,8 @@
 
 What the viewer's shader does in another way: one majorant for the whole volume (Woodcock et al.
 1965), no environment sampling, lamps by binary shadow rays; the same medium, the same scattering.
-Reads the run as JSON (viewer_gltf/test/support/pathtrace/harness.ts) on standard input, with "paths"; prints
-mean and standard error of premultiplied colour and coverage over the picture.
+Reads the run as JSON (viewer_gltf/test/support/pathtrace/harness.ts) on standard input, with
+"paths"; prints mean and standard error of premultiplied colour and coverage over the picture.
 """
 
 import json

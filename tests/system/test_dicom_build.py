@@ -9,7 +9,6 @@ import pytest
 import zstandard
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
-from test_nifti import write as write_nifti
 
 from stereocell.building.plan import FLESH
 from stereocell.cli.__main__ import main
@@ -17,6 +16,7 @@ from stereocell.verify.formats import check
 from support.bundles import load
 from support.dicom_series import BODIES, BRIGHTEST, grid, sample, turn, write_enhanced, write_series
 from support.glbs import decoded_positions_m
+from support.nifti_files import write as write_nifti
 
 SHAPE = (24, 40, 36)
 OBLIQUE = turn((1, 2, -0.5), 23.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
-from test_unwrap import OPTIONS, sphere, unwrapped
 
 from stereocell.building.settings import Settings
 from stereocell.building.unit import UnitInput, build_unit
@@ -21,6 +20,7 @@ from stereocell.textures.ambient_occlusion import find_openness
 from stereocell.textures.ambient_occlusion import sphere as directions
 from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.tangents import make_tangents
+from support.unwrapped import OPTIONS, sphere, unwrapped
 
 FINE = replace(OPTIONS, texel_um=0.1)
 

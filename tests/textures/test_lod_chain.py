@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from scipy import ndimage
-from test_certify import ball, kinds, moved, to_mesh
 
 from stereocell.building.settings import Settings
 from stereocell.isosurface.extract import cut_planes, extract_surface
@@ -21,6 +20,7 @@ from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.textures import lod_chain
 from stereocell.textures.lod_chain import make_levels, sharpest_angle
+from support.meshes import ball, kinds, moved, to_mesh
 
 SPACING = (1.0, 1.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)

@@ -16,22 +16,8 @@ from stereocell.model.mesh import Mesh
 from stereocell.textures import unwrap as unwrap_module
 from stereocell.textures.bake import REACH, fill
 from stereocell.textures.rasterize import find_texels
-from stereocell.textures.unwrap import UnwrapOptions, Unwrapped, mip_levels_apart, unwrap
-
-SPACING = (0.2, 0.1, 0.1)
-OPTIONS = UnwrapOptions().resolved(SPACING)
-
-
-def sphere(radius: float = 5.0, sides: int = 96) -> Mesh:
-    body = pv.Sphere(radius=radius, theta_resolution=sides, phi_resolution=sides)
-    positions = np.asarray(body.points, np.float32)
-    return Mesh(positions, body.regular_faces.astype(np.uint32), positions / np.float32(radius))
-
-
-def unwrapped(mesh: Mesh, options: UnwrapOptions = OPTIONS) -> Unwrapped:
-    found = unwrap(mesh, options)
-    assert isinstance(found, Unwrapped), found
-    return found
+from stereocell.textures.unwrap import UnwrapOptions, mip_levels_apart, unwrap
+from support.unwrapped import OPTIONS, SPACING, sphere, unwrapped
 
 
 def charts_of(mesh: Mesh) -> NDArray[np.int32]:

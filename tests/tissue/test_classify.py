@@ -1,7 +1,5 @@
 """Tissue classes against the head phantom's truth, and against volumes of known classes."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,10 +12,10 @@ from stereocell.tissue import brain_hull
 from stereocell.tissue.brain_hull import Hull, _icosphere, fill_hull
 from stereocell.tissue.classify import Tissue, TissueOptions, learn_tissue
 from stereocell.tissue.potts_prior import apply_potts_prior
+from support.tissue_volumes import Labels, blobs
 
 THREE = TissueOptions(classes=3, brain=True)
 SMALL = (80, 72, 72)
-Labels = NDArray[np.integer[Any]]
 
 
 def dice(found: NDArray[np.bool_], truth: NDArray[np.bool_]) -> float:
@@ -47,17 +45,6 @@ def learned() -> tuple[HeadPhantom, Tissue]:
     # neither seed nor shape nor bias are those of tests/bench/tissue.py
     head = make_head(SMALL, noise=0.05, bias=0.5, seed=23)
     return head, learn_tissue(head.voxels, head.spacing_um, THREE)
-
-
-def blobs(count: int) -> tuple[NDArray[np.uint16], Labels]:
-    """Return blobs of `count` tissues, 200 apart from 400 on, noise and a bias; air around."""
-    rng = np.random.default_rng(count)
-    shape = (32, 40, 40)
-    field = ndimage.gaussian_filter(rng.standard_normal(shape), 5)
-    levels = np.quantile(field, np.linspace(0, 1, count + 1)[1:-1])
-    labels = np.pad((np.digitize(field, levels) + 1)[3:-3, 3:-3, 3:-3], 3)
-    signal = 200.0 * (labels + (labels > 0)) * (1 + 0.15 * np.linspace(-1, 1, shape[2]))
-    return np.abs(signal + rng.normal(0, 30, shape)).astype(np.uint16), labels
 
 
 def test_each_class_overlaps_the_truth_and_beats_multi_otsu(

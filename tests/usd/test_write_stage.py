@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol
-from test_vdb import read_vdb, value_at
 
 from stereocell.formats.exr import read_atlas
 from stereocell.model.errors import OutputError
@@ -30,6 +29,7 @@ from support.stages import (
     make_tiles,
     write_whole,
 )
+from support.vdb_reader import read_vdb, value_at
 
 # voxels (z, y, x) at a corner of the F and just outside of it: one corner in each tile
 BORDER = [

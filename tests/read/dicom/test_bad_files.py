@@ -21,12 +21,12 @@ from pydicom.uid import (
     RLELossless,
     RTStructureSetStorage,
 )
-from test_dicom import error, whole
 
 from stereocell import read
 from stereocell.model.errors import SourceError
 from stereocell.read.dicom import stored_values
 from stereocell.read.dicom.codestream import plane_size
+from support.dicom_reading import error, whole
 from support.dicom_series import compress, grid, image, save, write_enhanced, write_series
 
 SHAPE = (6, 30, 26)

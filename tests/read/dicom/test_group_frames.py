@@ -7,10 +7,10 @@ import numpy as np
 import pydicom
 import pytest
 from pydicom.uid import generate_uid
-from test_dicom import error
 
 from stereocell import read
 from stereocell.model.errors import SourceError
+from support.dicom_reading import error
 from support.dicom_series import grid, turn, write_enhanced, write_series
 
 SHAPE = (10, 30, 26)

@@ -9,12 +9,12 @@ import pydicom
 import pytest
 from numpy.typing import NDArray
 from pydicom.uid import ImplicitVRLittleEndian, JPEGLosslessSV1, RLELossless
-from test_dicom import whole
 
 from stereocell import read
 from stereocell.cli.__main__ import main
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset
+from support.dicom_reading import whole
 from support.dicom_series import compress, grid, image, save
 
 SHAPE = (6, 30, 26)

@@ -1,0 +1,36 @@
+"""Reading DICOM files of tests, and where their voxels lie."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.read.dataset import Dataset
+from support.dicom_series import (
+    BODIES,
+    scene,
+)
+
+
+def whole(dataset: Dataset) -> NDArray[Any]:
+    return dataset.read(0, dataset.levels[0].box).voxels
+
+
+def lps_mm(dataset: Dataset) -> NDArray[np.float64]:
+    """LPS of every voxel: world is (L, S, -P), in um."""
+    level = dataset.levels[0]
+    index = np.stack(np.meshgrid(*map(np.arange, level.shape), indexing="ij"), axis=-1)
+    move = np.array(dataset.placement)
+    world = zyx_to_xyz(index * level.spacing_um) @ move[:3, :3].T + move[:3, 3]
+    return np.stack([world[..., 0], -world[..., 2], world[..., 1]], axis=-1) / 1000
+
+
+def error(dataset: Dataset) -> float:
+    """The largest difference to the scene, grey values of some 1000."""
+    return float(np.abs(whole(dataset) - scene(lps_mm(dataset))).max())
+
+
+def interpolation_bound(gap_mm: float) -> float:
+    """How far a straight line over a gap strays from the scene: h^2 / 8 times its curvature."""
+    return gap_mm**2 / 8 * max(height / sigma**2 for _, sigma, height in BODIES) + 1.0

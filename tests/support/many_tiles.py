@@ -1,0 +1,101 @@
+"""A stage of many tiles."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stereocell.model.channel import ChannelContent, Look, TileContent
+from stereocell.model.mesh import Lod, Mesh
+from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
+from stereocell.usd.write_tile import LAYER_NAME
+
+COLUMNS, ROWS, CHANNELS = 22, 11, 70
+
+
+EDGE = 4  # voxels of a tile
+
+
+# In a process of its own: the peak of this one's memory tells of the tests before. It prints
+# what it saw as JSON; no peak where /proc has none.
+OPEN = """
+import json, re, sys, time
+from pathlib import Path
+from pxr import UsdGeom
+from stereocell.usd.read_stage import open_stage
+from stereocell.usd.read_looks import read_looks
+
+def peak_kib():
+    status = Path("/proc/self/status")
+    found = status.is_file() and re.search(r"VmHWM:\\s+(\\d+) kB", status.read_text())
+    return int(found[1]) if found else None
+
+before, start = peak_kib(), time.perf_counter()
+stage = open_stage(Path(sys.argv[1]))
+tiles = stage.GetPrimAtPath("/Specimen/Tiles").GetAllChildren()
+cache = UsdGeom.BBoxCache(0, ["default"], useExtentsHint=True)
+box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
+looks = len(read_looks(stage))
+seconds, after = time.perf_counter() - start, peak_kib()
+print(json.dumps({
+    "tiles": len(tiles),
+    "loaded": sum(tile.IsLoaded() for tile in tiles),
+    "lods": sorted({t.GetVariantSets().GetAllVariantSelections()["lod"] for t in tiles}),
+    "width_um": box.GetSize()[0],
+    "looks": looks,
+    "seconds": seconds,
+    "growth_kib": None if before is None or after is None else after - before,
+}))
+"""
+
+
+def content(row: int, column: int, looks: list[Look]) -> TileContent:
+    first = (0.0, row * EDGE * 1.0, column * EDGE * 1.0)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    corners += np.array([first[2], -first[1] - 1, 1], np.float32)
+    up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
+    mesh = Mesh(corners, np.array([[0, 1, 2]], np.uint32), up)
+    lods = (Lod(mesh, 0.0), Lod(mesh, 0.5))
+    volume = np.full((EDGE + 2,) * 3, 7, np.uint8)
+    last = tuple(start + EDGE - 1 for start in first)
+    channels = tuple(ChannelContent(look.id, lods, volume) for look in looks)
+    return TileContent(f"r{row}_c{column}", (1.0, 1.0, 1.0), first, last, (EDGE,) * 3, channels)
+
+
+def write_many(folder: Path) -> Path:
+    """Write the stage; return its root layer."""
+    functions = ("default", "sharp", "soft", "surface", "threshold")
+    ramps = dict.fromkeys(functions, ((0.0, 0.0), (1.0, 1.0)))
+    looks = [
+        Look(f"channel {k}", (k / CHANNELS, 0.5, 0.5), (0.0, 9.0), 4.0, 1.0, "clear", ramps)
+        for k in range(CHANNELS)
+    ]
+    places = [(row, column) for row in range(ROWS) for column in range(COLUMNS)]
+    extents = [TileExtent.of(content(row, column, looks[:1])) for row, column in places]
+    write_tile(folder, content(*places[0], looks))
+    first, *others = (folder / "tiles" / extent.id / LAYER_NAME for extent in extents)
+    for layer in others:
+        layer.parent.mkdir()
+        shutil.copyfile(first, layer)
+    write_stage(folder, "many", looks, extents, {})
+    return folder / "stage.usda"
+
+
+def open_unloaded(stage: Path) -> dict[str, Any]:
+    """Open a stage in a process of its own; return what it saw, how long it took and held."""
+    run = subprocess.run(
+        [sys.executable, "-c", OPEN, str(stage)], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    seen: dict[str, Any] = json.loads(run.stdout)
+    return seen
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return open_unloaded(write_many(tmp_path_factory.mktemp("many")))

@@ -1,0 +1,72 @@
+"""Small closed meshes with known faults."""
+
+from dataclasses import replace
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from stereocell.meshes.validity import Faults
+from stereocell.model.mesh import Mesh
+
+
+def to_mesh(surface: pv.PolyData) -> Mesh:
+    positions = np.asarray(surface.points, np.float32)
+    triangles = surface.regular_faces.astype(np.uint32)
+    return Mesh(positions, triangles, np.zeros_like(positions))
+
+
+def ball(radius: float = 5.0, sides: int = 24) -> Mesh:
+    return to_mesh(pv.Sphere(radius=radius, theta_resolution=sides, phi_resolution=sides))
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])
+    return Mesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate(
+            [m.triangles + np.uint32(start) for m, start in zip(meshes, starts[:-1], strict=True)]
+        ),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )
+
+
+def turned(mesh: Mesh) -> Mesh:
+    return replace(mesh, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]))
+
+
+def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
+    return replace(mesh, positions=mesh.positions + np.float32(by))
+
+
+def kinds(faults: Faults) -> set[str]:
+    return {kind for kind, count in faults.counts.items() if count}
+
+
+def _with(mesh: Mesh, triangles: NDArray[np.integer]) -> Mesh:
+    return replace(mesh, triangles=triangles.astype(np.uint32))
+
+
+SOUND = {
+    "ball": ball(),
+    "torus": to_mesh(pv.ParametricTorus(u_res=40, v_res=20).triangulate().clean()),
+    "box": to_mesh(pv.Box((0, 1, 0, 2, 0, 3)).triangulate().clean()),
+    "ball with a cavity": joined(ball(), turned(ball(3.0))),
+    "ball in the cavity of a ball": joined(ball(), turned(ball(3.0)), ball(2.0)),
+    "two balls": joined(ball(), moved(ball(), (11.0, 0.0, 0.0))),
+    "nothing": _with(ball(), np.zeros((0, 3))),
+}
+
+
+def enclosed_volume(mesh: Mesh) -> float:
+    """The divergence theorem: signed tetrahedra from the origin; positive if wound outwards."""
+    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    return float((a * np.cross(b, c)).sum() / 6)
+
+
+def open_edges(mesh: Mesh) -> int:
+    """Directed edges without their opposite."""
+    t = mesh.triangles.astype(np.int64)
+    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+    count = len(mesh.positions)
+    return len(np.setdiff1d(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]))

@@ -1,0 +1,29 @@
+"""NIfTI files of known voxels."""
+
+from pathlib import Path
+from typing import Any
+
+import nibabel
+import numpy as np
+from numpy.typing import NDArray
+
+RAS = np.diag([-1.0, -1.0, 1.0, 1.0])  # to and from LPS
+
+
+def write(
+    path: Path,
+    affine_lps: NDArray[np.float64],
+    voxels: NDArray[Any],
+    form: str = "sform",
+    unit: str = "mm",
+) -> Path:
+    """Write (slice, row, column) voxels as NIfTI does: the first index is the fastest."""
+    nifti = nibabel.Nifti1Image(voxels, None)
+    nifti.header.set_xyzt_units(unit)
+    if form == "sform":
+        nifti.header.set_sform(RAS @ affine_lps, 1)
+        nifti.header["pixdim"][1:4] = np.linalg.norm(affine_lps[:3, :3], axis=0)
+    elif form == "qform":
+        nifti.header.set_qform(RAS @ affine_lps, 1)
+    nibabel.save(nifti, path)
+    return path

@@ -1,0 +1,27 @@
+"""Plans of small datasets."""
+
+from stereocell.building import settings as settings_module
+from stereocell.building.plan import Channel, Plan, choose_level, make_plan
+from stereocell.read import Level
+
+LEVELS = (
+    Level((64, 256, 640), (0.28, 0.14, 0.14)),
+    Level((64, 128, 320), (0.28, 0.28, 0.28)),
+    Level((64, 64, 160), (0.28, 0.56, 0.56)),
+)
+
+
+CHANNELS = (Channel(0, "Hoechst 33342", (0, 0, 1)), Channel(2, "CD3ε", (0, 1, 0)))
+
+
+def plan_of(
+    flags: dict[str, object] | None = None,
+    levels: tuple[Level, ...] = LEVELS,
+    channels: tuple[Channel, ...] = CHANNELS,
+    **sections: dict[str, object],
+) -> Plan:
+    settings = settings_module.load(None, None, {"plan": flags or {}, **sections})
+    level = choose_level(levels, len(channels), settings)
+    return make_plan(
+        "in.ome.zarr", "in", "ab" * 32, levels, (0.0, 0.0, 0.0), channels, level, settings
+    )

@@ -1,0 +1,24 @@
+"""A sphere with UVs."""
+
+import numpy as np
+import pyvista as pv
+
+from stereocell.model.mesh import Mesh
+from stereocell.textures.unwrap import UnwrapOptions, Unwrapped, unwrap
+
+SPACING = (0.2, 0.1, 0.1)
+
+
+OPTIONS = UnwrapOptions().resolved(SPACING)
+
+
+def sphere(radius: float = 5.0, sides: int = 96) -> Mesh:
+    body = pv.Sphere(radius=radius, theta_resolution=sides, phi_resolution=sides)
+    positions = np.asarray(body.points, np.float32)
+    return Mesh(positions, body.regular_faces.astype(np.uint32), positions / np.float32(radius))
+
+
+def unwrapped(mesh: Mesh, options: UnwrapOptions = OPTIONS) -> Unwrapped:
+    found = unwrap(mesh, options)
+    assert isinstance(found, Unwrapped), found
+    return found
