@@ -32,6 +32,7 @@ from support import phantoms
 from support.onnx_models import write_model
 
 Kill = Callable[[Path, list[str], tuple[str, str]], None]
+TESTS = Path(__file__).parents[1]
 REPORT = phases.run_report
 CHANNEL = "body"
 QUICK = """
@@ -191,9 +192,13 @@ def fork_and_run() -> None:
 @pytest.fixture(scope="module")
 def kill() -> Iterator[Kill]:
     """Run the command in a process that is killed at a moment; it must come to that."""
-    command = [sys.executable, "-c", "import test_tissue_faults as m; m.fork_and_run()"]
+    paths = os.pathsep.join(filter(None, [str(TESTS), os.environ.get("PYTHONPATH")]))
     with subprocess.Popen(
-        command, cwd=Path(__file__).parent, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, __file__],
+        env={**os.environ, "PYTHONPATH": paths},
+        text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
     ) as server:
         assert server.stdin is not None
         assert server.stdout is not None
@@ -387,3 +392,7 @@ def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
     assert f"has a channel '{CHANNEL}' of its own" in only_line(capfd)
     assert digests(out) == before
     assert json.loads((out / "tissue" / "tissue.json").read_text())["settings"]["classes"] == 2
+
+
+if __name__ == "__main__":
+    fork_and_run()

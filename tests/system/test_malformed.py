@@ -16,7 +16,12 @@ SAMPLE = 24
 @pytest.mark.slow
 def test_each_ends_in_a_sound_result_or_one_clear_line(tmp_path: Path) -> None:
     answer = tmp_path / "faults.json"
-    command = [sys.executable, str(Path(__file__).parents[1] / "malformed"), "--sample", str(SAMPLE)]
+    command = [
+        sys.executable,
+        str(Path(__file__).parents[1] / "malformed"),
+        "--sample",
+        str(SAMPLE),
+    ]
     run = subprocess.run(
         [*command, "--json", str(answer)], capture_output=True, text=True, timeout=900, check=False
     )
