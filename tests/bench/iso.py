@@ -18,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise, smooth
-from stereocell.isosurface.isovalue import CRITERIA, IsoValueOptions, find_iso_value
+from stereocell.isosurface.isovalue import find_iso_value
+from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from support.iso_value_family import SPACING, Mask, Member, boundary_distance_um, dice, family, make

@@ -24,7 +24,8 @@ from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import Store
 from stereocell.building.rounds import display_task, iso_task
-from stereocell.building.tasks import JOINT_VOXELS, SURVEY_VOXELS, read_iso_field, run_display
+from stereocell.building.tasks.iso_value import read_iso_field
+from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, run_display
 from stereocell.model.tiling import Box, cut
 from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr

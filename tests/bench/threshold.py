@@ -14,11 +14,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import stereocell.read
-from stereocell.building.settings import WindowOptions
 from stereocell.model.tiling import Box
 from stereocell.report.thresholds import describe, find_peers
 from stereocell.samples.head import BACKGROUND, GREY, WHITE, make_head
 from stereocell.transfer.channel_statistics import find_display
+from stereocell.transfer.options import WindowOptions
 from support.iso_value_family import dice
 
 WINDOW = WindowOptions(1.0, 99.8)  # the preset mri's

@@ -27,7 +27,8 @@ from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.components import find_solids
 from stereocell.isosurface.extract import extract_surface, signed_distance
-from stereocell.isosurface.isovalue import IsoValueOptions, find_iso_value
+from stereocell.isosurface.isovalue import find_iso_value
+from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.simplify import compact

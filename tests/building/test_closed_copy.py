@@ -10,14 +10,14 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from stereocell.building import closed_copy
-from stereocell.building.closed_copy import Closed, close_tile
-from stereocell.building.unit import Unit
+from stereocell.building.closed_copy import close_tile
 from stereocell.building.unit_files import find_closed, load_record, save_unit
 from stereocell.formats.stl import write_stl
 from stereocell.meshes.simplify_valid import Mended
 from stereocell.meshes.validity import Plane, certify
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
+from stereocell.model.unit import Closed, Unit
 
 SPACING = (0.5, 0.25, 0.25)
 REGION = Box((0, 0, 0), (30, 60, 60))

@@ -177,10 +177,19 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
 
 def fork_and_run() -> None:
     """Run each line of the input in a process of its own; what takes longest is done before."""
-    for name in ("tissue", "network", "tasks", "staging", "write.bundle", "write.usdz"):
+    for name in (
+        "tissue.classify",
+        "tissue.onnx_classifier",
+        "building.tasks.window",
+        "building.tasks.iso_value",
+        "building.tasks.unit",
+        "building.stage_tasks",
+        "bundle.write",
+        "usd.write_usdz",
+        "read.ome_tiff",
+        "read.ome_zarr",
+    ):
         key_of("", importlib.import_module(f"stereocell.{name}"))  # known from now on
-    for name in ("read.ome_tiff", "read.ome_zarr"):
-        importlib.import_module(f"stereocell.{name}")
     for line in sys.stdin:
         child = os.fork()
         if child == 0:

@@ -9,8 +9,8 @@ import pytest
 from pxr import Usd
 from scipy import ndimage
 
-from stereocell.building.calm import plan_for
 from stereocell.building.out_folder import Store
+from stereocell.building.plan import plan_for
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.isosurface.repair_rules import choose_repair

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -223,7 +224,9 @@ def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.Monk
     body = phantoms.f_phantom()
     np.save(tmp_path / "f.npy", body)
     monkeypatch.setattr(Location, "format", property(lambda location: "npy"))
-    monkeypatch.setitem(open_dataset.READERS, "npy", names["read_image"])
+    monkeypatch.setitem(sys.modules, "npy_reader", SimpleNamespace(read_image=names["read_image"]))
+    reader = open_dataset.Reader("npy_reader", "NumPy", "NAME.npy")
+    monkeypatch.setitem(open_dataset.READERS, "npy", reader)
     dataset = stereocell.open_volume(tmp_path / "f.npy", spacing_um=(0.5, 0.2, 0.2))
     assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
     np.save(tmp_path / "f.npy", body[0])

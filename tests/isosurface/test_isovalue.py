@@ -10,13 +10,8 @@ from scipy import ndimage
 
 from stereocell.filters.denoise import smooth
 from stereocell.isosurface.extract import extract_surface, signed_distance
-from stereocell.isosurface.isovalue import (
-    CRITERIA,
-    PEAK_SHARE,
-    IsoValueOptions,
-    _peak,
-    find_iso_value,
-)
+from stereocell.isosurface.isovalue import PEAK_SHARE, _peak, find_iso_value
+from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume

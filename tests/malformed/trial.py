@@ -62,10 +62,16 @@ def import_all() -> None:
     for module in pkgutil.walk_packages(stereocell.__path__, "stereocell."):
         if not module.name.endswith(_LEFT_OUT):
             importlib.import_module(module.name)
-    from stereocell.building import stage_tasks, tasks
+    from stereocell.building import stage_tasks
+    from stereocell.building.tasks import iso_value, unit, window
     from stereocell.storage import cache_key
 
-    for maker in (tasks, stage_tasks):  # looked up once a process, at the cost of seconds
+    for maker in (
+        window,
+        iso_value,
+        unit,
+        stage_tasks,
+    ):  # looked up once a process, at the cost of seconds
         cache_key.libraries_of(maker)
 
 

@@ -5,7 +5,8 @@ import pytest
 import pyvista as pv
 
 from stereocell.meshes.distance import Nearest, measure_distance
-from stereocell.meshes.simplify import FEWEST, LodOptions, drop_doubles, simplify
+from stereocell.meshes.options import LodOptions
+from stereocell.meshes.simplify import FEWEST, drop_doubles, simplify
 from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
 from support.meshes import open_edges

@@ -8,7 +8,7 @@ from PIL import Image
 
 from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
-from stereocell.isosurface.isovalue import CRITERIA
+from stereocell.isosurface.options import CRITERIA
 from stereocell.preview.iso_value import COLORS, Candidate, preview, table
 from support import phantoms
 

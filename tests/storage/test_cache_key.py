@@ -1,7 +1,10 @@
 """A result's key follows all the code, files and libraries that make it, and nothing else."""
 
+import ast
+import re
 import shutil
 import sys
+from collections.abc import Callable
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
@@ -10,12 +13,25 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from stereocell import report
-from stereocell.building import stage_tasks, tasks
+from stereocell.building import stage_tasks
+from stereocell.building.tasks import iso_value, unit, window
 from stereocell.bundle import write as bundle_writer
+from stereocell.read.open_dataset import READERS
 from stereocell.storage import assets, cache_key
 
 ROOT = Path(__file__).parents[2]
-MAKERS = {"units": tasks, "stage": stage_tasks, "bundle": bundle_writer, "report": report}
+ZARR, TIFF = READERS["ome-zarr"].module, READERS["ome-tiff"].module
+MAKERS = {
+    "window": (window, ZARR),
+    "iso-value": (iso_value, ZARR),
+    "unit": (unit, ZARR),
+    "unit of a TIFF": (unit, TIFF),
+    "stage": (stage_tasks,),
+    "bundle": (bundle_writer,),
+    "report": (report,),
+}
+UNITS = {"unit", "unit of a TIFF"}
+TASKS = UNITS | {"window", "iso-value"}
 
 
 @pytest.fixture(scope="module")
@@ -41,43 +57,155 @@ def keys(checkout: Path) -> dict[str, str]:
         patch.setattr(assets, "_HOMES", (package, checkout))
         try:
             _forget()
-            return {name: cache_key.key_of("x", maker) for name, maker in MAKERS.items()}
+            return {name: cache_key.key_of("x", *makers) for name, makers in MAKERS.items()}
         finally:
             _forget()
 
 
 def _forget() -> None:
     cache_key._digest.cache_clear()
-    cache_key._lineage.cache_clear()
+    cache_key._reach.cache_clear()
+    cache_key._code.cache_clear()
     cache_key._needs.cache_clear()
     cache_key._modules.cache_clear()
+
+
+def changed(checkout: Path, file: str, change: Callable[[str], str]) -> set[str]:
+    """The makers whose key follows a change of one file."""
+    before = keys(checkout)
+    path = checkout / file
+    content = path.read_text()
+    path.write_text(change(content))
+    assert path.read_text() != content
+    after = keys(checkout)
+    path.write_text(content)
+    return {maker for maker in MAKERS if before[maker] != after[maker]}
+
+
+def change_a_number(text: str) -> str:
+    """The same module with another value of its first number."""
+    number = next(
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float)
+    )
+    lines = text.encode().splitlines(keepends=True)
+    line = lines[number.lineno - 1]
+    lines[number.lineno - 1] = line[: number.col_offset] + b"765" + line[number.end_col_offset :]
+    return b"".join(lines).decode()
+
+
+PACKAGE = "pipeline/stereocell"
 
 
 @pytest.mark.parametrize(
     ("file", "reached"),
     [
-        ("pipeline/stereocell/cli/__main__.py", set()),
-        ("pipeline/stereocell/meshes/simplify.py", {"units", "stage", "report"}),
-        ("pipeline/stereocell/read/ome_zarr.py", {"units", "report"}),
-        ("pipeline/stereocell/formats/exr.py", {"stage", "bundle"}),
-        ("pipeline/stereocell/formats/gltf.py", {"bundle"}),
-        ("pipeline/stereocell/building/stage_tasks.py", {"stage"}),
-        ("usd_assets/lights.usda", {"stage"}),
-        ("schemas/usd/schema.usda", {"stage", "bundle"}),
-        ("pipeline/stereocell/report/charts.py", {"report"}),
+        ("cli/__main__.py", set()),
+        ("storage/lock.py", set()),
+        ("engine/run.py", set()),
+        ("serve/limits.py", set()),
+        ("textures/tangents.py", UNITS),
+        ("meshes/simplify.py", UNITS | {"report"}),
+        ("filters/denoise.py", TASKS - {"window"}),
+        ("isosurface/isovalue.py", TASKS - {"window"}),
+        ("transfer/boundaries.py", {"window"}),
+        ("read/ome_zarr.py", TASKS - {"unit of a TIFF"}),
+        ("read/ome_tiff.py", {"unit of a TIFF"}),
+        ("read/dicom/frame.py", set()),
+        ("read/nifti.py", set()),
+        ("formats/exr.py", {"stage", "bundle"}),
+        ("formats/gltf.py", {"bundle"}),
+        ("building/stage_tasks.py", {"stage"}),
+        ("report/charts.py", {"report"}),
     ],
 )
-def test_key_changes_with_what_makes_the_result(copy: Path, file: str, reached: set[str]) -> None:
+def test_a_constant_changes_the_keys_of_what_it_makes(
+    copy: Path, file: str, reached: set[str]
+) -> None:
+    assert changed(copy, f"{PACKAGE}/{file}", change_a_number) == reached
+
+
+@pytest.mark.parametrize(
+    ("file", "reached"),
+    [("usd_assets/lights.usda", {"stage"}), ("schemas/usd/schema.usda", {"stage", "bundle"})],
+)
+def test_an_asset_changes_the_keys_of_what_is_made_of_it(
+    copy: Path, file: str, reached: set[str]
+) -> None:
+    assert changed(copy, file, lambda text: f"{text}\n# changed\n") == reached
+
+
+def test_comments_and_docstrings_change_no_key(copy: Path) -> None:
+    """In all modules at once: a comment above, one in each body, another docstring."""
     before = keys(copy)
-    content = (copy / file).read_bytes()
-    (copy / file).write_bytes(content + b"\n# changed\n")
+    for file in (copy / PACKAGE).rglob("*.py"):
+        text = file.read_text()
+        if text.startswith('"""'):
+            text = '"""Another' + text[3:]
+        text = re.sub(r'^( +)"""(?=\w)', r'\1# a comment\n\1"""Another ', text, flags=re.MULTILINE)
+        file.write_text(f"# changed\n{text}\n# changed\n")
     after = keys(copy)
-    (copy / file).write_bytes(content)
-    assert {maker for maker in MAKERS if before[maker] != after[maker]} == reached
+    shutil.rmtree(copy / PACKAGE)
+    shutil.copytree(ROOT / PACKAGE, copy / PACKAGE)
+    assert after == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("", ""),
+        ('raise ValueError(f"{a}: found {b}")', 'raise ValueError(f"{a}: not {b:.2f}, " "other")'),
+        ('raise Error("words") from None', 'raise Error("other words") from None'),
+        ('console.print("done")', 'console.print(f"{a} is done")'),
+        ('log.info("done")', 'log.info("ready")'),
+        ('warnings.warn("old", stacklevel=2)', 'warnings.warn("older", stacklevel=2)'),
+        ('x = setting(1, "what it does")', 'x = setting(1, "what it is for")'),
+    ],
+)
+def test_words_for_people_change_no_code(tmp_path: Path, old: str, new: str) -> None:
+    assert code(tmp_path / "a.py", old) == code(tmp_path / "b.py", new)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("x = 1", "x = 2"),
+        ('x = "a"', 'x = "b"'),
+        ("x = setting(1, '')", "x = setting(2, '')"),
+        ('raise ValueError("words")', 'raise KeyError("words")'),
+        ('raise Error("words", code=1)', 'raise Error("words", code=2)'),
+        ('if a:\n    raise Error("words")', 'if b:\n    raise Error("words")'),
+        ('console.print("done")', "run()"),
+        ('words = "done"', 'words = "ready"'),
+        ("def f(a): return a", "def f(a): return b"),
+    ],
+)
+def test_code_changes_the_code(tmp_path: Path, old: str, new: str) -> None:
+    assert code(tmp_path / "a.py", old) != code(tmp_path / "b.py", new)
+
+
+def code(file: Path, text: str) -> str:
+    file.write_text(text)
+    return cache_key._code(file)
+
+
+def test_only_libraries_that_can_change_a_byte_are_in_a_unit_s_key() -> None:
+    _, libraries = cache_key._reach(unit.__name__, cache_key.NEUTRAL)
+    _, of_reader = cache_key._reach(ZARR, cache_key.NEUTRAL)
+    named = {name for name, _ in libraries} | {name for name, _ in of_reader}
+    assert {"numpy", "vtk", "xatlas", "edt", "zarr"} <= named
+    others = {"aiohttp", "botocore", "psutil", "jsonschema", "distributed", "rich", "pydicom"}
+    assert not others & named
+
+
+def test_modules_that_are_left_out_exist() -> None:
+    for part in cache_key.NEUTRAL:
+        assert f"stereocell.{part}" in cache_key._modules(), part
 
 
 def test_versions_of_libraries_count_those_of_lone_extension_modules_too() -> None:
-    assert {"numpy", "vtk", "xatlas", "edt", "zarr"} <= cache_key.libraries_of(tasks).keys()
+    assert {"numpy", "vtk", "xatlas", "edt", "zarr"} <= cache_key.libraries_of(unit, ZARR).keys()
     assert {"usd-core", "OpenEXR"} <= cache_key.libraries_of(stage_tasks).keys()
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pyvista as pv
 
 from stereocell.model.mesh import Mesh
-from stereocell.textures.unwrap import UnwrapOptions, Unwrapped, unwrap
+from stereocell.textures.options import UnwrapOptions
+from stereocell.textures.unwrap import Unwrapped, unwrap
 
 SPACING = (0.2, 0.1, 0.1)
 

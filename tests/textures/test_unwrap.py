@@ -15,8 +15,9 @@ from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
 from stereocell.textures import unwrap as unwrap_module
 from stereocell.textures.bake import REACH, fill
+from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.rasterize import find_texels
-from stereocell.textures.unwrap import UnwrapOptions, mip_levels_apart, unwrap
+from stereocell.textures.unwrap import mip_levels_apart, unwrap
 from support.unwrapped import OPTIONS, SPACING, sphere, unwrapped
 
 

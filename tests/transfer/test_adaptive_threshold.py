@@ -12,7 +12,6 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 from skimage import filters
 
-from stereocell.building.settings import WindowOptions
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import evaluate
 from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
@@ -30,6 +29,7 @@ from stereocell.transfer.channel_statistics import (
     make_look,
 )
 from stereocell.transfer.opacity import THRESHOLD
+from stereocell.transfer.options import WindowOptions
 from stereocell.verify.formats import check
 from support import phantoms
 

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stereocell.building import tasks
 from stereocell.building.out_folder import Store
-from stereocell.building.settings import WindowOptions
+from stereocell.building.tasks import window as window_task
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import evaluate
 from stereocell.transfer.channel_statistics import find_display, make_look
 from stereocell.transfer.opacity import NAMES, make_transfer_functions
+from stereocell.transfer.options import WindowOptions
 from support import phantoms
 
 
@@ -48,7 +48,7 @@ def test_window_is_that_of_the_region_alone(
     seen: tuple[int, tuple[slice, slice, slice]],
 ) -> None:
     """The data are dim to the left and bright to the right; a part of the left is built."""
-    monkeypatch.setattr(tasks, "SURVEY_VOXELS", limit)
+    monkeypatch.setattr(window_task, "SURVEY_VOXELS", limit)
     fine = np.random.default_rng(0).integers(100, 200, (16, 40, 80)).astype(np.uint16)
     fine[:, :, 36:] *= 10
     coarse = fine.reshape(8, 2, 20, 2, 40, 2).mean(axis=(1, 3, 5)).astype(np.uint16)
@@ -77,8 +77,8 @@ def test_window_is_that_of_the_region_alone(
 def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tasks, "SURVEY_VOXELS", 4000)
-    monkeypatch.setattr(tasks, "COUNTED_VOXELS", 7999)
+    monkeypatch.setattr(window_task, "SURVEY_VOXELS", 4000)
+    monkeypatch.setattr(window_task, "COUNTED_VOXELS", 7999)
     voxels = np.random.default_rng(0).integers(100, 200, (20, 20, 20)).astype(np.uint16)
     source = phantoms.write_ome_zarr(tmp_path / "one.ome.zarr", [voxels])
     out = tmp_path / "out"

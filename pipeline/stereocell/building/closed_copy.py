@@ -6,29 +6,14 @@ voxel past the cut: neighbours overlap by that, so that a union has no faces tha
 A copy is certified as every mesh is; one that simplification left with faults stays unsimplified.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes.simplify_valid import simplify_soundly
 from stereocell.meshes.validity import bodies, certify
-from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
-
-
-@dataclass(frozen=True, slots=True)
-class Closed:
-    """A closed copy of a tile.
-
-    faults     that are left, by the exact check
-    fallbacks  bodies that simplification left as they were: all, where it left faults
-    """
-
-    mesh: Mesh
-    faults: int
-    fallbacks: int
+from stereocell.model.unit import Closed
 
 
 def close_tile(

@@ -12,18 +12,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from stereocell.building import stage_tasks, tasks
+from stereocell.building import stage_tasks
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import Store
 from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.building.rounds import run_rounds
 from stereocell.building.settings import Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
+from stereocell.building.tasks import iso_value, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import OutputError
 from stereocell.model.version import GENERATOR
+from stereocell.read.open_dataset import READERS
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of, libraries_of
@@ -94,13 +96,14 @@ def settle(source: str, settings: Settings) -> Plan:
 def provenance(plan: Plan) -> dict[str, Any]:
     """Return what a reader of the results may know of their making: no paths, no identities."""
     settings = to_dict(plan.settings)
+    readers = [reader.module for reader in READERS.values()]
     return {
         "generator": GENERATOR,
         "fingerprint": plan.fingerprint,
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
-        "libraries": {**libraries_of(tasks), **libraries_of(stage_tasks)},
+        "libraries": libraries_of(window, iso_value, unit, stage_tasks, *readers),
         **_added(plan),
     }
 
@@ -138,7 +141,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         about = provenance(plan)
         names = [plan.name, plan.modality]
         depends = [index, [asdict(look) for look in looks], about, names, list(plan.placement)]
-        key = key_of(key_of(depends, stage_tasks), usdz_writer)
+        key = key_of(depends, stage_tasks, usdz_writer)
         if phase.is_done(key, partial(_digest_of_stage, store)):
             return
         remove(store.stage_list)  # of what was

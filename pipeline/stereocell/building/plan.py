@@ -13,6 +13,7 @@ from typing import Protocol, TypeVar
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.isosurface.repair import RepairOptions
+from stereocell.model.channel import Verdict
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.rigid_transform import IDENTITY, Matrix
@@ -379,3 +380,23 @@ def _repair_options(settings: Settings) -> RepairOptions:
 
 def _by(numbers: Sequence[float]) -> str:
     return " x ".join(f"{n:.15g}" for n in numbers)
+
+
+def plan_for(plan: Plan, verdict: Verdict) -> Plan:
+    """Return the plan by which a channel is built; one whose surface is unclear is smoothed more.
+
+    At the level of a surface that nothing tells from noise the field is frayed, in solids that join
+    into one: a tile of a real brain's autofluorescence (30 x 510 x 512 voxels) came to 1.42 million
+    triangles after 376 s of simplifying, where cells have 0.14 million after 10 s. There is no gap
+    in it that is known to be one, so none is closed, and what closing would have reached is spent
+    on smoothing: the unit reads no more voxels, neighbours still see the same field, and that tile
+    has 65 thousand triangles after 4.5 s.
+    """
+    if verdict != "unclear":
+        return plan
+    surface = plan.settings.surface
+    repair, step = plan.repair, plan.spacing_um
+    closing = repair.reach_um(step) - replace(repair, alpha_um=0.0).reach_um(step)
+    sigma = float(surface.smoothing_um) + closing / SMOOTHING_REACH
+    calm = replace(surface, smoothing_um=sigma)
+    return replace(plan, settings=replace(plan.settings, surface=calm))

@@ -8,31 +8,28 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
-from stereocell.building import tasks as maker
-from stereocell.building.calm import plan_for
 from stereocell.building.input_unchanged import require_added, require_input
 from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import Store
-from stereocell.building.plan import Channel, Plan
-from stereocell.building.tasks import (
-    DisplayTask,
-    IsoTask,
-    UnitTask,
-    run_unit,
-    write_display,
-    write_iso,
-)
+from stereocell.building.plan import Channel, Plan, plan_for
+from stereocell.building.tasks import iso_value as iso_maker
+from stereocell.building.tasks import unit as unit_maker
+from stereocell.building.tasks import window as window_maker
+from stereocell.building.tasks.iso_value import IsoTask, write_iso
+from stereocell.building.tasks.unit import UnitTask, run_unit
+from stereocell.building.tasks.window import DisplayTask, write_display
 from stereocell.building.unit import UnitInput
 from stereocell.building.unit_files import is_whole
 from stereocell.engine.run import Engine
-from stereocell.isosurface.isovalue import ADAPTIVE
 from stereocell.isosurface.neighbour_consensus import Agreed, agree, find_neighbours
+from stereocell.isosurface.options import ADAPTIVE
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import UsageError
 from stereocell.model.lattice_field import LatticeField, make_iso_field
 from stereocell.model.tiling import Box, Tile
+from stereocell.read.open_dataset import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_json, read_json, write_json
 from stereocell.transfer.channel_statistics import (
@@ -245,7 +242,7 @@ def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
             asdict(plan.settings.window),
             plan.settings.surface.background_um if task.subtracts else 0,
         ]
-        file = store.display_file(channel.id, key_of(depends, maker))
+        file = store.display_file(channel.id, key_of(depends, window_maker, _reader(plan, channel)))
         files[channel.id] = file
         if find_json(file, _DISPLAY) is None:
             tasks.append((channel.id, (task, file)))
@@ -275,7 +272,9 @@ def _isos(
                 task.given,
                 None if task.background is None else task.background.to_json(),
             ]
-            file = store.iso_file(tile.id, channel.id, key_of(depends, maker))
+            file = store.iso_file(
+                tile.id, channel.id, key_of(depends, iso_maker, _reader(plan, channel))
+            )
             files[tile.id, channel.id] = file
             if find_json(file, _ISO_VALUE) is None:
                 tasks.append((f"{tile.id}/{channel.name}", (task, file)))
@@ -326,7 +325,7 @@ def _unit_task(
         asdict(plan.settings.unwrap),
         painted,
     ]
-    key = key_of(depends, maker)
+    key = key_of(depends, unit_maker, _reader(plan, channel))
     directory = store.unit_dir(tile_id, channel.id, key)
     ref, index = source_of(plan, channel), painted and painted[0]
     return UnitTask(ref, plan.level_of(channel), channel.index, given, directory, index), key
@@ -340,6 +339,11 @@ def _input_key(plan: Plan, channel: Channel) -> list[Any]:
     if channel.source:
         return [channel.fingerprint, 0, plan.spacing_um, plan.origin_um, 0]
     return [plan.fingerprint, plan.level, plan.spacing_um, plan.origin_um, plan.settings.plan.time]
+
+
+def _reader(plan: Plan, channel: Channel) -> str:
+    """Return the module that reads a channel: other formats' readers change nothing of it."""
+    return reader_of(channel.source or plan.source)
 
 
 def _box(box: Box) -> list[list[int]]:

@@ -12,12 +12,13 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from stereocell.isosurface.isovalue import IsoValueOptions
-from stereocell.meshes.simplify import LodOptions
+from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions
+from stereocell.meshes.options import LodOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
-from stereocell.model.settings import AUTO, length_um, setting
-from stereocell.textures.unwrap import UnwrapOptions
+from stereocell.model.settings import AUTO, setting
+from stereocell.textures.options import UnwrapOptions
+from stereocell.transfer.options import WindowOptions
 
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length
@@ -66,88 +67,6 @@ class PlanOptions:
                 f"plan.modality is {self.modality!r}, expected one of "
                 f"{', '.join(sorted(MODALITIES))}, or nothing"
             )
-
-
-@dataclass(frozen=True, slots=True)
-class WindowOptions:
-    """Which voxel values become 0 and 255, dataset-wide."""
-
-    low_percentile: float = setting(0.5, "percent of the voxels that become 0")
-    high_percentile: float = setting(99.95, "percent of the voxels that stay below 255")
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.low_percentile < self.high_percentile <= 100:
-            raise UsageError(
-                f"window percentiles are {self.low_percentile:g} and {self.high_percentile:g}, "
-                "expected 0 <= low < high <= 100"
-            )
-
-
-WRAPS = ("voxels", "alpha-wrap")
-
-
-@dataclass(frozen=True, slots=True)
-class SurfaceOptions:
-    """Lengths in um; auto follows the voxel spacing."""
-
-    smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
-    alpha_um: float | str = setting(
-        AUTO, "radius of the ball that closes gaps; auto: by the channel's solids, see max_alpha_um"
-    )
-    max_alpha_um: float | str = setting(
-        AUTO, "what auto alpha may reach; auto: 2 coarsest spacings"
-    )
-    offset_um: float | str = setting(
-        0.0, "how far outside the surface lies: volumes grow by it; auto: a tenth of alpha"
-    )
-    grid_um: float = setting(
-        0.0,
-        "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
-    )
-    min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
-    max_fragment_um: float | str = setting(
-        AUTO,
-        "fragments up to this go as well if they are under half the mean of the channel's solids, "
-        "by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
-    )
-    max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
-    wrap: str = setting(
-        "voxels", "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)"
-    )
-    closed_tiles: bool = setting(
-        False, "whether the stage gets a closed STL of every tile and channel, in um"
-    )
-    background_um: float | str = setting(
-        AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
-    )
-
-    def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
-        """Return the options with lengths for `auto`; alpha and offset may wait for the solids."""
-        coarsest = max(spacing_um)
-        auto = {
-            "smoothing_um": min(spacing_um),
-            "max_alpha_um": 2 * coarsest,
-            "min_diagonal_um": 3 * coarsest,
-            "max_fragment_um": 6 * coarsest,
-            "max_cavity_um": 4 * coarsest,
-            "background_um": 64 * min(spacing_um),
-        }
-        lengths: dict[str, Any] = {
-            key: length_um(f"surface.{key}", getattr(self, key), auto[key]) for key in auto
-        }
-        if self.wrap not in WRAPS:
-            raise UsageError(f"surface.wrap is {self.wrap!r}, expected one of {', '.join(WRAPS)}")
-        for key in ("alpha_um", "offset_um"):
-            length_um(f"surface.{key}", getattr(self, key), 0.0)
-        if self.grid_um < 0:
-            raise UsageError(
-                f"surface.grid_um is {self.grid_um:g}, expected a length in um, or 0: all planes"
-            )
-        if self.offset_um != AUTO and float(self.offset_um) > coarsest:
-            raise UsageError(
-                f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"
-            )
-        return replace(self, **lengths)
 
 
 @dataclass(frozen=True, slots=True)

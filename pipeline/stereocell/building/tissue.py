@@ -29,6 +29,7 @@ from stereocell.engine.run import console
 from stereocell.formats.ome_zarr_write import write_probabilities
 from stereocell.model.errors import OutputError, SourceError, UsageError
 from stereocell.model.version import GENERATOR
+from stereocell.read.open_dataset import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.json_files import write_json
@@ -108,7 +109,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     source = [plan.fingerprint, plan.level, plan.spacing_um, plan.settings.plan.time]
     region = [plan.region.start, plan.region.stop]
     depends = [source, region, channel.index, channel.name, settings]
-    key = key_of(key_of(depends, tissue_module), network_module)
+    key = key_of(depends, tissue_module, network_module, reader_of(plan.source))
     record = _find_learned(out / FOLDER, key)
     if record is None:
         record = _learn(store, plan, channel, options, network, settings, key)
@@ -204,7 +205,7 @@ def _learn(
             }
             for one in classes
         ],
-        "libraries": {**libraries_of(tissue_module), **libraries_of(network_module)},
+        "libraries": libraries_of(tissue_module, network_module),
     }
     shape = dataset.levels[plan.level].shape
     with replacing_folder(store.out / FOLDER) as folder:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.closed_copy import Closed, close_tile
+from stereocell.building.closed_copy import close_tile
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.extract import cut_planes, extract_surface, signed_distance
@@ -14,15 +14,16 @@ from stereocell.isosurface.repair import Repaired, RepairOptions, repair
 from stereocell.meshes.alpha_wrap import alpha_wrap
 from stereocell.model.channel import APRON
 from stereocell.model.lattice_field import LatticeField
-from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
+from stereocell.model.unit import Closed, Unit
 from stereocell.model.volume import Volume
 from stereocell.textures.ambient_occlusion import find_openness
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels
+from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.sample_channel import find_paint
-from stereocell.textures.unwrap import UnwrapOptions
 from stereocell.transfer.joint_histogram import to_eight_bits
 
 PAST = 3  # voxels past a cut that maps are baked from: the halo is larger, and texels smaller
@@ -53,25 +54,6 @@ class UnitInput:
     display: tuple[float, float]
     settings: Settings
     painted: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Unit:
-    """What a unit leaves.
-
-    closed   a closed copy of lod0, if that is asked for and there are solids
-    volume   uint8 (z, y, x): the lattice's voxels, window applied, APRON voxels more on every side
-    reason   why there is no surface; empty if there is one
-    seconds  by step
-    """
-
-    lods: tuple[Lod, ...]
-    closed: Closed | None
-    volume: NDArray[np.uint8]
-    reason: str
-    fragments_dropped: int
-    cavities_filled: int
-    seconds: dict[str, float]
 
 
 def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) -> Unit:

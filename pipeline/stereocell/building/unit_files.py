@@ -17,11 +17,10 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.closed_copy import Closed
-from stereocell.building.unit import Unit
 from stereocell.formats.stl import write_stl
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
+from stereocell.model.unit import Closed, Unit
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
 from stereocell.storage.json_files import find_json, read_json, write_json

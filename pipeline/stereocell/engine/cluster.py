@@ -5,7 +5,6 @@ import re
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -13,6 +12,17 @@ from typing import Any, Generic, TypeVar
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.cache_key import key_of, libraries_of
 
+# The modules whose code workers must have in common, by name: this package stands below them
+_MAKERS = (
+    "stereocell.building.tasks.window",
+    "stereocell.building.tasks.iso_value",
+    "stereocell.building.tasks.unit",
+    "stereocell.building.stage_tasks",
+    "stereocell.read.ome_zarr",
+    "stereocell.read.ome_tiff",
+    "stereocell.read.nifti",
+    "stereocell.read.dicom",
+)
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -135,10 +145,5 @@ def _look_at(shared: str) -> _Sight:
 
 
 def _look() -> _Sight:
-    # by their names: what a cluster is asked belongs to no result's lineage
-    makers = [import_module(f"stereocell.building.{name}") for name in ("tasks", "stage_tasks")]
-    versions = {"StereoCell": version("stereocell")}
-    for maker in makers:
-        versions |= libraries_of(maker)
-    code = "".join(key_of("", maker) for maker in makers)
-    return _Sight(socket.gethostname(), tuple(versions.items()), code)
+    versions = {"StereoCell": version("stereocell"), **libraries_of(*_MAKERS)}
+    return _Sight(socket.gethostname(), tuple(versions.items()), key_of("", *_MAKERS))

@@ -39,56 +39,15 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.isosurface.extract import gradient_magnitude
+from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.raggedness import find_raggedness
-from stereocell.model.errors import NoSurfaceError, UsageError
-from stereocell.model.settings import setting
+from stereocell.model.errors import NoSurfaceError
 
-CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
-ADAPTIVE = "adaptive"  # the channel's threshold, in all tiles; its curves are those of `edges`
 NOISE_FACTOR = 8.0  # noise's own gradients rarely reach it; 3 to 16 choose alike
 DIM_PERCENTILE = 40.0  # of the voxels: taken as free of edges, where the noise is measured
 CHI = 0.789  # median over mean of a chi-square of three: of noise's squared gradient
 EDGES_SHARE = 0.70  # of the most edges: levels that follow nearly as many are in the choice
 PEAK_SHARE = 0.75  # of the best score: the summit of the curve, to which a parabola is fitted
-
-
-@dataclass(frozen=True, slots=True)
-class IsoValueOptions:
-    """How iso-values are found."""
-
-    criterion: str = setting(
-        "edges",
-        "edges, compromise, pekar-mean, pekar-total, pekar-area; adaptive: the channel's threshold",
-    )
-    bins: int = setting(256, "levels tried over the range of a tile's voxels")
-    clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
-    min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
-    min_confidence: float = setting(0.4, "of a clear surface, 0 to 1; see the report")
-
-    @property
-    def curve(self) -> str:
-        """Which of CRITERIA is the curve over the levels."""
-        return CRITERIA[0] if self.criterion == ADAPTIVE else self.criterion
-
-    def __post_init__(self) -> None:
-        if self.criterion not in (*CRITERIA, ADAPTIVE):
-            raise UsageError(
-                f"isovalue.criterion is {self.criterion!r}, expected one of "
-                f"{', '.join((*CRITERIA, ADAPTIVE))}"
-            )
-        if not 16 <= self.bins <= 65536:
-            raise UsageError(
-                f"isovalue.bins is {self.bins}, expected at least 16 and at most 65536"
-            )
-        if not 0 < self.clip_percentile <= 100:
-            raise UsageError(
-                f"isovalue.clip_percentile is {self.clip_percentile:g}, "
-                "expected more than 0 and at most 100"
-            )
-        if not 0 <= self.min_area_share <= 1:
-            raise UsageError(f"isovalue.min_area_share is {self.min_area_share:g}, expected 0 to 1")
-        if not 0 <= self.min_confidence <= 1:
-            raise UsageError(f"isovalue.min_confidence is {self.min_confidence:g}, expected 0 to 1")
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,7 +72,7 @@ def choose_repair(
     """Return what is cleaned of a channel's surface; `tiles`: SolidSums, as plain values.
 
     No gaps are closed in a surface that is not clear, by either wrap: none is known to be one
-    (calm.py).
+    (building.plan.plan_for).
     """
     surface, most = plan.settings.surface, plan.repair
     sums = list(tiles)

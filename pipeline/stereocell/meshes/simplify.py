@@ -6,7 +6,6 @@ on a common plane are the same at every level, and neighbours at different level
 """
 
 import ctypes
-from dataclasses import dataclass
 
 import meshoptimizer
 import numpy as np
@@ -14,9 +13,7 @@ from meshoptimizer._loader import lib
 from numpy.typing import NDArray
 
 from stereocell.meshes.validity import bodies
-from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
-from stereocell.model.settings import setting
 
 # meshoptimizer 0.2.30a0 declares no argument types for the only call that takes locked vertices;
 # without them a float goes over as an int
@@ -38,23 +35,6 @@ lib.meshopt_simplifyWithAttributes.argtypes = [
     ctypes.POINTER(ctypes.c_float),  # error found
 ]
 lib.meshopt_simplifyWithAttributes.restype = ctypes.c_size_t
-
-
-@dataclass(frozen=True, slots=True)
-class LodOptions:
-    """How levels of detail are made."""
-
-    errors: tuple[float, ...] = setting(
-        (0.1, 0.5, 0.8, 4.0),
-        "aim of simplifying to lod0, lod1, ..., in finest spacings; what comes out is measured",
-    )
-    samples: int = setting(1000, "points at which distances are measured, each way")
-
-    def __post_init__(self) -> None:
-        if not self.errors or list(self.errors) != sorted(self.errors) or self.errors[0] <= 0:
-            raise UsageError(f"lod.errors is {list(self.errors)}, expected rising positive numbers")
-        if self.samples < 1:
-            raise UsageError(f"lod.samples is {self.samples}, expected 1 or more")
 
 
 FEWEST = 8  # triangles of a body that would vanish: an octahedron

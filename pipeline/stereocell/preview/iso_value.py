@@ -16,8 +16,10 @@ from stereocell.building.phases import settle
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.rounds import display_task, iso_task
 from stereocell.building.settings import Settings
-from stereocell.building.tasks import IsoField, read_iso_field, run_display
-from stereocell.isosurface.isovalue import ADAPTIVE, CRITERIA, IsoValue
+from stereocell.building.tasks.iso_value import IsoField, read_iso_field
+from stereocell.building.tasks.window import run_display
+from stereocell.isosurface.isovalue import IsoValue
+from stereocell.isosurface.options import ADAPTIVE, CRITERIA
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.preview.draw_slices import VIEWS, Color, Slice, find_font, paint_slices

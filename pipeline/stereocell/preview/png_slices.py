@@ -18,8 +18,9 @@ from PIL import Image
 from stereocell.building.open_source import open_source, source_of
 from stereocell.building.plan import Plan
 from stereocell.building.rounds import display_task
-from stereocell.building.settings import Settings, SurfaceOptions
-from stereocell.building.tasks import run_display
+from stereocell.building.settings import Settings
+from stereocell.building.tasks.window import run_display
+from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.rigid_transform import IDENTITY
 from stereocell.model.version import GENERATOR

@@ -2,7 +2,9 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import fsspec
@@ -19,29 +21,47 @@ DTYPES = ("uint8", "uint16", "int16", "float32")
 MAX_CHUNK_BYTES = 4 << 30  # a chunk is decoded whole: a header that asks for more is refused
 
 
-def _open_zarr(location: Location) -> Image:
-    from stereocell.read.ome_zarr import read_image  # 2 s to import, and not both are needed
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """One format: its names, and the module whose `read_image(location) -> Image` reads it.
 
-    return read_image(location)
+    title       the format, as people call it
+    example     a file of it, as people name it
+    has_series  one source may hold several volumes: `read_image(location, series)`
+    """
+
+    module: str
+    title: str
+    example: str
+    has_series: bool = False
+
+    def read_image(self, location: Location, series: int) -> Image:
+        # imported when asked for: each takes up to 2 s, and one is needed
+        read = import_module(self.module).read_image
+        image: Image = read(location, series) if self.has_series else read(location)
+        return image
 
 
-def _open_tiff(location: Location) -> Image:
-    from stereocell.read.ome_tiff import read_image
-
-    return read_image(location)
-
-
-def _open_nifti(location: Location) -> Image:
-    from stereocell.read.nifti import read_image
-
-    return read_image(location)
-
-
-READERS: dict[str, Callable[[Location], Image]] = {
-    "ome-zarr": _open_zarr,
-    "ome-tiff": _open_tiff,
-    "nifti": _open_nifti,
+READERS = {
+    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr"),
+    "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif"),
+    "nifti": Reader("stereocell.read.nifti", "NIfTI", "NAME.nii, NAME.nii.gz"),
+    "dicom": Reader(
+        "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
+    ),
 }
+
+
+def reader_of(source: str | Path) -> str:
+    """Return the dotted name of the module that reads a source; empty: the format is unknown."""
+    reader = READERS.get(Location.of(source).format or "")
+    return "" if reader is None else reader.module
+
+
+def _formats() -> str:
+    """Return all formats in words, each with an example."""
+    *others, last = (f"{reader.title} ({reader.example})" for reader in READERS.values())
+    return f"{', '.join(others)} or {last}"
 
 
 def open(
@@ -69,11 +89,7 @@ def open(
     if location.is_local and not Path(location.source).is_dir():
         require_own(location.source, [location.folder], location.shown)
     if location.format is None:
-        raise SourceError(
-            f"{location.shown}: unknown format, "
-            "expected OME-Zarr (NAME.zarr), OME-TIFF (NAME.ome.tif), NIfTI (NAME.nii, NAME.nii.gz) "
-            "or DICOM (a folder or a file, on this machine)"
-        )
+        raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
     if not location.is_local:
         with one_line(location.shown, "an address that fsspec opens"):
             files, path = fsspec.url_to_fs(location.source, **location.storage_options)
@@ -81,14 +97,11 @@ def open(
             raise SourceError(
                 f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
             )
-    if location.format == "dicom":
-        from stereocell.read.dicom import read_image
-
-        image = read_image(location, series)
-    elif series:
-        raise UsageError(f"{location.shown}: --series {series}: only DICOM holds series")
-    else:
-        image = READERS[location.format](location)
+    reader = READERS[location.format]
+    if series and not reader.has_series:
+        titles = " and ".join(other.title for other in READERS.values() if other.has_series)
+        raise UsageError(f"{location.shown}: --series {series}: only {titles} holds series")
+    image = reader.read_image(location, series)
     try:
         return _dataset(location, image, time, spacing_um)
     except BaseException:
@@ -133,11 +146,11 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     themselves by. Raises SourceError, UsageError for a source of another format.
     """
     location = Location.of(source)
-    if location.format != "dicom":
+    reader = READERS.get(location.format or "")
+    if reader is None or not reader.has_series:
         raise UsageError(f"{location.shown}: --series list: expected DICOM, which holds series")
-    from stereocell.read.dicom import list_series as list_all
-
-    return list_all(location)
+    lines: tuple[str, ...] = import_module(reader.module).list_series(location)
+    return lines
 
 
 def _check_arrays(where: str, image: Image) -> None:

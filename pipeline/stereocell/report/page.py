@@ -15,8 +15,8 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from stereocell.building.calm import plan_for
 from stereocell.building.out_folder import Store
+from stereocell.building.plan import plan_for
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
 from stereocell.model.channel import APRON
 from stereocell.model.identifiers import from_identifier

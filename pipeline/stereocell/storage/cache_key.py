@@ -1,15 +1,17 @@
-"""What code a result comes from: the modules that make it and the libraries that they import.
+"""The name of a cached result: a hash of its input, its settings and the code that makes it.
 
-Results are kept under names that hold this, so that neither an upgrade of a library nor a change of
-any module on the way from voxels to file passes for nothing. Found from the sources themselves: a
-list by hand would be forgotten.
+The code is found from the imports, starting at the result's maker: a list by hand would be
+forgotten. The walk leaves out modules that can't change a byte of a result (NEUTRAL): how files are
+opened and written whole, how tasks are spread, how a plan was settled, as its values are a part of
+each result's content. Of the rest, comments, docstrings and the words of messages don't count.
+Libraries count by version where a module imports them that is not left out.
 """
 
 import ast
 import hashlib
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
@@ -18,41 +20,67 @@ from typing import Any
 
 from stereocell.storage.assets import find_asset
 
+# Packages and modules below `stereocell` whose code changes no byte of a result
+NEUTRAL = (
+    "storage",
+    "engine",
+    "model.errors",
+    "model.settings",
+    "model.timing",
+    "building.settings",
+    "building.plan",
+    "building.plan_file",
+    "building.out_folder",
+)
 _PACKAGE = Path(__file__).parents[1]
 _NAME = _PACKAGE.name
 _FINDER = find_asset.__name__
+_LOG_METHODS = {"print", "log", "debug", "info", "warning", "warn", "error"}
+_LOG_OBJECTS = {"console", "logger", "logging", "log", "warnings"}
 
 
-def key_of(content: Any, maker: ModuleType) -> str:
-    """Return the name of a result: a hash of what it depends on and of the code that makes it."""
-    return hashlib.sha256(
-        json.dumps([content, _digest(maker.__name__)], sort_keys=True).encode()
-    ).hexdigest()[:20]
+def key_of(content: Any, *makers: ModuleType | str) -> str:
+    """Return the name of a result, 20 hexadecimal digits.
+
+    content  what the result depends on, as JSON takes it
+    makers   the modules, or their dotted names, whose code makes it
+    """
+    digests = [_digest(_name(maker)) for maker in makers]
+    return hashlib.sha256(json.dumps([content, digests], sort_keys=True).encode()).hexdigest()[:20]
 
 
-def libraries_of(maker: ModuleType) -> dict[str, str]:
-    """Return the version of each library that the module's code imports, by name."""
-    return dict(_lineage(maker.__name__)[1])
+def libraries_of(*makers: ModuleType | str) -> dict[str, str]:
+    """Return the version of each library that the makers' code imports, by name."""
+    found: dict[str, str] = {}
+    for maker in makers:
+        found |= dict(_reach(_name(maker), ())[1])
+    return found
+
+
+def _name(maker: ModuleType | str) -> str:
+    return maker if isinstance(maker, str) else maker.__name__
 
 
 @cache
 def _digest(module: str) -> str:
-    files, libraries = _lineage(module)
+    files, libraries = _reach(module, NEUTRAL)
     digest = hashlib.sha256(json.dumps(libraries).encode())
     for file in files:
-        digest.update(file.read_bytes())
+        digest.update(_code(file).encode() if file.suffix == ".py" else file.read_bytes())
     return digest.hexdigest()
 
 
 @cache
-def _lineage(module: str) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]]:
+def _reach(
+    module: str, left_out: tuple[str, ...]
+) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]]:
     """Return the files of ours that a module needs, itself among them, and (library, version)."""
     found: dict[Path, None] = {}
     foreign: set[str] = set()
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name == _NAME:
+        if name == _NAME or _is_below(name, left_out):
             continue  # the package's own names are for its users: nothing is made by them
         if name.split(".")[0] != _NAME:
             foreign.add(name.split(".")[0])
@@ -67,6 +95,54 @@ def _lineage(module: str) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]
     tops = foreign - sys.stdlib_module_names
     versions = {made.name: made.version for top in tops for made in known[top]}
     return tuple(sorted(found)), tuple(sorted(versions.items()))
+
+
+def _is_below(name: str, parts: Collection[str]) -> bool:
+    """Return whether a module is one of some below `stereocell`, or lies in one of them."""
+    return any(name == f"{_NAME}.{part}" or name.startswith(f"{_NAME}.{part}.") for part in parts)
+
+
+@cache
+def _code(file: Path) -> str:
+    """Return a module's syntax tree as text, without docstrings and words for people."""
+    return ast.dump(_Bare().visit(ast.parse(file.read_bytes())))
+
+
+class _Bare(ast.NodeTransformer):
+    """Takes from a syntax tree all that changes no result."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        """Leave out docstrings (any lone constant), prints and log lines."""
+        match node.value:
+            case ast.Constant():
+                return ast.Pass()
+            case ast.Call(func=ast.Name(id="print")):
+                return ast.Pass()
+            case ast.Call(func=ast.Attribute(value=ast.Name(id=owner), attr=method)) if (
+                owner in _LOG_OBJECTS and method in _LOG_METHODS
+            ):
+                return ast.Pass()
+        return self.generic_visit(node)
+
+    def visit_Raise(self, node: ast.Raise) -> ast.AST:
+        """Leave out what an error says, not whether and as what it is raised."""
+        return _Wordless().visit(node)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Leave out the comment of a setting, which stands behind its default."""
+        if isinstance(node.func, ast.Name) and node.func.id == "setting":
+            node.args, node.keywords = node.args[:1], []
+        return self.generic_visit(node)
+
+
+class _Wordless(ast.NodeTransformer):
+    """Takes the texts out of an expression."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        return ast.Constant(None) if isinstance(node.value, str) else node
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
+        return ast.Constant(None)
 
 
 @cache

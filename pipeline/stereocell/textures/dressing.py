@@ -7,7 +7,8 @@ import numpy as np
 from stereocell.model.mesh import Baked, Lod
 from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, bake
-from stereocell.textures.unwrap import UnwrapOptions, unwrap
+from stereocell.textures.options import UnwrapOptions
+from stereocell.textures.unwrap import unwrap
 
 
 def dress(lod: Lod, level: int, baker: Baker, options: UnwrapOptions, clock: Clock) -> Lod:

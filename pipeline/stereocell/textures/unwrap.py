@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
-from stereocell.model.settings import AUTO, length_um, setting
+from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.tangents import make_tangents
 
 # xatlas 0.0.11 tells its worker threads to end without holding the lock that they sleep under: an
@@ -34,69 +33,9 @@ from stereocell.textures.tangents import make_tangents
 ATLASES_KEPT = 4
 _past_atlases: deque[xatlas.Atlas] = deque()
 
-TEXTURES = tuple(2**k for k in range(6, 14))  # largest edges that a map may have
 SHARP_DEG = 75.0  # between two triangles; coarse levels turn by 60 everywhere
 MULTIPLE = 8  # of texels, a map's edges: blocks of 4 down to mip level 1
-MOST_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
-# Texels finer than voxels show nothing new; xatlas takes long over a tenth, and far below crashes.
-MOST_TEXELS = 10  # along the finest voxel spacing
-# Of rays into the body and past its ends: all that they cross is held in memory.
-MOST_REACH = 64.0  # coarsest voxel spacings
 COARSENINGS = 3  # of texels, each by the square root of two at least, before a level goes without
-
-
-@dataclass(frozen=True, slots=True)
-class UnwrapOptions:
-    """UVs and baked maps. Levels without maps have occlusion and paint at their vertices."""
-
-    first_lod: int = setting(1, "the finest level that gets UVs and baked maps")
-    texel_um: float | str = setting(AUTO, "um a texel; auto: the coarsest voxel spacing")
-    padding: int = setting(6, "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2")
-    # Texels of one coarse voxel spacing want an edge of 1750 on a unit of 194 x 512 x 512 that is
-    # full of membranes, 300 to 1000 on nuclei and vessels.
-    max_texture: int = setting(1024, "texels, largest edge of a map; texels grow up to 2.8 times")
-    max_triangles: int = setting(100_000, "levels with more triangles go without maps")
-    occlusion_um: float | str = setting(
-        AUTO, "how far ambient occlusion looks; auto: 8 coarsest spacings; 0: none"
-    )
-    paint_um: float | str = setting(
-        AUTO, "depth below the surface within which paint's maximum counts; auto: 2 coarsest"
-    )
-
-    def __post_init__(self) -> None:
-        if self.first_lod < 0:
-            raise UsageError(f"unwrap.first_lod is {self.first_lod}, expected 0 or more")
-        if not 3 <= self.padding <= MOST_PADDING:
-            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 to {MOST_PADDING}")
-        if self.max_triangles < 0:
-            raise UsageError(f"unwrap.max_triangles is {self.max_triangles}, expected 0 or more")
-        if self.max_texture not in TEXTURES:
-            raise UsageError(
-                f"unwrap.max_texture is {self.max_texture}, expected a power of two "
-                f"from {TEXTURES[0]} to {TEXTURES[-1]}"
-            )
-
-    def resolved(self, spacing_um: tuple[float, float, float]) -> "UnwrapOptions":
-        """Return the options with every `auto` replaced by a length.
-
-        Raises UsageError for a length that suits no such voxels.
-        """
-        finest, coarsest = min(spacing_um), max(spacing_um)
-        texel_um = length_um("unwrap.texel_um", self.texel_um, coarsest)
-        if MOST_TEXELS * texel_um < finest * (1 - 1e-9):
-            raise UsageError(
-                f"unwrap.texel_um is {texel_um:g}, expected at least {finest / MOST_TEXELS:g} "
-                f"(the finest voxel spacing / {MOST_TEXELS})"
-            )
-        occlusion_um = length_um("unwrap.occlusion_um", self.occlusion_um, 8 * coarsest)
-        paint_um = length_um("unwrap.paint_um", self.paint_um, 2 * coarsest)
-        for key, length in (("occlusion_um", occlusion_um), ("paint_um", paint_um)):
-            if length > MOST_REACH * coarsest * (1 + 1e-9):
-                raise UsageError(
-                    f"unwrap.{key} is {length:g}, expected at most {MOST_REACH * coarsest:g} "
-                    f"({MOST_REACH:g} times the coarsest voxel spacing)"
-                )
-        return replace(self, texel_um=texel_um, occlusion_um=occlusion_um, paint_um=paint_um)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.settings import WindowOptions
 from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Look, Verdict
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.adaptive_threshold import (
@@ -22,6 +21,7 @@ from stereocell.transfer.adaptive_threshold import (
 )
 from stereocell.transfer.boundaries import Proposal
 from stereocell.transfer.opacity import make_transfer_functions
+from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import NAME as NAME_2D
 from stereocell.transfer.shapes2d import fall_back, shapes_from
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.open_source import open_source
-from stereocell.building.tasks import UnitTask
+from stereocell.building.tasks.unit import UnitTask
 from stereocell.building.unit import find_surface, to_eight_bit
 from stereocell.building.unit_files import load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas

@@ -1,28 +1,15 @@
-"""What a worker is given and does: find a window, find an iso-value, build a unit. Picklable.
+"""Find a channel's window, histogram and suggested 2D function, on a worker. Picklable."""
 
-The keys of the results hold this module's whole lineage: see lineage.py.
-"""
-
-import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, build_unit
-from stereocell.building.unit_files import save_unit
 from stereocell.filters.background import find_background
-from stereocell.filters.denoise import denoise
-from stereocell.isosurface.isovalue import ADAPTIVE, IsoValue, IsoValueOptions, find_iso_value
-from stereocell.isosurface.repair_rules import sum_solids
-from stereocell.model.errors import NoSurfaceError
-from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
-from stereocell.model.volume import Volume
 from stereocell.read import Dataset
 from stereocell.storage.json_files import write_json
 from stereocell.transfer.adaptive_threshold import Histogram, make_histogram
@@ -54,27 +41,6 @@ class DisplayTask:
     settings: Settings
     subtracts: bool  # a background
     window: tuple[float, float] | None = None  # None: it is found
-
-
-@dataclass(frozen=True, slots=True)
-class IsoTask:
-    ref: SourceRef
-    level: int
-    channel: int
-    box: Box
-    settings: Settings
-    given: float | None
-    background: LatticeField | None
-
-
-@dataclass(frozen=True, slots=True)
-class UnitTask:
-    ref: SourceRef
-    level: int
-    channel: int
-    given: UnitInput
-    directory: Path
-    painted: int | None = None  # the channel that is painted on the surface
 
 
 def write_display(task_and_file: tuple[DisplayTask, Path]) -> None:
@@ -154,78 +120,3 @@ def _region_at(task: DisplayTask, dataset: Dataset, level: int) -> Box:
     z0, y0, x0 = start
     z1, y1, x1 = (max(b, a + 1) for a, b in zip(start, stop, strict=True))
     return Box((z0, y0, x0), (z1, y1, x1))
-
-
-@dataclass(frozen=True, slots=True)
-class IsoField:
-    """What iso-values are sought in, float32 (z, y, x): denoised, above the background.
-
-    below     the background, mean over the tile; 0: none
-    constant  what every voxel is, background and all; None: they differ
-    """
-
-    values: NDArray[np.float32]
-    volume: Volume
-    below: float
-    constant: float | None
-
-    def find_iso_value(self, options: IsoValueOptions) -> IsoValue:
-        """Return the iso-value. Raises NoSurfaceError."""
-        if self.constant is not None:  # said of the voxels as they are, not above the background
-            raise NoSurfaceError(f"every voxel is {self.constant:g}")
-        return find_iso_value(self.values, self.volume.spacing_um, options)
-
-
-def read_iso_field(task: IsoTask) -> IsoField:
-    """Read one unit's voxels, without a halo, and make of them what iso-values are sought in."""
-    volume = open_source(task.ref).read(task.channel, task.box, task.level)
-    field = denoise(volume, float(task.settings.surface.smoothing_um))
-    first, below = float(field.flat[0]), 0.0
-    is_constant = bool((field == first).all())
-    if task.background is not None:
-        under = task.background.at(task.box)
-        below = float(np.mean(np.broadcast_to(under, field.shape), dtype=np.float64))
-        field -= under
-    return IsoField(field, volume, below, first if is_constant else None)
-
-
-def write_iso(task_and_file: tuple[IsoTask, Path]) -> None:
-    """Find one unit's iso-value and write it down with its curve."""
-    task, file = task_and_file
-    write_json(file, _find(task))
-
-
-def _find(task: IsoTask) -> dict[str, Any]:
-    field = read_iso_field(task)
-    result: dict[str, Any] = {
-        "value": None, "confidence": 0.0, "reason": "", "background": field.below
-    }  # fmt: skip
-    try:
-        if task.given is None and task.settings.isovalue.criterion == ADAPTIVE:
-            raise NoSurfaceError("the channel's histogram has no peak: it has no threshold")
-        found = field.find_iso_value(task.settings.isovalue)
-    except NoSurfaceError as error:
-        result["reason"] = str(error)
-    else:
-        result |= {"value": found.value, "found": found.value, "confidence": found.confidence}
-        result |= {name: getattr(found, name) for name in ("sharpness", "raggedness", "strength")}
-        level = found.value if task.given is None else task.given
-        smallest = float(task.settings.surface.min_diagonal_um)
-        sums = sum_solids(field.values > level, field.volume.spacing_um, smallest)
-        result["solids"] = asdict(sums)
-        result["levels"] = [float(f"{v:.6g}") for v in found.levels]
-        result["score"] = [round(float(v), 5) for v in found.score]
-    if task.given is not None and "found" in result:  # who gives a value is sure of it
-        result |= {"value": task.given, "confidence": 1.0}
-    return result
-
-
-def run_unit(task: UnitTask) -> None:
-    """Build one unit and write it down."""
-    start = time.perf_counter()
-    source, window = open_source(task.ref), task.given.window
-    volume = source.read(task.channel, window, task.level)
-    painted = None if task.painted is None else source.read(task.painted, window, task.level)
-    seconds = time.perf_counter() - start
-    built = build_unit(volume, task.given, painted)
-    save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))

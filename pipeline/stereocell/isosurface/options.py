@@ -1,0 +1,116 @@
+"""Settings of the iso-value and of the surface. Light to import: every command reads them."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from stereocell.model.errors import UsageError
+from stereocell.model.settings import AUTO, length_um, setting
+
+CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
+ADAPTIVE = "adaptive"  # the channel's threshold, in all tiles; its curves are those of `edges`
+
+
+@dataclass(frozen=True, slots=True)
+class IsoValueOptions:
+    """How iso-values are found."""
+
+    criterion: str = setting(
+        "edges",
+        "edges, compromise, pekar-mean, pekar-total, pekar-area; adaptive: the channel's threshold",
+    )
+    bins: int = setting(256, "levels tried over the range of a tile's voxels")
+    clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
+    min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
+    min_confidence: float = setting(0.4, "of a clear surface, 0 to 1; see the report")
+
+    @property
+    def curve(self) -> str:
+        """Which of CRITERIA is the curve over the levels."""
+        return CRITERIA[0] if self.criterion == ADAPTIVE else self.criterion
+
+    def __post_init__(self) -> None:
+        if self.criterion not in (*CRITERIA, ADAPTIVE):
+            raise UsageError(
+                f"isovalue.criterion is {self.criterion!r}, expected one of "
+                f"{', '.join((*CRITERIA, ADAPTIVE))}"
+            )
+        if not 16 <= self.bins <= 65536:
+            raise UsageError(
+                f"isovalue.bins is {self.bins}, expected at least 16 and at most 65536"
+            )
+        if not 0 < self.clip_percentile <= 100:
+            raise UsageError(
+                f"isovalue.clip_percentile is {self.clip_percentile:g}, "
+                "expected more than 0 and at most 100"
+            )
+        if not 0 <= self.min_area_share <= 1:
+            raise UsageError(f"isovalue.min_area_share is {self.min_area_share:g}, expected 0 to 1")
+        if not 0 <= self.min_confidence <= 1:
+            raise UsageError(f"isovalue.min_confidence is {self.min_confidence:g}, expected 0 to 1")
+
+
+WRAPS = ("voxels", "alpha-wrap")
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceOptions:
+    """Lengths in um; auto follows the voxel spacing."""
+
+    smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
+    alpha_um: float | str = setting(
+        AUTO, "radius of the ball that closes gaps; auto: by the channel's solids, see max_alpha_um"
+    )
+    max_alpha_um: float | str = setting(
+        AUTO, "what auto alpha may reach; auto: 2 coarsest spacings"
+    )
+    offset_um: float | str = setting(
+        0.0, "how far outside the surface lies: volumes grow by it; auto: a tenth of alpha"
+    )
+    grid_um: float = setting(
+        0.0,
+        "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
+    )
+    min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
+    max_fragment_um: float | str = setting(
+        AUTO,
+        "fragments up to this go as well if they are under half the mean of the channel's solids, "
+        "by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
+    )
+    max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
+    wrap: str = setting(
+        "voxels", "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)"
+    )
+    closed_tiles: bool = setting(
+        False, "whether the stage gets a closed STL of every tile and channel, in um"
+    )
+    background_um: float | str = setting(
+        AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
+    )
+
+    def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
+        """Return the options with lengths for `auto`; alpha and offset may wait for the solids."""
+        coarsest = max(spacing_um)
+        auto = {
+            "smoothing_um": min(spacing_um),
+            "max_alpha_um": 2 * coarsest,
+            "min_diagonal_um": 3 * coarsest,
+            "max_fragment_um": 6 * coarsest,
+            "max_cavity_um": 4 * coarsest,
+            "background_um": 64 * min(spacing_um),
+        }
+        lengths: dict[str, Any] = {
+            key: length_um(f"surface.{key}", getattr(self, key), auto[key]) for key in auto
+        }
+        if self.wrap not in WRAPS:
+            raise UsageError(f"surface.wrap is {self.wrap!r}, expected one of {', '.join(WRAPS)}")
+        for key in ("alpha_um", "offset_um"):
+            length_um(f"surface.{key}", getattr(self, key), 0.0)
+        if self.grid_um < 0:
+            raise UsageError(
+                f"surface.grid_um is {self.grid_um:g}, expected a length in um, or 0: all planes"
+            )
+        if self.offset_um != AUTO and float(self.offset_um) > coarsest:
+            raise UsageError(
+                f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"
+            )
+        return replace(self, **lengths)

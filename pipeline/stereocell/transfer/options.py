@@ -1,0 +1,21 @@
+"""Settings of a channel's window."""
+
+from dataclasses import dataclass
+
+from stereocell.model.errors import UsageError
+from stereocell.model.settings import setting
+
+
+@dataclass(frozen=True, slots=True)
+class WindowOptions:
+    """Which voxel values become 0 and 255, dataset-wide."""
+
+    low_percentile: float = setting(0.5, "percent of the voxels that become 0")
+    high_percentile: float = setting(99.95, "percent of the voxels that stay below 255")
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.low_percentile < self.high_percentile <= 100:
+            raise UsageError(
+                f"window percentiles are {self.low_percentile:g} and {self.high_percentile:g}, "
+                "expected 0 <= low < high <= 100"
+            )
