@@ -47,9 +47,10 @@ def build(
     from stereocell.building import phases
     from stereocell.building.settings import load
     from stereocell.engine.run import Engine
+    from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
-    from stereocell.storage.lock import LOCK, alone_in
-    from stereocell.storage.object_store import opened
+    from stereocell.storage.lock import alone_in
+    from stereocell.storage.workspace import opened
 
     if not isinstance(workers, int) or workers < 0:
         raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")

@@ -25,7 +25,7 @@ from stereocell.building.out_folder import Store
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
 from stereocell.storage.cache_key import key_of
-from stereocell.storage.lock import LOCK
+from stereocell.storage.claim import LOCK
 from stereocell.tissue.classify import TissueOptions
 from stereocell.verify import formats as check_module
 from support import phantoms

@@ -16,7 +16,8 @@ from stereocell.cli.__main__ import main
 from stereocell.engine.cluster import ClusterError, able, join
 from stereocell.engine.run import Engine, TasksFailedError
 from stereocell.storage.atomic_write import write_bytes
-from stereocell.storage.lock import LOCK, alone_in
+from stereocell.storage.claim import LOCK
+from stereocell.storage.lock import alone_in
 from support import ctrl_c, phantoms
 from support.object_store import ObjectStore, serving
 from support.server.timeouts import PATIENCE_S

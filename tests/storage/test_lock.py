@@ -12,7 +12,8 @@ import pytest
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import replacing, replacing_folder, write_bytes
-from stereocell.storage.lock import LOCK, alone_in, held, working_for
+from stereocell.storage.claim import LOCK, held, working_for
+from stereocell.storage.lock import alone_in
 from stereocell.storage.processes import machine
 
 HOLD = """

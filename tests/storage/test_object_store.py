@@ -18,10 +18,11 @@ import pytest
 
 from stereocell.building.tissue import TissueRequest, add_tissue
 from stereocell.cli.__main__ import main
+from stereocell.engine import object_store_tasks
 from stereocell.model.errors import OutputError
-from stereocell.storage import object_store
+from stereocell.storage import workspace
 from stereocell.storage.atomic_write import write_bytes
-from stereocell.storage.lock import alone_at
+from stereocell.storage.object_lock import alone_at
 from stereocell.storage.processes import machine, start_of
 from support import phantoms
 from support.digests import digests_of
@@ -284,18 +285,18 @@ def _put_slowly(file: Path) -> None:
 
 def test_each_thread_of_a_worker_tells_what_it_put_itself(store: ObjectStore) -> None:
     with (
-        object_store.opened("s3://bucket/threads", "build") as root,
+        workspace.opened("s3://bucket/threads", "build") as root,
         ThreadPoolExecutor(2) as threads,
     ):
-        work, _ = object_store.carried(_put_slowly)
+        work, _ = object_store_tasks.carried(_put_slowly)
         told = list(threads.map(work, [root / "a", root / "b"]))
     assert told == [(None, {"a": 1}), (None, {"b": 1})]
 
 
 def test_work_for_a_command_that_has_ended_puts_nothing_there(store: ObjectStore) -> None:
     fs = store.files()
-    with object_store.opened("s3://bucket/late", "build") as root:
-        work, _ = object_store.carried(_put_slowly)
+    with workspace.opened("s3://bucket/late", "build") as root:
+        work, _ = object_store_tasks.carried(_put_slowly)
     carried = pickle.dumps(work)  # to a cluster's worker
     for lock in (None, b"another's"):
         if lock is not None:
@@ -303,7 +304,7 @@ def test_work_for_a_command_that_has_ended_puts_nothing_there(store: ObjectStore
         with pytest.raises(OutputError, match=r"bucket/late: the command that asked .* has ended"):
             pickle.loads(carried)(root / "a")
         assert "bucket/late/a" not in fs.find("bucket/late")
-    object_store._forget(root)
+    workspace.forget(root)
 
 
 def _wait_for(fault: Callable[[], None]) -> None:
@@ -315,14 +316,14 @@ def _wait_for(fault: Callable[[], None]) -> None:
 def test_a_lock_that_was_not_renewed_is_taken_over(
     store: ObjectStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stereocell.storage.lock._SETTLE_S", 0.0)
+    monkeypatch.setattr("stereocell.storage.object_lock._SETTLE_S", 0.0)
     fs, path = store.files(), "bucket/renewed/.lock"
-    monkeypatch.setattr("stereocell.storage.lock.BEAT_S", 0.05)
+    monkeypatch.setattr("stereocell.storage.object_lock.BEAT_S", 0.05)
     with alone_at(fs, path, "there", "build") as require:
         refused = pytest.raises(OutputError, match="there: `stereocell build`")
         with refused, alone_at(fs, path, "there", "units"):
             pass
-        monkeypatch.setattr("stereocell.storage.lock.STALE_S", -1e6)
+        monkeypatch.setattr("stereocell.storage.object_lock.STALE_S", -1e6)
         with alone_at(fs, path, "there", "units"):
             assert json.loads(fs.cat_file(path))["command"] == "units"
             with pytest.raises(OutputError, match=r"there: was taken over by .*: start it again"):
@@ -412,5 +413,5 @@ def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
         (tmp_path / name / "units").mkdir(parents=True)
     long_ago = time.time() - week_s - 60
     os.utime(tmp_path / f"stereocell.0000beef.{dead.pid}.longago", (long_ago, long_ago))
-    object_store._clear_scratch()
+    workspace._clear_scratch()
     assert {name: (tmp_path / name).exists() for name in folders} == folders

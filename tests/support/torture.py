@@ -30,7 +30,7 @@ from typing import Protocol
 import numpy as np
 import psutil
 
-from stereocell.storage.lock import LOCK
+from stereocell.storage.claim import LOCK
 from support import phantoms
 from support.digests import digests_of
 from support.object_store import ObjectStore, serving

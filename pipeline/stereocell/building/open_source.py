@@ -6,7 +6,7 @@ from pathlib import Path
 
 from stereocell import read
 from stereocell.building.plan import Channel, Plan
-from stereocell.storage.object_store import bring
+from stereocell.storage.workspace import bring
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_json, read_json, write_json
-from stereocell.storage.object_store import remove, sizes_below
+from stereocell.storage.workspace import remove, sizes_below
 
 _PLAN = "plan.schema.json"
 _PHASES = "units.schema.json#Phases"

@@ -32,7 +32,7 @@ from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.file_list import find_faults, read_list
 from stereocell.storage.json_files import write_json
 from stereocell.storage.location import Location, require_apart
-from stereocell.storage.object_store import is_file, objects_below, remove, sizes_below
+from stereocell.storage.workspace import is_file, objects_below, remove, sizes_below
 from stereocell.transfer.channel_statistics import look_from
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer

@@ -17,7 +17,7 @@ from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import find_json, read_json, write_json
-from stereocell.storage.object_store import at_hand, remove
+from stereocell.storage.workspace import at_hand, remove
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import written_files
 

@@ -10,7 +10,7 @@ from typing import Any
 from stereocell.model.errors import OutputError
 from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json
-from stereocell.storage.object_store import bring
+from stereocell.storage.workspace import bring
 
 FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
 _SCHEMA = "tissue.schema.json"

@@ -32,7 +32,7 @@ from stereocell.model.errors import OutputError, StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.atomic_write import replacing_folder, write_bytes
 from stereocell.storage.json_files import read_json, write_json
-from stereocell.storage.object_store import is_file, sizes_below
+from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
 from stereocell.usd.read_attributes import Point
 from stereocell.usd.read_looks import ComposedLook

@@ -82,7 +82,7 @@ def _run(options: argparse.Namespace) -> int:
 
                 shown = Location.of(out).shown
                 raise UsageError(f"OUT is {shown}, expected a folder or file of this machine")
-            from stereocell.storage.object_store import opened
+            from stereocell.storage.workspace import opened
 
             is_writer = name in WRITERS
             options.out = stack.enter_context(

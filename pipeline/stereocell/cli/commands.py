@@ -147,7 +147,7 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
     from stereocell.building.out_folder import Store
     from stereocell.engine.run import Engine
     from stereocell.model.errors import UsageError
-    from stereocell.storage.lock import LOCK
+    from stereocell.storage.claim import LOCK
 
     scheduler, edited = getattr(options, "scheduler", ""), getattr(options, "stage", None)
     is_kept = isinstance(options.shown, str)  # on object storage: workers find it by themselves

@@ -25,8 +25,8 @@ from rich.progress import (
 
 from stereocell.engine.cluster import ClusterError, able, join
 from stereocell.engine.interrupts import children_ignore_interrupts
+from stereocell.engine.object_store_tasks import carried, forget_scratch
 from stereocell.model.errors import StereoCellError
-from stereocell.storage.object_store import carried, forget_scratch
 
 T = TypeVar("T")
 R = TypeVar("R")

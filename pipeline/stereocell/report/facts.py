@@ -14,7 +14,7 @@ from stereocell.building.plan import Channel, Plan
 from stereocell.building.unit_files import find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile
 from stereocell.storage.json_files import read_json
-from stereocell.storage.object_store import sizes_below
+from stereocell.storage.workspace import sizes_below
 
 PHASES = ("plan", "units", "stage", "bundle")
 

@@ -4,11 +4,10 @@ Temporary names are never used twice, and who works for a command that has ended
 place: whoever was cut off from a build that has gone on without it, as a worker whose scheduler was
 killed, spoils nothing. Who writes next clears away what it left.
 
-Where OUT is on object storage, it is put there then: see mirror.py.
+Where OUT is on object storage, it is put there then: see workspace.py.
 """
 
 import os
-import re
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -16,11 +15,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from stereocell.model.errors import OutputError
-from stereocell.storage.lock import require_asked
-from stereocell.storage.object_store import keep, making
-
-# of a file .STEM.TOKEN.SUFFIX, of a folder .NAME.TOKEN.partial and .NAME.TOKEN.old
-_TEMPORARY = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}(?P<suffix>\.partial|\.old|\.\w+|)")
+from stereocell.storage.claim import require_asked
+from stereocell.storage.temporary_names import clear_beside
+from stereocell.storage.workspace import keep, making
 
 
 @contextmanager
@@ -34,7 +31,7 @@ def replacing(path: Path) -> Iterator[Path]:
     require_asked()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _clear_beside(path)
+        clear_beside(path)
         temporary.touch()
         try:
             yield temporary
@@ -66,7 +63,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     token = secrets.token_hex(4)
     new, old = (path.with_name(f".{path.name}.{token}.{word}") for word in ("partial", "old"))
     try:
-        _clear_beside(path)
+        clear_beside(path)
         with making(new, path):
             new.mkdir(parents=True)
             try:
@@ -81,29 +78,6 @@ def replacing_folder(path: Path) -> Iterator[Path]:
                 shutil.rmtree(new, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
-
-
-def clear_remains(out: Path) -> None:
-    """Remove all that a killed command left in the OUT that it wrote into."""
-    for path in out.rglob(".*"):
-        if _TEMPORARY.fullmatch(path.name):
-            _remove(path)
-
-
-def _clear_beside(path: Path) -> None:
-    """Remove what a killed worker left of `path` beside it."""
-    if path.parent.is_dir():
-        for name in os.listdir(path.parent):
-            found = _TEMPORARY.fullmatch(name)
-            if found and path.name in (found["name"], f"{found['name']}{found['suffix']}"):
-                _remove(path.parent / name)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)  # who was cut off may still write there
-    else:
-        path.unlink(missing_ok=True)
 
 
 def _swap(new: Path, path: Path, old: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.json_files import read_json
-from stereocell.storage.object_store import at_hand, is_mirrored, sizes_below
+from stereocell.storage.workspace import at_hand, is_mirrored, sizes_below
 
 # by path from the list's folder, with forward slashes: {"bytes": ..., "sha256": ...}
 FileList = Mapping[str, Mapping[str, Any]]

@@ -12,7 +12,7 @@ from jsonschema.exceptions import best_match
 from stereocell.model.errors import OutputError
 from stereocell.storage.assets import schema_path
 from stereocell.storage.atomic_write import write_bytes
-from stereocell.storage.object_store import bring
+from stereocell.storage.workspace import bring
 
 
 def read_json(path: Path, schema: str | None, remedy: str) -> Any:

@@ -19,7 +19,7 @@ from stereocell.formats.gltf import Material
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.location import Location, require_own
-from stereocell.storage.object_store import at_hand
+from stereocell.storage.workspace import at_hand
 from stereocell.usd.layer import (
     CHANNELS,
     METERS_PER_UNIT,

@@ -26,7 +26,7 @@ from stereocell.model.channel import Look, Provenance, TileContent
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.object_store import at_hand
+from stereocell.storage.workspace import at_hand
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
     LAYER_SUFFIXES,

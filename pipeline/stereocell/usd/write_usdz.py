@@ -25,7 +25,7 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
-from stereocell.storage.object_store import bring, remove
+from stereocell.storage.workspace import bring, remove
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_stage import (

@@ -25,7 +25,7 @@ from stereocell.storage.file_list import (
     list_files,
     read_list,
 )
-from stereocell.storage.object_store import at_hand, bring, is_file
+from stereocell.storage.workspace import at_hand, bring, is_file
 from stereocell.usd.layer import LAYER_SUFFIXES, is_layer
 
 FILES, STAGE_NAME = "files.json", "stage.usda"

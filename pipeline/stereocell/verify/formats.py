@@ -30,7 +30,7 @@ from stereocell.storage.assets import find_asset
 from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json
 from stereocell.storage.location import Location, require_own
-from stereocell.storage.object_store import sizes_below
+from stereocell.storage.workspace import sizes_below
 from stereocell.transfer.shapes2d import find_fault, shapes_from
 from stereocell.usd import written_files
 from stereocell.usd.read_stage import dependencies

@@ -28,7 +28,7 @@ from stereocell.model.channel import APRON
 from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
-from stereocell.storage.object_store import at_hand
+from stereocell.storage.workspace import at_hand
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,

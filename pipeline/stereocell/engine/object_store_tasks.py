@@ -1,0 +1,66 @@
+"""Tasks whose OUT lies on object storage: each worker finds it by itself, and tells what it put."""
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from stereocell.storage.claim import Claim, held, working_for
+from stereocell.storage.object_store import Place, Size
+from stereocell.storage.workspace import forget, joined, opened_here
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_working = threading.Lock()  # a worker of several threads does one task at a time
+
+
+@dataclass(frozen=True, slots=True)
+class _Carried(Generic[T, R]):
+    """A function that finds its OUT on any machine, and tells what it has put there."""
+
+    function: Callable[[T], R]
+    place: Place
+    claim: bytes
+
+    def __call__(self, task: T) -> tuple[R, dict[str, Size]]:
+        with _working:
+            mirror = joined(self.place, self.claim)
+            mirror.news.clear()
+            return self.function(task), dict(mirror.news)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked(Generic[T, R]):
+    """A function that writes into a folder as long as the command is at work that asked for it."""
+
+    function: Callable[[T], R]
+    claim: Claim
+
+    def __call__(self, task: T) -> R:
+        with working_for(self.claim):
+            return self.function(task)
+
+
+def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[Any], R]]:
+    """Return what workers are to run instead of a function, and what makes its result of theirs."""
+    mirror = opened_here()
+    if mirror is None:
+        claim = held()
+        return function if claim is None else _Asked(function, claim), lambda result: result
+
+    def settle(answer: tuple[R, dict[str, Size]]) -> R:
+        result, news = answer
+        mirror.learn(news)
+        return result
+
+    return _Carried(function, mirror.place, mirror.claim), settle
+
+
+def forget_scratch(client: Any) -> None:
+    """Remove, on a cluster's workers, the folders in which they worked."""
+    mirror = opened_here()
+    if mirror is not None:
+        with suppress(Exception):  # whatever befell the cluster
+            client.run(forget, mirror.place.root)

@@ -1,0 +1,211 @@
+"""An OUT on object storage: written and read here as files, kept there as objects.
+
+pxr, numpy and PIL want files. So where OUT is an address (`s3://...`), a command works in a folder
+of this machine that lasts as long as it does, and each of a cluster's workers in one of the same
+name on its own machine:
+
+- `keep` puts what was written under its final name, whole, what tells of the others last. A large
+  file is then taken away here: the disk holds what is at work, never the build.
+- `bring` fetches what is about to be read; the small files that steer a build come at the start.
+
+In any other folder these do nothing, so that readers and writers just call them.
+"""
+
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
+
+from stereocell.model.errors import StereoCellError, UsageError
+from stereocell.storage.object_store import STEERING, Mirror, Place
+from stereocell.storage.processes import is_alive, machine
+
+# of whose command: where it runs, and its process
+_SCRATCH = re.compile(r"stereocell\.([0-9a-f]{8})\.(\d+)\.\w+")
+_LONGEST_S = 7 * 24 * 3600.0  # no command of another machine works for so long in one folder
+
+_open: list[Mirror] = []  # of this process: none or one
+
+
+def _of(path: Path) -> Mirror | None:
+    """Return the mirror that a path lies in."""
+    return next((mirror for mirror in _open if path.is_relative_to(mirror.place.root)), None)
+
+
+def bring(*paths: Path) -> None:
+    """Have files, or all of folders, at hand. Raises OutputError."""
+    for path in paths:
+        mirror = _of(path)
+        if mirror is not None and not path.is_file():
+            mirror.bring(mirror.keys_of(path))
+
+
+@contextmanager
+def at_hand(*paths: Path) -> Iterator[None]:
+    """Have files, or all of folders, at hand within the block; what it fetched is gone afterwards.
+
+    Raises OutputError.
+    """
+    brought: list[Path] = []
+    try:
+        for path in paths:
+            mirror = _of(path)
+            if mirror is not None:
+                brought += mirror.bring(mirror.keys_of(path))
+        yield
+    finally:
+        for file in brought:
+            file.unlink(missing_ok=True)
+
+
+def keep(path: Path) -> None:
+    """Put a file that was written under its final name. Raises OutputError.
+
+    One of a folder that this process is making is put with the folder.
+    """
+    mirror = _of(path)
+    if mirror is not None and not any(path.is_relative_to(folder) for folder in mirror.making):
+        mirror.keep(path)
+
+
+@contextmanager
+def making(folder: Path, final: Path) -> Iterator[None]:
+    """Put a folder as a whole that the block makes at `folder` and renames to `final`."""
+    mirror = _of(folder)
+    if mirror is None or any(folder.is_relative_to(outer) for outer in mirror.making):
+        yield
+        return
+    mirror.remove(folder)
+    mirror.making.add(folder)
+    try:
+        yield
+        old, new = mirror._key(folder), mirror._key(final)
+        mirror.keep(final, {new + key[len(old) :]: kept for key, kept in mirror.moves.items()})
+    finally:
+        mirror.making.discard(folder)
+        mirror.moves = {}
+
+
+def move(file: Path, to: Path) -> None:
+    """Have a file that is kept in a folder that is being made, too; it may be gone from its own."""
+    mirror = _of(file)
+    if mirror is not None and not file.is_file():
+        mirror.moves[mirror._key(to)] = mirror._key(file)
+        return
+    to.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, to)
+    except OSError:  # a file system without
+        os.replace(file, to)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder with all that lies in it, if it is there. Raises OutputError."""
+    mirror = _of(path)
+    if mirror is not None:
+        mirror.remove(path)
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def sizes_below(path: Path) -> dict[Path, int]:
+    """Return every file at or below a path, here or kept, in order, with its bytes."""
+    mirror = _of(path)
+    if mirror is not None:
+        return {mirror.place.root / key: n for key, n in sorted(mirror.keys_of(path).items())}
+    files = sorted(path.rglob("*")) if path.is_dir() else [path]
+    return {file: file.stat().st_size for file in files if file.is_file()}
+
+
+def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:
+    """Return key, bytes and mark of all that is kept below a folder: what an edit alters.
+
+    None for a folder that is on no object storage.
+    """
+    mirror = _of(folder)
+    return None if mirror is None else mirror.marks(folder)
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a file is there, here or kept."""
+    return path.is_file() or (_of(path) is not None and path in sizes_below(path))
+
+
+def is_mirrored(path: Path) -> bool:
+    """Return whether a path is of an OUT on object storage: here are copies, of later times."""
+    return _of(path) is not None
+
+
+@contextmanager
+def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
+    """Yield the folder of this machine in which an OUT at an address is worked on.
+
+    Holds OUT for a `command` that writes there; without one, all of OUT is fetched, or what lies
+    below one folder of it. In errors from inside the block, the address stands for the folder.
+
+    Raises OutputError if nothing can be read there or another command writes there, UsageError for
+    an address that can't be written.
+    """
+    if address.partition("://")[0] in ("http", "https"):
+        from stereocell.storage.location import Location
+
+        raise UsageError(
+            f"OUT is {Location.of(address).shown}: expected a folder or an s3:// address"
+        )
+    _clear_scratch()
+    root = Path(tempfile.mkdtemp(prefix=f"stereocell.{machine()}.{os.getpid()}.")).resolve()
+    mirror = Mirror(Place(address.rstrip("/"), root))
+    _open.append(mirror)
+    try:
+        with mirror.alone(command) if command else nullcontext():
+            mirror.list_all()
+            keys = mirror.keys_of(root / only)
+            mirror.bring(key for key in keys if not command or STEERING.fullmatch(key))
+            yield root
+    except StereoCellError as error:
+        error.args = tuple(str(part).replace(str(root), mirror.place.shown) for part in error.args)
+        raise
+    finally:
+        _open.remove(mirror)
+        shutil.rmtree(root, ignore_errors=True)
+
+
+def _clear_scratch() -> None:
+    """Remove what killed commands left here: this machine's, and others' whose workers ran here."""
+    for folder in Path(tempfile.gettempdir()).glob("stereocell.*"):
+        name = _SCRATCH.fullmatch(folder.name)
+        if name is None:
+            continue
+        with suppress(OSError):  # another command removes it, too
+            is_ours = name[1] == machine()
+            age_s = time.time() - folder.stat().st_mtime
+            if not is_alive(int(name[2])) if is_ours else age_s > _LONGEST_S:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def joined(place: Place, claim: bytes) -> Mirror:
+    """Return the mirror of an OUT that this process works on for a command elsewhere."""
+    mirror = next((mirror for mirror in _open if mirror.place == place), None)
+    if mirror is None:
+        _clear_scratch()
+        mirror = Mirror(place, claim)
+        _open[:] = [mirror]
+    place.root.mkdir(parents=True, exist_ok=True)
+    return mirror
+
+
+def opened_here() -> Mirror | None:
+    """Return the mirror that this process works on; None: OUT is a folder."""
+    return _open[0] if _open else None
+
+
+def forget(root: Path) -> None:
+    """Leave the folder in which this process worked, and remove it."""
+    _open.clear()
+    shutil.rmtree(root, ignore_errors=True)
