@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from stereocell import report
 from stereocell.building import input_unchanged, phases
 from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
@@ -33,7 +34,7 @@ from support.onnx_models import write_model
 
 Kill = Callable[[Path, list[str], tuple[str, str]], None]
 TESTS = Path(__file__).parents[1]
-REPORT = phases.run_report
+REPORT = report.run_report
 CHANNEL = "body"
 QUICK = """
 [lod]
@@ -84,7 +85,7 @@ def learn(voxels: NDArray[Any], _: object, options: TissueOptions) -> SimpleName
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The report takes longest and is written last; no fault here is one of glTF or KTX2."""
-    monkeypatch.setattr(phases, "run_report", lambda out: None)
+    monkeypatch.setattr(report, "run_report", lambda out: None)
     monkeypatch.setattr(check_module, "_run_node", lambda script, paths: "")
 
 
@@ -106,7 +107,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def undisturbed(built: Path) -> Path:
     """The same with two classes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(phases, "run_report", lambda out: None)
+        patch.setattr(report, "run_report", lambda out: None)
         out = copy(built, built.parent / "undisturbed")
         assert tissue(out) == 0
     return out
@@ -169,7 +170,7 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
 
     console.quiet = True
-    phases.viewer_dist, phases.run_report = (lambda: None), (lambda out: None)
+    phases.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
     tissue_channels.learn_tissue = learn  # type: ignore[assignment]
     sys.addaudithook(hook)
     tissue(Path(out), *flags)
@@ -332,7 +333,7 @@ def test_damaged_file_is_named_and_made_again(
     damage: Callable[[Path], None],
 ) -> None:
     out = copy(undisturbed, tmp_path / "out")
-    monkeypatch.setattr(phases, "run_report", REPORT)
+    monkeypatch.setattr(report, "run_report", REPORT)
     damage(out / name)
     (fault,) = faults(out)
     assert fault.startswith(f"tissue: {out / name}")
@@ -346,7 +347,7 @@ def test_damaged_file_is_named_and_made_again(
         line = only_line(capfd)
         assert str(out / name) in line
         assert "run `stereocell tissue OUT` again" in line
-    monkeypatch.setattr(phases, "run_report", lambda out: None)
+    monkeypatch.setattr(report, "run_report", lambda out: None)
     assert tissue(out) == 0
     assert Path(name).name in capfd.readouterr().err
     assert digests(out) == digests(undisturbed)

@@ -13,10 +13,10 @@ from stereocell.building.out_folder import Store
 from stereocell.building.plan import plan_for
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import SMOOTHING_REACH
-from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.report.facts import gather
 from stereocell.report.remarks import find_remarks
 from support import phantoms
+from support.plans import choose
 
 SPACING = (1.0, 1.0, 1.0)
 SHAPE = (24, 40, 80)
@@ -133,9 +133,9 @@ def test_calm_surface_reads_no_more_voxels_and_the_halo_holds(out: Path) -> None
     calm = plan_for(plan, "unclear")
     before, after = plan.settings.surface, calm.settings.surface
     assert float(after.smoothing_um) > 2 * float(before.smoothing_um)
-    assert choose_repair(plan, "unclear", []).alpha_um == 0
+    assert choose(plan, "unclear", []).alpha_um == 0
     reaches = [
-        choose_repair(plan, verdict, []).reach_um(plan.spacing_um)
+        choose(plan, verdict, []).reach_um(plan.spacing_um)
         + SMOOTHING_REACH * float(surface.smoothing_um)
         for verdict, surface in (("clear", before), ("unclear", after))
     ]

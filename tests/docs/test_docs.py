@@ -24,7 +24,7 @@ import pytest
 import yaml
 
 import stereocell
-from stereocell.building import phases
+from stereocell import report as drawing
 from stereocell.cli import __main__ as cli
 from stereocell.model.errors import UsageError
 from stereocell.read import open_dataset
@@ -103,7 +103,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_commands_run(
     sources: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report: Callable[[Path], None] = phases.run_report
+    report: Callable[[Path], None] = drawing.run_report
     drawn: list[Path] = []
 
     def draw(out: Path) -> None:  # seconds each time: the first that is built, and where asked for
@@ -111,7 +111,7 @@ def test_commands_run(
             report(out)
             drawn.append(out)
 
-    monkeypatch.setattr(phases, "run_report", draw)
+    monkeypatch.setattr(drawing, "run_report", draw)
     ran = []
     for page in PAGES:
         for command in commands(page, "stereocell"):

@@ -29,7 +29,7 @@ def made(tmp_path_factory):
     write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tiles3d, "MOST_WHOLE_TILES", 0)
-        write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0))
+        write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0).run)
     return out
 
 

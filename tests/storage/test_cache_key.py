@@ -12,11 +12,11 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from stereocell import report
 from stereocell.building import stage_tasks
 from stereocell.building.tasks import iso_value, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.read.open_dataset import READERS
+from stereocell.report import page
 from stereocell.storage import assets, cache_key
 
 ROOT = Path(__file__).parents[2]
@@ -28,7 +28,7 @@ MAKERS = {
     "unit of a TIFF": (unit, TIFF),
     "stage": (stage_tasks,),
     "bundle": (bundle_writer,),
-    "report": (report,),
+    "report": (page,),
 }
 UNITS = {"unit", "unit of a TIFF"}
 TASKS = UNITS | {"window", "iso-value"}
@@ -105,7 +105,7 @@ PACKAGE = "pipeline/stereocell"
         ("storage/lock.py", set()),
         ("engine/run.py", set()),
         ("serve/limits.py", set()),
-        ("textures/tangents.py", UNITS),
+        ("textures/tangents.py", UNITS | {"report"}),
         ("meshes/simplify.py", UNITS | {"report"}),
         ("filters/denoise.py", TASKS - {"window"}),
         ("isosurface/isovalue.py", TASKS - {"window"}),

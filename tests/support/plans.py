@@ -1,7 +1,13 @@
 """Plans of small datasets."""
 
+from collections.abc import Iterable, Mapping
+from typing import Any
+
 from stereocell.building import settings as settings_module
 from stereocell.building.plan import Channel, Plan, choose_level, make_plan
+from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_rules import choose_repair
+from stereocell.model.channel import Verdict
 from stereocell.read import Level
 
 LEVELS = (
@@ -24,4 +30,15 @@ def plan_of(
     level = choose_level(levels, len(channels), settings)
     return make_plan(
         "in.ome.zarr", "in", "ab" * 32, levels, (0.0, 0.0, 0.0), channels, level, settings
+    )
+
+
+def choose(plan: Plan, verdict: Verdict, tiles: Iterable[Mapping[str, Any]]) -> RepairOptions:
+    """What is cleaned of a channel's surface by a plan."""
+    return choose_repair(
+        tiles,
+        plan.repair,
+        surface=plan.settings.surface,
+        spacing_um=plan.spacing_um,
+        verdict=verdict,
     )

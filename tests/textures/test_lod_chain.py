@@ -15,7 +15,8 @@ from stereocell.meshes.distance import Nearest, measure_enclosure, measure_sprea
 from stereocell.meshes.simplify import simplify
 from stereocell.meshes.simplify_valid import Mended, simplify_soundly
 from stereocell.meshes.validity import border, certify
-from stereocell.model.mesh import Mesh
+from stereocell.model.lattice import Plane
+from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.textures import lod_chain
@@ -137,7 +138,7 @@ def test_thin_process_is_cut_off_and_with_a_bound_it_stays(with_process: Mesh) -
 
 def test_no_level_strays_from_the_one_before_and_the_process_stays(with_process: Mesh) -> None:
     errors = (0.1, 0.5, 2.0)
-    lods = make_levels(with_process, (), SPACING, _settings(errors), Clock())
+    lods = _levels(with_process, (), _settings(errors))
     tip = float(with_process.positions[:, 0].max())
     for before, lod, error in zip(lods, lods[1:], errors[1:], strict=False):
         assert _farthest(before.mesh, lod.mesh) <= lod_chain.STRAY * error
@@ -153,7 +154,7 @@ def test_level_outside_the_surface_encloses_it_and_one_inside_does_not(
     fine = ball(4.0, 60)
     scaled = replace(fine, positions=fine.positions * np.float32(1 + outward_um / 4))
     monkeypatch.setattr(lod_chain, "simplify_soundly", lambda *_: Mended(scaled, 0, 0))
-    *_, last = make_levels(fine, (), SPACING, _settings((0.1, 0.5)), Clock())
+    *_, last = _levels(fine, (), _settings((0.1, 0.5)))
     assert last.quality is not None
     assert low <= last.quality.enclosed <= high
     assert last.quality.away.mean == pytest.approx(abs(outward_um), abs=0.02)
@@ -178,7 +179,7 @@ def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
 def test_record_tells_distances_faults_and_angles(sponge: Mesh) -> None:
     settings = Settings()
     settings = replace(settings, surface=settings.surface.resolved(SPACING))
-    lods = make_levels(sponge, PLANES, SPACING, settings, Clock())
+    lods = _levels(sponge, PLANES, settings)
     for lod in lods:
         quality = lod.quality
         assert quality is not None
@@ -205,3 +206,14 @@ def test_largest_distance_counts_vertices_that_no_sample_meets() -> None:
 
 def test_angle_of_equilateral_triangles_is_60_degrees() -> None:
     assert sharpest_angle(to_mesh(pv.Tetrahedron())) == pytest.approx(60, abs=1e-3)
+
+
+def _levels(fine: Mesh, planes: tuple[Plane, ...], settings: Settings) -> tuple[Lod, ...]:
+    return make_levels(
+        fine,
+        planes,
+        spacing_um=SPACING,
+        lod=settings.lod,
+        unwrap=settings.unwrap,
+        clock=Clock(),
+    )

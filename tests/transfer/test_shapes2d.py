@@ -285,7 +285,7 @@ def test_a_faulty_edit_is_one_clear_line(
 def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its bundle, to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, Engine(0))
+    write_bundle(stage, out, None, Engine(0).run)
     return out
 
 
@@ -345,7 +345,7 @@ def test_an_edit_of_shapes_reaches_the_bundle(stage: Path, tmp_path: Path) -> No
         shapeSoftness=Vt.FloatArray([0]),
         gradientMax=0.74,
     )
-    write_bundle(path, tmp_path / "bundle", None, Engine(0))
+    write_bundle(path, tmp_path / "bundle", None, Engine(0).run)
     entry = channel(tmp_path / "bundle")
     assert entry["transfer_function"] == NAME  # what is chosen in the layer
     found = functions(tmp_path / "bundle")

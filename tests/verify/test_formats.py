@@ -31,7 +31,7 @@ def made(tmp_path_factory):
     looks = (spheres.RED, spheres.BLUE)
     write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
     write_list(out / "stage", {}, out / "stage")
-    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0))
+    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0).run)
     return out
 
 
@@ -186,7 +186,7 @@ def test_a_build_without_any_surface_passes(tmp_path):
     write_tile(tmp_path / "stage", tile)
     write_stage(tmp_path / "stage", "empty", [spheres.BLUE], [TileExtent.of(tile)], {})
     write_list(tmp_path / "stage", {}, tmp_path / "stage")
-    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, Engine(0))
+    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, Engine(0).run)
     assert failed(tmp_path) == set()
     assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"
 

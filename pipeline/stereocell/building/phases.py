@@ -48,7 +48,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     """
     require_apart(source, out)
     store = Store(out)
-    with _phase(store, "plan") as phase:
+    with phase_of(store, "plan") as phase:
         plan = settle(source, settings)
         store.require_writable()
         phase.is_up_to_date = not store.save_plan(plan)
@@ -118,7 +118,7 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     """Find windows and iso-values for all units, then build the units (or `only` one of them)."""
     store = Store(out)
     plan = store.plan()
-    with _phase(store, "units") as phase:
+    with phase_of(store, "units") as phase:
         built, missing = run_rounds(store, plan, engine, only)
         phase.is_up_to_date = not built
         units = len(plan.tiles) * len(plan.channels)
@@ -133,7 +133,7 @@ def run_stage(out: Path, engine: Engine) -> None:
     """
     store = Store(out)
     plan = store.plan()
-    with _phase(store, "stage") as phase:
+    with phase_of(store, "stage") as phase:
         store.require_units_of(plan)
         index, content = store.index(), store.survey()
         looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
@@ -174,7 +174,7 @@ def run_stage(out: Path, engine: Engine) -> None:
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
     """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it."""
     store = Store(out)
-    with _phase(store, "bundle") as phase:
+    with phase_of(store, "bundle") as phase:
         store.require_finished("stage")
         path = stage if stage is not None else store.stage_file
         if not is_file(path):
@@ -194,7 +194,7 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         if not phase.is_done(key, partial(_digest_of_bundle, store)):
             store.remove_other_folders(store.parts_dir, {key})
             parts = store.parts_dir / key
-            bundle_writer.write_bundle(path, store.bundle_dir, viewer, engine, parts, _tell)
+            bundle_writer.write_bundle(path, store.bundle_dir, viewer, engine.run, parts, _tell)
     remove(store.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         console.print(
@@ -212,23 +212,7 @@ def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
     return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
 
 
-def run_report(out: Path) -> None:
-    """Write OUT/report/index.html: pictures, sizes, times."""
-    from stereocell import report  # what draws takes a while to import, and no other phase wants it
-
-    store = Store(out)
-    with _phase(store, "report") as phase:
-        plan = store.plan()
-        store.require_units_of(plan)
-        others = {name: entry for name, entry in store.phases().items() if name != "report"}
-        content = [store.index(), store.survey(), provenance(plan), others]
-        key = key_of([content, report.TEMPLATE.read_text()], report)
-        if phase.is_done(key, partial(_digest_of, [store.report_file])):
-            return
-        report.write_report(out)
-
-
-def _digest_of(results: Iterable[Path]) -> str:
+def digest_of(results: Iterable[Path]) -> str:
     """Return a digest of all files' names and sizes: what a damage alters."""
     digest = hashlib.sha256()
     for result in results:
@@ -245,7 +229,7 @@ def _digest_of_bundle(store: Store) -> str:
     except OutputError:
         return ""
     faults = find_faults(store.bundle_dir, listed, since=path)
-    return "" if faults else _digest_of([store.bundle_dir])
+    return "" if faults else digest_of([store.bundle_dir])
 
 
 def _digest_of_stage(store: Store) -> str:
@@ -259,7 +243,7 @@ def _digest_of_stage(store: Store) -> str:
     return written_files.digest_of(listed)
 
 
-class _Phase:
+class Phase:
     """One phase at work: does it have anything to do, and how long does it take."""
 
     def __init__(self, store: Store, name: str) -> None:
@@ -282,10 +266,10 @@ class _Phase:
 
 
 @contextmanager
-def _phase(store: Store, name: str) -> Iterator[_Phase]:
+def phase_of(store: Store, name: str) -> Iterator[Phase]:
     """Tell how long a phase took and keep it for the report; one with nothing to do says so."""
     start = time.perf_counter()
-    phase = _Phase(store, name)
+    phase = Phase(store, name)
     yield phase
     seconds = time.perf_counter() - start
     if phase.is_up_to_date:

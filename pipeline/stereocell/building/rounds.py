@@ -166,7 +166,11 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
             },
             "repair": asdict(
                 choose_repair(
-                    plan, agreed.verdict, [f["solids"] for f in found.values() if "solids" in f]
+                    [f["solids"] for f in found.values() if "solids" in f],
+                    plan.repair,
+                    surface=plan.settings.surface,
+                    spacing_um=plan.spacing_um,
+                    verdict=agreed.verdict,
                 )
             ),
             "look": asdict(replace(look, painted_by=painter.id if painter else "")),

@@ -76,7 +76,15 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
         reason = "no voxel crosses the iso-value"
         return Unit((), None, eight_bit, reason, dropped, filled, clock.seconds)
     planes = cut_planes(frame.lattice, frame.region, frame.spacing_um, frame.origin_um)
-    lods = make_levels(fine, planes, volume.spacing_um, given.settings, clock, source)
+    lods = make_levels(
+        fine,
+        planes,
+        spacing_um=volume.spacing_um,
+        lod=given.settings.lod,
+        unwrap=given.settings.unwrap,
+        clock=clock,
+        source=source,
+    )
     return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds)
 
 

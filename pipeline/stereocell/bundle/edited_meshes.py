@@ -13,17 +13,18 @@ Nothing of an edited mesh is claimed unseen: it is certified anew.
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
+from pydantic import TypeAdapter, ValidationError
 
-from stereocell.building.settings import Settings, from_dict
 from stereocell.meshes.distance import Nearest, measure_distance
+from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.validity import Faults, Plane, border, certify
 from stereocell.model.channel import to_srgb8
@@ -32,6 +33,7 @@ from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.lod_chain import make_levels
+from stereocell.textures.options import UnwrapOptions
 from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_mesh import move_mesh
 from stereocell.usd.read_stage import (
@@ -43,6 +45,16 @@ from stereocell.usd.read_stage import (
     read_lods,
 )
 from stereocell.usd.read_textures import ComposedMaps, read_image
+
+T = TypeVar("T")
+
+
+class _Options(NamedTuple):
+    """How levels are made."""
+
+    lod: LodOptions
+    unwrap: UnwrapOptions
+
 
 _FAULTS = {
     "degenerate": "triangles without area",
@@ -94,12 +106,12 @@ def _follow(
     tile: Usd.Prim, channel_id: str, lods: list[ComposedLod], edited: set[int]
 ) -> tuple[list[ComposedLod], list[str]]:
     """Return the levels with those that follow from an edited one, and what is to be told."""
-    fine, settings = lods[0], _settings(tile.GetStage())
+    fine, options = lods[0], _options(tile.GetStage())
     planes = _cut_planes(tile, channel_id, fine)
-    to_fine = Nearest(fine.mesh, settings.lod.samples)
+    to_fine = Nearest(fine.mesh, options.lod.samples)
 
     def away(lod: ComposedLod) -> float:
-        return measure_distance(to_fine, Nearest(lod.mesh, settings.lod.samples))
+        return measure_distance(to_fine, Nearest(lod.mesh, options.lod.samples))
 
     def verdict(lod: ComposedLod) -> str:
         _, faults = _certified(read_local(tile, channel_id, lod.level), planes)
@@ -116,7 +128,7 @@ def _follow(
     told = [verdict(fine)]
     # an opinion outside the variants lies over all levels: the finest's edit, not their own
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
-    made = _make(tile, channel_id, lods, settings, planes) if len(own) < len(lods) - 1 else {}
+    made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
     result = [replace(fine, distance_um=0.0)]
     anew = []
     for lod in lods[1:]:
@@ -137,7 +149,7 @@ def _make(
     tile: Usd.Prim,
     channel_id: str,
     lods: Sequence[ComposedLod],
-    settings: Settings,
+    options: _Options,
     planes: tuple[Plane, ...],
 ) -> dict[int, tuple[ComposedLod, int]]:
     """Return the coarser levels made of the finest one, by level, and how many faults they have."""
@@ -148,9 +160,16 @@ def _make(
     openness = np.ones(len(bare.positions), np.float32) if mesh.openness is None else mesh.openness
     paints = [] if mesh.colors is None else list(np.ascontiguousarray(mesh.colors.T))
     sources = [FineSurface(bare, openness, paint) for paint in paints or [None]]
-    errors = settings.lod.errors[: lods[-1].level + 1]
-    settings = replace(settings, lod=replace(settings.lod, errors=errors))
-    made = make_levels(bare, planes, spacing, settings, Clock(), sources[0], first)
+    made = make_levels(
+        bare,
+        planes,
+        spacing_um=spacing,
+        lod=replace(options.lod, errors=options.lod.errors[: lods[-1].level + 1]),
+        unwrap=options.unwrap,
+        clock=Clock(),
+        source=sources[0],
+        first=first,
+    )
     others = [Baker(source) for source in sources[1:]]
     stretch = float(np.linalg.norm(fine.matrix[:3, :3], 2))
     result: dict[int, tuple[ComposedLod, int]] = {}
@@ -311,26 +330,36 @@ def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[float,
     return edge, edge, edge
 
 
-def _settings(stage: Usd.Stage) -> Settings:
+def _options(stage: Usd.Stage) -> _Options:
     """Return what the stage says of how its levels were made; defaults where it doesn't.
 
-    Raises UsageError for values that are none.
+    Raises StageError for values that are none.
     """
     for layer in stage.GetUsedLayers():
         found = layer.customLayerData.get("stereocell", {}).get("settings", {})
-        sections = {name: found.get(name) for name in ("lod", "unwrap")}
-        if all(isinstance(content, dict) for content in sections.values()):
-            return from_dict({name: dict(_known(name, sections[name])) for name in sections})
-    return Settings()
+        if isinstance(found.get("lod"), dict) and isinstance(found.get("unwrap"), dict):
+            where = f"{layer.GetDisplayName()}: customLayerData: settings"
+            return _Options(
+                _read_options(LodOptions, found["lod"], f"{where}: lod"),
+                _read_options(UnwrapOptions, found["unwrap"], f"{where}: unwrap"),
+            )
+    return _Options(LodOptions(), UnwrapOptions())
 
 
-def _known(section: str, content: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the settings of a section, as JSON has them; another version's are passed over."""
-    for field in fields(getattr(Settings(), section)):
-        if field.name in content:
-            value = content[field.name]
-            is_list = isinstance(value, str) and value.startswith("[")
-            yield field.name, json.loads(value) if is_list else value
+def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
+    """Return a section of settings; keys of another version are passed over."""
+    known = {field.name for field in fields(kind)}  # type: ignore[arg-type]
+    values = {
+        key: json.loads(value) if isinstance(value, str) and value.startswith("[") else value
+        for key, value in content.items()
+        if key in known
+    }
+    try:
+        return TypeAdapter(kind).validate_python(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(map(str, first["loc"]))
+        raise StageError(f"{where}.{name} is {first['input']!r:.80}: {first['msg']}") from None
 
 
 def _odd_units(tile: Usd.Prim, channel_id: str, level: int) -> Iterator[str]:

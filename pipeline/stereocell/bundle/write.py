@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from stereocell.bundle.write_tile import (
     write_file,
 )
 from stereocell.bundle.write_transfer2d import describe, encode_histogram, sum_tiles
-from stereocell.engine.run import Engine
 from stereocell.formats.gltf import choose_step
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.formats.tiles3d import make_tilesets
@@ -52,21 +51,31 @@ from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
 
 MANIFEST = "manifest.json"
 FILES = "files.json"
+T = TypeVar("T")
+R = TypeVar("R")
 _Told = Callable[[str], None]
+
+
+class Run(Protocol):
+    """Run a function over named tasks and return their results, as `Engine.run` does."""
+
+    def __call__(
+        self, label: str, function: Callable[[T], R], tasks: Sequence[tuple[str, T]], /
+    ) -> list[R]: ...
 
 
 def write_bundle(
     stage_path: Path,
     bundle_dir: Path,
     viewer_dist: Path | None,
-    engine: Engine,
+    run: Run,
     parts: Path | None = None,
     tell: _Told = lambda _: None,
 ) -> None:
     """Write the bundle of a stage, or of a layer over it, in place of an older one.
 
     viewer_dist  the built viewer, copied into the bundle; None: no viewer
-    engine       whose workers share the tiles; the bytes don't depend on their number
+    run          how the tiles are shared among workers; the bytes don't depend on their number
     parts        a folder for the tiles that are finished, of this very stage: those that are in it
                  are taken, and all are left there; None: none are kept if this does not end well
     tell         is given a line on each layer that is not as it was written, and on each surface
@@ -80,7 +89,7 @@ def write_bundle(
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
     with replacing_folder(bundle_dir) as folder:
-        _fill(stage_path, folder, viewer_dist, engine, parts or folder / ".parts", tell)
+        _fill(stage_path, folder, viewer_dist, run, parts or folder / ".parts", tell)
         shutil.rmtree(folder / ".parts", ignore_errors=True)
 
 
@@ -100,7 +109,7 @@ def _fill(
     stage_path: Path,
     root: Path,
     viewer_dist: Path | None,
-    engine: Engine,
+    run: Run,
     parts: Path,
     tell: _Told,
 ) -> None:
@@ -126,7 +135,7 @@ def _fill(
     names = [str(prim.GetName()) for prim in prims]
     found = {name: find_part(parts / name) for name in names}
     missing = [name for name in names if found[name] is None]
-    exported = engine.run("bundle", export, [(name, name) for name in missing])
+    exported = run("bundle", export, [(name, name) for name in missing])
     found |= dict(zip(missing, [tile for tile, _ in exported], strict=True))
     for layer_path in sorted(as_written.changed.union(*(changed for _, changed in exported))):
         tell(

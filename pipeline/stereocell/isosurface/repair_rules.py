@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.plan import Plan
 from stereocell.isosurface.components import find_solids
+from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Verdict
 from stereocell.model.settings import AUTO
@@ -67,14 +67,22 @@ def sum_solids(
 
 
 def choose_repair(
-    plan: Plan, verdict: Verdict, tiles: Iterable[Mapping[str, Any]]
+    tiles: Iterable[Mapping[str, Any]],
+    most: RepairOptions,
+    *,
+    surface: SurfaceOptions,
+    spacing_um: tuple[float, float, float],
+    verdict: Verdict,
 ) -> RepairOptions:
-    """Return what is cleaned of a channel's surface; `tiles`: SolidSums, as plain values.
+    """Return what is cleaned of a channel's surface.
+
+    tiles       SolidSums of each, as plain values
+    most        the most that may be cleaned: the units' halo covers it
+    spacing_um  (z, y, x)
 
     No gaps are closed in a surface that is not clear, by either wrap: none is known to be one
     (building.plan.plan_for).
     """
-    surface, most = plan.settings.surface, plan.repair
     sums = list(tiles)
     count, kept = (sum(tile[key] for tile in sums) for key in ("count", "kept"))
     options = most
@@ -91,7 +99,7 @@ def choose_repair(
             diagonal = sum(tile["kept_diagonal_um"] for tile in sums) / kept
             faces = sum(tile["kept_faces"] for tile in sums) / kept
             alpha = ALPHA_SIDES * diagonal / faces**0.5
-        least = LEAST_ALPHA * max(plan.spacing_um)
+        least = LEAST_ALPHA * max(spacing_um)
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
     if verdict == "unclear":
         options = replace(options, alpha_um=0.0)

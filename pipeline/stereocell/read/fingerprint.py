@@ -8,21 +8,37 @@ of the finest, spread evenly.
 import hashlib
 import json
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
 from stereocell.model.tiling import Box
 
-if TYPE_CHECKING:
-    from stereocell.read.dataset import Dataset
-
 BUDGET_BYTES = 64_000_000  # decoded; half for the coarsest level, half for the finest
 _GOLDEN = 0.6180339887498949
 
 
-def fingerprint_of(dataset: "Dataset") -> str:
+class Fingerprinted(Protocol):
+    """What a digest is made of: `arrays` has one entry for each of `levels`, finest first."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def time(self) -> int: ...
+    @property
+    def levels(self) -> Sequence[Any]: ...
+    @property
+    def channels(self) -> Sequence[Any]: ...
+    @property
+    def arrays(self) -> Sequence[Any]: ...
+    @property
+    def modality(self) -> str: ...
+    @property
+    def placement(self) -> Any: ...
+
+
+def fingerprint_of(dataset: Fingerprinted) -> str:
     """Return the digest, 64 hex digits. Raises what the format libraries raise."""
     metadata = {
         "dtype": dataset.dtype.name,
@@ -43,7 +59,7 @@ def fingerprint_of(dataset: "Dataset") -> str:
     return digest.hexdigest()
 
 
-def _spread(dataset: "Dataset", level: int, budget: int) -> Iterator[tuple[int, Box]]:
+def _spread(dataset: Fingerprinted, level: int, budget: int) -> Iterator[tuple[int, Box]]:
     """Yield (channel, box): the whole level within the budget, else chunks (one at least)."""
     whole = dataset.levels[level].box
     channels = len(dataset.channels)

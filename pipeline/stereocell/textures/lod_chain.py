@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from stereocell.building.settings import Settings
 from stereocell.meshes.distance import Nearest, measure_distance, measure_enclosure, measure_spread
 from stereocell.meshes.fairing import make_fair
+from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify_valid import simplify_soundly
 from stereocell.meshes.validity import Plane, certify
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, FineSurface
-from stereocell.textures.dressing import dress
+from stereocell.textures.options import UnwrapOptions
+from stereocell.textures.texture_lod import texture_lod
 
 STRAY = 3.0  # errors: how far a vertex may lie from the next level; about .1 % would be further
 SLIDE = 0.5  # finest voxel spacings: how far a vertex of lod0 may go along the surface
@@ -19,39 +20,43 @@ SLIDE = 0.5  # finest voxel spacings: how far a vertex of lod0 may go along the 
 def make_levels(
     fine: Mesh,
     planes: tuple[Plane, ...],
-    spacing: tuple[float, float, float],
-    settings: Settings,
+    *,
+    spacing_um: tuple[float, float, float],
+    lod: LodOptions,
+    unwrap: UnwrapOptions,
     clock: Clock,
     source: FineSurface | None = None,
     first: int = 0,
 ) -> tuple[Lod, ...]:
     """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
 
-    `source`: what maps are baked from, the fine surface and what lies past the planes; without one
-    the fine surface alone, which nothing hides.
-    `first`: the finest level to be made, of a surface that is itself the level before it.
+    planes      where tiles were cut
+    spacing_um  of the voxels, (z, y, x)
+    source      what maps are baked from, the fine surface and what lies past the planes; without
+                one the fine surface alone, which nothing hides
+    first       the finest level to be made, of a surface that is itself the level before it
+
     Meshes are certified before seams of charts split their vertices: places stay the same.
     """
-    options = settings.lod
     lods: list[Lod] = []
     mesh = fine
-    unwrapping = settings.unwrap.resolved(spacing)
+    unwrapping = unwrap.resolved(spacing_um)
     with clock("bake"):
         baker = Baker(source or FineSurface.bare(fine))
     with clock("measure"):
-        to_fine = Nearest(fine, options.samples)
-    for level, error in list(enumerate(options.errors))[first:]:
+        to_fine = Nearest(fine, lod.samples)
+    for level, error in list(enumerate(lod.errors))[first:]:
         with clock("simplify"):
-            length = error * min(spacing)
+            length = error * min(spacing_um)
             mended = simplify_soundly(mesh, planes, length, STRAY * length)
             mesh = mended.mesh
         if level == 0:
             with clock("fair"):
-                mesh = make_fair(mesh, planes, SLIDE * min(spacing), error * min(spacing))
+                mesh = make_fair(mesh, planes, SLIDE * min(spacing_um), error * min(spacing_um))
         with clock("certify"):
             left = certify(mesh, planes).total
         with clock("measure"):
-            to_mesh = Nearest(mesh, options.samples)
+            to_mesh = Nearest(mesh, lod.samples)
             distance = measure_distance(to_fine, to_mesh)
             # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
             distance = max(distance, lods[-1].distance_um if lods else 0.0)
@@ -64,10 +69,10 @@ def make_levels(
                 angle_deg=sharpest_angle(mesh),
                 enclosed=measure_enclosure(to_fine, to_mesh),
             )
-        lod = Lod(mesh, distance, quality=quality)
+        made = Lod(mesh, distance, quality=quality)
         if len(mesh.triangles):
-            lod = dress(lod, level, baker, unwrapping, clock)
-        lods.append(lod)
+            made = texture_lod(made, level, baker, unwrapping, clock)
+        lods.append(made)
     return tuple(lods)
 
 

@@ -1,0 +1,90 @@
+"""Where a tile's samples lie: what was read, what is the tile's own, what is built."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stereocell.model.tiling import Box
+from stereocell.model.volume import zyx_to_xyz
+
+Spacing = tuple[float, float, float]  # um between samples, (z, y, x)
+Point = tuple[float, float, float]  # um, (z, y, x)
+Step = tuple[int, int, int]  # planes of voxels, (z, y, x)
+Plane = tuple[int, float]  # a column of positions (0 x, 1 y, 2 z), and its value in um
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Where a tile's samples lie; boxes are half-open, (z, y, x), in voxels of the level.
+
+    window      what was read: the arrays that belong to the lattice cover it
+    own         the tile's lattice points: its cells lie between them
+    region      all that is built: a tile is cut where its own points end before it
+    spacing_um  between samples, (z, y, x)
+    origin_um   centre of voxel (0, 0, 0), (z, y, x); the same for all tiles of a build
+    """
+
+    window: Box
+    own: Box
+    region: Box
+    spacing_um: Spacing
+    origin_um: Point
+
+    @classmethod
+    def of_whole(cls, box: Box, spacing_um: Spacing, origin_um: Point = (0, 0, 0)) -> "Lattice":
+        """Return the lattice of a volume that is one tile, and all that is built."""
+        return cls(box, box, box, spacing_um, origin_um)
+
+    def alone(self) -> "Lattice":
+        """Return the lattice of the tile's own points as if no other tile followed."""
+        return Lattice.of_whole(self.own, self.spacing_um, self.origin_um)
+
+    def grown(self, voxels: int) -> "Lattice":
+        """Return the lattice with so many more points of its own each way, within the region."""
+        return replace(self, own=self.own.grown((voxels, voxels, voxels), self.region))
+
+    def thinned(self, step: Step) -> "Lattice":
+        """Return the lattice of every `step`-th plane, counted from the region's first one."""
+        if step == (1, 1, 1):
+            return self
+        z, y, x = (h * k for h, k in zip(self.spacing_um, step, strict=True))
+        first = zip(self.origin_um, self.region.start, self.spacing_um, strict=True)
+        oz, oy, ox = (origin + start * h for origin, start, h in first)
+        return Lattice(
+            self.window.thinned(self.region, step),
+            self.own.thinned(self.region, step, outward=True),
+            self.region.thinned(self.region, step),
+            (z, y, x),
+            (oz, oy, ox),
+        )
+
+    def slices_of_thinned(self, step: Step) -> tuple[slice, slice, slice]:
+        """Return which planes of the window `thinned` keeps."""
+        starts = zip(
+            self.window.thinned(self.region, step).start,
+            self.region.start,
+            self.window.start,
+            step,
+            strict=True,
+        )
+        z, y, x = (slice(a * k + first - low, None, k) for a, first, low, k in starts)
+        return z, y, x
+
+    def cuts(self) -> Iterator[tuple[int, int]]:
+        """Yield where another tile follows: the axis (0 z, 1 y, 2 x), and the plane's index."""
+        for axis in range(3):
+            if self.own.start[axis] != self.region.start[axis]:
+                yield axis, self.own.start[axis]
+            if self.own.stop[axis] != self.region.stop[axis]:
+                yield axis, self.own.stop[axis] - 1
+
+    def cut_planes(self) -> tuple[Plane, ...]:
+        """Return where an extracted mesh is open, as float32 has it: where another tile follows."""
+        planes = []
+        for axis, place in self.cuts():
+            zyx = np.zeros(3)
+            zyx[axis] = place * self.spacing_um[axis] + self.origin_um[axis]
+            value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # as of the mesh's vertices
+            planes.append((2 - axis, float(value)))
+        return tuple(planes)
