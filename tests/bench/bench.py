@@ -22,6 +22,7 @@ from stereocell.engine.run import Engine
 from stereocell.filters import denoise
 from stereocell.isosurface import extract, repair
 from stereocell.meshes import simplify
+from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from support.many_tiles import CHANNELS, COLUMNS, ROWS, open_unloaded, write_many
@@ -66,7 +67,7 @@ def main() -> None:
     print(f"phantom {shape}, {voxels.size / 1e6:.1f} M voxels; medians of {ROUNDS}")
     compare(
         "extract_surface",
-        lambda: extract.extract_surface(distance, region, region, region, SPACING, (0, 0, 0)),
+        lambda: extract.extract_surface(distance, Lattice.of_whole(region, SPACING)),
         lambda: measure.marching_cubes(distance, 0.0, spacing=SPACING),
         "scikit-image's marching cubes",
     )
@@ -84,7 +85,7 @@ def main() -> None:
         close_by_morphology,
         "a binary closing alone",
     )
-    fine = extract.extract_surface(distance, region, region, region, SPACING, (0, 0, 0))
+    fine = extract.extract_surface(distance, Lattice.of_whole(region, SPACING))
 
     def chain() -> None:
         mesh = fine

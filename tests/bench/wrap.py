@@ -34,6 +34,7 @@ from stereocell.meshes.distance import Nearest, measure_enclosure, measure_sprea
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import simplify_soundly
 from stereocell.meshes.validity import bodies, certify
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
@@ -113,7 +114,7 @@ def wrap(given: Input) -> Mesh:
     )
     whole = Box((0, 0, 0), distance.shape)
     closed = repair(distance, spacing, options).distance
-    surface = extract_surface(closed, whole, whole, whole, spacing, (0.0, 0.0, 0.0))
+    surface = extract_surface(closed, Lattice.of_whole(whole, spacing))
     return simplify_soundly(surface, (), given.error * alpha).mesh
 
 
@@ -123,7 +124,7 @@ def iso_surface(given: Input) -> Mesh:
     height = given.field - np.float32(given.iso)
     # values by the clip that extraction expects: only their signs and ratios matter
     height *= np.float32(2 * max(given.spacing)) / np.abs(height).max()
-    return extract_surface(height, whole, whole, whole, given.spacing, (0.0, 0.0, 0.0))
+    return extract_surface(height, Lattice.of_whole(whole, given.spacing))
 
 
 def chain(binary: Path, surface: Mesh, alpha: float, folder: Path) -> tuple[Mesh, float]:

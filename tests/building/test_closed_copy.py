@@ -14,7 +14,8 @@ from stereocell.building.closed_copy import close_tile
 from stereocell.building.unit_files import find_closed, load_record, save_unit
 from stereocell.formats.stl import write_stl
 from stereocell.meshes.simplify_valid import Mended
-from stereocell.meshes.validity import Plane, certify
+from stereocell.meshes.validity import certify
+from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
 from stereocell.model.unit import Closed, Unit
@@ -36,7 +37,9 @@ def distance() -> NDArray[np.float32]:
 
 
 def close(field: NDArray[np.float32], lattice: Box) -> Closed:
-    copy = close_tile(field, REGION, lattice, SPACING, (0, 0, 0), ERROR)
+    copy = close_tile(
+        field, Lattice(REGION, lattice, REGION, SPACING, (0, 0, 0)), max_error_um=ERROR
+    )
     assert copy is not None
     return copy
 
@@ -83,7 +86,7 @@ def test_stl_is_read_back_by_vtk(distance: NDArray[np.float32], tmp_path: Path) 
 
 def test_nothing_inside_is_no_copy(distance: NDArray[np.float32]) -> None:
     nothing = -abs(distance) - 1
-    assert close_tile(nothing, REGION, REGION, SPACING, (0, 0, 0), 1) is None
+    assert close_tile(nothing, Lattice.of_whole(REGION, SPACING), max_error_um=1) is None
 
 
 def test_a_copy_that_simplification_spoilt_stays_unsimplified(

@@ -20,6 +20,7 @@ from stereocell.building.unit_files import load_lods, load_record, load_volume
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes.validity import certify
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box, Tile, cut
 from support import phantoms
@@ -273,7 +274,9 @@ def test_lattice_points_on_the_iso_value_make_no_degenerate_triangle() -> None:
     for tile in cut(region, (13, 13, 12)):
         lattice = tile.lattice(region)
         part = distance[lattice.slices]
-        mesh = extract_surface(part, lattice, lattice, region, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+        mesh = extract_surface(
+            part, Lattice(lattice, lattice, region, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+        )
         a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
         assert area.min() > 1e-5

@@ -9,6 +9,7 @@ from stereocell.building.settings import Settings
 from stereocell.building.unit import UnitInput, build_unit, to_eight_bit
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import APRON
+from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
@@ -24,9 +25,8 @@ def _given(scale: float) -> UnitInput:
     settings = replace(settings, surface=settings.surface.resolved(SPACING))
     iso = LatticeField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
     repair, step = RepairOptions(0.6, 0.9, 1.2), (1, 1, 1)
-    return UnitInput(
-        BOX, BOX, BOX, (0.0, 0.0, 0.0), iso, None, repair, step, (0.0, scale), settings
-    )
+    lattice = Lattice.of_whole(BOX, SPACING)
+    return UnitInput(lattice, iso, None, repair, step, (0.0, scale), settings)
 
 
 @pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])
@@ -43,7 +43,7 @@ def test_voxels_whose_squares_leave_float32_give_the_same_unit(scale: float) -> 
 
 def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end() -> None:
     voxels = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE) % 251
-    lattice = Box((0, 10, 20), (10, 20, 40))
+    lattice = Lattice(BOX, Box((0, 10, 20), (10, 20, 40)), BOX, SPACING, (0.0, 0.0, 0.0))
     given = replace(_given(1.0), lattice=lattice, display=(0.0, 255.0))
     eight_bit = to_eight_bit(voxels, given)
     padded = np.pad(voxels, APRON, mode="edge")

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from stereocell.filters.denoise import SMOOTHING_REACH, smooth
 from stereocell.isosurface.extract import extract_surface, gradient_magnitude, signed_distance
 from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
 from stereocell.model.volume import Volume, zyx_to_xyz
@@ -23,7 +24,9 @@ def _extract(
     field = smooth(Volume(voxels[window.slices], SPACING), 0.14)
     distance = signed_distance(field, np.float32(iso), SPACING, 1000.0)
     repaired = repair(distance, SPACING, OPTIONS)
-    return extract_surface(repaired.distance, window, lattice, region, SPACING, (0.0, 0.0, 0.0))
+    return extract_surface(
+        repaired.distance, Lattice(window, lattice, region, SPACING, (0.0, 0.0, 0.0))
+    )
 
 
 def _whole(voxels: NDArray[np.float32], iso: float) -> Mesh:

@@ -13,6 +13,7 @@ from stereocell.isosurface.extract import extract_surface, signed_distance
 from stereocell.isosurface.isovalue import PEAK_SHARE, _peak, find_iso_value
 from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 from stereocell.model.errors import NoSurfaceError, UsageError
+from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from support.meshes import enclosed_volume
@@ -51,7 +52,7 @@ def _volume_error(radius: float, sigma: float, noise: float, seed: int) -> float
     iso = np.float32(find_iso_value(field, SPACING, IsoValueOptions()).value)
     box = Box((0, 0, 0), (z, y, x))
     distance = signed_distance(field, iso, SPACING, 1000.0)
-    mesh = extract_surface(distance, box, box, box, SPACING, (0.0, 0.0, 0.0))
+    mesh = extract_surface(distance, Lattice.of_whole(box, SPACING))
     return enclosed_volume(mesh) / (4 / 3 * np.pi * radius**3) - 1
 
 

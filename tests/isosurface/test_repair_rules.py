@@ -11,6 +11,7 @@ from stereocell.isosurface.components import find_solids
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.isosurface.repair_rules import sum_solids
+from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from stereocell.read import Level
 from support.plans import CHANNELS, choose, plan_of
@@ -33,7 +34,7 @@ def _distance() -> NDArray[np.float32]:
 def test_faces_are_those_of_the_extracted_surface() -> None:
     distance, whole = _distance(), Box((0, 0, 0), SHAPE)
     solids = find_solids(distance > 0, SPACING, 26)
-    mesh = extract_surface(distance, whole, whole, whole, SPACING, (0, 0, 0))
+    mesh = extract_surface(distance, Lattice.of_whole(whole, SPACING))
     assert len(solids.diagonal_um) == len(RADII)
     # twice the vertices, and four less for each ball
     assert solids.faces().sum() - 4 * len(RADII) == len(mesh.triangles)
@@ -102,7 +103,7 @@ def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
     moved = repair(distance, SPACING, options)
     assert moved.fragments_dropped == 1
     whole = Box((0, 0, 0), SHAPE)
-    mesh = extract_surface(moved.distance, whole, whole, whole, SPACING, (0, 0, 0))
+    mesh = extract_surface(moved.distance, Lattice.of_whole(whole, SPACING))
     x, y, z = mesh.positions.T
     away = [
         np.sqrt((z - c) ** 2 + (-y - b) ** 2 + (x - a) ** 2) - radius

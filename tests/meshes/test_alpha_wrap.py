@@ -9,6 +9,7 @@ from stereocell.cli.__main__ import main
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import alpha_wrap
 from stereocell.meshes.validity import certify
+from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from support.phantoms import blurred_ball, write_ome_tiff
 
@@ -55,7 +56,7 @@ def test_wrap_is_closed_and_lies_the_offset_away() -> None:
     z, y, x = np.indices(shape) - np.float64(14.6)
     distance = np.clip(9 - np.sqrt(z**2 + y**2 + x**2), -2, 2).astype(np.float32)
     whole = Box((0, 0, 0), shape)
-    ball = extract_surface(distance, whole, whole, whole, (1, 1, 1), (0, 0, 0))
+    ball = extract_surface(distance, Lattice.of_whole(whole, (1, 1, 1)))
     wrapped = alpha_wrap.alpha_wrap(ball, 2.0, 0.5)
     assert not certify(wrapped).total
     outward = wrapped.positions - np.float32([14.6, -14.6, 14.6])

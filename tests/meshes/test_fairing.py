@@ -9,6 +9,7 @@ from stereocell.isosurface.extract import RIM_SNAP, extract_surface
 from stereocell.meshes import fairing
 from stereocell.meshes.fairing import make_fair
 from stereocell.meshes.validity import border, certify
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.textures.lod_chain import sharpest_angle
@@ -85,7 +86,9 @@ def _cut_ball() -> tuple[Mesh, tuple[int, float]]:
     z, y, x = np.indices(shape) - np.float64(19.6)
     distance = (radius - np.sqrt(z**2 + y**2 + x**2)).astype(np.float32)
     whole, part = Box((0, 0, 0), shape), Box((0, 0, 0), (40, 40, 23))
-    mesh = extract_surface(np.clip(distance, -2, 2), whole, part, whole, (1, 1, 1), (0, 0, 0))
+    mesh = extract_surface(
+        np.clip(distance, -2, 2), Lattice(whole, part, whole, (1, 1, 1), (0, 0, 0))
+    )
     return mesh, (0, 22.0)
 
 
@@ -117,12 +120,7 @@ def _shell(thickness: float) -> Mesh:
     away, whole = np.sqrt(z**2 + y**2 + x**2), Box((0, 0, 0), shape)
     walls = [
         extract_surface(
-            np.clip(radius - away, -2, 2).astype(np.float32),
-            whole,
-            whole,
-            whole,
-            (1, 1, 1),
-            (0, 0, 0),
+            np.clip(radius - away, -2, 2).astype(np.float32), Lattice.of_whole(whole, (1, 1, 1))
         )
         for radius in (12.3, 12.3 - thickness)
     ]

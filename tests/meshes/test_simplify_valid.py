@@ -10,6 +10,7 @@ from stereocell.meshes import simplify_valid
 from stereocell.meshes.simplify import compact, renumber
 from stereocell.meshes.simplify_valid import simplify_soundly
 from stereocell.meshes.validity import Faults, certify
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from support.meshes import ball, kinds
@@ -22,7 +23,7 @@ def sponge(seed: int) -> Mesh:
     field = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 1.6)
     distance = np.clip(field / field.std() - 0.3, -2, 2).astype(np.float32)
     whole = Box((0, 0, 0), SHAPE)
-    return extract_surface(distance, whole, whole, whole, (1.0,) * 3, (0.0,) * 3)
+    return extract_surface(distance, Lattice.of_whole(whole, (1.0,) * 3))
 
 
 def by_vertices(faults: Faults, triangles: NDArray, used: NDArray) -> dict[str, set]:

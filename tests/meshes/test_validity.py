@@ -8,6 +8,7 @@ import pyvista as pv
 
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes.validity import border, certify
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from support.meshes import SOUND, _with, ball, joined, kinds, moved, to_mesh, turned
@@ -133,7 +134,11 @@ def _half(at: int) -> tuple[Mesh, Box, Box]:
     distance = 6.3 - np.sqrt((z - 9.5) ** 2 + (y - 9.5) ** 2 + (x - 9.5) ** 2)
     part = np.clip(distance, -2, 2).astype(np.float32)[lattice.slices]
     origin = (0.0, 0.0, 0.0)
-    return extract_surface(part, lattice, lattice, region, (1.0,) * 3, origin), lattice, region
+    return (
+        extract_surface(part, Lattice(lattice, lattice, region, (1.0,) * 3, origin)),
+        lattice,
+        region,
+    )
 
 
 @pytest.mark.parametrize("at", [5, 10, 14])
@@ -158,6 +163,6 @@ def test_iso_surface_of_noise_is_sound(seed: int) -> None:
     noise = np.random.default_rng(seed).normal(size=(24, 24, 24))
     distance = np.clip(noise, -2, 2).astype(np.float32)
     box = Box((0, 0, 0), (24, 24, 24))
-    mesh = extract_surface(distance, box, box, box, (1.0,) * 3, (0.0,) * 3)
+    mesh = extract_surface(distance, Lattice.of_whole(box, (1.0,) * 3))
     assert len(mesh.triangles) > 30_000
     assert kinds(certify(mesh)) == set()

@@ -10,6 +10,7 @@ from skimage.metrics import structural_similarity as peer
 from stereocell.building.settings import Settings
 from stereocell.building.unit import UnitInput, build_unit
 from stereocell.isosurface.repair import RepairOptions
+from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod
 from stereocell.model.tiling import Box
@@ -39,10 +40,7 @@ def lods() -> tuple[Lod, ...]:
     )
     iso = LatticeField(((28.0,), (36.0,), (36.0,)), np.full((1, 1, 1), 500.0))
     given = UnitInput(
-        window=BOX,
-        lattice=BOX,
-        region=BOX,
-        origin_um=(0.0, 0.0, 0.0),
+        lattice=Lattice(BOX, BOX, BOX, SPACING, (0.0, 0.0, 0.0)),
         iso=iso,
         background=None,
         repair=RepairOptions(2.0, 3.0, 4.0),

@@ -11,6 +11,7 @@ from stereocell.building.settings import Settings
 from stereocell.building.unit import UnitInput, build_unit
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.simplify import simplify
+from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
@@ -134,8 +135,10 @@ def test_openness_is_that_of_the_sky_above() -> None:
     at = np.stack([np.full(5, 9.5), np.full(5, 40.0), along], axis=1)  # on the floor
     points = zyx_to_xyz(at).astype(np.float32)
     up = np.tile(np.float32([0, 0, 1]), (5, 1))
+    floor = Mesh(points, np.zeros((0, 3), np.uint32), up)
+    lattice = Lattice.of_whole(box, (1.0, 1.0, 1.0))
     radius = 8.0
-    found = find_openness(solid, box, points, up, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), radius)
+    found = find_openness(solid, lattice, floor, radius_um=radius)
     sky = directions(20000)
     sky = sky[sky[:, 2] > 0]
     for value, distance in zip(found, along - 19.5, strict=True):
@@ -144,7 +147,7 @@ def test_openness_is_that_of_the_sky_above() -> None:
         expected = 1 - (hidden * sky[:, 2]).sum() / sky[:, 2].sum()
         assert value == pytest.approx(expected, abs=0.06)
     assert found[-1] == 1
-    none = find_openness(solid, box, points, up, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 0.0)
+    none = find_openness(solid, lattice, floor, radius_um=0.0)
     assert (none == 1).all()
 
 
@@ -179,10 +182,7 @@ def neighbours() -> tuple[tuple[Lod, ...], ...]:
     for lattice in LATTICES:
         window = lattice.grown(HALO, REGION)
         given = UnitInput(
-            window=window,
-            lattice=lattice,
-            region=REGION,
-            origin_um=(0.0, 0.0, 0.0),
+            lattice=Lattice(window, lattice, REGION, SPACING, (0.0, 0.0, 0.0)),
             iso=iso,
             background=None,
             repair=RepairOptions(2.0, 3.0, 3.0),

@@ -9,13 +9,13 @@ import pyvista as pv
 from scipy import ndimage
 
 from stereocell.building.settings import Settings
-from stereocell.isosurface.extract import cut_planes, extract_surface
+from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import simplify_valid
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.simplify import simplify
 from stereocell.meshes.simplify_valid import Mended, simplify_soundly
 from stereocell.meshes.validity import border, certify
-from stereocell.model.lattice import Plane
+from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
@@ -27,7 +27,7 @@ SPACING = (1.0, 1.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
 REGION = Box((0, 0, 0), (40, 40, 60))
 LATTICE = Box((0, 0, 0), (40, 40, 31))
-PLANES = cut_planes(LATTICE, REGION, SPACING, ORIGIN)
+PLANES = Lattice(LATTICE, LATTICE, REGION, SPACING, ORIGIN).cut_planes()
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def sponge() -> Mesh:
     field = ndimage.gaussian_filter(noise, 1.6)
     distance = np.clip((field - 0.3 * field.std()) / field.std(), -2, 2).astype(np.float32)
     part = distance[LATTICE.slices]
-    return extract_surface(part, LATTICE, LATTICE, REGION, SPACING, ORIGIN)
+    return extract_surface(part, Lattice(LATTICE, LATTICE, REGION, SPACING, ORIGIN))
 
 
 def _chain(mesh: Mesh) -> Iterator[Mended]:
@@ -118,7 +118,7 @@ def with_process() -> Mesh:
     process = 1.3 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - along) ** 2)
     whole = Box((0, 0, 0), shape)
     distance = np.clip(np.maximum(body, process), -2, 2).astype(np.float32)
-    return extract_surface(distance, whole, whole, whole, SPACING, ORIGIN)
+    return extract_surface(distance, Lattice.of_whole(whole, SPACING, ORIGIN))
 
 
 def _farthest(mesh: Mesh, simplified: Mesh) -> float:

@@ -13,6 +13,8 @@ from stereocell.building.out_folder import Store
 from stereocell.building.unit_files import load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import PaintColors, to_srgb8
+from stereocell.model.lattice import Lattice
+from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
 from stereocell.textures.sample_channel import find_paint
@@ -30,11 +32,13 @@ def test_paint_is_the_largest_value_down_to_the_stated_depth() -> None:
     voxels[6] = 300  # the floor lies at z = 9
     at = zyx_to_xyz([[9.0, 4.0, 4.0]]).astype(np.float32)
     up = np.float32([[0, 0, 1]])
-    box = Box((0, 0, 0), voxels.shape)
+    floor = Mesh(at, np.zeros((0, 3), np.uint32), up)
+    lattice = Lattice.of_whole(Box((0, 0, 0), voxels.shape), (1.0, 1.0, 1.0))
 
     def painted(depth: float, display: tuple[float, float]) -> float:
         volume = Volume(voxels, (1.0, 1.0, 1.0))
-        return float(find_paint(volume, box, display, at, up, (0.0, 0.0, 0.0), depth)[0])
+        found = find_paint(volume, lattice, floor, display=display, depth_um=depth)
+        return float(found[0])
 
     assert painted(1.5, (100, 500)) == 0
     assert painted(3.0, (100, 500)) == pytest.approx(0.5)

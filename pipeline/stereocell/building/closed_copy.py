@@ -12,27 +12,21 @@ from numpy.typing import NDArray
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes.simplify_valid import simplify_soundly
 from stereocell.meshes.validity import bodies, certify
-from stereocell.model.tiling import Box
+from stereocell.model.lattice import Lattice
 from stereocell.model.unit import Closed
 
 
 def close_tile(
-    distance: NDArray[np.float32],
-    window: Box,
-    lattice: Box,
-    spacing_um: tuple[float, float, float],
-    origin_um: tuple[float, float, float],
-    max_error_um: float,
+    distance: NDArray[np.float32], lattice: Lattice, *, max_error_um: float
 ) -> Closed | None:
-    """Return the closed surface of the solids inside `lattice`, simplified soundly, in world um.
+    """Return the closed surface of the solids of a tile, simplified soundly, in world um.
 
     None where there are no solids.
 
-    distance (z, y, x), um, positive inside, covers `window`; the lattice ends what is built, as far
-    as the surface knows.
+    distance float32 (z, y, x), um, positive inside, covers `lattice.window`.
     """
-    own = distance[lattice.slices_in(window)]
-    fine = extract_surface(own, lattice, lattice, lattice, spacing_um, origin_um)
+    own = distance[lattice.own.slices_in(lattice.window)]
+    fine = extract_surface(own, lattice.alone())
     if not len(fine.triangles):
         return None
     simplified = simplify_soundly(fine, (), max_error_um)

@@ -27,6 +27,7 @@ from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import UsageError
+from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField, make_iso_field
 from stereocell.model.tiling import Box, Tile
 from stereocell.read.open_dataset import reader_of
@@ -300,13 +301,10 @@ def _unit_task(
     painted: tuple[int, tuple[float, float]] | None,
 ) -> tuple[UnitTask, str]:
     tile = plan.tile(tile_id)
-    lattice = tile.lattice(plan.region)
-    window = lattice.grown(plan.halo, plan.region)
+    own = tile.lattice(plan.region)
+    window = own.grown(plan.halo, plan.region)
     given = UnitInput(
-        window=window,
-        lattice=lattice,
-        region=plan.region,
-        origin_um=plan.origin_um,
+        lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
         iso=_around(iso, window),
         background=_around(display.background, window),
         repair=repair,
@@ -318,7 +316,7 @@ def _unit_task(
     depends = [
         _input_key(plan, channel),
         channel.index,
-        [_box(box) for box in (given.window, given.lattice, given.region)],
+        [_box(box) for box in (window, own, plan.region)],
         [None if f is None else f.to_json() for f in (given.iso, given.background)],
         given.display,
         plan.settings.surface.smoothing_um,

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from stereocell.building.closed_copy import close_tile
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
-from stereocell.isosurface.extract import cut_planes, extract_surface, signed_distance
+from stereocell.isosurface.extract import extract_surface, signed_distance
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
 from stereocell.meshes.alpha_wrap import alpha_wrap
 from stereocell.model.channel import APRON
+from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
-from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import Closed, Unit
 from stereocell.model.volume import Volume
@@ -33,32 +33,30 @@ PAST = 3  # voxels past a cut that maps are baked from: the halo is larger, and 
 class UnitInput:
     """What a unit depends on, besides its voxels.
 
-    window, lattice, region  what was read, the tile's lattice points, all that is built (voxels)
-    origin_um                where voxel (0, 0, 0) lies; the plan's, as every tile must use the same
-    iso                      the iso-value near the tile, above the background; None: no surface
-    background               what lies under it; None: nothing is subtracted
-    repair                   what is cleaned of the channel's surface
-    step                     every so many planes of voxels (z, y, x) carry the surface
-    display                  voxel values that become 0 and 255
-    painted                  those of the channel that is painted on the surface; None: no paint
+    lattice     where its voxels lie; the volumes cover its window
+    iso         the iso-value near the tile, above the background; None: no surface
+    background  what lies under it; None: nothing is subtracted
+    repair      what is cleaned of the channel's surface
+    step        every so many planes of voxels (z, y, x) carry the surface
+    display     voxel values that become 0 and 255
+    painted     those of the channel that is painted on the surface; None: no paint
     """
 
-    window: Box
-    lattice: Box
-    region: Box
-    origin_um: tuple[float, float, float]
+    lattice: Lattice
     iso: LatticeField | None
     background: LatticeField | None
     repair: RepairOptions
-    step: tuple[int, int, int]
+    step: Step
     display: tuple[float, float]
     settings: Settings
     painted: tuple[float, float] | None = None
 
 
 def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) -> Unit:
-    """Return meshes and volume of one unit. `volume` covers `given.window`, as does `painted`, the
-    channel that is painted on the surface.
+    """Return meshes and volume of one unit.
+
+    volume   its voxels (z, y, x); they cover the lattice's window
+    painted  those of the channel that is painted on the surface
 
     A unit whose part of the field never crosses the iso-value has no surface, and says so.
     """
@@ -68,17 +66,16 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
     if given.iso is None:
         return Unit((), None, eight_bit, "the channel has no iso-value", 0, 0, clock.seconds)
 
-    frame = _frame(volume.spacing_um, given)
+    lattice = given.lattice.thinned(given.step)
     fine, closed, source, dropped, filled = _fine_surface(
-        volume, given, frame, given.iso, painted, clock
+        volume, given, lattice, given.iso, painted, clock
     )
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
         return Unit((), None, eight_bit, reason, dropped, filled, clock.seconds)
-    planes = cut_planes(frame.lattice, frame.region, frame.spacing_um, frame.origin_um)
     lods = make_levels(
         fine,
-        planes,
+        lattice.cut_planes(),
         spacing_um=volume.spacing_um,
         lod=given.settings.lod,
         unwrap=given.settings.unwrap,
@@ -88,42 +85,6 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
     return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds)
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """The boxes, in planes that carry the surface, their distances (z, y, x), where they begin."""
-
-    window: Box
-    lattice: Box
-    region: Box
-    spacing_um: tuple[float, float, float]
-    origin_um: tuple[float, float, float]
-
-
-def _frame(spacing_um: tuple[float, float, float], given: UnitInput) -> _Frame:
-    step, region = given.step, given.region
-    if step == (1, 1, 1):
-        return _Frame(given.window, given.lattice, region, spacing_um, given.origin_um)
-    z, y, x = (h * k for h, k in zip(spacing_um, step, strict=True))
-    first = zip(given.origin_um, region.start, spacing_um, strict=True)
-    oz, oy, ox = (origin + start * h for origin, start, h in first)
-    return _Frame(
-        given.window.thinned(region, step),
-        given.lattice.thinned(region, step, outward=True),
-        region.thinned(region, step),
-        (z, y, x),
-        (oz, oy, ox),
-    )
-
-
-def _thin(field: NDArray[np.float32], given: UnitInput, frame: _Frame) -> NDArray[np.float32]:
-    """Return the voxels of the window's planes that carry the surface."""
-    places = zip(
-        frame.window.start, given.region.start, given.window.start, given.step, strict=True
-    )
-    part = tuple(slice(a * k + first - low, None, k) for a, first, low, k in places)
-    return np.ascontiguousarray(field[part])
-
-
 def find_surface(volume: Volume, given: UnitInput) -> Mesh:
     """Return a unit's iso-surface, repaired, before any level of detail is made of it; it may be
     empty. The same numbers as in `build_unit`.
@@ -131,25 +92,25 @@ def find_surface(volume: Volume, given: UnitInput) -> Mesh:
     if given.iso is None:
         nothing = np.zeros((0, 3), np.float32)
         return Mesh(nothing, np.zeros((0, 3), np.uint32), nothing)
-    frame = _frame(volume.spacing_um, given)
-    return _extract(*_repaired(volume, given, frame, given.iso, Clock()), given, frame, Clock())
+    lattice = given.lattice.thinned(given.step)
+    return _extract(*_repaired(volume, given, lattice, given.iso, Clock()), given, lattice, Clock())
 
 
 def _repaired(
-    volume: Volume, given: UnitInput, frame: _Frame, iso: LatticeField, clock: Clock
+    volume: Volume, given: UnitInput, lattice: Lattice, iso: LatticeField, clock: Clock
 ) -> tuple[Repaired, bool]:
     """Return the repaired distance, and whether gaps are still to be closed by triangles.
 
     A function of its own: its float32 copies of the window are gone when levels are made.
     """
-    surface, spacing = given.settings.surface, frame.spacing_um
+    surface, spacing = given.settings.surface, lattice.spacing_um
     with clock("distance"):
         field = denoise(volume, float(surface.smoothing_um))
         if given.background is not None:
-            field -= given.background.at(given.window)
-        field -= iso.at(given.window)
+            field -= given.background.at(given.lattice.window)
+        field -= iso.at(given.lattice.window)
         if given.step != (1, 1, 1):
-            field = _thin(field, given, frame)
+            field = np.ascontiguousarray(field[given.lattice.slices_of_thinned(given.step)])
         value_range = given.display[1] - given.display[0]
         distance = signed_distance(field, np.zeros(1, np.float32), spacing, value_range)
         del field
@@ -162,17 +123,10 @@ def _repaired(
 
 
 def _extract(
-    repaired: Repaired, by_triangles: bool, given: UnitInput, frame: _Frame, clock: Clock
+    repaired: Repaired, by_triangles: bool, given: UnitInput, lattice: Lattice, clock: Clock
 ) -> Mesh:
     with clock("extract"):
-        fine = extract_surface(
-            repaired.distance,
-            frame.window,
-            frame.lattice,
-            frame.region,
-            frame.spacing_um,
-            frame.origin_um,
-        )
+        fine = extract_surface(repaired.distance, lattice)
     if by_triangles and len(fine.triangles):
         with clock("wrap"):
             fine = alpha_wrap(fine, given.repair.alpha_um, given.repair.offset_um)
@@ -182,7 +136,7 @@ def _extract(
 def _fine_surface(
     volume: Volume,
     given: UnitInput,
-    frame: _Frame,
+    lattice: Lattice,
     iso: LatticeField,
     painted: Volume | None,
     clock: Clock,
@@ -190,17 +144,16 @@ def _fine_surface(
     """Return the repaired surface, its closed copy, what maps are baked from, and the numbers of
     fragments dropped and cavities filled.
     """
-    repaired, by_triangles = _repaired(volume, given, frame, iso, clock)
-    fine = _extract(repaired, by_triangles, given, frame, clock)
-    boxes, spacing = (frame.window, frame.lattice), frame.spacing_um
+    repaired, by_triangles = _repaired(volume, given, lattice, iso, clock)
+    fine = _extract(repaired, by_triangles, given, lattice, clock)
     closed = None
     if given.settings.surface.closed_tiles:
         with clock("close"):
             error = given.settings.lod.errors[0] * min(volume.spacing_um)
-            closed = close_tile(repaired.distance, *boxes, spacing, frame.origin_um, error)
+            closed = close_tile(repaired.distance, lattice, max_error_um=error)
     with clock("occlude"):
         unwrapping = given.settings.unwrap.resolved(volume.spacing_um)
-        source = _with_surroundings(fine, repaired.distance, given, frame, unwrapping, painted)
+        source = _with_surroundings(fine, repaired.distance, given, lattice, unwrapping, painted)
     return fine, closed, source, repaired.fragments_dropped, repaired.cavities_filled
 
 
@@ -208,38 +161,34 @@ def _with_surroundings(
     fine: Mesh,
     distance: NDArray[np.float32],
     given: UnitInput,
-    frame: _Frame,
+    lattice: Lattice,
     options: UnwrapOptions,
     painted: Volume | None,
 ) -> FineSurface:
     """Return the surface, some voxels past the cut, with how open it lies and what is painted."""
-    origin, spacing = frame.origin_um, frame.spacing_um
-    lattice = frame.lattice.grown((PAST, PAST, PAST), frame.region)
-    mesh = fine
-    if lattice != frame.lattice:
-        boxes = frame.window, lattice, frame.region
-        mesh = extract_surface(distance, *boxes, spacing, origin, cuts=frame.lattice)
-    where = mesh.positions, mesh.normals
+    past = lattice.grown(PAST)
+    mesh = fine if past == lattice else extract_surface(distance, past, cut_as=lattice)
     # a little smaller: rays start outside of it
-    solid = distance > 0.25 * max(spacing)
+    solid = distance > 0.25 * max(lattice.spacing_um)
     radius, depth = float(options.occlusion_um), float(options.paint_um)
-    openness = find_openness(solid, frame.window, *where, spacing, origin, radius)
+    openness = find_openness(solid, lattice, mesh, radius_um=radius)
     paint = None
     if painted is not None and given.painted is not None:
-        paint = find_paint(painted, given.window, given.painted, *where, given.origin_um, depth)
+        paint = find_paint(painted, given.lattice, mesh, display=given.painted, depth_um=depth)
     return FineSurface(mesh, openness, paint)
 
 
 def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
     """Return the lattice's voxels and an apron, window applied; ends of the region repeat."""
+    lattice = given.lattice
     index = [
         np.clip(np.arange(a - APRON, b + APRON), low, high - 1) - w
         for a, b, low, high, w in zip(
-            given.lattice.start,
-            given.lattice.stop,
-            given.region.start,
-            given.region.stop,
-            given.window.start,
+            lattice.own.start,
+            lattice.own.stop,
+            lattice.region.start,
+            lattice.region.stop,
+            lattice.window.start,
             strict=True,
         )
     ]

@@ -8,8 +8,6 @@ units and put into the world in float64, by the same arithmetic for every tile.
 Extraction is Flying Edges (Schroeder, Maynard & Geveci, LDAV 2015) as VTK has it.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -17,8 +15,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
-from stereocell.model.tiling import Box
 from stereocell.model.volume import zyx_to_xyz
 
 # Values nearer to zero than this share of the distance's clip are moved off it: a vertex on a
@@ -88,41 +86,37 @@ def signed_distance(
 
 
 def extract_surface(
-    distance: NDArray[np.float32],
-    window: Box,
-    lattice: Box,
-    region: Box,
-    spacing_um: tuple[float, float, float],
-    origin_um: tuple[float, float, float],
-    cuts: Box | None = None,
+    distance: NDArray[np.float32], lattice: Lattice, *, cut_as: Lattice | None = None
 ) -> Mesh:
-    """Return the surface distance = 0 inside `lattice`, in world um; empty if there is none.
+    """Return the surface distance = 0 between the lattice's own points; empty if there is none.
 
-    `distance` (z, y, x) covers `window`. The mesh is open where another tile follows, and closed
-    by a cap, within one voxel, where `region` (all that is built) ends. Normals come from the
-    field's gradient, which halos make continuous across tiles. `cuts`: the lattice at whose ends
-    tiles are cut, if it isn't this one; there the surface is as that one's.
+    distance  float32 (z, y, x), um, positive inside; covers `lattice.window`
+    cut_as    the lattice at whose ends tiles are cut, if it isn't this one; there the surface is
+              as that one's
+
+    The mesh is in world um (x, y, z). It is open where another tile follows, and closed by a cap,
+    within one voxel, where the region ends. Normals come from the field's gradient, which halos
+    make continuous across tiles.
     """
-    near = lattice.grown((2, 2, 2), window)  # what the slopes round each vertex are made of
-    distance, window = distance[near.slices_in(window)], near
-    limit = np.float32(2 * max(spacing_um))
+    own, region = lattice.own, lattice.region
+    window = own.grown((2, 2, 2), lattice.window)  # what the slopes round each vertex are made of
+    distance = distance[window.slices_in(lattice.window)]
+    limit = np.float32(2 * max(lattice.spacing_um))
     cap = [
         (int(a == low), int(b == high))
-        for a, b, low, high in zip(
-            lattice.start, lattice.stop, region.start, region.stop, strict=True
-        )
+        for a, b, low, high in zip(own.start, own.stop, region.start, region.stop, strict=True)
     ]
     # where the lattice ends with the region, so does the window: both get the same margin
     margin = np.array([low for low, _ in cap])
     distance = np.pad(distance, cap, constant_values=-limit)
     box = [
         (part.start, part.stop + low + high)
-        for part, (low, high) in zip(lattice.slices_in(window), cap, strict=True)
+        for part, (low, high) in zip(own.slices_in(window), cap, strict=True)
     ]
     values = distance[tuple(slice(*ends) for ends in box)].copy()
     snap = np.float32(SNAP) * limit
     _move_off_zero(values, snap)
-    for axis, place in _cut_places(cuts or lattice, region):
+    for axis, place in (cut_as or lattice).cuts():
         at = place - window.start[axis] + cap[axis][0]
         plane = np.moveaxis(values, axis, 0)[at - box[axis][0]]
         least = _least_on_plane(distance, box, axis, at, snap)
@@ -132,8 +126,8 @@ def extract_surface(
         empty = np.zeros((0, 3), np.float32)
         return Mesh(empty, np.zeros((0, 3), np.uint32), empty)
 
-    steps, origin = np.asarray(spacing_um), np.asarray(origin_um)
-    lattice_zyx = points[:, ::-1].astype(np.float64) + (np.asarray(lattice.start) - margin)
+    steps, origin = np.asarray(lattice.spacing_um), np.asarray(lattice.origin_um)
+    lattice_zyx = points[:, ::-1].astype(np.float64) + (np.asarray(own.start) - margin)
     positions = zyx_to_xyz(lattice_zyx * steps + origin).astype(np.float32)
     normals = _normals(distance, lattice_zyx - np.asarray(window.start) + margin, steps)
     # VTK winds by the image's own axes; the world mirrors y, which turns every triangle over
@@ -173,34 +167,6 @@ def _least_on_plane(
     ]
     part[axis] = slice(0, 1)
     return np.moveaxis(least[tuple(part)], axis, 0)[0]
-
-
-def cut_planes(
-    lattice: Box,
-    region: Box,
-    spacing_um: tuple[float, float, float],
-    origin_um: tuple[float, float, float],
-) -> tuple[tuple[int, float], ...]:
-    """Return where `extract_surface` leaves the mesh open: where another tile follows.
-
-    Each plane is a column of the positions (0 x, 1 y, 2 z) and its value in um, as float32 has it.
-    """
-    planes = []
-    for axis, place in _cut_places(lattice, region):
-        zyx = np.zeros(3)
-        zyx[axis] = place * spacing_um[axis] + origin_um[axis]
-        value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # as of the mesh's vertices
-        planes.append((2 - axis, float(value)))
-    return tuple(planes)
-
-
-def _cut_places(lattice: Box, region: Box) -> Iterator[tuple[int, int]]:
-    """Yield where another tile follows: the axis, and the plane's index along it."""
-    for axis in range(3):
-        if lattice.start[axis] != region.start[axis]:
-            yield axis, lattice.start[axis]
-        if lattice.stop[axis] != region.stop[axis]:
-            yield axis, lattice.stop[axis] - 1
 
 
 def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:

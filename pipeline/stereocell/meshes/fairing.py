@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.meshes.split_edges import split_edges
-from stereocell.meshes.validity import Plane, border, certify, match_edges
+from stereocell.meshes.validity import border, certify, match_edges
+from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 SLIDES = 3  # rounds; more make no triangle better and cross more of them

@@ -20,7 +20,8 @@ from stereocell.meshes.distance import Nearest
 from stereocell.meshes.self_intersections import MARGIN
 from stereocell.meshes.separate_sheets import part_sheets
 from stereocell.meshes.simplify import compact, renumber, simplify_part
-from stereocell.meshes.validity import Faults, Plane, bodies, border, certify
+from stereocell.meshes.validity import Faults, bodies, border, certify
+from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 ROUNDS = 14

@@ -8,7 +8,8 @@ PN triangles", I3D 2001): the middle, lifted by what the normals at the ends say
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.meshes.validity import Plane, match_edges
+from stereocell.meshes.validity import match_edges
+from stereocell.model.lattice import Plane
 
 COSINE = 0.7  # between the halves of a triangle and the whole
 

@@ -14,10 +14,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from stereocell.meshes.self_intersections import are_collinear, find_crossings
+from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 Indices = NDArray[np.int64]
-Plane = tuple[int, float]  # column of the positions (0 x, 1 y, 2 z), and its value in um
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from stereocell.model.tiling import Box
+from stereocell.model.lattice import Lattice
+from stereocell.model.mesh import Mesh
 from stereocell.model.volume import xyz_to_zyx
 
 DIRECTIONS = 48  # over the whole sphere; half of them rise above a surface
@@ -21,26 +22,22 @@ NEIGHBOURS = 4  # points with a value of their own that others take the mean of
 
 
 def find_openness(
-    solid: NDArray[np.bool_],
-    window: Box,
-    points: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    spacing_um: tuple[float, float, float],
-    origin_um: tuple[float, float, float],
-    radius_um: float,
+    solid: NDArray[np.bool_], lattice: Lattice, mesh: Mesh, *, radius_um: float
 ) -> NDArray[np.float32]:
-    """Return for each point (n, 3) the share of open sky, 0..1; 1 all over for a radius of 0.
+    """Return for each vertex the share of open sky, float32 (n,), 0..1; 1 for a radius of 0.
 
-    `solid` (z, y, x) covers `window`. Points and unit normals: x, y, z in the world, um. Directions
-    count by the cosine to the normal; what is hit farther off counts less, at `radius_um` nothing.
-    Rays start a STEP above the surface, so that it is not hidden by its own voxels.
+    solid  bool (z, y, x), covers `lattice.window`
+    mesh   positions and unit normals in world um (x, y, z); its triangles are not looked at
+
+    Directions count by the cosine to the normal; what is hit farther off counts less, at
+    `radius_um` nothing. Rays start a STEP above the surface, so that it is not hidden by its own
+    voxels.
     """
+    points = mesh.positions
     if radius_um <= 0 or not len(points):
         return np.ones(len(points), np.float32)
-    kept = thin_out(points, max(spacing_um))
-    found = _cast(
-        solid, window, points[kept], normals[kept], spacing_um, np.asarray(origin_um), radius_um
-    )
+    kept = thin_out(points, max(lattice.spacing_um))
+    found = _cast(solid, lattice, points[kept], mesh.normals[kept], radius_um)
     return spread(points[kept], found, points)
 
 
@@ -66,15 +63,13 @@ def spread(
 
 def _cast(
     solid: NDArray[np.bool_],
-    window: Box,
+    lattice: Lattice,
     points: NDArray[np.float32],
     normals: NDArray[np.float32],
-    spacing_um: tuple[float, float, float],
-    origin_um: NDArray[np.float64],
     radius_um: float,
 ) -> NDArray[np.float32]:
-    spacing = np.asarray(spacing_um)
-    offset = step = STEP * max(spacing_um)
+    spacing, origin = np.asarray(lattice.spacing_um), np.asarray(lattice.origin_um)
+    offset = step = STEP * max(lattice.spacing_um)
     distances = np.arange(offset, radius_um + offset, step)
     # empty all round, so that no ray leaves the array
     margin = np.ceil((distances[-1] + offset) / spacing).astype(int) + 2
@@ -82,8 +77,8 @@ def _cast(
     strides = np.array([padded.shape[1] * padded.shape[2], padded.shape[2], 1])
     padded = padded.ravel()
     up = xyz_to_zyx(normals.astype(np.float64))
-    start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin_um) / spacing
-    start += margin - np.asarray(window.start) + 0.5  # truncated, the nearest voxel
+    start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin) / spacing
+    start += margin - np.asarray(lattice.window.start) + 0.5  # truncated, the nearest voxel
     start, up = start.astype(np.float32), up.astype(np.float32)
 
     whole, hidden = np.zeros(len(points), np.float32), np.zeros(len(points), np.float32)

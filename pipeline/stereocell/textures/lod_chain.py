@@ -6,7 +6,8 @@ from stereocell.meshes.distance import Nearest, measure_distance, measure_enclos
 from stereocell.meshes.fairing import make_fair
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify_valid import simplify_soundly
-from stereocell.meshes.validity import Plane, certify
+from stereocell.meshes.validity import certify
+from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, FineSurface

@@ -9,27 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.model.tiling import Box
+from stereocell.model.lattice import Lattice
+from stereocell.model.mesh import Mesh
 from stereocell.model.volume import Volume, xyz_to_zyx
 
 
 def find_paint(
     painted: Volume,
-    window: Box,
+    lattice: Lattice,
+    mesh: Mesh,
+    *,
     display: tuple[float, float],
-    points: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    origin_um: tuple[float, float, float],
     depth_um: float,
 ) -> NDArray[np.float32]:
-    """Return the intensity 0..1 at each point (n, 3), x, y, z in um; `painted` covers `window`.
+    """Return the intensity at each vertex, float32 (n,), 0..1.
 
-    `display`: voxel values that become 0 and 1. `origin_um`: where voxel (0, 0, 0) lies.
+    painted  the other channel's voxels (z, y, x); they cover `lattice.window`
+    mesh     positions and unit normals in world um (x, y, z); its triangles are not looked at
+    display  voxel values that become 0 and 1
     """
-    spacing = np.asarray(painted.spacing_um)
+    points, spacing = mesh.positions, np.asarray(painted.spacing_um)
     voxels = painted.voxels.astype(np.float32)
-    at = (xyz_to_zyx(points) - origin_um) / spacing - np.asarray(window.start)
-    inwards = -xyz_to_zyx(normals) / spacing
+    at = (xyz_to_zyx(points) - lattice.origin_um) / spacing - np.asarray(lattice.window.start)
+    inwards = -xyz_to_zyx(mesh.normals) / spacing
     largest = np.full(len(points), -np.inf, np.float32)
     steps = max(int(np.ceil(depth_um / min(painted.spacing_um))), 1)
     for depth in np.linspace(0.0, depth_um, steps + 1):

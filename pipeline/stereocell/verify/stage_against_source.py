@@ -77,7 +77,7 @@ def hold_unit(task: SourceTask) -> UnitFinding:
     """Return how a unit's part of the stage agrees with its voxels. Raises StereoCellError."""
     given = task.unit.given
     dataset = open_source(task.unit.ref)
-    volume = dataset.read(task.unit.channel, given.window, task.unit.level)
+    volume = dataset.read(task.unit.channel, given.lattice.window, task.unit.level)
     fine = find_surface(volume, given)
     problems = []
     stage = open_stage(task.stage_file)

@@ -22,7 +22,7 @@ class UnitTask:
 def run_unit(task: UnitTask) -> None:
     """Build one unit and write it down."""
     start = time.perf_counter()
-    source, window = open_source(task.ref), task.given.window
+    source, window = open_source(task.ref), task.given.lattice.window
     volume = source.read(task.channel, window, task.level)
     painted = None if task.painted is None else source.read(task.painted, window, task.level)
     seconds = time.perf_counter() - start
