@@ -8,7 +8,8 @@ renderers do it; without maps by the interpolated normals.
 A picture is as large as the viewer draws the surface at the moment when it takes this level for the
 next finer one: the level's distance from the iso-surface spans ERROR_PX there.
 
-SSIM: Wang et al. 2004, Gaussian window, mean over the picture.
+SSIM: Wang, Bovik, Sheikh & Simoncelli, IEEE Transactions on Image Processing 13, 2004
+(https://doi.org/10.1109/TIP.2003.819861), mean over the picture, by scikit-image.
 """
 
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from skimage.metrics import structural_similarity
 
 from stereocell.model.mesh import Lod
 from stereocell.textures.rasterize import find_pixels
@@ -27,8 +29,6 @@ LEAST_PX, MOST_PX = 48, 256  # of a picture's edge
 CLOSE_PX = 512  # the same for every level, however far off the viewer shows it
 _FINE = 2  # drawn this many times larger, then averaged down
 _AMBIENT, _GROUND = 0.35, 0.0
-_SIGMA, _TRUNCATE = 1.5, 3.5  # pixels, sigmas: 11 x 11, as in the paper
-_C1, _C2 = 0.01**2, 0.03**2
 
 
 def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
@@ -38,8 +38,7 @@ def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
     wanted = ERROR_PX * diagonal / max(coarse.distance_um, 1e-9)
     size = int(np.clip(wanted, LEAST_PX, MOST_PX))
     return tuple(
-        structural_similarity(draw(fine, view, ends, size), draw(coarse, view, ends, size))
-        for view in VIEWS
+        compare(draw(fine, view, ends, size), draw(coarse, view, ends, size)) for view in VIEWS
     )
 
 
@@ -47,7 +46,7 @@ def find_close_likeness(fine: Lod, coarse: Lod) -> float:
     """Return the SSIM of two levels of one surface from the front, in CLOSE_PX."""
     ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
     pictures = (draw(lod, VIEWS[0], ends, CLOSE_PX) for lod in (fine, coarse))
-    return structural_similarity(*pictures)
+    return compare(*pictures)
 
 
 def draw(
@@ -116,19 +115,14 @@ def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.flo
     return found
 
 
-def structural_similarity(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the mean SSIM of two pictures of values 0..1."""
-
-    def blur(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return ndimage.gaussian_filter(values, _SIGMA, truncate=_TRUNCATE)
-
-    mean_a, mean_b = blur(a), blur(b)
-    spread_a, spread_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
-    common = blur(a * b) - mean_a * mean_b
-    index = (2 * mean_a * mean_b + _C1) * (2 * common + _C2)
-    index /= (mean_a**2 + mean_b**2 + _C1) * (spread_a + spread_b + _C2)
-    inner = index[5:-5, 5:-5]  # where the window lies inside
-    return float(inner.mean())
+def compare(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Return the mean SSIM of two pictures of values 0..1, each (height, width)."""
+    # Gaussian window of 11 x 11 pixels and variances of the population, as in the paper
+    return float(
+        structural_similarity(
+            a, b, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False
+        )
+    )
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -91,9 +91,9 @@ def describe(found: Threshold) -> str:
 def find_peers(histogram: Histogram) -> tuple[float, float]:
     """Return Otsu's and Li's thresholds, voxel values; of counts in at least two bins."""
     counts, levels = np.asarray(histogram.counts), histogram.levels
-    otsu = filters.threshold_otsu(hist=(counts, levels))  # type: ignore[no-untyped-call]
+    otsu = filters.threshold_otsu(hist=(counts, levels))
     fewer = np.ceil(counts * min(1.0, _LI_VOXELS / counts.sum())).astype(np.int64)
-    li = filters.threshold_li(np.repeat(levels, fewer))  # type: ignore[no-untyped-call]
+    li = filters.threshold_li(np.repeat(levels, fewer))
     return float(otsu), float(li)
 
 
