@@ -142,10 +142,11 @@ view: setup ## Serve OUT's bundle on localhost and open a browser
 serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
 	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
-lint: setup ## ruff, mypy, biome, tsc
+lint: setup ## ruff, mypy, layers of imports, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
 	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy
+	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
 test-fast: setup ## Unit tests only

@@ -27,7 +27,7 @@ from websockets.sync.client import connect
 from stereocell.cli.__main__ import main as stereocell
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import encode_tree
-from stereocell.formats.ktx2_read import decode_finest
+from stereocell.formats.ktx2 import decode_finest
 from stereocell.formats.voxel_bvh import build, reassemble
 from stereocell.serve.brick_library import BrickLibrary, Volume, invisible_below
 from stereocell.serve.server import BundleServer

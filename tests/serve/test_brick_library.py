@@ -7,8 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from stereocell.formats.ktx2 import encode_2d, encode_3d
-from stereocell.formats.ktx2_read import decode_finest
+from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import OutputError, SourceError, StereoCellError
 from stereocell.serve.brick_library import BrickLibrary, UnknownVolumeError, invisible_below

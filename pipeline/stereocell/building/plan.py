@@ -108,7 +108,7 @@ class Plan:
 
     @property
     def repair(self) -> RepairOptions:
-        """The most that is cleaned, which the halo covers; a channel's own is in wrap.py."""
+        """The most that is cleaned: the halo covers it (channels' own: repair_rules.py)."""
         return _repair_options(self.settings)
 
     @property

@@ -1,6 +1,6 @@
 """What a worker is given and does to write one tile of the stage from its units. Picklable.
 
-The keys of the stage and of its tiles hold this module's whole lineage: see lineage.py.
+The keys of the stage and of its tiles hold this module's whole lineage: see storage/cache_key.py.
 """
 
 import sys

@@ -70,7 +70,7 @@ class TileChannel:
     triangles  by level of detail; levels finer than the finest have as many as that
     volume     its entry in volumes.json, or None
     files      all that was written
-    joint      the volume's histogram of value and gradient, packed; see bundle_transfer2d.py
+    joint      the volume's histogram of value and gradient, packed; see bundle/write_transfer2d.py
     edit       what was edited by hand of its surface, and what follows from that; or empty
     """
 

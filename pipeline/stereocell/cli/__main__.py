@@ -72,7 +72,7 @@ def _shortened(line: str) -> str:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Run a command, alone in its OUT if it writes there; see lock.py and mirror.py."""
+    """Run a command, alone in its OUT if it writes there: storage/lock.py, workspace.py."""
     out, name = getattr(options, "out", None), options.command
     options.shown = out
     with ExitStack() as stack:

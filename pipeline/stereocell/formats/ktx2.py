@@ -6,6 +6,8 @@ No package on PyPI writes 3D KTX2. Followed: KTX 2.0 specification (Khronos, rev
 which only what these textures need is here: 8-bit UNORM with 1, 2 or 4 components, one layer,
 one face. The data format descriptor keeps `bytesPlane0` of the inflated data, as that revision
 asks; readers also know the older 0. Level data of a supercompressed file has no alignment.
+
+Read back is the finest level of such textures; sizes are checked before memory is taken.
 """
 
 import struct
@@ -18,17 +20,20 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from stereocell.model.errors import SourceError
 from stereocell.model.version import GENERATOR
 
 _IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 _HEADER = struct.Struct("<9I4I2Q")
 _LEVEL = struct.Struct("<3Q")
 _VK_FORMATS = {1: 9, 2: 16, 4: 37}  # components: R8_UNORM, R8G8_UNORM, R8G8B8A8_UNORM
+_COMPONENTS = {vk_format: components for components, vk_format in _VK_FORMATS.items()}
 _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
 # texture x to the right, y down, z out of the picture, towards the viewer
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
 _ETC1S_QUALITY = 80  # of 100
 _ZSTD = 2
+_MAX_BYTES = 1 << 31  # of a level that is read
 _ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
 
 
@@ -175,3 +180,32 @@ def _describe(components: int) -> bytes:
 def _key_value(key: str, value: str) -> bytes:
     pair = key.encode() + b"\0" + value.encode() + b"\0"
     return struct.pack("<I", len(pair)) + pair + bytes(-len(pair) % 4)
+
+
+def decode_finest(data: bytes) -> NDArray[np.uint8]:
+    """Return level 0, uint8 (z, y, x, components); z is 1 in a 2D texture.
+
+    Raises SourceError, without the file's name, for what is no such texture.
+    """
+    if len(data) < len(_IDENTIFIER) + _HEADER.size + _LEVEL.size or data[:12] != _IDENTIFIER:
+        raise SourceError("no KTX 2.0 texture")
+    header = _HEADER.unpack_from(data, len(_IDENTIFIER))
+    vk_format, _, width, height, depth, layers, faces, _, scheme = header[:9]
+    components = _COMPONENTS.get(vk_format)
+    if components is None or scheme != _ZSTD or layers or faces != 1:
+        raise SourceError(
+            f"VK_FORMAT {vk_format}, scheme {scheme}, {layers} layers, {faces} faces; "
+            "expected 8-bit UNORM, zstd, one layer, one face"
+        )
+    shape = (max(depth, 1), height, width, components)
+    size = shape[0] * shape[1] * shape[2] * components
+    offset, length, plain = _LEVEL.unpack_from(data, len(_IDENTIFIER) + _HEADER.size)
+    if plain != size or not 0 < size <= _MAX_BYTES or offset + length > len(data):
+        raise SourceError(f"level 0 of {plain} bytes at byte {offset}, expected {size} bytes")
+    frame = data[offset : offset + length]
+    try:
+        if zstandard.get_frame_parameters(frame).content_size != size:
+            raise SourceError(f"level 0 does not unpack to {size} bytes")
+        return np.frombuffer(zstandard.decompress(frame), dtype=np.uint8).reshape(shape)
+    except zstandard.ZstdError as error:
+        raise SourceError(f"level 0 is no zstd frame: {error}") from None

@@ -24,12 +24,13 @@ sigma). Half the height and the mean's peak lie s^2 / R further in, the total's 
 
 A tile's confidence is (1 - 1 / sharpness) x (1 - raggedness): how much steeper the field is at the
 level than elsewhere in the tile, and how much of the surface stays when it is smoothed once more
-(raggedness.py). agreement.py lets the neighbours weaken it. The bound `min_confidence`, .4, by this
-evidence: cells of a real light-sheet stack .77 and .49 (its bright and its dark part), the
-autofluorescence in its other channel .34 and .15; stained tiles of the synthetic block .57 to .99,
-those without the stain .02 to .13; noise without structure, white, blurred, rising or log-normal,
-.00 to .21. Of the 144 tiles above 118 reach it: none of the 5 whose solids have a Dice below .3,
-all but 6 of the 67 with a Dice above .8 (packed membranes and tubes, of few photons).
+(isosurface/raggedness.py). isosurface/neighbour_consensus.py lets the neighbours weaken it. The
+bound `min_confidence`, .4, by this evidence: cells of a real light-sheet stack .77 and .49 (its
+bright and its dark part), the autofluorescence in its other channel .34 and .15; stained tiles of
+the synthetic block .57 to .99, those without the stain .02 to .13; noise without structure, white,
+blurred, rising or log-normal, .00 to .21. Of the 144 tiles above 118 reach it: none of the 5 whose
+solids have a Dice below .3, all but 6 of the 67 with a Dice above .8 (packed membranes and tubes,
+of few photons).
 """
 
 from dataclasses import dataclass

@@ -7,11 +7,12 @@ wide, .14 and .25; noise without structure .15 to 1 (.30 and more unless it was 
 tiles where a stain is absent .36 to .44, a real brain's autofluorescence .20 to .36.
 
 That overlaps: blurred noise is smooth too, but no steeper at its level than elsewhere, which is
-what the sharpness of the level says. So they are judged together (isovalue.py). Two other measures
-were tried on the same fields and left, since each fails on one kind alone: the share of solids that
-are specks (.36 and .57 of the brain's cells, .86 of its autofluorescence, but .83 to .92 in packed
-membranes, one body and few specks), and the share of the surface that is on specks (.03 and .05 of
-the cells', .05 and .11 of the autofluorescence's, .0003 of that of noise whose solids have joined).
+what the sharpness of the level says. So they are judged together (isosurface/isovalue.py). Two
+other measures were tried on the same fields and left, since each fails on one kind alone: the share
+of solids that are specks (.36 and .57 of the brain's cells, .86 of its autofluorescence, but .83 to
+.92 in packed membranes, one body and few specks), and the share of the surface that is on specks
+(.03 and .05 of the cells', .05 and .11 of the autofluorescence's, .0003 of that of noise whose
+solids have joined).
 """
 
 import numpy as np

@@ -20,7 +20,7 @@ ShapeKind = Literal["rectangle", "triangle"]
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One shape of a 2D transfer function; see transfer2d.py and docs/transfer-functions.md.
+    """One shape of a 2D transfer function; see transfer/shapes2d.py and docs/transfer-functions.md.
 
     values     its ends, 0..1 in the window; a triangle's at `gradients[1]`
     gradients  its ends, 0..1 of the channel's gradient_max
@@ -54,8 +54,8 @@ class Look:
     painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
     shapes            of those functions that are two-dimensional, by name
-    gradient_max      the gradient magnitude that is 1 to shapes; see histogram2d.py
-    threshold         where the body begins, in voxel values; see threshold.py; None: none was found
+    gradient_max      the gradient magnitude that is 1 to shapes; see transfer/joint_histogram.py
+    threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
     """
 
     name: str

@@ -101,7 +101,8 @@ class Dataset:
     images       how many the source holds; the first is the one that is read
     modality     what took it, as DICOM calls it: `MR`, `CT`, ...; empty: not known
     placement    rows of a (4, 4) matrix for columns, um: from the world in which the centre of
-                 voxel (0, 0, 0) is the origin (volume.zyx_to_xyz) to the patient's; see anatomy.py
+                 voxel (0, 0, 0) is the origin (volume.zyx_to_xyz) to the patient's; see
+                 read/anatomical_axes.py
     remarks      what the reader changed or left out, a sentence each
     """
 

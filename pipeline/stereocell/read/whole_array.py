@@ -4,7 +4,7 @@ What lies in a file for each slice, or behind one stream of gzip, has no blocks.
 cut along canonical axes, which cross nearly every slice of nearly every series, so reading by
 slices would decode the whole series for each window; a volume of this kind is some hundred MB at
 most. So a process decodes it once and holds it. Its size is known from the headers and is checked
-(opening.py) before any memory is taken.
+(read/open_dataset.py) before any memory is taken.
 """
 
 from collections.abc import Callable

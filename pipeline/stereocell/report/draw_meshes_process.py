@@ -1,4 +1,4 @@
-"""The process that draws meshes: `python draw_meshes.py FOLDER`.
+"""The process that draws meshes: `python report/draw_meshes_process.py FOLDER`.
 
 It reads FOLDER/scenes.json and writes FOLDER/0.png, 1.png, ...; where the machine has no OpenGL it
 writes why into FOLDER/refused.txt, unless VTK ends the process first.

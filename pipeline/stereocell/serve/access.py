@@ -57,7 +57,7 @@ class Gate:
 class Access:
     """ASGI middleware: refuses with 403 whoever may not ask, before anything is looked at.
 
-    All answers get the headers that protect them (serve_headers.py): it is the outermost layer.
+    All answers get the headers that protect them (serve/headers.py): it is the outermost layer.
     """
 
     def __init__(self, app: ASGIApp, names: Collection[str], gate: Gate | None) -> None:

@@ -30,7 +30,7 @@ from stereocell.formats.brick_stream import (
     encode_tree,
     parse_table,
 )
-from stereocell.formats.ktx2_read import decode_finest
+from stereocell.formats.ktx2 import decode_finest
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import OutputError, SourceError
 from stereocell.serve.brick_order import PlacedTree, place

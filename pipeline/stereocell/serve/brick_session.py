@@ -9,7 +9,7 @@ docs/brick-stream.md is closed with a code and a reason:
     1008  against the order or the limits   1009  a message that is too long
     1012  the bundle was written anew       1013  too many connections
 
-(1001, the server ends, and limits of frames that are no messages: serve_socket.py.)
+(1001, the server ends, and limits of frames that are no messages: serve/websocket_protocol.py.)
 """
 
 import asyncio

@@ -4,7 +4,7 @@ Its `timeout_keep_alive` begins with the end of an answer and ends with the next
 is; nothing is counted before the first request, and `limit_concurrency` counts whole requests. So a
 client that connects and is silent, or sends a head (or the body of what was answered) a byte at a
 time, holds a socket for good. Here a head has HEAD_S seconds, from the connection on or from the
-end of the answer before it. (The TLS handshake, which comes first, has as long: serve_lifetime.py.)
+end of the answer before it. (The TLS handshake, which comes first, has as long: serve/lifetime.py.)
 """
 
 import asyncio
@@ -39,7 +39,7 @@ class HeadDeadline(H11Protocol):
         self._stop_if_answering()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        self._stop()  # what follows has limits of its own: serve_limits.py
+        self._stop()  # what follows has limits of its own: serve/limits.py
         super().handle_websocket_upgrade(event)
 
     def _await_head(self) -> None:

@@ -1,10 +1,11 @@
 """Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
 The static bundle stands by itself and works on any web host; here it is served with byte ranges,
-and beside it the websocket `/bricks` sends volumes by view (serve_bricks.py). On localhost, or with
-`--lan` to the network: then by TLS, and to holders of a token only (serve_access.py). Nothing is
-logged but faults of the program itself and of the bundle: no request, so no token, and no name that
-a client sent. What the other modules refuse, and from whom, is listed in docs/brick-stream.md.
+and beside it the websocket `/bricks` sends volumes by view (serve/brick_session.py). On localhost,
+or with `--lan` to the network: then by TLS, and to holders of a token only (serve/access.py).
+Nothing is logged but faults of the program itself and of the bundle: no request, so no token, and
+no name that a client sent. What the other modules refuse, and from whom, is listed in
+docs/brick-stream.md.
 """
 
 import json

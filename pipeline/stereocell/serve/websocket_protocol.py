@@ -1,8 +1,8 @@
 """The websocket's frames: pings, fragments and ends, before a message is one.
 
 uvicorn answers every ping and waits for ever for a message's last fragment; what messages say is
-serve_bricks.py's. Here both have limits, and whoever is closed is gone soon after, also if it reads
-nothing. When the server ends, its clients are told so: 1001, going away.
+serve/brick_session.py's. Here both have limits, and whoever is closed is gone soon after, also if
+it reads nothing. When the server ends, its clients are told so: 1001, going away.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""Where a head is, and where in it the brain: thresholds, a hull (brain_surface.py), fluid.
+"""Where a head is, and where in it the brain: thresholds, a hull (tissue/brain_hull.py), fluid.
 
 The hull begins at what erosion leaves of bright tissue, as in Shattuck et al., NeuroImage 13
 (2001), and is found twice: the second time with a rough bias field taken out, which the first one
@@ -36,7 +36,7 @@ def find_foreground(smooth: NDArray[np.float32]) -> Mask:
         raise SourceError(f"every voxel is {smooth.flat[0]:g}: expected tissue of several kinds")
     sample = smooth[::2, ::2, ::2]
     values = np.log1p(np.maximum(sample - np.percentile(sample, 1), 0))
-    level = np.expm1(float(threshold_otsu(values))) + np.percentile(sample, 1)  # type: ignore[no-untyped-call]
+    level = np.expm1(float(threshold_otsu(values))) + np.percentile(sample, 1)
     mask = _largest(smooth > level)
     return np.asarray(ndimage.binary_fill_holes(mask), np.bool_)
 
@@ -59,7 +59,7 @@ def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> M
 
 def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tuple[Hull, float]:
     """Return the hull, and the level above which there is tissue, not fluid, bone or air."""
-    level = float(threshold_multiotsu(field[head], 3)[0])  # type: ignore[no-untyped-call]
+    level = float(threshold_multiotsu(field[head], 3)[0])
     tissue = head & (field > level)
     core = _within(tissue, -ERODED_UM, spacing_um)
     if not core.any():
@@ -109,7 +109,7 @@ def _add_fluid(
     steep = ndimage.gaussian_gradient_magnitude(smooth, 0.5).ravel()[places]
     if _separability(dark[steep <= np.quantile(steep, CALM)]) < PARTED:
         return brain
-    split = float(threshold_otsu(dark))  # type: ignore[no-untyped-call]
+    split = float(threshold_otsu(dark))
     bone, fluid = dark[dark <= split], dark[dark > split]
     # half-way between their middles: voxels of mixed content pull Otsu's level up
     split = min(0.5 * float(np.median(bone) + np.median(fluid)), split)
@@ -121,7 +121,7 @@ def _separability(values: NDArray[np.float32]) -> float:
     """Return the share of the variance that lies between Otsu's two classes, his eta (1979)."""
     if values.min() == values.max():
         return 0.0
-    split = float(threshold_otsu(values))  # type: ignore[no-untyped-call]
+    split = float(threshold_otsu(values))
     low, high = values[values <= split], values[values > split]
     share = len(low) / len(values)
     between = share * (1 - share) * float(low.mean() - high.mean()) ** 2

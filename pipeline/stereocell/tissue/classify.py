@@ -1,9 +1,9 @@
 """Tissue classes, learned from the volume itself: per-voxel probabilities, bias field removed.
 
 Mixture of Gaussians on intensity and gradient magnitude, with the bias field fitted between its
-steps (bias_field.py) and a spatial prior at the end (spatial_prior.py). How many classes: the
-Bayesian information criterion, Schwarz, Annals of Statistics 6 (1978). Everything is seeded and
-samples are taken by rule: the same voxels give the same bytes.
+steps (tissue/bias_field.py) and a spatial prior at the end (tissue/potts_prior.py). How many
+classes: the Bayesian information criterion, Schwarz, Annals of Statistics 6 (1978). Everything is
+seeded and samples are taken by rule: the same voxels give the same bytes.
 """
 
 from dataclasses import dataclass

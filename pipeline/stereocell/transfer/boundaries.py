@@ -6,10 +6,11 @@ from one material to the other (Kindlmann & Durkin 1998).
 
 Arcs of different pairs cross, and one that spans the whole window passes over the others' voxels.
 So no arc is looked for by itself: what lies above the noise is explained as a sum of boundaries of
-all pairs of materials (see materials.py) at a row of blurs (see edge_counts.py), and of what the
-materials' own noise leaves there, none of them negative (Lawson & Hanson, Solving Least Squares
-Problems, 1974). The pairs that it takes much of are the boundaries; one that passes over a third
-material, whose own noise it can pass for, only if the rest explains what is there clearly worse.
+all pairs of materials (see transfer/material_peaks.py) at a row of blurs (see
+transfer/edge_model.py), and of what the materials' own noise leaves there, none of them negative
+(Lawson & Hanson, Solving Least Squares Problems, 1974). The pairs that it takes much of are the
+boundaries; one that passes over a third material, whose own noise it can pass for, only if the rest
+explains what is there clearly worse.
 """
 
 from dataclasses import dataclass
@@ -104,7 +105,8 @@ def propose(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> Proposal:
 def find_boundaries(
     counts: NDArray[np.int64], gradient_max: float, spacing_um: Ratios = EVEN
 ) -> Boundaries:
-    """Return materials and boundaries of a histogram, int (rows, columns); see histogram2d.py.
+    """Return materials and boundaries of a histogram, int (rows, columns); see
+    transfer/joint_histogram.py.
 
     Same histogram, same answer. A constant volume, or one of a single material, has no arcs.
     """

@@ -1,4 +1,5 @@
-"""Find noise and materials in a histogram of value and gradient magnitude; see histogram2d.py.
+"""Find noise and materials in a histogram of value and gradient magnitude; see
+transfer/joint_histogram.py.
 
 Inside of a material the gradient is noise alone, the length of a vector of three noisy differences,
 and values pile up. So the gradients' modes tell the noise, and the peaks among the voxels that have

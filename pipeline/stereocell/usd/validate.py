@@ -3,8 +3,8 @@
 USD's validators find missing files (in unselected variants too), faults of metadata, of API schemas
 and of nesting. They do not see units that differ between layers, selections of variants that do
 not exist, wrong counts, indices and extents, names that only their folder tells apart, fields whose
-grid their .vdb lacks: those are checked here. No validator needs an exception: what write/usd.py
-writes passes all of them.
+grid their .vdb lacks: those are checked here. No validator needs an exception: what
+usd/write_stage.py writes passes all of them.
 
 Both run once for each level of detail, since each has a geometry of its own; the channels' transfer
 functions take turns with them, and meshes and volumes are active together.
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdValidation, UsdVol
 
-from stereocell.formats.vdb_head import read_vdb_head
+from stereocell.formats.vdb import read_vdb_head
 from stereocell.model.errors import StageError
 from stereocell.usd.layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
 from stereocell.usd.read_attributes import one_line

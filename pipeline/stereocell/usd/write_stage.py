@@ -1,11 +1,11 @@
 """Write the stage of a specimen: stage.usda, which only composes, and its looks.
 
 stage.usda                    /Specimen: tiles by payload, cameras; sublayers the two looks/ layers
-looks/channels.usda           /Specimen/Channels, see usd_looks.py
+looks/channels.usda           /Specimen/Channels, see usd/write_looks.py
 looks/lights.usda             a copy of usd_assets/lights.usda
-tiles/<tile>/tile.usdc        see usd_tile.py
+tiles/<tile>/tile.usdc        see usd/write_tile.py
 
-specimen.usdz                 see usdz.py
+specimen.usdz                 see usd/write_usdz.py
 
 stage.usda says nothing about what the tiles and looks hold but which variants of the tiles are
 selected, so that they are seen, and changed, in the one layer that a person reads, and known while

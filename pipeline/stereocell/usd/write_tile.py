@@ -9,7 +9,7 @@ look of a channel that is painted has no opinion about diffuseColor.
 
 `lod1` is selected unless someone asks otherwise: an artist arranges and lights all tiles at once,
 for which the finest level is millions of triangles too heavy, and picks `lod0` for the final frame.
-So neither of the two is a wish for less on the phone, but a coarser one is (composed_choice.py).
+So neither of the two is a wish for less on the phone, but a coarser one is (usd/read_variants.py).
 """
 
 import shutil

@@ -1,7 +1,8 @@
 """DICOM: a folder at any depth, or one file, single-frame or enhanced multi-frame.
 
-PS3.3 for the attributes; dicom_header.py says what is looked at, dicom_series.py how frames become
-volumes, stack_layout.py where they lie. Files are found by content, whatever they are called.
+PS3.3 for the attributes; read/dicom/header.py says what is looked at, read/dicom/series.py how
+frames become volumes, read/plane_stack.py where they lie. Files are found by content, whatever they
+are called.
 """
 
 import os

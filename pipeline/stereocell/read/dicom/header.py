@@ -18,9 +18,9 @@ import pydicom
 from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
-from stereocell.read.dicom.codecs import PLUGINS, is_compressed
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
 
 _TAGS: list[Any] = [
     "SOPClassUID",

@@ -30,8 +30,9 @@ def decode(
 ) -> NDArray[Any]:
     """Return the values of frames of one size, (n, rows, columns), in their order.
 
-    Each file is read once; the frames' padding is replaced (dicom_padding.py). Raises SourceError
-    for a frame that can't be decoded: it names the file by its number among `paths`, never by name.
+    Each file is read once; the frames' padding is replaced (read/dicom/padding.py). Raises
+    SourceError for a frame that can't be decoded: it names the file by its number among `paths`,
+    never by name.
     """
     padding = Padding()
     planes = np.empty((len(frames), frames[0].rows, frames[0].columns), dtype)

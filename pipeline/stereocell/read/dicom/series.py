@@ -1,9 +1,10 @@
 """Sort DICOM frames into stacks, each a volume, and say what each holds without its description.
 
 A stack is one series, one frame of reference, one StackID, one size of pixels and planes, one
-orientation (dicom_groups.py): a localizer of three orientations is three stacks. Of frames at
-one place the first by instance number is taken; if every place holds the same number of them, and
-they differ, they are points in time (or echoes, or b-values) in the order of instance numbers.
+orientation (read/dicom/group_frames.py): a localizer of three orientations is three stacks. Of
+frames at one place the first by instance number is taken; if every place holds the same number of
+them, and they differ, they are points in time (or echoes, or b-values) in the order of instance
+numbers.
 """
 
 from collections.abc import Callable, Iterable

@@ -1,16 +1,26 @@
-"""Stored values of a DICOM file's frames, as pydicom hands them out."""
+"""Stored values of a DICOM file's frames, as pydicom hands them out, and the decoders behind it.
 
+PLUGINS names which decoder unpacks which compressed pixels (transfer syntaxes of PS3.5 annex A.4),
+one by one: pydicom would take any that is installed, and one of these, pylibjpeg-libjpeg, is under
+the GPL. GDCM decodes JPEG (baseline, extended, lossless), CharLS JPEG-LS, OpenJPEG JPEG 2000 in
+both of its forms, and pydicom itself RLE: 1 ms for 384 x 274 x 16 bits, .3 ms by pylibjpeg-rle,
+which panics, with a backtrace that nothing stops, on a stream that is too long.
+
+A compressed image states its own size, which is checked before a decoder takes memory for it. JPEG
+and JPEG-LS: the frame header SOFn (ITU-T T.81 B.2.2, T.87 C.2.2). JPEG 2000: the marker SIZ (ITU-T
+T.800 A.5.1), bare or inside JP2 boxes. RLE states none.
+"""
+
+import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pydicom
 from numpy.typing import NDArray
+from pydicom import uid
 from pydicom.encaps import generate_frames
 from pydicom.pixels.utils import iter_pixels
-
-from stereocell.read.dicom.codecs import PLUGINS, is_compressed
-from stereocell.read.dicom.codestream import plane_size
 
 _TAGS: list[Any] = [
     "Rows",
@@ -74,3 +84,53 @@ def _check_streams(dataset: Any) -> None:
         size = plane_size(stream)
         if size is not None and size != (dataset.Rows, dataset.Columns):
             raise ValueError
+
+
+PLUGINS: dict[str, str] = {
+    uid.JPEGBaseline8Bit: "gdcm",
+    uid.JPEGExtended12Bit: "gdcm",
+    uid.JPEGLossless: "gdcm",
+    uid.JPEGLosslessSV1: "gdcm",
+    uid.JPEGLSLossless: "pyjpegls",
+    uid.JPEGLSNearLossless: "pyjpegls",
+    uid.JPEG2000Lossless: "pylibjpeg",
+    uid.JPEG2000: "pylibjpeg",
+    uid.HTJ2KLossless: "pylibjpeg",
+    uid.HTJ2KLosslessRPCL: "pylibjpeg",
+    uid.HTJ2K: "pylibjpeg",
+    uid.RLELossless: "pydicom",
+}
+_NATIVE = (uid.ImplicitVRLittleEndian, uid.ExplicitVRLittleEndian, uid.ExplicitVRBigEndian)
+
+
+def is_compressed(syntax: str | None) -> bool:
+    """Return whether pixels in this transfer syntax must be unpacked; None: it is not stated."""
+    return syntax is not None and syntax not in _NATIVE
+
+
+_J2K = b"\xff\x4f\xff\x51"  # SOC, then SIZ
+# SOF0 to SOF15 without DHT, JPG and DAC, which lie among them; SOF55 is JPEG-LS
+_FRAMES = {*range(0xC0, 0xD0), 0xF7} - {0xC4, 0xC8, 0xCC}
+
+
+def plane_size(stream: bytes) -> tuple[int, int] | None:
+    """Return (rows, columns) of a stream; None: it states none. Raises struct.error if cut."""
+    start = stream.find(_J2K, 0, 4096)
+    if start >= 0:
+        right, bottom, left, top = struct.unpack_from(">4I", stream, start + 8)
+        return bottom - top, right - left
+    if stream[:2] != b"\xff\xd8":
+        return None
+    place = 2
+    while place < len(stream):
+        if stream[place] != 0xFF:
+            return None
+        code = stream[place + 1]
+        if code == 0xFF:  # a fill byte
+            place += 1
+            continue
+        if code in _FRAMES:
+            rows, columns = struct.unpack_from(">2H", stream, place + 5)
+            return rows, columns
+        place += 2 + struct.unpack_from(">H", stream, place + 2)[0]
+    return None
