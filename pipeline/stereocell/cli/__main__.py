@@ -12,6 +12,7 @@ from stereocell.cli import commands, flags
 from stereocell.cli.commands import Handler
 from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
+from stereocell.storage.processes import require_address_space, shortage
 
 EXIT_CODES = """exit codes:
   0    done; `view`, `serve`: stopped
@@ -47,15 +48,24 @@ def _main(words: Sequence[str]) -> int:
             return _run(options)
     except StereoCellError as error:
         return _fail(options, str(error), error.exit_code)
-    except ModuleNotFoundError as error:
-        told = f"the package {error.name} is missing: install StereoCell anew"
-        return _fail(options, f"{told}; `stereocell doctor` lists what else is", 1)
-    except OSError as error:  # the disk is full, a folder was taken away
-        place = f"{error.filename}: " if error.filename else ""
-        return _fail(options, f"{place}{error.strerror or error}", 1)
+    except (MemoryError, RuntimeError, ImportError, OSError) as error:
+        return _fail(options, _reason(error), 1)
     except KeyboardInterrupt as stop:
         code = 143 if isinstance(stop, Terminated) else 130
         return _fail(options, "stopped; the same command goes on from here", code)
+
+
+def _reason(error: Exception) -> str:
+    """Return the line for what this machine lacks; all other errors are bugs, and raised on."""
+    if words := shortage(error):
+        return words
+    if isinstance(error, ModuleNotFoundError):
+        told = f"the package {error.name} is missing: install StereoCell anew"
+        return f"{told}; `stereocell doctor` lists what else is"
+    if isinstance(error, OSError):  # the disk is full, a folder was taken away
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{error.strerror or error}"
+    raise error
 
 
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
@@ -75,6 +85,8 @@ def _run(options: argparse.Namespace) -> int:
     """Run a command, alone in its OUT if it writes there: storage/lock.py, workspace.py."""
     out, name = getattr(options, "out", None), options.command
     options.shown = out
+    if name not in LIGHT:
+        require_address_space(name)
     with ExitStack() as stack:
         if isinstance(out, str):  # an address
             if name not in WRITERS | READERS.keys():
@@ -228,6 +240,8 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
 WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
 # ... and these, of an OUT on object storage, fetch this first: all, or what phones are shown
 READERS = {"check": "", "view": "bundle", "serve": "bundle"}
+# These load nothing that is large
+LIGHT = frozenset({"settings", "doctor"})
 
 if __name__ == "__main__":
     sys.exit(main())

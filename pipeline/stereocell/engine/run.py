@@ -27,6 +27,7 @@ from stereocell.engine.cluster import ClusterError, able, join
 from stereocell.engine.interrupts import children_ignore_interrupts
 from stereocell.engine.object_store_tasks import carried, forget_scratch
 from stereocell.model.errors import StereoCellError
+from stereocell.storage.processes import shortage
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -246,9 +247,7 @@ def _in_words(error: BaseException) -> str:
             "its worker process was killed each time, most likely for want of memory: try fewer "
             "--workers or a smaller --tile-size"
         )
-    if isinstance(error, MemoryError):
-        return f"out of memory ({words}): try fewer --workers or a smaller --tile-size"
-    return f"{type(error).__name__}: {words}"
+    return shortage(error) or f"{type(error).__name__}: {words}"
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from stereocell.read.resample import orthogonal_grid, resample_sheared
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
+from stereocell.storage.library_errors import raise_if_short
 from stereocell.storage.location import Location
 
 NAME = "NIfTI"
@@ -125,7 +126,8 @@ def _open(location: Location) -> Any:
             if not 0 <= stored.offset <= _MAX_OFFSET:
                 raise ValueError
             return image
-    except _FAULTS:
+    except _FAULTS as error:
+        raise_if_short(error, location.shown)
         raise SourceError(
             f"{location.shown}: not readable as NIfTI, expected a whole .nii or .nii.gz file"
         ) from None
@@ -152,7 +154,8 @@ def _load(
         with ImageOpener(location.source) as file:
             raw = fileslice(file, place, data.shape, data.dtype, data.offset, data.order)  # type: ignore[no-untyped-call]
         values = rescale(raw, float(data.slope), float(data.inter), dtype)
-    except _FAULTS:
+    except _FAULTS as error:
+        raise_if_short(error, location.shown)
         raise SourceError(
             f"{location.shown}: its voxels can't be read, expected {NAME} that is whole"
         ) from None

@@ -1,6 +1,7 @@
 """What the format libraries raise on damaged, odd or unreachable sources, told in one line."""
 
 import logging
+import math
 import struct
 import sys
 import warnings
@@ -18,6 +19,7 @@ from zstandard import ZstdError
 
 import stereocell.storage.location as location
 from stereocell.model.errors import SourceError, StereoCellError
+from stereocell.storage.processes import address_limit, shortage
 
 # Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
 # KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
@@ -61,7 +63,20 @@ def one_line(
     except StereoCellError:
         raise
     except _faults() as error:
+        raise_if_short(error, where, raised)
         raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
+
+
+def raise_if_short(
+    error: BaseException, where: str, raised: type[StereoCellError] = SourceError
+) -> None:
+    """Raise an error of one line if a library's own is for want of memory on this machine.
+
+    Without a limit a MemoryError is the file's doing, which may claim any size.
+    """
+    is_ours = not isinstance(error, MemoryError) or address_limit() < math.inf
+    if is_ours and (words := shortage(error)):
+        raise raised(f"{where}: {words}") from error
 
 
 def _reason(error: BaseException) -> str:

@@ -1,10 +1,25 @@
 """Other processes of this machine, and what there is for them."""
 
+import errno
 import hashlib
+import math
 import os
+import re
 import socket
 from contextlib import suppress
 from pathlib import Path
+
+from stereocell.model.errors import StereoCellError
+
+# bytes; measured on 2 cores: below, OpenBLAS gives up, and USD, which writes the stage, crashes
+_LEAST, _LEAST_FOR_STAGE, _LEAST_PER_CORE = 1.5e9, 2.9e9, 0.15e9
+_STAGE_WRITERS = ("build", "stage", "tissue")
+_SIGNS = re.compile(
+    r"can't start new thread|resource temporarily unavailable|cannot allocate memory|"
+    r"failed to map segment|bad_alloc|thread constructor failed|unable to allocate|"
+    r"insufficient memory|not enough memory|out of memory",
+    re.IGNORECASE,
+)
 
 
 def cores() -> int:
@@ -20,6 +35,54 @@ def available_bytes() -> int:
     from distributed.system import memory_limit
 
     return int(min(psutil.virtual_memory().available, memory_limit()))
+
+
+def address_limit() -> float:
+    """Return the bytes of address space that this process may have (`ulimit -v`), or infinity."""
+    try:
+        import resource  # which Windows lacks
+    except ImportError:
+        return math.inf
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return math.inf if soft == resource.RLIM_INFINITY else soft
+
+
+def require_address_space(command: str) -> None:
+    """Raise StereoCellError where libraries would crash for want of address space, wordlessly.
+
+    What their code, and a stack and a heap for a thread of each core, take before any voxel.
+    """
+    least = _LEAST_FOR_STAGE if command in _STAGE_WRITERS else _LEAST
+    least += _LEAST_PER_CORE * (os.cpu_count() or 1)
+    if address_limit() < least:
+        raise StereoCellError(
+            f"memory: {_allowed()}; `{command}` needs at least {least / 1e9:.1f} GB, and more for "
+            "voxels: raise the limit, as by `ulimit -v unlimited`"
+        )
+
+
+def shortage(error: BaseException) -> str:
+    """Return what is to be said of an error if it, or its cause, is a want of memory; else empty.
+
+    Threads, processes and shared libraries that can't be had for want of it have errors of theirs.
+    """
+    seen: BaseException | None = error
+    while seen is not None:
+        text = str(seen)
+        if (
+            isinstance(seen, MemoryError)
+            or (isinstance(seen, OSError) and seen.errno == errno.ENOMEM)
+            or (isinstance(seen, RuntimeError | ImportError | OSError) and _SIGNS.search(text))
+        ):
+            limit = f"; {_allowed()}: raise the limit" if address_limit() < math.inf else ""
+            told = " ".join(text.split())[:160] or type(seen).__name__
+            return f"out of memory ({told}): try fewer --workers or a smaller --tile-size{limit}"
+        seen = seen.__cause__ or seen.__context__
+    return ""
+
+
+def _allowed() -> str:
+    return f"{address_limit() / 1e9:.1f} GB of address space are allowed here (`ulimit -v`)"
 
 
 def machine() -> str:

@@ -15,6 +15,7 @@ from stereocell.read.dicom.padding import Padding, is_padding
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.dicom.stored_values import open_pixels, stored_values
 from stereocell.read.rescale import dtype_for, rescale
+from stereocell.storage.library_errors import raise_if_short
 
 
 def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
@@ -58,7 +59,8 @@ def decode(
                         if has_padding:
                             mask = is_padding(values, raw, encoding)
                             padding.add(place, planes[place], mask)
-            except DICOM_FAULTS:  # its text may quote what the file says
+            except DICOM_FAULTS as error:  # its text may quote what the file says
+                raise_if_short(error, where)
                 raise SourceError(
                     f"{where}: its pixels can't be decoded, expected {frames[wanted[0]].rows} x "
                     f"{frames[wanted[0]].columns} whole ones, as its header says"
