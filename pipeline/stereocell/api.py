@@ -72,7 +72,7 @@ def build(
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)
-    wanted = load(preset, file, settings or {}, "settings")
+    wanted = load(preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
     with ExitStack() as stack:
         if place.is_local:

@@ -63,7 +63,9 @@ def main() -> None:
     volume = Volume(voxels, SPACING)
     region = Box((0, 0, 0), shape)
     field = denoise.smooth(volume, 0.14)
-    distance = extract.signed_distance(field, np.float32(700), SPACING, 1000.0)
+    distance = extract.signed_distance(
+        field, np.float32(700), spacing_um=SPACING, value_range=1000.0
+    )
     print(f"phantom {shape}, {voxels.size / 1e6:.1f} M voxels; medians of {ROUNDS}")
     compare(
         "extract_surface",
@@ -105,7 +107,9 @@ def main() -> None:
         for workers in (1, 2):
             out = Path(folder) / str(workers)
             phases.make(
-                str(source), out, settings_module.load("cycif", None, {"plan": {"grid": "4x2"}})
+                str(source),
+                out,
+                settings_module.load("cycif", None, flags={"plan": {"grid": "4x2"}}),
             )
             engine = Engine(workers)
             engine.run("warm-up", abs, [("a", -1), ("b", -2)])

@@ -38,7 +38,9 @@ def fields(counts: NDArray[np.uint16]) -> tuple[NDArray[np.float32], NDArray[np.
     """Return the smoothed voxels, and those that our criteria see: denoised, above background."""
     volume = Volume(counts, SPACING)
     region = Box((0, 0, 0), counts.shape)  # type: ignore[arg-type]
-    under = find_background(counts.astype(np.float32), region, SPACING, BLOCK_UM)
+    under = find_background(
+        counts.astype(np.float32), region, spacing_um=SPACING, block_um=BLOCK_UM
+    )
     return smooth(volume, SIGMA_UM), denoise(volume, SIGMA_UM) - under.at(region)
 
 

@@ -119,7 +119,7 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
         display = run_display(display_task(settled, channel))
         take(sent)
         for each in settled.tiles:
-            read_iso_field(iso_task(settled, each, channel, display))
+            read_iso_field(iso_task(settled, each, channel=channel, display=display))
         isos = take(sent)
     region, chunk = settled.region, chunk_of(source)
     voxel = stored(source, region) / math.prod(region.shape)

@@ -39,7 +39,7 @@ def main() -> None:
     print("| shape | noise | bias | seed | method | " + " | ".join(NAMES) + " | s |")
     print("|---" * 9 + "|")
     for shape, noise, bias, seed in CASES:
-        head = make_head(shape, noise, bias, seed)
+        head = make_head(shape, noise, bias=bias, seed=seed)
         start = time.perf_counter()
         tissue = learn_tissue(head.voxels, head.spacing_um, TissueOptions(classes=3, brain=True))
         seconds = time.perf_counter() - start

@@ -72,7 +72,7 @@ def inputs() -> Iterator[Input]:
         ("vessels", 2, 0, 0.56, 0.1),
     ):
         tissue = grow_tissue((size[0], size[1], size[2]), seed, 1.0)
-        voxels = record(tissue, stain, Box((0, 0, 0), SHAPE), seed)
+        voxels = record(tissue, stain, box=Box((0, 0, 0), SHAPE), seed=seed)
         yield prepare(f"{name} ({STAINS[stain].name})", Volume(voxels, SPACING_UM), grid, error)
     folder = os.environ.get("STEREOCELL_DATA", "")
     file = Path(folder) / "brain_cells_2ch" / "brain_cells_2ch.ome.tif"
@@ -89,7 +89,9 @@ def prepare(name: str, volume: Volume, grid: float, error: float) -> Input:
     whole = Box((0, 0, 0), volume.voxels.shape)
     spacing = volume.spacing_um
     field = denoise(volume, min(spacing))
-    under = find_background(volume.voxels.astype(np.float32), whole, spacing, 64 * min(spacing))
+    under = find_background(
+        volume.voxels.astype(np.float32), whole, spacing_um=spacing, block_um=64 * min(spacing)
+    )
     field -= under.at(whole)
     iso = find_iso_value(field, spacing, IsoValueOptions()).value
     return Input(name, field, spacing, iso, grid, error)
@@ -102,7 +104,9 @@ def wrap(given: Input) -> Mesh:
     z, y, x = (h * k for h, k in zip(given.spacing, step, strict=True))
     field = np.ascontiguousarray(given.field[:: step[0], :: step[1], :: step[2]])
     spacing = (z, y, x)
-    distance = signed_distance(field, np.float32(given.iso), spacing, float(np.ptp(field)))
+    distance = signed_distance(
+        field, np.float32(given.iso), spacing_um=spacing, value_range=float(np.ptp(field))
+    )
     solids = find_solids(distance > 0, spacing, 26)
     options = RepairOptions(
         alpha_um=alpha,
@@ -115,7 +119,7 @@ def wrap(given: Input) -> Mesh:
     whole = Box((0, 0, 0), distance.shape)
     closed = repair(distance, spacing, options).distance
     surface = extract_surface(closed, Lattice.of_whole(whole, spacing))
-    return simplify_soundly(surface, (), given.error * alpha).mesh
+    return simplify_soundly(surface, (), max_error_um=given.error * alpha).mesh
 
 
 def iso_surface(given: Input) -> Mesh:

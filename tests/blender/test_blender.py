@@ -165,7 +165,7 @@ def test_edits_reach_the_bundle(stage_path: Path, tmp_path: Path, size: str) -> 
         delete=[leaf("r0_c0", BALL_ID)], move={"/Specimen/Tiles/r0_c0": offset},
     )  # fmt: skip
     assert validate_stage(overlay) == []
-    write_bundle(overlay, bundle, None, Engine(0).run)
+    write_bundle(overlay, bundle, None, run=Engine(0).run)
     manifest = load(bundle / "manifest.json")
     letter, ball, _ = manifest["channels"]
     assert letter["color"] == [0.25, 0.5, 0.75]
@@ -286,7 +286,7 @@ def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, 
         found_at = prim.GetLocalTransformation().ExtractTranslation()
         assert np.allclose(found_at, expected or (0, 0, 0), atol=1e-5)
         assert prim.GetXformOpOrderAttr().HasAuthoredValue() == (expected is not None)
-    write_bundle(overlay, tmp_path / "bundle", None, Engine(0).run)
+    write_bundle(overlay, tmp_path / "bundle", None, run=Engine(0).run)
     ball = load(tmp_path / "bundle" / "manifest.json")["channels"][1]
     entries = load(tmp_path / "bundle" / ball["volumes"]["path"])["volumes"]
     assert entries[1]["matrix"][12:] == pytest.approx([0, -4, 0, 1])

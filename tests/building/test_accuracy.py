@@ -21,7 +21,7 @@ VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
 
 
 def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[Store, list[Mesh]]:
-    phases.make(str(source), out, settings_module.load("cycif", None, {"plan": plan}))
+    phases.make(str(source), out, settings_module.load("cycif", None, flags={"plan": plan}))
     engine = Engine(0)
     phases.run_units(out, engine)
     store = Store(out)

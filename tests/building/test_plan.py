@@ -74,7 +74,7 @@ def test_a_grid_is_kept_and_its_plan_repeats() -> None:
 
 @pytest.mark.parametrize("preset", ["cycif", "lightsheet", None])
 def test_lengths_that_suit_the_voxels_make_a_plan(preset: str | None) -> None:
-    surface = settings_module.load(preset, None, {}).surface
+    surface = settings_module.load(preset, None, flags={}).surface
     plan_of(surface=dataclasses.asdict(surface))
 
 
@@ -87,7 +87,7 @@ def test_lengths_that_suit_the_voxels_make_a_plan(preset: str | None) -> None:
     ],
 )
 def test_presets_and_defaults_suit_their_data(preset: str | None, level: Level) -> None:
-    settings = settings_module.to_dict(settings_module.load(preset, None, {}))
+    settings = settings_module.to_dict(settings_module.load(preset, None, flags={}))
     plan_of(settings.pop("plan"), levels=(level,), channels=CHANNELS[:1], **settings)
 
 

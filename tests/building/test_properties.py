@@ -76,7 +76,7 @@ def regions(draw: st.DrawFn, shape: tuple[int, int, int]) -> str:
 def plans(draw: st.DrawFn) -> Plan:
     shape = draw(shapes)
     wanted = settings_module.load(
-        None, None, {"plan": {**draw(cuts()), "region": draw(regions(shape))}}
+        None, None, flags={"plan": {**draw(cuts()), "region": draw(regions(shape))}}
     )
     channels = [
         Channel(index, name, (0.1, 0.2, 0.3))
@@ -86,7 +86,14 @@ def plans(draw: st.DrawFn) -> Plan:
     try:
         chosen = choose_level(levels, len(channels), wanted)
         return make_plan(
-            "in.ome.zarr", "in", "ab" * 32, levels, (0.0, 0.0, 0.0), channels, chosen, wanted
+            "in.ome.zarr",
+            "in",
+            fingerprint="ab" * 32,
+            levels=levels,
+            origin_um=(0.0, 0.0, 0.0),
+            channels=channels,
+            level=chosen,
+            settings=wanted,
         )
     except (UsageError, SourceError) as error:  # told, in one line, before anything is written
         assert "\n" not in str(error)  # noqa: PT017
@@ -225,7 +232,7 @@ def test_any_volume_comes_back_from_openvdb(
     first: tuple[float, float, float],
 ) -> None:
     path = tmp_path / "a.vdb"
-    write_vdb(path, volume, first, spacing)
+    write_vdb(path, volume, first_um=first, spacing_um=spacing)
     check_vdb(path)
     vdb = read_vdb(path)  # the tests' own reader, by OpenVDB's tables
     assert len(vdb.voxels) == np.count_nonzero(volume)

@@ -38,14 +38,14 @@ def test_any_channel_name_survives_the_file() -> None:
 def test_a_later_tile_size_replaces_an_earlier_grid(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text('[plan]\ngrid = "5x2"\ntile_size = [64, 100, 100]\n')
-    assert settings_module.load("mri", file, {}).plan.grid == "5x2"
-    plan = settings_module.load(None, file, {"plan": {"tile_size": [8, 9, 9]}}).plan
+    assert settings_module.load("mri", file, flags={}).plan.grid == "5x2"
+    plan = settings_module.load(None, file, flags={"plan": {"tile_size": [8, 9, 9]}}).plan
     assert (plan.grid, plan.tile_size) == ("", (8, 9, 9))
 
 
 @pytest.mark.parametrize("preset", ["cycif", "lightsheet", "mri"])
 def test_presets_load(preset: str) -> None:
-    settings = settings_module.load(preset, None, {})
+    settings = settings_module.load(preset, None, flags={})
     assert settings != settings_module.Settings()
     assert settings_module.from_dict(settings_module.to_dict(settings)) == settings
 
@@ -53,7 +53,7 @@ def test_presets_load(preset: str) -> None:
 def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[window]\nlow_percentile = 3\n[surface]\nalpha_um = 2.5\n[plan]\nlevel = 1\n")
-    settings = settings_module.load("cycif", file, {"plan": {"level": 2}})
+    settings = settings_module.load("cycif", file, flags={"plan": {"level": 2}})
     assert settings.plan.level == 2
     assert settings.window.low_percentile == 3.0
     assert settings.surface.alpha_um == 2.5
@@ -63,7 +63,7 @@ def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None
 def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
     file = tmp_path / "ours.toml"
     file.write_text('[isovalue]\ncriterion = "pekar-mean"\n[iso_values]\n"Hoechst 33342" = 800\n')
-    settings = settings_module.load(str(file), None, {})
+    settings = settings_module.load(str(file), None, flags={})
     assert settings.isovalue.criterion == "pekar-mean"
     assert settings.iso_values == {"Hoechst 33342": 800.0}
     assert settings_module.from_dict(tomllib.loads(settings_module.to_toml(settings))) == settings
@@ -98,7 +98,7 @@ def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: s
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(UsageError) as raised:
-        settings_module.load(None, file, {})
+        settings_module.load(None, file, flags={})
     assert message in str(raised.value)
     assert ("'auto'" in str(raised.value)) == ("'auto'" in message)
     assert "\n" not in str(raised.value)
@@ -106,12 +106,12 @@ def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: s
 
 def test_unknown_preset_lists_the_known() -> None:
     with pytest.raises(UsageError, match=r"one of cycif, lightsheet, mri or a \.toml file"):
-        settings_module.load("confocal", None, {})
+        settings_module.load("confocal", None, flags={})
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"none\.toml: No such file"):
-        settings_module.load(None, tmp_path / "none.toml", {})
+        settings_module.load(None, tmp_path / "none.toml", flags={})
 
 
 def test_auto_lengths_follow_the_spacing() -> None:
@@ -126,4 +126,4 @@ def test_whole_number_without_end_is_wrong_usage(tmp_path: Path) -> None:
     file = tmp_path / "huge.toml"
     file.write_text("[isovalue]\nmin_confidence = " + "9" * 400)
     with pytest.raises(UsageError, match=r"isovalue\.min_confidence is 9"):
-        settings_module.load(None, file, {})
+        settings_module.load(None, file, flags={})

@@ -31,7 +31,7 @@ def stage(tmp_path_factory):
 def bundle(stage, tmp_path_factory):
     """Its bundle, to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, Engine(0).run)
+    write_bundle(stage, out, None, run=Engine(0).run)
     return out
 
 
@@ -48,7 +48,7 @@ def edit(stage, tmp_path):
         layer.Save()
         del over
         export.told = []
-        write_bundle(path, tmp_path / "bundle", None, Engine(0).run, tell=export.told.append)
+        write_bundle(path, tmp_path / "bundle", None, run=Engine(0).run, tell=export.told.append)
         return tmp_path / "bundle"
 
     return export
@@ -100,7 +100,7 @@ def test_window_edit_survives_flattening(edit, tmp_path):
     edited = edit(change)
     flat = tmp_path / "flat.usda"
     Usd.Stage.Open(str(tmp_path / "edited.usda")).Export(str(flat))
-    write_bundle(flat, tmp_path / "flat", None, Engine(0).run)
+    write_bundle(flat, tmp_path / "flat", None, run=Engine(0).run)
     for folder in (edited, tmp_path / "flat"):
         assert channel(folder)["window"] == [490, 2050]
     paths = [folder / volumes(folder)[0]["file"]["path"] for folder in (edited, tmp_path / "flat")]
@@ -253,7 +253,7 @@ def test_representation_survives_flattening(edit, tmp_path):
         if "r0_c0" not in kept:
             choose(stage, "r0_c0", representation="mesh")
         stage.Export(str(flat))
-        write_bundle(flat, tmp_path / "flat", None, Engine(0).run)
+        write_bundle(flat, tmp_path / "flat", None, run=Engine(0).run)
         found = [tile["representation"] for tile in load(tmp_path / "flat/manifest.json")["tiles"]]
         assert found == ["volume" if "r0_c0" in kept else "mesh", "both"]
 
@@ -281,7 +281,7 @@ def test_triangles_are_told_by_the_stage_s_levels_whatever_is_left_out(tmp_path,
     stage = Usd.Stage.Open(str(write_tiles(tmp_path, tiles)))
     choose(stage, "r0_c1", lod="lod2")
     stage.GetRootLayer().Save()
-    write_bundle(tmp_path / "stage.usda", tmp_path / "bundle", None, Engine(0).run)
+    write_bundle(tmp_path / "stage.usda", tmp_path / "bundle", None, run=Engine(0).run)
     assert chain(tmp_path / "bundle", "r0_c1") == ["lod3.glb", "lod2.glb"]
     full, cut = ([len(lod.mesh.triangles) for lod in tile.channels[0].lods] for tile in tiles)
     cut[:2] = [cut[2]] * 2
@@ -403,7 +403,11 @@ def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, ed
         layer.Save()
     told: list[str] = []
     write_bundle(
-        tmp_path / "old/stage.usda", tmp_path / "from_old", None, Engine(0).run, tell=told.append
+        tmp_path / "old/stage.usda",
+        tmp_path / "from_old",
+        None,
+        run=Engine(0).run,
+        tell=told.append,
     )
     assert told == []
     assert files(tmp_path / "from_old") == files(bundle)
@@ -579,7 +583,9 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     variants.SetVariantSelection("lod1")
     own.GetRootLayer().Save()
     told: list[str] = []
-    write_bundle(tmp_path / "own/stage.usda", tmp_path / "a", None, Engine(0).run, tell=told.append)
+    write_bundle(
+        tmp_path / "own/stage.usda", tmp_path / "a", None, run=Engine(0).run, tell=told.append
+    )
     (line,) = told
     assert "lod0 (sound); made anew from lod0: lod1" in line
     assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < 0.1
@@ -590,7 +596,9 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     tile.GetVariantSet("lod").SetVariantSelection("lod0")
     whole.Export(str(tmp_path / "flat.usda"))
     told: list[str] = []
-    write_bundle(tmp_path / "flat.usda", tmp_path / "flat", None, Engine(0).run, tell=told.append)
+    write_bundle(
+        tmp_path / "flat.usda", tmp_path / "flat", None, run=Engine(0).run, tell=told.append
+    )
     (line,) = told
     assert line == "r0_c0/CD31: edited by hand: lod0 (sound)"
 
@@ -606,7 +614,9 @@ def test_points_in_other_units_are_told(stage, tmp_path):
     root.subLayerPaths = ["./an artist's.usda"]
     root.Save()
     told: list[str] = []
-    write_bundle(tmp_path / "root.usda", tmp_path / "bundle", None, Engine(0).run, tell=told.append)
+    write_bundle(
+        tmp_path / "root.usda", tmp_path / "bundle", None, run=Engine(0).run, tell=told.append
+    )
     (line,) = told
     assert "points of an artist's.usda, whose metersPerUnit is 0.01, are taken as um" in line
 
@@ -636,14 +646,18 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
     write_tile(tmp_path, tile)
     settings = {"lod": {"errors": [0.1, 0.5, 0.8]}, "unwrap": {"first_lod": first_lod}}
     looks = (replace(spheres.RED, painted_by="Hoechst_x20_33342"), spheres.BLUE)
-    write_stage(tmp_path, "one", looks, [TileExtent.of(tile)], {"settings": settings})
+    write_stage(
+        tmp_path, "one", looks=looks, tiles=[TileExtent.of(tile)], provenance={"settings": settings}
+    )
     layer = Sdf.Layer.CreateNew(str(tmp_path / "edit.usda"))
     layer.subLayerPaths = ["./stage.usda"]
     over = Usd.Stage.Open(layer)
     in_level(over, "lod0", swell(1.25))
     layer.Save()
     told: list[str] = []
-    write_bundle(tmp_path / "edit.usda", tmp_path / "bundle", None, Engine(0).run, tell=told.append)
+    write_bundle(
+        tmp_path / "edit.usda", tmp_path / "bundle", None, run=Engine(0).run, tell=told.append
+    )
     (line,) = told
     assert "made anew from lod0: lod1" in line
     with loaded(open_stage(tmp_path / "edit.usda"), "r0_c0") as (prim, _):

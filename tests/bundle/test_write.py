@@ -28,7 +28,7 @@ def stage(tmp_path_factory):
 def bundle(stage, tmp_path_factory):
     """Its bundle, to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, Engine(0).run)
+    write_bundle(stage, out, None, run=Engine(0).run)
     return out
 
 
@@ -158,7 +158,7 @@ def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
 
 
 def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):
-    write_bundle(stage, tmp_path / "again", None, Engine(2).run)
+    write_bundle(stage, tmp_path / "again", None, run=Engine(2).run)
     assert files(tmp_path / "again") == files(bundle)
 
 
@@ -169,7 +169,7 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
     with pytest.raises(
         StereoCellError, match=r"CD31\.exr: can't be read as OpenEXR: it ends at byte"
     ):
-        write_bundle(stage, tmp_path / "bundle", None, Engine(0).run)
+        write_bundle(stage, tmp_path / "bundle", None, run=Engine(0).run)
     for line in capfd.readouterr().err.splitlines():  # OpenEXR's own words would come on top
         assert line.startswith("bundle: ")
 
@@ -188,7 +188,7 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
     stage = write_tiles(tmp_path / "stage")
     (tmp_path / "stage" / lost).unlink()
     with pytest.raises(StereoCellError, match=words) as caught:
-        write_bundle(stage, tmp_path / "bundle", None, Engine(0).run)
+        write_bundle(stage, tmp_path / "bundle", None, run=Engine(0).run)
     assert "\n" not in str(caught.value)
     for line in capfd.readouterr().err.splitlines():  # USD's own warnings would come on top
         assert line.startswith("bundle: ")
@@ -197,12 +197,12 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
 
 def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, bundle, tmp_path):
     place = tmp_path / "bundle"
-    write_bundle(stage, place, None, Engine(0).run)
+    write_bundle(stage, place, None, run=Engine(0).run)
     (place / "left over").write_text("from an older build")
     with pytest.raises(StageError):
-        write_bundle(tmp_path / "none.usda", place, None, Engine(0).run)
+        write_bundle(tmp_path / "none.usda", place, None, run=Engine(0).run)
     assert (place / "left over").exists()
-    write_bundle(stage, place, None, Engine(0).run)
+    write_bundle(stage, place, None, run=Engine(0).run)
     assert files(place) == files(bundle)
     assert [p.name for p in tmp_path.iterdir()] == ["bundle"]
 
@@ -210,7 +210,7 @@ def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, 
 def test_folder_that_is_no_bundle_is_left_alone(stage, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(OutputError, match=r"is no bundle: no manifest\.json in it"):
-        write_bundle(stage, tmp_path, None, Engine(0).run)
+        write_bundle(stage, tmp_path, None, run=Engine(0).run)
     assert (tmp_path / "thesis.tex").exists()
 
 
@@ -218,14 +218,14 @@ def test_viewer_is_copied_and_listed(stage, tmp_path):
     (tmp_path / "dist" / "assets").mkdir(parents=True)
     (tmp_path / "dist" / "index.html").write_text("<!doctype html>")
     (tmp_path / "dist" / "assets" / "main.js").write_text("start()")
-    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0).run)
+    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
     assert (tmp_path / "bundle" / "assets" / "main.js").read_text() == "start()"
     assert {"index.html", "assets/main.js"} <= load(tmp_path / "bundle" / "files.json").keys()
 
 
 def test_viewer_that_is_not_built_is_named(stage, tmp_path):
     with pytest.raises(OutputError, match=r"dist: no index\.html, expected the built viewer"):
-        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0).run)
+        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
 
 
 def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
@@ -233,14 +233,14 @@ def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
     for name in ("index.html", "manifest.json"):
         (tmp_path / "dist" / name).write_text("")
     with pytest.raises(OutputError, match=r"the bundle has a manifest\.json of its own"):
-        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", Engine(0).run)
+        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
     assert not (tmp_path / "bundle").exists()
 
 
 @pytest.mark.parametrize("escape", ["id", "path"])
 def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
     parts = tmp_path / "parts"
-    write_bundle(stage, tmp_path / "first", None, Engine(0).run, parts)
+    write_bundle(stage, tmp_path / "first", None, run=Engine(0).run, parts=parts)
     (tmp_path / "secret.txt").write_text("private")
     for record in sorted(parts.glob("*/tile.json")):
         content = load(record)
@@ -251,7 +251,7 @@ def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path
                 for file in channel["files"]:
                     file |= {"path": "../../secret.txt", "bytes": 7}
         record.write_text(json.dumps(content))
-    write_bundle(stage, tmp_path / "again", None, Engine(0).run, parts)
+    write_bundle(stage, tmp_path / "again", None, run=Engine(0).run, parts=parts)
     assert files(tmp_path / "again") == files(bundle)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"first", "again", "parts", "secret.txt"}

@@ -20,7 +20,7 @@ def test_ramp_under_noise_and_bodies_is_found_where_it_lies() -> None:
     rng = np.random.default_rng(0)
     ball = blurred_ball(REGION.shape, SPACING, (6.7, 9.0, 9.0), 2.0, 0.3)
     counts = (_ramp() + 500 * ball + rng.normal(0, 5, REGION.shape)).astype(np.float32)
-    found = find_background(counts, REGION, SPACING, 4.5).at(REGION)
+    found = find_background(counts, REGION, spacing_um=SPACING, block_um=4.5).at(REGION)
     inner = (slice(12, 36), slice(24, 104), slice(24, 104))
     # a low percentile of a ramp lies below its middle: a constant, which no threshold sees
     error = found[inner] - _ramp()[inner]
@@ -29,14 +29,14 @@ def test_ramp_under_noise_and_bodies_is_found_where_it_lies() -> None:
 
 
 def test_coarser_voxels_give_the_same_background() -> None:
-    fine = find_background(_ramp(), REGION, SPACING, 4.5)
-    coarse = find_background(_ramp()[:, ::2, ::2], REGION, SPACING, 4.5)
+    fine = find_background(_ramp(), REGION, spacing_um=SPACING, block_um=4.5)
+    coarse = find_background(_ramp()[:, ::2, ::2], REGION, spacing_um=SPACING, block_um=4.5)
     for found, expected in zip(coarse.centres, fine.centres, strict=True):
         assert found == pytest.approx(expected)
     np.testing.assert_allclose(coarse.at(REGION), fine.at(REGION), atol=3)
 
 
 def test_block_larger_than_the_region_is_one_constant() -> None:
-    found = find_background(_ramp(), REGION, SPACING, 1e6)
+    found = find_background(_ramp(), REGION, spacing_um=SPACING, block_um=1e6)
     assert found.values.shape == (1, 1, 1)
     assert found.at(REGION).shape == (1, 1, 1)

@@ -33,7 +33,9 @@ def test_neighbours_decode_their_common_vertices_to_equal_floats():
     step = choose_step(109.0)
     edges = []
     for mesh in (left, right):
-        points = decoded_positions_m(encode_glb(mesh, step, RED, "mesh", EXTRAS).data)
+        points = decoded_positions_m(
+            encode_glb(mesh, step, material=RED, name="mesh", extras=EXTRAS).data
+        )
         edge = points[np.abs(points[:, 0] - 72.31e-6) < 1e-7]
         edges.append(edge[np.argsort(edge[:, 2])])
     assert len(edges[0]) == 9
@@ -43,7 +45,7 @@ def test_neighbours_decode_their_common_vertices_to_equal_floats():
 def test_positions_are_in_metres_to_half_a_step():
     mesh = patch(-13.7, 72.31)
     step = choose_step(90.0)
-    glb = encode_glb(mesh, step, RED, "mesh", EXTRAS)
+    glb = encode_glb(mesh, step, material=RED, name="mesh", extras=EXTRAS)
     points = decoded_positions_m(glb.data)
     distances = np.abs(points[:, None] * 1e6 - mesh.positions[None]).max(-1).min(1)
     assert distances.max() <= 0.51 * step * 1e6
@@ -60,7 +62,9 @@ def test_step_is_a_power_of_two_that_spans_the_extent(extent_um):
 
 def test_triangles_keep_winding_and_number():
     mesh = patch(0, 10)
-    document, arrays = read(encode_glb(mesh, choose_step(20), RED, "mesh", EXTRAS).data)
+    document, arrays = read(
+        encode_glb(mesh, choose_step(20), material=RED, name="mesh", extras=EXTRAS).data
+    )
     primitive = document["meshes"][0]["primitives"][0]
     corners = arrays[primitive["attributes"]["POSITION"]].astype(float)[
         arrays[primitive["indices"]].reshape(-1, 3)
@@ -73,12 +77,16 @@ def test_triangles_keep_winding_and_number():
 def test_vertices_without_a_triangle_are_left_out():
     mesh = patch(0, 10)
     half = Mesh(mesh.positions, mesh.triangles[:1], mesh.normals)
-    document, _ = read(encode_glb(half, choose_step(20), RED, "mesh", EXTRAS).data)
+    document, _ = read(
+        encode_glb(half, choose_step(20), material=RED, name="mesh", extras=EXTRAS).data
+    )
     assert document["accessors"][0]["count"] == 3
 
 
 def test_color_and_extras_are_written():
-    document, _ = read(encode_glb(patch(0, 10), choose_step(20), RED, "mesh", EXTRAS).data)
+    document, _ = read(
+        encode_glb(patch(0, 10), choose_step(20), material=RED, name="mesh", extras=EXTRAS).data
+    )
     factor = document["materials"][0]["pbrMetallicRoughness"]
     assert factor["baseColorFactor"] == [1.0, 0.25, 0.0, 1.0]
     assert (factor["metallicFactor"], factor["roughnessFactor"]) == (0, 0.75)
@@ -96,7 +104,9 @@ def test_normals_and_tangents_are_kept_to_about_a_degree():
     signs = rng.choice([-1.0, 1.0], size=(1600, 1))
     tangents = np.hstack([normals[::-1], signs]).astype(np.float32)
     mesh = replace(mesh, normals=normals.astype(np.float32), tangents=tangents)
-    document, arrays = read(encode_glb(mesh, choose_step(20), RED, "m", EXTRAS, MAP).data)
+    document, arrays = read(
+        encode_glb(mesh, choose_step(20), material=RED, name="m", extras=EXTRAS, textures=MAP).data
+    )
     attributes = document["meshes"][0]["primitives"][0]["attributes"]
     # vertices are ordered anew: find each by its place
     x, _, z = arrays[attributes["POSITION"]].astype(float).T
@@ -113,7 +123,14 @@ def test_normals_and_tangents_are_kept_to_about_a_degree():
 def test_normal_map_brings_uvs_with_v_down_and_tangents():
     mesh = patch(0, 10)
     document, arrays = read(
-        encode_glb(mesh, choose_step(20), RED, "m", EXTRAS, Textures(b"not looked into")).data
+        encode_glb(
+            mesh,
+            choose_step(20),
+            material=RED,
+            name="m",
+            extras=EXTRAS,
+            textures=Textures(b"not looked into"),
+        ).data
     )
     attributes = document["meshes"][0]["primitives"][0]["attributes"]
     uvs = arrays[attributes["TEXCOORD_0"]] / 65535
@@ -128,7 +145,11 @@ def test_normal_map_brings_uvs_with_v_down_and_tangents():
 
 def test_occlusion_and_colour_maps_come_beside_the_normal_map():
     maps = Textures(b"normals", b"occlusion", b"colours")
-    document, _ = read(encode_glb(patch(0, 10), choose_step(20), RED, "m", EXTRAS, maps).data)
+    document, _ = read(
+        encode_glb(
+            patch(0, 10), choose_step(20), material=RED, name="m", extras=EXTRAS, textures=maps
+        ).data
+    )
     (material,) = document["materials"]
     texture = {
         b"normals": material["normalTexture"],
@@ -147,7 +168,9 @@ def test_vertex_colours_are_linear_and_dimmed_where_the_sky_is_hidden():
     colors = np.float32([[1, 0.5, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     openness = np.float32([1, 1, 0, 0])
     painted = replace(mesh, colors=colors, openness=openness)
-    document, arrays = read(encode_glb(painted, choose_step(20), RED, "m", EXTRAS).data)
+    document, arrays = read(
+        encode_glb(painted, choose_step(20), material=RED, name="m", extras=EXTRAS).data
+    )
     attributes = document["meshes"][0]["primitives"][0]["attributes"]
     expected = np.rint(colors * np.where(openness, 1, 0.6)[:, None] * 255)
     points = arrays[attributes["POSITION"]][:, [0, 2]].astype(float)
@@ -158,20 +181,27 @@ def test_vertex_colours_are_linear_and_dimmed_where_the_sky_is_hidden():
 def test_uvs_outside_the_unit_square_survive():
     mesh = patch(0, 10)
     wide = Mesh(mesh.positions, mesh.triangles, mesh.normals, mesh.uvs * 3 - 1, mesh.tangents)
-    document, arrays = read(encode_glb(wide, choose_step(20), RED, "m", EXTRAS, MAP).data)
+    document, arrays = read(
+        encode_glb(wide, choose_step(20), material=RED, name="m", extras=EXTRAS, textures=MAP).data
+    )
     uvs = arrays[document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]]
     assert (uvs.min(), uvs.max()) == (-1, 2)
 
 
 def test_many_vertices_take_32_bit_indices():
-    document, arrays = read(encode_glb(patch(0, 9, n=260), choose_step(20), RED, "m", {}).data)
+    document, arrays = read(
+        encode_glb(patch(0, 9, n=260), choose_step(20), material=RED, name="m", extras={}).data
+    )
     indices = document["meshes"][0]["primitives"][0]["indices"]
     assert document["accessors"][indices]["componentType"] == 5125
     assert arrays[indices].max() == 260 * 260 - 1
 
 
 def test_same_mesh_same_bytes():
-    first, second = (encode_glb(patch(0, 9), choose_step(20), RED, "m", EXTRAS) for _ in range(2))
+    first, second = (
+        encode_glb(patch(0, 9), choose_step(20), material=RED, name="m", extras=EXTRAS)
+        for _ in range(2)
+    )
     assert first == second
 
 
@@ -180,8 +210,8 @@ def test_what_can_not_be_written_is_refused():
     nothing = Mesh(mesh.positions, mesh.triangles[:0], mesh.normals)
     plain = Mesh(mesh.positions, mesh.triangles, mesh.normals)
     with pytest.raises(ValueError, match="no triangles"):
-        encode_glb(nothing, choose_step(20), RED, "m", EXTRAS)
+        encode_glb(nothing, choose_step(20), material=RED, name="m", extras=EXTRAS)
     with pytest.raises(ValueError, match="no UVs"):
-        encode_glb(plain, choose_step(20), RED, "m", EXTRAS, MAP)
+        encode_glb(plain, choose_step(20), material=RED, name="m", extras=EXTRAS, textures=MAP)
     with pytest.raises(ValueError, match="lattice steps"):
-        encode_glb(mesh, choose_step(1), RED, "m", EXTRAS)
+        encode_glb(mesh, choose_step(1), material=RED, name="m", extras=EXTRAS)

@@ -89,7 +89,7 @@ def manifest(rng, tiles, files):
         )
         channels.append(entry)
     specimen = {"name": "70 channels", "modality": ""}
-    return describe_bundle(specimen, tiles, channels, ref("files.json", 14_000_000))
+    return describe_bundle(specimen, tiles, channels=channels, index=ref("files.json", 14_000_000))
 
 
 def test_manifest_of_70_channels_fits_its_schema(manifest, tiles):

@@ -17,7 +17,7 @@ def test_every_voxel_lies_at_its_world_position(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     density = rng.integers(0, 256, (11, 18, 25), dtype=np.uint8)
     density[rng.random(density.shape) < 0.4] = 0
-    write_vdb(tmp_path / "a.vdb", density, (5.0, 7.0, 9.0), SPACING_UM)
+    write_vdb(tmp_path / "a.vdb", density, first_um=(5.0, 7.0, 9.0), spacing_um=SPACING_UM)
     vdb = read_vdb(tmp_path / "a.vdb")
     assert len(vdb.voxels) == np.count_nonzero(density)
     for z, y, x in np.ndindex(density.shape):
@@ -28,7 +28,7 @@ def test_every_voxel_lies_at_its_world_position(tmp_path: Path) -> None:
 def test_scales_are_positive_and_the_header_names_the_grid(tmp_path: Path) -> None:
     density = np.zeros((4, 6, 9), dtype=np.uint8)
     density[1, 2, 3] = density[2, 5, 8] = 255
-    write_vdb(tmp_path / "a.vdb", density, (0.0, 0.0, 0.0), SPACING_UM)
+    write_vdb(tmp_path / "a.vdb", density, first_um=(0.0, 0.0, 0.0), spacing_um=SPACING_UM)
     vdb = read_vdb(tmp_path / "a.vdb")
     assert vdb.transform == "ScaleTranslateMap"
     assert vdb.scale_um == (0.15, 0.14, 0.28)
@@ -44,7 +44,7 @@ def test_trees_of_many_nodes_keep_their_order(tmp_path: Path) -> None:
     marks = [(0, 0, 0), (1, 299, 4199), (0, 150, 127), (1, 20, 128), (0, 171, 4096), (1, 44, 4095)]
     for n, mark in enumerate(marks):
         density[mark] = 50 * (n + 1) - 45
-    write_vdb(tmp_path / "a.vdb", density, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    write_vdb(tmp_path / "a.vdb", density, first_um=(0.0, 0.0, 0.0), spacing_um=(1.0, 1.0, 1.0))
     vdb = read_vdb(tmp_path / "a.vdb")
     assert vdb.transform == "UniformScaleTranslateMap"
     assert len(vdb.voxels) == len(marks)
@@ -54,7 +54,12 @@ def test_trees_of_many_nodes_keep_their_order(tmp_path: Path) -> None:
 
 
 def test_an_empty_volume_is_a_file_without_leaves(tmp_path: Path) -> None:
-    write_vdb(tmp_path / "a.vdb", np.zeros((9, 9, 9), dtype=np.uint8), (0, 0, 0), SPACING_UM)
+    write_vdb(
+        tmp_path / "a.vdb",
+        np.zeros((9, 9, 9), dtype=np.uint8),
+        first_um=(0, 0, 0),
+        spacing_um=SPACING_UM,
+    )
     vdb = read_vdb(tmp_path / "a.vdb")
     assert vdb.voxels == {}
     assert vdb.metadata["file_bbox_max"] == (-1, -1, -1)
@@ -63,9 +68,9 @@ def test_an_empty_volume_is_a_file_without_leaves(tmp_path: Path) -> None:
 def test_same_voxels_same_bytes_and_other_voxels_another_uuid(tmp_path: Path) -> None:
     density = np.full((9, 9, 9), 7, dtype=np.uint8)
     for name in ("a", "b"):
-        write_vdb(tmp_path / f"{name}.vdb", density, (0, 0, 0), SPACING_UM)
+        write_vdb(tmp_path / f"{name}.vdb", density, first_um=(0, 0, 0), spacing_um=SPACING_UM)
     density[0, 0, 0] = 8
-    write_vdb(tmp_path / "c.vdb", density, (0, 0, 0), SPACING_UM)
+    write_vdb(tmp_path / "c.vdb", density, first_um=(0, 0, 0), spacing_um=SPACING_UM)
     assert (tmp_path / "a.vdb").read_bytes() == (tmp_path / "b.vdb").read_bytes()
     assert read_vdb(tmp_path / "a.vdb").uuid != read_vdb(tmp_path / "c.vdb").uuid
 
@@ -73,7 +78,7 @@ def test_same_voxels_same_bytes_and_other_voxels_another_uuid(tmp_path: Path) ->
 def test_a_file_that_was_cut_short_or_is_another_is_one_clear_line(tmp_path: Path) -> None:
     path = tmp_path / "a.vdb"
     density = np.random.default_rng(1).integers(0, 256, (9, 12, 30), dtype=np.uint8)
-    write_vdb(path, density, (0.0, 0.0, 0.0), SPACING_UM)
+    write_vdb(path, density, first_um=(0.0, 0.0, 0.0), spacing_um=SPACING_UM)
     whole = path.read_bytes()
     check_vdb(path)
     for size in (0, 7, 40, 80, len(whole) // 2, len(whole) - 1):
@@ -91,4 +96,9 @@ def test_a_file_that_was_cut_short_or_is_another_is_one_clear_line(tmp_path: Pat
 def test_a_folder_that_is_a_file_is_one_clear_line(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("in the way")
     with pytest.raises(OutputError, match=r"out/a\.vdb: can't be written"):
-        write_vdb(tmp_path / "out" / "a.vdb", np.zeros((3, 3, 3), np.uint8), (0, 0, 0), (1, 1, 1))
+        write_vdb(
+            tmp_path / "out" / "a.vdb",
+            np.zeros((3, 3, 3), np.uint8),
+            first_um=(0, 0, 0),
+            spacing_um=(1, 1, 1),
+        )

@@ -22,7 +22,7 @@ def _extract(
     voxels: NDArray[np.float32], window: Box, lattice: Box, region: Box, iso: float
 ) -> Mesh:
     field = smooth(Volume(voxels[window.slices], SPACING), 0.14)
-    distance = signed_distance(field, np.float32(iso), SPACING, 1000.0)
+    distance = signed_distance(field, np.float32(iso), spacing_um=SPACING, value_range=1000.0)
     repaired = repair(distance, SPACING, OPTIONS)
     return extract_surface(
         repaired.distance, Lattice(window, lattice, region, SPACING, (0.0, 0.0, 0.0))
@@ -106,8 +106,10 @@ def test_gradient_of_huge_and_tiny_voxels_has_the_same_digits(exponent: int) -> 
     scale = np.float32(2.0**exponent)
     plain = gradient_magnitude(field, SPACING)
     np.testing.assert_array_equal(gradient_magnitude(field * scale, SPACING), plain * scale)
-    distance = signed_distance(field * scale, scale, SPACING, float(scale))
-    np.testing.assert_array_equal(distance, signed_distance(field, np.float32(1), SPACING, 1.0))
+    distance = signed_distance(field * scale, scale, spacing_um=SPACING, value_range=float(scale))
+    np.testing.assert_array_equal(
+        distance, signed_distance(field, np.float32(1), spacing_um=SPACING, value_range=1.0)
+    )
 
 
 def test_f_stays_an_f() -> None:

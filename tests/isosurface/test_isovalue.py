@@ -51,7 +51,7 @@ def _volume_error(radius: float, sigma: float, noise: float, seed: int) -> float
     field = smooth(Volume(counts, SPACING), 0.14)
     iso = np.float32(find_iso_value(field, SPACING, IsoValueOptions()).value)
     box = Box((0, 0, 0), (z, y, x))
-    distance = signed_distance(field, iso, SPACING, 1000.0)
+    distance = signed_distance(field, iso, spacing_um=SPACING, value_range=1000.0)
     mesh = extract_surface(distance, Lattice.of_whole(box, SPACING))
     return enclosed_volume(mesh) / (4 / 3 * np.pi * radius**3) - 1
 

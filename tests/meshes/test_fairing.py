@@ -32,7 +32,7 @@ def _edges(mesh: Mesh) -> set[tuple[int, int]]:
 
 
 def test_long_diagonal_becomes_the_short_one() -> None:
-    fair = make_fair(_roof(), (), 0.0, 0.1)
+    fair = make_fair(_roof(), (), max_slide_um=0.0, max_turn_um=0.1)
     assert _edges(_roof()) - _edges(fair) == {(0, 1)}
     assert _edges(fair) - _edges(_roof()) == {(2, 3)}
     assert kinds(certify(fair)) == set()
@@ -41,8 +41,8 @@ def test_long_diagonal_becomes_the_short_one() -> None:
 
 def test_ridge_is_not_turned_beyond_the_bound() -> None:
     """Its two diagonals are `height` apart."""
-    assert _edges(make_fair(_roof(0.2), (), 0.0, 0.1)) == _edges(_roof())
-    assert _edges(make_fair(_roof(0.2), (), 0.0, 0.3)) != _edges(_roof())
+    assert _edges(make_fair(_roof(0.2), (), max_slide_um=0.0, max_turn_um=0.1)) == _edges(_roof())
+    assert _edges(make_fair(_roof(0.2), (), max_slide_um=0.0, max_turn_um=0.3)) != _edges(_roof())
 
 
 def test_border_and_vertices_stay() -> None:
@@ -50,7 +50,7 @@ def test_border_and_vertices_stay() -> None:
     positions = np.round(squeezed.positions * np.float32([1, 0.3, 1]), 3)
     keep = (positions[squeezed.triangles][:, :, 0] >= 0).all(axis=1)
     half = replace(squeezed, positions=positions, triangles=squeezed.triangles[keep])
-    fair = make_fair(half, ((0, 0.0),), 0.0, 0.5)
+    fair = make_fair(half, ((0, 0.0),), max_slide_um=0.0, max_turn_um=0.5)
     assert (fair.triangles[: len(half.triangles)] != half.triangles).any()
     np.testing.assert_array_equal(fair.positions[: len(half.positions)], half.positions)
     np.testing.assert_array_equal(border(fair.triangles), border(half.triangles))
@@ -67,7 +67,7 @@ def test_turn_that_would_make_a_fault_is_not_made() -> None:
     )
     before = certify(nested)
     assert "crossings" not in kinds(before)
-    fair = make_fair(nested, (), 0.0, 0.3)
+    fair = make_fair(nested, (), max_slide_um=0.0, max_turn_um=0.3)
     assert "crossings" not in kinds(certify(fair))
     assert (0, 1) in _edges(fair)
 
@@ -75,7 +75,7 @@ def test_turn_that_would_make_a_fault_is_not_made() -> None:
 @pytest.mark.parametrize("bound", [0.01, 0.5])
 def test_turning_is_the_same_twice(bound: float) -> None:
     squeezed = replace(ball(), positions=ball().positions * np.float32([1, 1, 0.2]))
-    first, second = (make_fair(squeezed, (), 0.1, bound) for _ in range(2))
+    first, second = (make_fair(squeezed, (), max_slide_um=0.1, max_turn_um=bound) for _ in range(2))
     np.testing.assert_array_equal(first.triangles, second.triangles)
     assert sharpest_angle(first) >= sharpest_angle(squeezed)
 
@@ -94,7 +94,7 @@ def _cut_ball() -> tuple[Mesh, tuple[int, float]]:
 
 def test_slides_make_an_iso_surface_fair_and_keep_it_on_the_ball() -> None:
     mesh, plane = _cut_ball()
-    fair = make_fair(mesh, (plane,), 0.5, 0.05)
+    fair = make_fair(mesh, (plane,), max_slide_um=0.5, max_turn_um=0.05)
     assert sharpest_angle(mesh) < 5
     assert sharpest_angle(fair) > 15
     assert kinds(certify(fair, (plane,))) == set()
@@ -131,10 +131,12 @@ def test_slide_that_would_make_a_fault_is_not_made(monkeypatch: pytest.MonkeyPat
     """Walls so close that they cross where vertices slide as they like."""
     shell = _shell(0.02)
     assert kinds(certify(shell)) == set()
-    assert kinds(certify(make_fair(shell, (), 0.5, 0.05))) == set()
+    assert kinds(certify(make_fair(shell, (), max_slide_um=0.5, max_turn_um=0.05))) == set()
     with monkeypatch.context() as patch:
         patch.setattr(fairing, "certify", lambda *_: certify(ball()))  # as if all were well
-        assert "crossings" in kinds(certify(make_fair(shell, (), 0.5, 0.05)))
+        assert "crossings" in kinds(
+            certify(make_fair(shell, (), max_slide_um=0.5, max_turn_um=0.05))
+        )
 
 
 LENGTH, SIDES = 32.0, 12
@@ -172,8 +174,8 @@ def test_needles_of_a_thin_tube_are_split_and_its_surface_stays(
     assert sharpest_angle(tube) < 8
     with monkeypatch.context() as patch:
         patch.setattr(fairing, "SPLITS", 0)
-        assert sharpest_angle(make_fair(tube, ENDS, 0.5, 0.1)) < 8
-    fair = make_fair(tube, ENDS, 0.5, 0.1)
+        assert sharpest_angle(make_fair(tube, ENDS, max_slide_um=0.5, max_turn_um=0.1)) < 8
+    fair = make_fair(tube, ENDS, max_slide_um=0.5, max_turn_um=0.1)
     assert kinds(certify(fair, ENDS)) == set()
     assert sharpest_angle(fair) > 12
     rim = border(tube.triangles)
@@ -195,10 +197,12 @@ def test_split_that_would_make_a_fault_is_not_made(monkeypatch: pytest.MonkeyPat
     inner, outer = _tube(2.0, 5), _tube(1.95, 31, apothem=True)
     nested = joined(outer, turned(inner), moved(inner, (0.0, 9.0, 0.0)))
     assert kinds(certify(nested, ENDS)) == set()
-    fair = make_fair(nested, ENDS, 0.5, 0.1)
+    fair = make_fair(nested, ENDS, max_slide_um=0.5, max_turn_um=0.1)
     assert kinds(certify(fair, ENDS)) == set()
     new = fair.positions[len(nested.positions) :]
     assert (new[:, 1] > 5).sum() > 3 * SIDES
     with monkeypatch.context() as patch:
         patch.setattr(fairing, "certify", lambda *_: certify(ball()))  # as if all were well
-        assert "crossings" in kinds(certify(make_fair(nested, ENDS, 0.5, 0.1), ENDS))
+        assert "crossings" in kinds(
+            certify(make_fair(nested, ENDS, max_slide_um=0.5, max_turn_um=0.1), ENDS)
+        )

@@ -57,7 +57,7 @@ def test_faults_of_every_round_are_those_of_a_full_check(
         return found
 
     monkeypatch.setattr(simplify_valid._Draft, "faults", compared)
-    done = simplify_soundly(sponge(seed), (), max_error_um)
+    done = simplify_soundly(sponge(seed), (), max_error_um=max_error_um)
     assert kinds(certify(done.mesh)) == set()
     assert totals[-1] == 0
     assert max_error_um < 2 or len(totals) > 1  # else this would show nothing
@@ -78,6 +78,6 @@ def test_triangles_are_found_among_others() -> None:
 
 
 def test_simplified_ball_is_one_body_and_says_so() -> None:
-    done = simplify_soundly(ball(), (), 0.5)
+    done = simplify_soundly(ball(), (), max_error_um=0.5)
     assert (done.mended, done.fallbacks) == (0, 0)
     assert len(done.mesh.triangles) < 0.3 * len(ball().triangles)

@@ -21,7 +21,9 @@ def _on_ball(radius: float) -> NDArray[np.float64]:
 
 
 def test_diagonal_is_split_into_four_triangles_that_cover_the_two() -> None:
-    positions, normals, triangles, ends = split_edges(DIAMOND, UP, PAIR, BOTH, (), 0.1)
+    positions, normals, triangles, ends = split_edges(
+        DIAMOND, UP, triangles=PAIR, wanted=BOTH, planes=(), max_lift_um=0.1
+    )
     np.testing.assert_array_equal(positions[:4], DIAMOND)
     np.testing.assert_array_equal(positions[4:], [[4, 0, 0]])
     np.testing.assert_array_equal(normals[4:], [[0, 0, 1]])
@@ -33,7 +35,9 @@ def test_diagonal_is_split_into_four_triangles_that_cover_the_two() -> None:
 @pytest.mark.parametrize("radius", [16.0, 32.0])
 def test_new_vertex_lies_on_the_ball_up_to_the_fourth_order(radius: float) -> None:
     corners = _on_ball(radius)
-    positions, normals, *_ = split_edges(corners, corners / radius, PAIR, BOTH, (), 2.0)
+    positions, normals, *_ = split_edges(
+        corners, corners / radius, triangles=PAIR, wanted=BOTH, planes=(), max_lift_um=2.0
+    )
     half = np.arcsin(4 / radius)  # of the angle between the ends
     assert len(positions) == 6
     assert radius - np.linalg.norm(corners[:2].mean(axis=0)) > 0.4 * radius * half**2
@@ -45,7 +49,9 @@ def test_surface_that_would_move_too_far_is_not_split() -> None:
     corners = _on_ball(16.0)
     sagitta = 16 - np.sqrt(16**2 - 4**2)
     for bound, count in ((0.9 * sagitta, 5), (1.1 * sagitta, 6)):
-        positions, *_ = split_edges(corners, corners / 16, PAIR, BOTH, (), bound)
+        positions, *_ = split_edges(
+            corners, corners / 16, triangles=PAIR, wanted=BOTH, planes=(), max_lift_um=bound
+        )
         assert len(positions) == count
 
 
@@ -69,7 +75,9 @@ def test_ends_that_disagree_lift_by_the_lesser(first: float, second: float, heig
     lean = [[s, 0, np.sqrt(1 - s**2)] for s in (first, second)]
     positions = np.concatenate([DIAMOND, [[4, 0, 9], [4, 0, -9]]])  # room above and below
     normals = np.concatenate([lean, UP])
-    split, *_ = split_edges(positions, normals, PAIR, BOTH, (), 1.0)
+    split, *_ = split_edges(
+        positions, normals, triangles=PAIR, wanted=BOTH, planes=(), max_lift_um=1.0
+    )
     assert split[6, 2] == pytest.approx(height, rel=0.03)
 
 
@@ -81,7 +89,9 @@ def test_split_that_would_fold_the_surface_is_not_made(widths: tuple[int, int], 
     positions = np.concatenate([DIAMOND, [[4, 0, 9]]])
     positions[2:4, 1] = widths[0], -widths[1]
     normals = np.concatenate([[[-lean, 0, up], [lean, 0, up]], UP[:3]])
-    *_, ends = split_edges(positions, normals, PAIR, BOTH, (), 10.0)
+    *_, ends = split_edges(
+        positions, normals, triangles=PAIR, wanted=BOTH, planes=(), max_lift_um=10.0
+    )
     assert len(ends) == count
 
 
@@ -90,7 +100,12 @@ def test_border_is_not_split() -> None:
     for triangles in (PAIR[:1], np.array([[0, 1, 2], [2, 1, 3]])):
         corners = np.array([[0, 0, 0], [8, 0, 0], [4, 1, 0], [5, 1.5, 0]], float)
         positions, _, same, ends = split_edges(
-            corners, UP, triangles, np.arange(len(triangles)) == 0, (), 0.1
+            corners,
+            UP,
+            triangles=triangles,
+            wanted=np.arange(len(triangles)) == 0,
+            planes=(),
+            max_lift_um=0.1,
         )
         assert len(ends) == 0
         np.testing.assert_array_equal(positions, corners)
@@ -101,7 +116,9 @@ def test_border_is_not_split() -> None:
 def test_chord_between_two_vertices_on_a_plane_is_not_split(
     column: int, value: float, count: int
 ) -> None:
-    *_, ends = split_edges(DIAMOND, UP, PAIR, BOTH, ((column, value),), 0.1)
+    *_, ends = split_edges(
+        DIAMOND, UP, triangles=PAIR, wanted=BOTH, planes=((column, value),), max_lift_um=0.1
+    )
     assert len(ends) == count
 
 
@@ -109,7 +126,9 @@ def test_point_that_rises_to_a_plane_is_not_made() -> None:
     corners = _on_ball(16.0)
     for above, count in ((0.01, 0), (1.5, 1)):
         plane = (2, 16 + above)
-        *_, ends = split_edges(corners, corners / 16, PAIR, BOTH, (plane,), 0.6)
+        *_, ends = split_edges(
+            corners, corners / 16, triangles=PAIR, wanted=BOTH, planes=(plane,), max_lift_um=0.6
+        )
         assert len(ends) == count
 
 
@@ -118,6 +137,11 @@ def test_of_two_edges_of_one_triangle_the_longer_is_split() -> None:
     corners = np.array([[0, 0, 0], [8, 0, 0], [4, -1, 0], [9, 1, 0], [4.5, 1.2, 0]], float)
     strip = np.array([[1, 0, 2], [0, 1, 3], [0, 3, 4]])
     *_, ends = split_edges(
-        corners, np.tile([0.0, 0, 1], (5, 1)), strip, np.array([True, False, True]), (), 0.1
+        corners,
+        np.tile([0.0, 0, 1], (5, 1)),
+        triangles=strip,
+        wanted=np.array([True, False, True]),
+        planes=(),
+        max_lift_um=0.1,
     )
     np.testing.assert_array_equal(np.sort(ends), [[0, 3]])

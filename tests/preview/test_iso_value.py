@@ -78,8 +78,10 @@ def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
 ) -> None:
     """Each candidate's line is a circle, whole, in its own colour, and at its own radius."""
     flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 800.0}}
-    settings = load(None, None, flags)
-    candidates, path = preview(str(source), "0", "r0_c0", tmp_path / "a.png", settings)
+    settings = load(None, None, flags=flags)
+    candidates, path = preview(
+        str(source), "0", tile_id="r0_c0", out=tmp_path / "a.png", settings=settings
+    )
     top, left = SLICES_AT
     xy = np.asarray(Image.open(path))[top : top + 900, left : left + 900]
     outlining = [c for c in candidates if 0.01 < c.inside < 0.5]  # others hardly cut this plane
@@ -103,7 +105,13 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     source: Path, tmp_path: Path
 ) -> None:
     flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 600.0}}
-    candidates, _ = preview(str(source), "0", "r0_c0", tmp_path / "a.png", load(None, None, flags))
+    candidates, _ = preview(
+        str(source),
+        "0",
+        tile_id="r0_c0",
+        out=tmp_path / "a.png",
+        settings=load(None, None, flags=flags),
+    )
     chosen = next(c for c in candidates if c.is_chosen)
     assert (chosen.name, chosen.level, chosen.raw, chosen.confidence) == ("given", 600, 600, None)
     assert [c.is_chosen for c in candidates].count(True) == 1

@@ -102,7 +102,15 @@ def _slices() -> list[Slice]:
     lattice, first, spacing = Box((2, 10, 20), (14, 50, 80)), (1.0, 2.0, 4.0), (0.5, 0.2, 0.2)
     center = np.array(first) + np.array([6, 8, 48]) * spacing
     volume = np.zeros(lattice.shape, np.uint8)
-    return cut_unit(volume, lattice, first, spacing, _ball(center, 1.0), 0.2, None)
+    return cut_unit(
+        volume,
+        lattice,
+        first_um=first,
+        spacing_um=spacing,
+        mesh=_ball(center, 1.0),
+        sigma_um=0.2,
+        iso_at=None,
+    )
 
 
 def test_mid_slices_meet_the_mesh_where_it_lies() -> None:
@@ -128,8 +136,8 @@ def test_field_minus_iso_value_is_zero_on_a_ramps_own_level() -> None:
     lattice = Box((0, 0, 0), (9, 16, 16))
     ramp = np.broadcast_to(np.arange(16, dtype=np.uint8) * 10, lattice.shape)
     slices = cut_unit(
-        ramp, lattice, (0, 0, 0), (1, 1, 1), None, 0.7,
-        lambda box: np.full(box.shape, 70, np.float32),
+        ramp, lattice, first_um=(0, 0, 0), spacing_um=(1, 1, 1), mesh=None, sigma_um=0.7,
+        iso_at=lambda box: np.full(box.shape, 70, np.float32),
     )  # fmt: skip
     by_name = {s.name: s.above for s in slices}
     assert list(by_name) == list(VIEWS)
@@ -185,17 +193,19 @@ def test_thinning_out_keeps_the_share_and_all_channels() -> None:
 
 
 def test_curve_marks_what_was_taken_and_what_was_found() -> None:
-    svg = charts.criterion([0.0, 50.0, 100.0], [0.0, 1.0, 0.0], 75.0, 25.0)
+    svg = charts.criterion([0.0, 50.0, 100.0], [0.0, 1.0, 0.0], taken=75.0, found=25.0)
     assert 'class="mark" d="M240.0,' in svg
     assert 'class="found" d="M80.0,' in svg
-    assert "found" not in charts.criterion([0.0, 100.0], [0.0, 1.0], 75.0, 75.0)
-    refused = charts.criterion([0.0, 100.0], [0.0, 1.0], None, 25.0)
+    assert "found" not in charts.criterion([0.0, 100.0], [0.0, 1.0], taken=75.0, found=75.0)
+    refused = charts.criterion([0.0, 100.0], [0.0, 1.0], taken=None, found=25.0)
     assert "found" in refused
     assert "mark" not in refused
 
 
 def test_value_beyond_the_axis_is_marked_at_its_end() -> None:
-    assert 'class="mark" d="M320.0,' in charts.criterion([0.0, 1.0], [0.0, 1.0], 9.0, None)
+    assert 'class="mark" d="M320.0,' in charts.criterion(
+        [0.0, 1.0], [0.0, 1.0], taken=9.0, found=None
+    )
 
 
 def test_histogram_draws_every_transfer_function() -> None:

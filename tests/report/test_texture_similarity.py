@@ -68,7 +68,7 @@ def test_level_with_maps_looks_like_the_finest(
 
 def test_picture_shows_the_surface_lit_from_the_eye(lods: tuple[Lod, ...]) -> None:
     ends = np.array([lods[0].mesh.positions.min(axis=0), lods[0].mesh.positions.max(axis=0)])
-    picture = draw(lods[0], VIEWS[0], ends, 64)
+    picture = draw(lods[0], VIEWS[0], ends=ends, size=64)
     assert picture.shape == (64, 64)
     assert 0 < (picture > 0).mean() < 1
     assert picture.max() <= 1

@@ -164,7 +164,7 @@ def test_voxels_hold_the_boundary_intensity_at_the_nuclei_s_surface() -> None:
     box = Box((0, 0, 0), (64, 200, 360))
     size_um = tuple(n * h for n, h in zip(box.shape, SPACING_UM, strict=True))
     tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed=1, brightness_spread=0.0)
-    voxels = microscope.record(tissue, 0, box, seed=1).astype(np.float64)
+    voxels = microscope.record(tissue, 0, box=box, seed=1).astype(np.float64)
     waves = microscope.waves_of(0, tissue.size_um, seed=1)
     directions = np.random.default_rng(0).normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -237,7 +237,7 @@ def test_each_dye_is_where_its_body_is() -> None:
     tube = Tube((5.0, -4.0, 16.0), (5.0, 16.0, 16.0), 3.0)
     tissue = Tissue((10.08, 11.2, 22.4), (nucleus,), (tube,))
     box = Box((0, 0, 0), (36, 80, 160))
-    hoechst, mart1, cd31 = (microscope.record(tissue, stain, box, seed=0) for stain in range(3))
+    hoechst, mart1, cd31 = (microscope.record(tissue, stain, box=box, seed=0) for stain in range(3))
     background = [100.0 + stain.background for stain in STAINS]
     assert disc_means(hoechst, (5.0, 6.0, 6.0)) == pytest.approx(background[0] + 1000.0, rel=0.15)
     assert disc_means(hoechst, (5.0, 6.0, 16.0)) == pytest.approx(background[0], rel=0.4)
@@ -253,7 +253,7 @@ def test_blur_is_wider_along_z() -> None:
     nucleus = Nucleus((8.0, 8.0, 8.0), (6.0, 6.0, 6.0), np.eye(3), 1.0, 0.0)
     tissue = Tissue((16.0, 16.0, 16.0), (nucleus,), ())
     box = Box((0, 0, 0), (58, 115, 115))
-    voxels = microscope.record(tissue, 0, box, seed=0).astype(np.float64)
+    voxels = microscope.record(tissue, 0, box=box, seed=0).astype(np.float64)
     z = voxels[:29, 55:60, 55:60].mean(axis=(1, 2))
     x = voxels[28:31, 55:60, :57].mean(axis=(0, 1))
     slope_z = np.diff(z).max() / SPACING_UM[0]
@@ -268,15 +268,15 @@ def test_a_box_repeats_the_dye_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(microscope, "READ_NOISE", 0.0)
     monkeypatch.setattr(microscope, "GAIN", 1e-3)  # many electrons: next to no Poisson noise
     tissue = grow_tissue((6.72, 13.44, 13.44), seed=2, brightness_spread=1.0)
-    whole = microscope.record(tissue, 1, Box((0, 0, 0), (24, 96, 96)), seed=2)
+    whole = microscope.record(tissue, 1, box=Box((0, 0, 0), (24, 96, 96)), seed=2)
     part = Box((3, 20, 40), (20, 70, 96))
-    alone = microscope.record(tissue, 1, part, seed=2)
+    alone = microscope.record(tissue, 1, box=part, seed=2)
     assert np.abs(alone.astype(int) - whole[part.slices]).max() <= 10
 
 
 def test_noise_has_the_stated_variance() -> None:
     tissue = Tissue((10.0, 10.0, 10.0), (), ())
-    voxels = microscope.record(tissue, 0, Box((0, 0, 0), (16, 64, 64)), seed=0)
+    voxels = microscope.record(tissue, 0, box=Box((0, 0, 0), (16, 64, 64)), seed=0)
     difference = np.diff(voxels.astype(np.float64), axis=2) / math.sqrt(2.0)
     photons = (voxels.mean() - microscope.OFFSET) / microscope.GAIN
     variance = microscope.GAIN**2 * photons + microscope.READ_NOISE**2

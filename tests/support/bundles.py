@@ -14,7 +14,11 @@ def write_tiles(folder, tiles=TILES):
     for tile in tiles:
         write_tile(folder, tile)
     write_stage(
-        folder, "two tiles", (spheres.RED, spheres.BLUE), [TileExtent.of(t) for t in tiles], {}
+        folder,
+        "two tiles",
+        looks=(spheres.RED, spheres.BLUE),
+        tiles=[TileExtent.of(t) for t in tiles],
+        provenance={},
     )
     return folder / "stage.usda"
 

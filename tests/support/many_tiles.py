@@ -82,7 +82,7 @@ def write_many(folder: Path) -> Path:
     for layer in others:
         layer.parent.mkdir()
         shutil.copyfile(first, layer)
-    write_stage(folder, "many", looks, extents, {})
+    write_stage(folder, "many", looks=looks, tiles=extents, provenance={})
     return folder / "stage.usda"
 
 

@@ -26,10 +26,17 @@ def plan_of(
     channels: tuple[Channel, ...] = CHANNELS,
     **sections: dict[str, object],
 ) -> Plan:
-    settings = settings_module.load(None, None, {"plan": flags or {}, **sections})
+    settings = settings_module.load(None, None, flags={"plan": flags or {}, **sections})
     level = choose_level(levels, len(channels), settings)
     return make_plan(
-        "in.ome.zarr", "in", "ab" * 32, levels, (0.0, 0.0, 0.0), channels, level, settings
+        "in.ome.zarr",
+        "in",
+        fingerprint="ab" * 32,
+        levels=levels,
+        origin_um=(0.0, 0.0, 0.0),
+        channels=channels,
+        level=level,
+        settings=settings,
     )
 
 

@@ -78,7 +78,13 @@ def write_whole(folder: Path) -> Path:
     for tile in tiles:
         write_tile(folder, tile)
     provenance = {"generator": "tests", "seed": 1, "settings": {"lod.errors": [0.1, 0.4]}}
-    write_stage(folder, "F", make_looks(), [TileExtent.of(t) for t in tiles], provenance)
+    write_stage(
+        folder,
+        "F",
+        looks=make_looks(),
+        tiles=[TileExtent.of(t) for t in tiles],
+        provenance=provenance,
+    )
     return folder / "stage.usda"
 
 

@@ -42,7 +42,7 @@ def sponge() -> Mesh:
 
 def _chain(mesh: Mesh) -> Iterator[Mended]:
     for error in (0.1, 0.5, 2.0, 4.0):
-        mended = simplify_soundly(mesh, PLANES, error)
+        mended = simplify_soundly(mesh, PLANES, max_error_um=error)
         yield mended
         mesh = mended.mesh
 
@@ -92,7 +92,7 @@ def test_body_that_cannot_be_mended_keeps_its_surface_and_is_counted(
         np.concatenate([sponge.normals, alone.normals]),
     )
     monkeypatch.setattr(simplify_valid, "ROUNDS", 0)
-    kept = simplify_soundly(both, PLANES, 2.0)
+    kept = simplify_soundly(both, PLANES, max_error_um=2.0)
     assert kept.fallbacks > 0
     assert kinds(certify(kept.mesh, PLANES)) == set()
     assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # the sponge is one body, mostly
@@ -102,7 +102,7 @@ def test_body_that_cannot_be_mended_keeps_its_surface_and_is_counted(
 def test_mesh_with_faults_of_its_own_keeps_the_body_that_has_them() -> None:
     """Nothing hides: what is at fault stays, and is found by whoever checks."""
     holed = replace(ball(), triangles=ball().triangles[1:])
-    done = simplify_soundly(holed, (), 0.5)
+    done = simplify_soundly(holed, (), max_error_um=0.5)
     assert done.fallbacks == 1
     np.testing.assert_array_equal(done.mesh.triangles, holed.triangles)
     assert kinds(certify(done.mesh)) == {"open"}
@@ -128,8 +128,8 @@ def _farthest(mesh: Mesh, simplified: Mesh) -> float:
 
 def test_thin_process_is_cut_off_and_with_a_bound_it_stays(with_process: Mesh) -> None:
     """The simplifier's error, a mean over planes, hardly feels it."""
-    assert _farthest(with_process, simplify_soundly(with_process, (), 2.0).mesh) > 10
-    bound = simplify_soundly(with_process, (), 2.0, 3.0)
+    assert _farthest(with_process, simplify_soundly(with_process, (), max_error_um=2.0).mesh) > 10
+    bound = simplify_soundly(with_process, (), max_error_um=2.0, max_away_um=3.0)
     assert _farthest(with_process, bound.mesh) <= 3.0
     assert kinds(certify(bound.mesh)) == set()
     assert bound.fallbacks == 0

@@ -64,7 +64,7 @@ def test_each_class_overlaps_the_truth_and_beats_multi_otsu(
 def test_it_does_in_other_shapes_noises_and_biases(
     shape: tuple[int, int, int], bias: float, noise: float
 ) -> None:
-    head = make_head(shape, noise, bias, seed=31)
+    head = make_head(shape, noise, bias=bias, seed=31)
     require_overlap(head, learn_tissue(head.voxels, head.spacing_um, THREE), 0.9)
 
 
@@ -139,7 +139,13 @@ def test_neighbours_far_away_vote_less() -> None:
     likelihood = np.stack([-2 * (seen - k) ** 2 for k in (0, 1)]).astype(np.float32)
     mask = np.ones(truth.shape, np.bool_)
     right = {
-        depth: (apply_potts_prior(likelihood, mask, (depth, 1.0, 1.0), 0.6, 5)[1] > 0.5) == truth
+        depth: (
+            apply_potts_prior(
+                likelihood, mask, spacing_um=(depth, 1.0, 1.0), strength=0.6, rounds=5
+            )[1]
+            > 0.5
+        )
+        == truth
         for depth in (1.0, 6.0)
     }
     alone = ((seen > 0.5) == truth).mean()
@@ -150,7 +156,7 @@ def test_neighbours_far_away_vote_less() -> None:
 def test_a_hull_holds_its_volume() -> None:
     points, triangles = _icosphere(3)
     ball = Hull(20 * points + 30, triangles)
-    filled = fill_hull(ball, (60, 60, 40), (1.0, 1.0, 1.5))
+    filled = fill_hull(ball, (60, 60, 40), spacing_mm=(1.0, 1.0, 1.5))
     # voxels that the surface passes count as inside: half a voxel more all round
     assert filled.sum() * 1.5 == pytest.approx(4 / 3 * np.pi * 20.5**3, rel=0.05)
     assert filled[30, 30, 20]

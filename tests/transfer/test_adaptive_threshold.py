@@ -245,7 +245,9 @@ def two_bodies() -> NDArray[np.uint16]:
 
 def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     display = find_display(two_bodies(), WindowOptions(0, 100))
-    look = make_look("MR", (1, 1, 1), display, {"a": 500.0}, 0.9, "clear")
+    look = make_look(
+        "MR", (1, 1, 1), display=display, iso_values={"a": 500.0}, confidence=0.9, surface="clear"
+    )
     assert look.threshold is not None
     assert 250 < look.threshold < 850
     assert look.threshold_normalized is not None
@@ -257,7 +259,7 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     again = display_from_json(json.loads(json.dumps(display_to_json(display))))
     assert again == display
     flat = find_display(np.full(100, 7, np.uint8), WindowOptions())
-    bare = make_look("MR", (1, 1, 1), flat, {}, 0.0, "none")
+    bare = make_look("MR", (1, 1, 1), display=flat, iso_values={}, confidence=0.0, surface="none")
     assert bare.threshold is None
     assert THRESHOLD not in bare.transfer_functions
 

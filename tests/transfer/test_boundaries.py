@@ -43,7 +43,7 @@ def nested(
 
 
 def fine_counts(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> NDArray[np.int64]:
-    return count_joint(voxels, spacing, STEEPEST, FINE_ROWS)
+    return count_joint(voxels, spacing, gradient_max=STEEPEST, rows=FINE_ROWS)
 
 
 def boundaries(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> tuple[Boundaries, float]:
@@ -220,10 +220,12 @@ def test_an_edge_counts_as_the_voxels_of_a_ball_do(spacing: Spacing) -> None:
     """An independent count: of a ball's voxels, which lie about its surface in all directions."""
     sigma, radius, noise = 0.8, 25.0, 0.03
     voxels = nested((0.2, 0.8), (radius,), sigma, noise, spacing)
-    counted = count_joint(voxels, spacing, 1.0).reshape(ROWS, COLUMNS // 4, 4).sum(axis=2)
+    counted = (
+        count_joint(voxels, spacing, gradient_max=1.0).reshape(ROWS, COLUMNS // 4, 4).sum(axis=2)
+    )
     plane = Plane(ROWS, COLUMNS // 4, 1.0, spacing)
     area = 4 * np.pi * radius**2 / spacing[0]  # voxels in a layer one finest spacing thick
-    expected = area * count_edge(0.2, 0.8, sigma, noise, plane)
+    expected = area * count_edge(0.2, 0.8, blur=sigma, sigma=noise, plane=plane)
     # above the noise, by rows and by columns
     steep = slice(20, None)
     for axis in (0, 1):

@@ -123,7 +123,9 @@ def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
 def test_look_means_over_the_tiles_that_have_a_surface() -> None:
     display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     values = {"a": 20.0, "b": 40.0, "c": None}
-    look = make_look("CD31", (0, 1, 0), display, values, 0.75, "clear")
+    look = make_look(
+        "CD31", (0, 1, 0), display=display, iso_values=values, confidence=0.75, surface="clear"
+    )
     assert look.iso_value == 30
     assert look.iso_confidence == 0.75
     assert look.iso_normalized == pytest.approx(0.3)
@@ -132,7 +134,14 @@ def test_look_means_over_the_tiles_that_have_a_surface() -> None:
 def test_opacity_of_an_unclear_channel_does_not_begin_at_its_level() -> None:
     display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     clear, unclear, none = (
-        make_look("CD31", (0, 1, 0), display, {"a": value}, 0.3, verdict).transfer_functions
+        make_look(
+            "CD31",
+            (0, 1, 0),
+            display=display,
+            iso_values={"a": value},
+            confidence=0.3,
+            surface=verdict,
+        ).transfer_functions
         for value, verdict in ((30.0, "clear"), (30.0, "unclear"), (None, "none"))
     )
     assert unclear == none

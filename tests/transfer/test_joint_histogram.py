@@ -78,29 +78,32 @@ def test_a_blurred_edge_is_an_arc(sigma: float) -> None:
 
 def test_every_inner_voxel_is_counted_at_its_value_and_row() -> None:
     voxels = np.full((5, 6, 7), 40, np.uint8)
-    counts = count_joint(voxels, (1, 1, 1), 0.5)
+    counts = count_joint(voxels, (1, 1, 1), gradient_max=0.5)
     assert counts.shape == (ROWS, COLUMNS)
     assert counts.sum() == counts[0, 40] == 3 * 4 * 5
     ramp = np.broadcast_to(np.arange(0, 70, 10, dtype=np.uint8), (5, 6, 7))
-    counts = count_joint(np.ascontiguousarray(ramp), (1, 1, 1), 0.5)
+    counts = count_joint(np.ascontiguousarray(ramp), (1, 1, 1), gradient_max=0.5)
     row = round(20 / 255 / 0.5 * (ROWS - 1))
     assert {tuple(cell) for cell in np.argwhere(counts)} == {(row, v) for v in (10, 20, 30, 40, 50)}
     assert (counts[counts > 0] == 12).all()
-    assert count_joint(np.ascontiguousarray(ramp), (1, 1, 1), 0.01)[-1].sum() == 60
-    assert count_joint(np.ascontiguousarray(ramp), (1, 1, 1), 0.5, every=2).sum() == 40
+    assert count_joint(np.ascontiguousarray(ramp), (1, 1, 1), gradient_max=0.01)[-1].sum() == 60
+    assert count_joint(np.ascontiguousarray(ramp), (1, 1, 1), gradient_max=0.5, every=2).sum() == 40
 
 
 @pytest.mark.parametrize("shape", [(1, 5, 6), (1, 1, 1), (2, 2, 2)])
 def test_thin_volumes_repeat_their_ends(shape: tuple[int, int, int]) -> None:
-    counts = count_joint(np.full(shape, 9, np.uint8), (1, 1, 1), 0.5)
+    counts = count_joint(np.full(shape, 9, np.uint8), (1, 1, 1), gradient_max=0.5)
     assert counts.sum() == counts[0, 9] > 0
 
 
 def test_fine_rows_become_those_of_the_scale() -> None:
     voxels = np.random.default_rng(2).integers(0, 120, (12, 20, 20)).astype(np.uint8)
-    fine = count_joint(voxels, SPACING, STEEPEST, FINE_ROWS)
+    fine = count_joint(voxels, SPACING, gradient_max=STEEPEST, rows=FINE_ROWS)
     for gradient_max in (0.2, 0.55):
-        direct, coarse = count_joint(voxels, SPACING, gradient_max), rebin(fine, gradient_max)
+        direct, coarse = (
+            count_joint(voxels, SPACING, gradient_max=gradient_max),
+            rebin(fine, gradient_max),
+        )
         assert (direct.sum(axis=0) == coarse.sum(axis=0)).all()
         # a fine row may lie across the border of two: never further
         below = [counts.cumsum(axis=0) for counts in (direct, coarse)]
@@ -111,16 +114,16 @@ def test_fine_rows_become_those_of_the_scale() -> None:
 def test_the_scale_ends_above_the_edges_and_not_at_a_hot_voxel() -> None:
     edge = np.zeros((80, 80, 80), np.uint8)
     edge[:, :, 40:] = 102  # 0.4 of the window
-    fine = count_joint(edge, (1, 1, 1), STEEPEST, FINE_ROWS)
+    fine = count_joint(edge, (1, 1, 1), gradient_max=STEEPEST, rows=FINE_ROWS)
     assert choose_gradient_max(fine) == pytest.approx(0.4, abs=2 / FINE_ROWS)
     edge[5, 5, 9] = 255
-    fine = count_joint(edge, (1, 1, 1), STEEPEST, FINE_ROWS)
+    fine = count_joint(edge, (1, 1, 1), gradient_max=STEEPEST, rows=FINE_ROWS)
     assert choose_gradient_max(fine) < 0.5
 
 
 def test_a_constant_volume_has_a_scale() -> None:
     for voxels in (np.zeros((4, 4, 4), np.uint8), np.full((4, 4, 4), 255, np.uint8)):
-        fine = count_joint(voxels, (1, 1, 1), STEEPEST, FINE_ROWS)
+        fine = count_joint(voxels, (1, 1, 1), gradient_max=STEEPEST, rows=FINE_ROWS)
         assert choose_gradient_max(fine) == 0.05
     assert choose_gradient_max(np.zeros((FINE_ROWS, COLUMNS), np.int64)) == 0.05
 

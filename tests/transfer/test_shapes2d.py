@@ -179,7 +179,13 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stage")
     for tile in TILES:
         write_tile(folder, tile)
-    write_stage(folder, "two tiles", LOOKS, [TileExtent.of(tile) for tile in TILES], {})
+    write_stage(
+        folder,
+        "two tiles",
+        looks=LOOKS,
+        tiles=[TileExtent.of(tile) for tile in TILES],
+        provenance={},
+    )
     return folder / "stage.usda"
 
 
@@ -285,7 +291,7 @@ def test_a_faulty_edit_is_one_clear_line(
 def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its bundle, to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, Engine(0).run)
+    write_bundle(stage, out, None, run=Engine(0).run)
     return out
 
 
@@ -315,7 +321,9 @@ def test_the_bundle_has_the_shapes_and_its_files_fit_their_schema(bundle: Path) 
 
 
 def test_the_histogram_counts_the_volumes_of_all_tiles(bundle: Path) -> None:
-    counts = sum(count_joint(t.channels[0].volume, spheres.SPACING, 0.37) for t in TILES)
+    counts = sum(
+        count_joint(t.channels[0].volume, spheres.SPACING, gradient_max=0.37) for t in TILES
+    )
     assert isinstance(counts, np.ndarray)
     assert functions(bundle)["most"] == counts.max()
     assert np.array_equal(picture(bundle), log_scaled(counts))
@@ -345,14 +353,16 @@ def test_an_edit_of_shapes_reaches_the_bundle(stage: Path, tmp_path: Path) -> No
         shapeSoftness=Vt.FloatArray([0]),
         gradientMax=0.74,
     )
-    write_bundle(path, tmp_path / "bundle", None, Engine(0).run)
+    write_bundle(path, tmp_path / "bundle", None, run=Engine(0).run)
     entry = channel(tmp_path / "bundle")
     assert entry["transfer_function"] == NAME  # what is chosen in the layer
     found = functions(tmp_path / "bundle")
     edited = Shape("rectangle", (0.1, 0.3), (0.2, 0.8), 0.2, (0, 1, 0), 0.6, 0)
     assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: (edited,)}  # type: ignore[attr-defined]
     assert found["gradient_max"] == 0.74
-    counts = sum(count_joint(t.channels[0].volume, spheres.SPACING, 0.74) for t in TILES)
+    counts = sum(
+        count_joint(t.channels[0].volume, spheres.SPACING, gradient_max=0.74) for t in TILES
+    )
     assert np.array_equal(picture(tmp_path / "bundle"), log_scaled(np.asarray(counts)))
 
 

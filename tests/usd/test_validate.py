@@ -153,7 +153,9 @@ def test_a_field_that_its_vdb_lacks_is_found(stage_path: Path, tmp_path: Path) -
 
 def test_a_vdb_in_metres_is_found(stage_path: Path, tmp_path: Path) -> None:
     voxels = np.full((16, 48, 18), 9, np.uint8)
-    write_vdb(tmp_path / "metres.vdb", voxels, (0, 0, 0), (0.5e-6, 0.25e-6, 0.25e-6))
+    write_vdb(
+        tmp_path / "metres.vdb", voxels, first_um=(0, 0, 0), spacing_um=(0.5e-6, 0.25e-6, 0.25e-6)
+    )
     field = 'over "density"\n{\nasset filePath = @./metres.vdb@\n}'
     (text,) = edit_volume(stage_path, tmp_path, field)
     assert "voxels of [2.5e-07, 2.5e-07, 5e-07]" in text

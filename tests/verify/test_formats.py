@@ -29,9 +29,9 @@ def made(tmp_path_factory):
     tile = spheres.tile(0)
     write_tile(out / "stage", tile)
     looks = (spheres.RED, spheres.BLUE)
-    write_stage(out / "stage", "one tile", looks, [TileExtent.of(tile)], {})
+    write_stage(out / "stage", "one tile", looks=looks, tiles=[TileExtent.of(tile)], provenance={})
     write_list(out / "stage", {}, out / "stage")
-    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, Engine(0).run)
+    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)
     return out
 
 
@@ -184,9 +184,15 @@ def test_tileset_whose_errors_grow_is_found(out):
 def test_a_build_without_any_surface_passes(tmp_path):
     tile = spheres.tile(0, (spheres.BLUE,))
     write_tile(tmp_path / "stage", tile)
-    write_stage(tmp_path / "stage", "empty", [spheres.BLUE], [TileExtent.of(tile)], {})
+    write_stage(
+        tmp_path / "stage",
+        "empty",
+        looks=[spheres.BLUE],
+        tiles=[TileExtent.of(tile)],
+        provenance={},
+    )
     write_list(tmp_path / "stage", {}, tmp_path / "stage")
-    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, Engine(0).run)
+    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, run=Engine(0).run)
     assert failed(tmp_path) == set()
     assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"
 
@@ -211,13 +217,20 @@ def test_cut_file_of_the_stage_is_found(out, path, capfd):
 @pytest.fixture
 def with_copies(out):
     """A build whose plan asks for closed copies: of CD31, which has a surface."""
-    settings = settings_module.load(None, None, {"surface": {"closed_tiles": True}})
+    settings = settings_module.load(None, None, flags={"surface": {"closed_tiles": True}})
     channels = tuple(
         Channel(k, name, (1, 0, 0)) for k, name in enumerate(("CD31", "Hoechst 33342"))
     )
     level = Level((8, 8, 8), (1.0, 1.0, 1.0))
     plan = make_plan(
-        "in", "in", "ab" * 32, (level,), (0.0, 0.0, 0.0), channels, (0, "asked for"), settings
+        "in",
+        "in",
+        fingerprint="ab" * 32,
+        levels=(level,),
+        origin_um=(0.0, 0.0, 0.0),
+        channels=channels,
+        level=(0, "asked for"),
+        settings=settings,
     )
     Store(out).save_plan(plan)
     copy = out / "stage" / "tiles" / "r0_c0" / "CD31_closed.stl"

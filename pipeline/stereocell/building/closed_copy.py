@@ -29,7 +29,7 @@ def close_tile(
     fine = extract_surface(own, lattice.alone())
     if not len(fine.triangles):
         return None
-    simplified = simplify_soundly(fine, (), max_error_um)
+    simplified = simplify_soundly(fine, (), max_error_um=max_error_um)
     faults = certify(simplified.mesh).total
     if not faults:
         return Closed(simplified.mesh, 0, simplified.fallbacks)

@@ -88,9 +88,17 @@ def settle(source: str, settings: Settings) -> Plan:
     level = choose_level(dataset.levels, len(channels), settings)
     origin = dataset.levels[level[0]].origin_um
     return make_plan(
-        location, dataset.name, dataset.fingerprint, dataset.levels, origin, channels, level,
-        settings, modality=modality, placement=dataset.placement,
-    )  # fmt: skip
+        location,
+        dataset.name,
+        fingerprint=dataset.fingerprint,
+        levels=dataset.levels,
+        origin_um=origin,
+        channels=channels,
+        level=level,
+        settings=settings,
+        modality=modality,
+        placement=dataset.placement,
+    )
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
@@ -119,7 +127,7 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     store = Store(out)
     plan = store.plan()
     with phase_of(store, "units") as phase:
-        built, missing = run_rounds(store, plan, engine, only)
+        built, missing = run_rounds(store, plan, engine=engine, only=only)
         phase.is_up_to_date = not built
         units = len(plan.tiles) * len(plan.channels)
         phase.about = "" if built == units else f"{built} of {units} units"
@@ -137,7 +145,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         store.require_units_of(plan)
         index, content = store.index(), store.survey()
         looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
-        tiles = [(tile.id, tile_task(store, plan, index, tile)) for tile in plan.tiles]
+        tiles = [(tile.id, tile_task(store, plan, index=index, tile=tile)) for tile in plan.tiles]
         about = provenance(plan)
         names = [plan.name, plan.modality]
         depends = [index, [asdict(look) for look in looks], about, names, list(plan.placement)]
@@ -155,9 +163,9 @@ def run_stage(out: Path, engine: Engine) -> None:
         stage_writer.write_stage(
             store.stage_dir,
             plan.name,
-            looks,
-            extents,
-            about,
+            looks=looks,
+            tiles=extents,
+            provenance=about,
             modality=plan.modality,
             placement=plan.placement,
         )
@@ -194,7 +202,9 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         if not phase.is_done(key, partial(_digest_of_bundle, store)):
             store.remove_other_folders(store.parts_dir, {key})
             parts = store.parts_dir / key
-            bundle_writer.write_bundle(path, store.bundle_dir, viewer, engine.run, parts, _tell)
+            bundle_writer.write_bundle(
+                path, store.bundle_dir, viewer, run=engine.run, parts=parts, tell=_tell
+            )
     remove(store.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         console.print(

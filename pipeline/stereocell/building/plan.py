@@ -174,13 +174,13 @@ def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings)
 def make_plan(
     source: str,
     name: str,
+    *,
     fingerprint: str,
     levels: Sequence[LevelLike],
     origin_um: tuple[float, float, float],
     channels: Sequence[Channel],
     level: tuple[int, str],
     settings: Settings,
-    *,
     modality: str = "",
     placement: Matrix = IDENTITY,
 ) -> Plan:

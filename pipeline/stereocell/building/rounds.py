@@ -47,7 +47,7 @@ _DISPLAY, _ISO_VALUE = "units.schema.json#Display", "units.schema.json#IsoValue"
 _AGAIN = "run `stereocell units OUT` again"
 
 
-def run_rounds(store: Store, plan: Plan, engine: Engine, only: str | None) -> tuple[int, int]:
+def run_rounds(store: Store, plan: Plan, *, engine: Engine, only: str | None) -> tuple[int, int]:
     """Build the units (or `only` one, `<tile>/<channel>`).
 
     Returns how many were not done already, and how many others are still to be built.
@@ -145,13 +145,13 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
         look = make_look(
             channel.name,
             channel.color,
-            display,
-            {
+            display=display,
+            iso_values={
                 tile: None if value is None else value + found[tile]["background"]
                 for tile, value in agreed.values.items()
             },
-            agreed.confidence,
-            agreed.verdict,
+            confidence=agreed.confidence,
+            surface=agreed.verdict,
         )
         content[channel.id] = {
             "display": display_to_json(display),
@@ -210,7 +210,7 @@ def display_task(plan: Plan, channel: Channel) -> DisplayTask:
     return DisplayTask(ref, level, channel.index, plan.region, settings, subtracts, window)
 
 
-def iso_task(plan: Plan, tile: Tile, channel: Channel, display: Display) -> IsoTask:
+def iso_task(plan: Plan, tile: Tile, *, channel: Channel, display: Display) -> IsoTask:
     """Return the task that finds one unit's iso-value."""
     return IsoTask(
         source_of(plan, channel),
@@ -266,7 +266,7 @@ def _isos(
     settings = plan.settings
     for tile in plan.tiles:
         for channel in plan.channels:
-            task = iso_task(plan, tile, channel, displays[channel.id])
+            task = iso_task(plan, tile, channel=channel, display=displays[channel.id])
             depends = [
                 _input_key(plan, channel),
                 channel.index,

@@ -93,7 +93,11 @@ _BY_CHANNEL = {
 
 
 def load(
-    preset: str | None, config: Path | None, flags: Mapping[str, Any], where: str = "command line"
+    preset: str | None,
+    config: Path | None,
+    *,
+    flags: Mapping[str, Any],
+    where: str = "command line",
 ) -> Settings:
     """Return the settings of a preset (name or TOML file), a TOML file and flags, in that order.
 

@@ -58,7 +58,7 @@ class TileTask:
         return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
 
 
-def tile_task(store: Store, plan: Plan, index: Mapping[str, str], tile: Tile) -> TileTask:
+def tile_task(store: Store, plan: Plan, *, index: Mapping[str, str], tile: Tile) -> TileTask:
     """Return the task of one tile; `index` holds the units' keys, by `<tile>/<channel>`."""
     units = tuple(
         (

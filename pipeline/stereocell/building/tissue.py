@@ -212,11 +212,11 @@ def _learn(
         write_probabilities(
             folder / VOXELS,
             [one.probabilities for one in classes],
-            [(one.name, one.color) for one in classes],
-            plan.region.start,
-            shape,
-            plan.spacing_um,
-            plan.origin_um,
+            channels=[(one.name, one.color) for one in classes],
+            start=plan.region.start,
+            shape=shape,
+            spacing_um=plan.spacing_um,
+            origin_um=plan.origin_um,
         )
         write_json(folder / RECORD, {**record, "files": digests_of(folder)})
     open_source.cache_clear()  # another volume lies at the same address now

@@ -112,7 +112,9 @@ def _repaired(
         if given.step != (1, 1, 1):
             field = np.ascontiguousarray(field[given.lattice.slices_of_thinned(given.step)])
         value_range = given.display[1] - given.display[0]
-        distance = signed_distance(field, np.zeros(1, np.float32), spacing, value_range)
+        distance = signed_distance(
+            field, np.zeros(1, np.float32), spacing_um=spacing, value_range=value_range
+        )
         del field
     with clock("repair"):
         by_triangles = surface.wrap == "alpha-wrap" and given.repair.alpha_um > 0

@@ -68,6 +68,7 @@ def write_bundle(
     stage_path: Path,
     bundle_dir: Path,
     viewer_dist: Path | None,
+    *,
     run: Run,
     parts: Path | None = None,
     tell: _Told = lambda _: None,
@@ -158,7 +159,7 @@ def _fill(
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
-    write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels, index))
+    write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels=channels, index=index))
     for tile in tiles:
         for channel in tile.channels:
             if channel.edit:
@@ -168,6 +169,7 @@ def _fill(
 def describe_bundle(
     specimen: dict[str, str],
     tiles: Sequence[BundleTile],
+    *,
     channels: Sequence[dict[str, Any]],
     index: FileRef,
 ) -> bytes:

@@ -123,7 +123,7 @@ def find_part(part: Path) -> BundleTile | None:
 
 
 def export_tile(
-    stage_path: Path, parts: Path, tile_id: str, looks: tuple[ComposedLook, ...], step_m: float
+    stage_path: Path, parts: Path, tile_id: str, *, looks: tuple[ComposedLook, ...], step_m: float
 ) -> tuple[BundleTile, set[Path]]:
     """Write one tile's part, `parts`/<tile>/; see gltf.py for the lattice step, in metres.
 
@@ -252,10 +252,10 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
         return encode_glb(
             lod.mesh,
             step_m,
-            lod.material,
-            f"{channel_id}_{tile.GetName()}",
-            {"tile": tile.GetName(), "channel": channel_id},
-            textures,
+            material=lod.material,
+            name=f"{channel_id}_{tile.GetName()}",
+            extras={"tile": tile.GetName(), "channel": channel_id},
+            textures=textures,
         )
     except ValueError as error:  # what an artist may have done to the mesh
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error

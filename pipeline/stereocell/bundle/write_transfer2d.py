@@ -39,7 +39,7 @@ def count_tile(voxels: NDArray[np.uint8], volume: ComposedVolume, gradient_max: 
     # a single plane is no distance thick
     finest = min(step for step in (x, y, z, 1.0) if step > 0)
     spacing = (z or finest, y or finest, x or finest)
-    counts = count_joint(own, spacing, gradient_max, every=every)
+    counts = count_joint(own, spacing, gradient_max=gradient_max, every=every)
     return zlib.compress(counts.astype(_STORED).tobytes(), 1)
 
 

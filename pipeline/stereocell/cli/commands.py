@@ -90,7 +90,7 @@ def _as_given(options: argparse.Namespace, text: str) -> str:
 def settings(options: argparse.Namespace) -> Answer:
     from stereocell.building import settings as settings_module
 
-    found = settings_module.load(options.preset, options.config, {})
+    found = settings_module.load(options.preset, options.config, flags={})
     say(options, settings_module.to_toml(found, settings_module.TEMPLATE).removesuffix("\n"))
     return Answer(settings_module.to_dict(found))
 
@@ -112,7 +112,7 @@ def plan(options: argparse.Namespace) -> Answer:
     from stereocell.building import phases
     from stereocell.building import settings as settings_module
 
-    wanted = settings_module.load(options.preset, options.config, flags_of(options))
+    wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
     made = phases.make(options.input, options.out, wanted)
     return Answer(
         {
@@ -133,9 +133,9 @@ def iso(options: argparse.Namespace) -> Answer:
     from stereocell.building import settings as settings_module
     from stereocell.preview import iso_value as iso_preview
 
-    wanted = settings_module.load(options.preset, options.config, flags_of(options))
+    wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
     candidates, path = iso_preview.preview(
-        options.input, options.channel, options.tile, options.out, wanted
+        options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
     say(options, "\n".join(iso_preview.table(candidates)))
     say(options, f"wrote {path}")
@@ -206,7 +206,7 @@ def slices(options: argparse.Namespace) -> Answer:
     from stereocell.preview.png_slices import without_surface, write_slices
     from stereocell.storage.location import require_apart
 
-    wanted = settings_module.load(options.preset, options.config, flags_of(options))
+    wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
     require_apart(options.input, options.out)
     count = write_slices(phases.settle(options.input, without_surface(wanted)), options.out)
     say(options, f"wrote {count} slices to {options.out}")
@@ -299,7 +299,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
         serve(
             options.out,
             options.port,
-            options.lan,
+            lan=options.lan,
             open_browser=open_browser,
             for_program=options.json,
         )

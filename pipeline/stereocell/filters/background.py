@@ -23,6 +23,7 @@ SMOOTHING = 0.7  # sigma, in blocks: a block that a body fills all the same is d
 def find_background(
     field: NDArray[Any],
     region: Box,
+    *,
     spacing_um: tuple[float, float, float],
     block_um: float,
 ) -> LatticeField:

@@ -75,6 +75,7 @@ def choose_step(extent_um: float) -> float:
 def encode_glb(
     mesh: Mesh,
     step_m: float,
+    *,
     material: Material,
     name: str,
     extras: dict[str, str],

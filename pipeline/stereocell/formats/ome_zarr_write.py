@@ -18,6 +18,7 @@ CHUNK = (1, 64, 128, 128)  # (c, z, y, x): 1 MB
 def write_probabilities(
     path: Path,
     volumes: Sequence[NDArray[np.uint8]],
+    *,
     channels: Sequence[tuple[str, Triple]],
     start: tuple[int, int, int],
     shape: tuple[int, int, int],

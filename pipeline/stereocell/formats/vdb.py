@@ -55,6 +55,7 @@ _Leaves = tuple[NDArray[np.uint8], NDArray[np.int64]]
 def write_vdb(
     path: Path,
     density: NDArray[np.uint8],
+    *,
     first_um: tuple[float, float, float],
     spacing_um: tuple[float, float, float],
 ) -> None:

@@ -68,6 +68,7 @@ def _squared_gradient(
 def signed_distance(
     field: NDArray[np.float32],
     iso_value: NDArray[np.float32],
+    *,
     spacing_um: tuple[float, float, float],
     value_range: float,
 ) -> NDArray[np.float32]:

@@ -34,7 +34,7 @@ Triangles = NDArray[np.int64]
 
 
 def make_fair(
-    mesh: Mesh, planes: tuple[Plane, ...], max_slide_um: float, max_turn_um: float
+    mesh: Mesh, planes: tuple[Plane, ...], *, max_slide_um: float, max_turn_um: float
 ) -> Mesh:
     """Return the mesh with fairer triangles; where that made a fault, it is done again without.
 
@@ -84,7 +84,12 @@ def _fair(
         sharp = _angle(*positions[triangles].transpose(1, 0, 2)) < np.radians(SPLIT_DEG)
         sharp &= ~_any(held[triangles])
         positions, normals, triangles, new = split_edges(
-            positions, normals, triangles, sharp, planes, max_turn_um
+            positions,
+            normals,
+            triangles=triangles,
+            wanted=sharp,
+            planes=planes,
+            max_lift_um=max_turn_um,
         )
         ends = np.concatenate([ends, new])
         start = np.concatenate([start, positions[len(start) :]])

@@ -23,6 +23,7 @@ ERROR_BOUND = (7 + 56 * 2.0**-53) * 2.0**-53
 def find_crossings(
     positions: Points,
     triangles: Indices,
+    *,
     one_fan: NDArray[np.bool_] | None = None,
     fresh: NDArray[np.bool_] | None = None,
 ) -> Indices:

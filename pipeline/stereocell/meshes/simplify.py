@@ -43,12 +43,15 @@ FEWEST = 8  # triangles of a body that would vanish: an octahedron
 def simplify(mesh: Mesh, max_error_um: float) -> Mesh:
     """Return the mesh with as few triangles as the error allows, border vertices untouched."""
     locked = np.zeros(len(mesh.positions), bool)
-    return compact(mesh, simplify_part(mesh, mesh.triangles, max_error_um, locked))
+    return compact(
+        mesh, simplify_part(mesh, mesh.triangles, max_error_um=max_error_um, locked=locked)
+    )
 
 
 def simplify_part(
     mesh: Mesh,
     triangles: NDArray[np.uint32],
+    *,
     max_error_um: float,
     locked: NDArray[np.bool_],
 ) -> NDArray[np.uint32]:

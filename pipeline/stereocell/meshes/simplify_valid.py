@@ -44,7 +44,7 @@ class Mended:
 
 
 def simplify_soundly(
-    mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float, max_away_um: float = np.inf
+    mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float, max_away_um: float = np.inf
 ) -> Mended:
     """Return the mesh simplified and without faults, its borders as they are.
 
@@ -56,7 +56,9 @@ def simplify_soundly(
     body = draft.body  # of the mesh's own vertices
     tries = np.zeros(len(mesh.positions), np.int64)
     tree: cKDTree | None = None
-    triangles = draft.part(simplify_part(mesh, mesh.triangles, max_error_um, tries > 0))
+    triangles = draft.part(
+        simplify_part(mesh, mesh.triangles, max_error_um=max_error_um, locked=tries > 0)
+    )
     chosen = np.ones(int(body.max(initial=0)) + 1, bool)
     redone: set[int] = set()
     mended: set[int] = set()
@@ -80,7 +82,9 @@ def simplify_soundly(
                 tree = cKDTree(mesh.positions)
             if faults.total:
                 tries[_around(tree, draft.mesh, triangles, faults, tries)] += 1
-            again = draft.part(simplify_part(mesh, again, max_error_um, tries > 0))
+            again = draft.part(
+                simplify_part(mesh, again, max_error_um=max_error_um, locked=tries > 0)
+            )
         else:
             kept.update(worst.tolist())
         triangles = np.concatenate([triangles[~chosen[draft.body[triangles[:, 0]]]], again])

@@ -20,6 +20,7 @@ Indices = NDArray[np.int64]
 def split_edges(
     positions: Points,
     normals: Points,
+    *,
     triangles: Indices,
     wanted: NDArray[np.bool_],
     planes: tuple[Plane, ...],

@@ -84,8 +84,8 @@ def certify(
     crossings = find_crossings(
         mesh.positions.astype(np.float64),
         triangles[used],
-        one_fan,
-        None if fresh is None else fresh[used],
+        one_fan=one_fan,
+        fresh=None if fresh is None else fresh[used],
     )
     return Faults(
         degenerate=np.flatnonzero(degenerate),

@@ -58,6 +58,7 @@ class Slice:
 def cut_unit(
     volume: NDArray[np.uint8],
     lattice: Box,
+    *,
     first_um: tuple[float, float, float],
     spacing_um: tuple[float, float, float],
     mesh: Mesh | None,

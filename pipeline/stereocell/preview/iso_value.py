@@ -59,7 +59,7 @@ class Candidate:
 
 
 def preview(
-    source: str, channel_name: str, tile_id: str, out: Path | None, settings: Settings
+    source: str, channel_name: str, *, tile_id: str, out: Path | None, settings: Settings
 ) -> tuple[list[Candidate], Path]:
     """Write the picture; return the candidates and the picture's path. Nothing else is written.
 
@@ -73,7 +73,7 @@ def preview(
     plan = settle(source, settings)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
     display = run_display(display_task(plan, channel))
-    task = iso_task(plan, tile, channel, display)
+    task = iso_task(plan, tile, channel=channel, display=display)
     field = read_iso_field(task)
     try:
         chosen = field.find_iso_value(plan.settings.isovalue)

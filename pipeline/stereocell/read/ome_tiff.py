@@ -107,7 +107,7 @@ def _check_files(location: Location, tiff: TiffFile) -> None:
         is_other = element.tag.endswith("UUID") and element.text != root.get("UUID", "")
         if name is not None and is_other:
             named = f"{location.shown}: OME-XML: UUID FileName {name!r:.200}"
-            require_own(os.path.join(tiff.filehandle.dirname, name), [location.folder], named)
+            require_own(os.path.join(tiff.filehandle.dirname, name), [location.folder], named=named)
 
 
 def _image(

@@ -87,7 +87,7 @@ def open(
             f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
         )
     if location.is_local and not Path(location.source).is_dir():
-        require_own(location.source, [location.folder], location.shown)
+        require_own(location.source, [location.folder], named=location.shown)
     if location.format is None:
         raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
     if not location.is_local:

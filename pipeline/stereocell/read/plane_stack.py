@@ -98,6 +98,7 @@ def normal_of(along_row: ArrayLike, along_column: ArrayLike) -> NDArray[np.float
 def lay_out(
     positions_mm: ArrayLike,
     along_row: ArrayLike,
+    *,
     along_column: ArrayLike,
     pixel_spacing_mm: tuple[float, float],
     plane_shape: tuple[int, int],

@@ -76,7 +76,7 @@ class GuardedStore(WrapperStore[Store]):
         if not self._location.is_local:
             require_own_key(key, named)
             return
-        found = require_own(f"{self._location.source}/{key}", [self._folder], named)
+        found = require_own(f"{self._location.source}/{key}", [self._folder], named=named)
         if found is not None and found.st_size > most:
             raise OSError(f"{key}: {found.st_size} bytes, over the {most} that it may have")
 

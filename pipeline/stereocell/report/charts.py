@@ -33,7 +33,7 @@ def histogram(
 
 
 def criterion(
-    levels: Sequence[float], score: Sequence[float], taken: float | None, found: float | None
+    levels: Sequence[float], score: Sequence[float], *, taken: float | None, found: float | None
 ) -> Markup:
     """Return the criterion's curve over the levels (voxel values).
 
@@ -54,6 +54,7 @@ def criterion(
 def threshold(
     counts: Sequence[int],
     smoothed: NDArray[np.float64],
+    *,
     top: float,
     peaks: Sequence[float],
     rules: Mapping[str, float],

@@ -206,11 +206,11 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
     slices = cut_unit(
         volume,
         lattice,
-        plan.position_um(lattice.start),
-        plan.spacing_um,
-        load_lods(unit.directory)[0].mesh if unit.lods else None,
-        float(plan_for(plan, verdict).settings.surface.smoothing_um),
-        None if iso is None else partial(_in_eight_bits, iso, display.background, low, high),
+        first_um=plan.position_um(lattice.start),
+        spacing_um=plan.spacing_um,
+        mesh=load_lods(unit.directory)[0].mesh if unit.lods else None,
+        sigma_um=float(plan_for(plan, verdict).settings.surface.smoothing_um),
+        iso_at=None if iso is None else partial(_in_eight_bits, iso, display.background, low, high),
     )
     curve = read_curve(store.out, unit)
     levels, found = curve.get("levels"), curve.get("found")
@@ -218,7 +218,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
         "unit": unit,
         "color": css_color(unit.channel.color),
         "slices": _inline(Picture(*draw_slices(slices))),
-        "chart": charts.criterion(levels, curve["score"], unit.iso_value, found)
+        "chart": charts.criterion(levels, curve["score"], taken=unit.iso_value, found=found)
         if levels
         else None,
         "ends": (levels[0], levels[-1]) if levels else None,

@@ -38,19 +38,20 @@ def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
     wanted = ERROR_PX * diagonal / max(coarse.distance_um, 1e-9)
     size = int(np.clip(wanted, LEAST_PX, MOST_PX))
     return tuple(
-        compare(draw(fine, view, ends, size), draw(coarse, view, ends, size)) for view in VIEWS
+        compare(draw(fine, view, ends=ends, size=size), draw(coarse, view, ends=ends, size=size))
+        for view in VIEWS
     )
 
 
 def find_close_likeness(fine: Lod, coarse: Lod) -> float:
     """Return the SSIM of two levels of one surface from the front, in CLOSE_PX."""
     ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
-    pictures = (draw(lod, VIEWS[0], ends, CLOSE_PX) for lod in (fine, coarse))
+    pictures = (draw(lod, VIEWS[0], ends=ends, size=CLOSE_PX) for lod in (fine, coarse))
     return compare(*pictures)
 
 
 def draw(
-    lod: Lod, view: Sequence[float], ends: NDArray[np.float32], size: int
+    lod: Lod, view: Sequence[float], *, ends: NDArray[np.float32], size: int
 ) -> NDArray[np.float64]:
     """Return the level as seen from `view`, grey 0..1 (size, size).
 

@@ -70,9 +70,9 @@ def draw_threshold(display: Display) -> ThresholdFigure | None:
     chart = charts.threshold(
         values.counts,
         found.smoothed,
-        _ROOM * float(heights[-2:][0]),
-        [place(level) for level in found.peaks],
-        {row.kind: place(row.value) for row in reversed(rows)},
+        top=_ROOM * float(heights[-2:][0]),
+        peaks=[place(level) for level in found.peaks],
+        rules={row.kind: place(row.value) for row in reversed(rows)},
     )
     return ThresholdFigure(describe(found), rows, chart, (values.low, values.high))
 

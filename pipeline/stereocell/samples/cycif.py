@@ -27,6 +27,7 @@ _COARSEST = 64  # voxels: the pyramid ends when the longer side in the plane is 
 def write_cycif(
     path: Path,
     grid: tuple[int, int],
+    *,
     tile_size: tuple[int, int, int],
     seed: int,
     brightness_spread: float,
@@ -178,7 +179,7 @@ def _write_zarr(
             # A whole row of tiles at a time, so that few chunks are written twice.
             row = np.concatenate(
                 [
-                    microscope.record(tissue, stain, box, seed)
+                    microscope.record(tissue, stain, box=box, seed=seed)
                     for x in range(0, shape[2], width)
                     for box in [Box((0, y, x), (shape[0], y + height, x + width))]
                 ],

@@ -89,7 +89,7 @@ def background(stain: Stain, waves: tuple[Wave, ...], points: Points) -> Values:
     return OFFSET + stain.background * level
 
 
-def record(tissue: Tissue, stain: int, box: Box, seed: int) -> NDArray[np.uint16]:
+def record(tissue: Tissue, stain: int, *, box: Box, seed: int) -> NDArray[np.uint16]:
     """Return the voxels (z, y, x) of a box in one channel.
 
     The noise belongs to the box: another box that overlaps it repeats the dye, not the noise.

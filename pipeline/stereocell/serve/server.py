@@ -41,7 +41,7 @@ _OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
 
 
 def serve(
-    out: Path, port: int, lan: bool, open_browser: bool, *, for_program: bool = False
+    out: Path, port: int, *, lan: bool, open_browser: bool, for_program: bool = False
 ) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
 
@@ -69,7 +69,7 @@ def serve(
 
 
 def make_app(
-    bundle: Path, library: BrickLibrary | None, names: tuple[str, ...], gate: Gate | None
+    bundle: Path, library: BrickLibrary | None, *, names: tuple[str, ...], gate: Gate | None
 ) -> ASGIApp:
     """Return the application: the bundle's files, and `/bricks`.
 
@@ -138,7 +138,7 @@ class BundleServer:
         self.port: int = self._socket.getsockname()[1]
         self.address = f"{scheme}://{host}:{self.port}/"
         config = uvicorn.Config(
-            make_app(bundle, library, names, self.gate),
+            make_app(bundle, library, names=names, gate=self.gate),
             log_config=None,
             log_level="error",
             access_log=False,

@@ -174,6 +174,7 @@ def is_own(path: str | Path, folders: Sequence[Path]) -> bool:
 def require_own(
     path: str | Path,
     folders: Sequence[Path],
+    *,
     named: str,
     raised: type[StereoCellError] = SourceError,
 ) -> os.stat_result | None:

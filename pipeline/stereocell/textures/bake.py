@@ -129,7 +129,7 @@ def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
         "nk,nkd->nd", weights, coarse.uvs[coarse.triangles[triangle]].astype(np.float64)
     )
     wanted = _tell(coarse, triangle, weights, baker)
-    image = fit_rims(image, ~inside.reshape(size), uvs, wanted)
+    image = fit_rims(image, ~inside.reshape(size), uvs=uvs, wanted=wanted)
     bytes_ = np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
     return Maps(
         np.ascontiguousarray(bytes_[..., :3]),

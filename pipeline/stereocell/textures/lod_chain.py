@@ -49,11 +49,16 @@ def make_levels(
     for level, error in list(enumerate(lod.errors))[first:]:
         with clock("simplify"):
             length = error * min(spacing_um)
-            mended = simplify_soundly(mesh, planes, length, STRAY * length)
+            mended = simplify_soundly(mesh, planes, max_error_um=length, max_away_um=STRAY * length)
             mesh = mended.mesh
         if level == 0:
             with clock("fair"):
-                mesh = make_fair(mesh, planes, SLIDE * min(spacing_um), error * min(spacing_um))
+                mesh = make_fair(
+                    mesh,
+                    planes,
+                    max_slide_um=SLIDE * min(spacing_um),
+                    max_turn_um=error * min(spacing_um),
+                )
         with clock("certify"):
             left = certify(mesh, planes).total
         with clock("measure"):
@@ -72,7 +77,7 @@ def make_levels(
             )
         made = Lod(mesh, distance, quality=quality)
         if len(mesh.triangles):
-            made = texture_lod(made, level, baker, unwrapping, clock)
+            made = texture_lod(made, level, baker=baker, options=unwrapping, clock=clock)
         lods.append(made)
     return tuple(lods)
 

@@ -39,6 +39,7 @@ def find_rims(
 def fit_rims(
     image: NDArray[np.float64],
     is_free: NDArray[np.bool_],
+    *,
     uvs: NDArray[np.float64],
     wanted: NDArray[np.float64],
 ) -> NDArray[np.float64]:

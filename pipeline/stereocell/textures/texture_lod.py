@@ -11,7 +11,7 @@ from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.unwrap import unwrap
 
 
-def texture_lod(lod: Lod, level: int, baker: Baker, options: UnwrapOptions, clock: Clock) -> Lod:
+def texture_lod(lod: Lod, level: int, *, baker: Baker, options: UnwrapOptions, clock: Clock) -> Lod:
     """Return the level with maps, or with values at its vertices; `options` are resolved."""
     reason = f"finer than lod{options.first_lod}" if level < options.first_lod else ""
     if not reason:

@@ -52,6 +52,7 @@ def flat_field(shape: tuple[int, int, int], degree: int) -> BiasField:
 def fit_bias_field(
     field: BiasField,
     indices: NDArray[np.int64],
+    *,
     residual: NDArray[np.float32],
     weights: NDArray[np.float32],
 ) -> BiasField:

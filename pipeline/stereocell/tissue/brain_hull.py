@@ -33,6 +33,7 @@ class Hull:
 def find_hull(
     field: NDArray[np.float32],
     spacing_mm: tuple[float, float, float],
+    *,
     center_mm: tuple[float, float, float],
     radius_mm: float,
     levels: tuple[float, float, float],
@@ -87,6 +88,7 @@ def _inflate(
 def fill_hull(
     hull: Hull,
     shape: tuple[int, int, int],
+    *,
     spacing_mm: tuple[float, float, float],
     shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> NDArray[np.bool_]:

@@ -50,7 +50,9 @@ def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> M
     """
     coarse, inside, spacing = _coarsen(smooth, head, spacing_um)
     hull, tissue_level = _find_hull(coarse, inside, spacing)
-    brain = fill_hull(hull, _shape(smooth), _mm(spacing_um), _shift(spacing, spacing_um))
+    brain = fill_hull(
+        hull, _shape(smooth), spacing_mm=_mm(spacing_um), shift_mm=_shift(spacing, spacing_um)
+    )
     brain &= head
     if not brain.any():
         raise SourceError("no brain: the hull holds no voxel, expected a head in MR")
@@ -72,12 +74,16 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
     center = (at[0] * mm[0], at[1] * mm[1], at[2] * mm[2])
     radius = float(np.cbrt(3 / (4 * np.pi) * core.sum() * np.prod(mm)))
 
-    hull = find_hull(field, mm, center, radius, _levels(field, head, core))
-    brain = fill_hull(hull, _shape(field), mm) & tissue
+    hull = find_hull(
+        field, mm, center_mm=center, radius_mm=radius, levels=_levels(field, head, core)
+    )
+    brain = fill_hull(hull, _shape(field), spacing_mm=mm) & tissue
     if not brain.any():
         raise SourceError("no brain: the hull holds no bright tissue, expected a head in MR")
     flat = field / _rough_bias(field, brain, spacing_um)
-    return find_hull(flat, mm, center, radius, _levels(flat, head, brain)), level
+    return find_hull(
+        flat, mm, center_mm=center, radius_mm=radius, levels=_levels(flat, head, brain)
+    ), level
 
 
 def _levels(field: NDArray[np.float32], head: Mask, brain: Mask) -> Triple:

@@ -96,7 +96,13 @@ def learn_tissue(
     blur_um = options.blur_voxels * float(spacing.min())
     smooth /= gain
     likelihood = _log_likelihood(mixture, smooth, _gradient(smooth, spacing) * np.float32(blur_um))
-    found = apply_potts_prior(likelihood, inside, spacing_um, options.prior, options.prior_rounds)
+    found = apply_potts_prior(
+        likelihood,
+        inside,
+        spacing_um=spacing_um,
+        strength=options.prior,
+        rounds=options.prior_rounds,
+    )
     probabilities = np.zeros((count, *voxels.shape), np.float32)
     probabilities[(slice(None), *box)] = found
     order = np.argsort(mixture.means_[:, 0])
@@ -207,7 +213,7 @@ def _learn_field(
         weights = share @ certainty
         residual = measured - (share * certainty) @ np.log(level) / weights
         field = fit_bias_field(
-            field, indices, residual.astype(np.float32), weights.astype(np.float32)
+            field, indices, residual=residual.astype(np.float32), weights=weights.astype(np.float32)
         )
     return field
 

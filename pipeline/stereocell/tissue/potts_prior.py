@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 def apply_potts_prior(
     log_likelihood: NDArray[np.float32],
     mask: NDArray[np.bool_],
+    *,
     spacing_um: tuple[float, float, float],
     strength: float,
     rounds: int,

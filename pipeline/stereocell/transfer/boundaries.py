@@ -246,7 +246,7 @@ def _make_terms(
     for number, (low, high) in enumerate(pairs):
         sigma = value_noise(_noise_at(noise, (low + high) / 2), plane.gradient_max)
         for blur in BLURS:
-            share = count_edge(low, high, float(blur), sigma, plane)
+            share = count_edge(low, high, blur=float(blur), sigma=sigma, plane=plane)
             seen = share[is_steep]
             if seen.sum() > LEAST_SEEN * share.sum():
                 terms.append(seen * weight)

@@ -51,6 +51,7 @@ class Display:
 def find_display(
     voxels: NDArray[Any],
     options: WindowOptions,
+    *,
     background: LatticeField | None = None,
     window: tuple[float, float] | None = None,
 ) -> Display:
@@ -106,6 +107,7 @@ def display_from_json(content: Mapping[str, Any]) -> Display:
 def make_look(
     name: str,
     color: tuple[float, float, float],
+    *,
     display: Display,
     iso_values: Mapping[str, float | None],
     confidence: float,

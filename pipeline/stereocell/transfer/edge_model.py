@@ -46,7 +46,7 @@ def value_noise(noise: float, gradient_max: float) -> float:
     return noise * gradient_max / NOISE_FACTOR / 2
 
 
-def count_edge(low: float, high: float, blur: float, sigma: float, plane: Plane) -> Field:
+def count_edge(low: float, high: float, *, blur: float, sigma: float, plane: Plane) -> Field:
     """Return the voxels of an edge by gradient and value, (rows, columns), per voxel of its area.
 
     low, high  values of the materials; sigma: of the values' noise; blur: in finest voxels

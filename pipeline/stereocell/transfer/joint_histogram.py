@@ -50,6 +50,7 @@ def find_steps(
 def count_joint(
     voxels: NDArray[np.uint8],
     spacing_um: tuple[float, float, float],
+    *,
     gradient_max: float,
     rows: int = ROWS,
     every: int = 1,

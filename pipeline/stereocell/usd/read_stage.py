@@ -136,7 +136,7 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
         while waiting:
             for asset, name in _named_in(waiting.pop()):
                 file = Path(Ar.SplitPackageRelativePathOuter(name)[0])  # what is in a .usdz: that
-                if name in names or not require_own(file, folders, asset, StageError):
+                if name in names or not require_own(file, folders, named=asset, raised=StageError):
                     continue
                 files.add(file)
                 names.add(name)

@@ -74,10 +74,10 @@ class TileExtent:
 def write_stage(
     stage_dir: Path,
     name: str,
+    *,
     looks: Sequence[Look],
     tiles: Sequence[TileExtent],
     provenance: Provenance,
-    *,
     modality: str = "",
     placement: Matrix = IDENTITY,
 ) -> None:

@@ -110,7 +110,12 @@ def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
 
 def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> None:
     own = channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)]
-    write_vdb(folder / f"{channel.channel_id}.vdb", own, tile.first_um, tile.spacing_um)
+    write_vdb(
+        folder / f"{channel.channel_id}.vdb",
+        own,
+        first_um=tile.first_um,
+        spacing_um=tile.spacing_um,
+    )
     write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
     if channel.closed is not None:
         shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))

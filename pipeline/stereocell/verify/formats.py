@@ -178,7 +178,7 @@ def _check_stage_files(out: Path) -> str:
     problems = _lost_copies(out)
     for path in paths:
         try:
-            require_own(path, [Location.of(folder).folder], str(path), CheckError)
+            require_own(path, [Location.of(folder).folder], named=str(path), raised=CheckError)
             _WHOLE[path.suffix](path)
         except StereoCellError as error:
             problems.append(str(error))

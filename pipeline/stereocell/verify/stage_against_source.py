@@ -235,7 +235,7 @@ def _hold_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) -> 
         return [*problems, "its volume has no field with a file"]
     with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
         anew = Path(folder) / vdb.name
-        write_vdb(anew, own, task.first_um, task.spacing_um)
+        write_vdb(anew, own, first_um=task.first_um, spacing_um=task.spacing_um)
         try:
             if vdb.read_bytes() != anew.read_bytes():
                 problems.append(f"{vdb.name}: not the file that the source gives")

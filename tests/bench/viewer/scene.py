@@ -111,7 +111,7 @@ def nuclei() -> tuple[Scene, Scene]:
     depth, height, width = SHAPE
     fine = (depth, 2 * height, 2 * width)
     z, y, x = (n * h for n, h in zip(fine, SPACING_UM, strict=True))
-    counts = record(grow_tissue((z, y, x), 0, 1.0), 0, Box((0, 0, 0), fine), 0)
+    counts = record(grow_tissue((z, y, x), 0, 1.0), 0, box=Box((0, 0, 0), fine), seed=0)
     cubes = counts.reshape(depth, height, 2, width, 2).mean(axis=(2, 4))
     voxels = windowed(cubes)
     spacing = np.full(3, SPACING)

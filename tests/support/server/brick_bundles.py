@@ -32,7 +32,7 @@ def write_out(folder: Path, volume: np.ndarray | None = None) -> Path:
     viewer = folder / "viewer"
     viewer.mkdir(parents=True)
     (viewer / "index.html").write_text("<!doctype html>")
-    write_bundle(write_tiles(folder / "stage"), folder / "bundle", viewer, Engine(0).run)
+    write_bundle(write_tiles(folder / "stage"), folder / "bundle", viewer, run=Engine(0).run)
     if volume is not None:
         replace_volume(folder / "bundle", volume)
     return folder

@@ -77,10 +77,10 @@ def run_display(task: DisplayTask) -> Display:
         background = find_background(
             voxels,
             task.region,
-            dataset.levels[task.level].spacing_um,
-            float(surface.background_um),
+            spacing_um=dataset.levels[task.level].spacing_um,
+            block_um=float(surface.background_um),
         )
-    display = find_display(voxels, task.settings.window, background, task.window)
+    display = find_display(voxels, task.settings.window, background=background, window=task.window)
     if len(voxels) < task.region.shape[0] and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
         display = replace(display, values=_count_values(task, dataset, display.window))
     return replace(display, proposal=_propose(task, dataset, display.window))
@@ -104,7 +104,9 @@ def _propose(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -
     for box in sample_boxes(task.region, JOINT_VOXELS):
         around = box.grown((1, 1, 1), task.region)
         voxels = dataset.read(task.channel, around, task.level).voxels
-        fine += count_joint(to_eight_bits(voxels, window), spacing, STEEPEST, FINE_ROWS)
+        fine += count_joint(
+            to_eight_bits(voxels, window), spacing, gradient_max=STEEPEST, rows=FINE_ROWS
+        )
     return propose(fine, spacing)
 
 

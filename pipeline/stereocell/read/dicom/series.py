@@ -114,9 +114,9 @@ def _stack(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> St
         layout = lay_out(
             [frame.position for frame in by_time[0]],
             group.along_row,
-            group.along_column,
-            group.spacing,
-            (first.rows, first.columns),
+            along_column=group.along_column,
+            pixel_spacing_mm=group.spacing,
+            plane_shape=(first.rows, first.columns),
         )
     except NoStackError as error:
         return Stack(by_time, None, str(error), tuple(notes))
