@@ -37,10 +37,9 @@ const LONGEST = 8000;
 const WORDS: SwitchWords = ["off", "on"];
 /** A channel's letter alone says that a switch is off. */
 const CHANNEL_WORDS: SwitchWords = ["", "on"];
+const NAMED_APART: ReadonlySet<Parameter<ViewerState>> = new Set([...VOLUMES, ...LIGHT]);
 /** Besides where volumes show, and the light, which has a part of its own. */
-const others = new Set(PARAMETERS);
-for (const row of [...VOLUMES, ...LIGHT]) others.delete(row);
-const OTHERS = [...others];
+const OTHERS = PARAMETERS.filter((row) => !NAMED_APART.has(row));
 
 export type Shared = Readonly<{ actions: readonly Action[]; look: Look | null }>;
 
@@ -94,14 +93,9 @@ function writeChannel(
   has: HasShapes,
 ): string[] {
   const opened = { ...channel, ...START_CHANNEL, color: channel.original };
-  const wordsOf = (areSwitches: boolean) =>
-    writeWords(
-      CHANNEL.filter(({ kind }) => (kind === "switch") === areSwitches),
-      channel,
-      opened,
-      CHANNEL_WORDS,
-    ).map(([letter, word]) => `${letter}${word}`);
-  const parts = wordsOf(false);
+  const parts = writeWords(CHANNEL, channel, opened, CHANNEL_WORDS).map(
+    ([letter, word]) => `${letter}${word}`,
+  );
   const [low, high] = channel.window;
   if (low !== 0 || high !== 1) parts.push(`w${written([low])}_${written([high])}`);
   const shaped = Object.entries(channel.shapes).filter(([name]) => has(channel, name));
@@ -112,7 +106,6 @@ function writeChannel(
   if (shaped.length > 0 || channel.transferFunction !== start?.transferFunction) {
     parts.push(`t${encodeURIComponent(channel.transferFunction)}`);
   }
-  parts.push(...wordsOf(true));
   return parts.length > 0 ? [[encodeURIComponent(channel.id), ...parts].join(":")] : [];
 }
 

@@ -2,7 +2,6 @@
 import { Group, Matrix4, Scene, Vector3 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
-import { loadVolumes } from "../bundle/load";
 import type { Shapes } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
 import type { ShownVolume } from "../state/on_screen";
@@ -12,28 +11,19 @@ import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { BrickTile } from "./bricks/brick_atlas";
 import type { BrickService } from "./bricks/brick_service";
 import { brickCounts } from "./bricks8";
+import { ChannelLists } from "./channel_volumes";
 import { OccupancyClient } from "./empty_space_client";
 import { LoadQueue } from "./load_queue";
 import { levelsToFetch } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
 import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_raymarch";
 import { type Packed, TileTexture } from "./tile_texture";
-import {
-  loadTransferFunctions,
-  lookUpTable,
-  opacities,
-  type TransferFunction,
-} from "./transfer_luts";
+import { lookUpTable, opacities } from "./transfer_luts";
 import { NO_ENTRIES, type PlaneTable, planeTable } from "./transfer_table_2d";
-import { VolumeSource } from "./volume_source";
+import type { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
-type ChannelVolumes = Readonly<{
-  sources: ReadonlyMap<string, VolumeSource>;
-  transferFunctions: ReadonlyMap<string, TransferFunction>;
-}>;
-
 type MadePlane = Readonly<{
   shapes: Shapes;
   gradientMax: number;
@@ -54,9 +44,7 @@ export class VolumeSet {
   private readonly group = new Group();
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly occupancy = new OccupancyClient();
-  private readonly channels = new Map<string, ChannelVolumes>();
-  private readonly channelsUnderWay = new Map<string, Promise<void>>();
-  private readonly failedChannels = new Set<string>();
+  private readonly channels: ChannelLists;
   private readonly residents: Residency;
   /** The last table of each channel: all tiles ask for the same. */
   private readonly planes = new Map<string, MadePlane>();
@@ -68,7 +56,7 @@ export class VolumeSet {
   private hasToldLimit = false;
 
   constructor(
-    private readonly bundle: Bundle,
+    bundle: Bundle,
     private readonly frame: MarchFrame,
     private readonly limits: Readonly<{ bytes: number; side: number }>,
     private readonly onChange: () => void,
@@ -77,6 +65,11 @@ export class VolumeSet {
     private readonly bricks: BrickService | null = null,
   ) {
     this.residents = new Residency(limits.bytes);
+    const onList = () => {
+      if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
+      this.onChange();
+    };
+    this.channels = new ChannelLists(bundle, onList, onError);
     this.group.matrixAutoUpdate = false;
     this.scene.add(this.group);
   }
@@ -84,7 +77,7 @@ export class VolumeSet {
   get isLoading(): boolean {
     return (
       this.leapsUnderWay > 0 ||
-      this.channelsUnderWay.size > 0 ||
+      this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
   }
@@ -121,13 +114,13 @@ export class VolumeSet {
 
   /** All volumes of a channel, by tile; null: its list has not come, which was told. */
   async sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null> {
-    await this.loadChannel(channel);
+    await this.channels.load(channel);
     return this.channels.get(channel)?.sources ?? null;
   }
 
   /** The same, once it is known; null also after a fault, which was told. */
   async sourceOf(tile: string, channel: string): Promise<VolumeSource | null> {
-    await this.loadChannel(channel);
+    await this.channels.load(channel);
     return this.source(tile, channel);
   }
 
@@ -189,24 +182,21 @@ export class VolumeSet {
     this.mayRefine = mayRefine;
     this.residents.unwantAll();
     for (const each of wanted) this.want(each);
-    for (const id of this.failedChannels) {
-      const isUsed = wanted.some(({ channels }) => channels.includes(id));
-      if (!isUsed) this.failedChannels.delete(id);
-    }
+    this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
     this.residents.evict();
     for (const resident of this.residents.all) this.dress(resident);
   }
 
   /** With the next `follow`, what has failed is loaded anew. */
   retryFailed(): void {
-    this.failedChannels.clear();
+    this.channels.forgetFailed();
     for (const { texture } of this.residents.all) texture.retryFailed();
   }
 
   private want(wanted: WantedTile): void {
     const sources = new Map<string, VolumeSource>();
     for (const id of wanted.channels) {
-      void this.loadChannel(id);
+      void this.channels.load(id);
       const source = this.source(wanted.tile, id);
       if (source !== null) sources.set(id, source);
     }
@@ -270,40 +260,8 @@ export class VolumeSet {
 
   private canCome(channel: string, tile: string): boolean {
     const volumes = this.channels.get(channel);
-    if (volumes === undefined) return !this.failedChannels.has(channel);
+    if (volumes === undefined) return !this.channels.hasFailed(channel);
     return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
-  }
-
-  /** A channel's list of volumes, unless it is known or has failed. */
-  private async loadChannel(id: string): Promise<void> {
-    if (this.channels.has(id) || this.failedChannels.has(id)) return;
-    let underWay = this.channelsUnderWay.get(id);
-    if (underWay === undefined) {
-      underWay = this.fetchChannel(id).finally(() => this.channelsUnderWay.delete(id));
-      this.channelsUnderWay.set(id, underWay);
-    }
-    await underWay;
-  }
-
-  private async fetchChannel(id: string): Promise<void> {
-    const channel = this.bundle.manifest.channels.find((c) => c.id === id);
-    if (channel === undefined) throw new Error(`the bundle has no channel ${id}`);
-    try {
-      const { base } = this.bundle;
-      const [volumes, transferFunctions] = await Promise.all([
-        loadVolumes(base, channel.volumes),
-        loadTransferFunctions(base, channel),
-      ]);
-      const sources = new Map(
-        [...volumes].map(([tile, volume]) => [tile, new VolumeSource(base, volume)]),
-      );
-      this.channels.set(id, { sources, transferFunctions });
-    } catch (error) {
-      this.failedChannels.add(id);
-      this.onError(error);
-    }
-    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
-    this.onChange();
   }
 
   /** A march for what has come, in the colours of the state. */
