@@ -62,7 +62,7 @@ function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
   }
 }
 
-export type DeskOptions = Readonly<{
+export type ControllerOptions = Readonly<{
   subtitle: string;
   /** Enter stereo; called from within a click or a key, as is the other. */
   onStereo: () => void;
@@ -70,7 +70,7 @@ export type DeskOptions = Readonly<{
   onSplit: (lenses: Profile) => void;
 }>;
 
-export class Desk {
+export class Controller {
   readonly panel: Panel;
   private view: PanelView = { ...START_VIEW, ...rememberedLens() };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
@@ -84,7 +84,7 @@ export class Desk {
     private readonly viewer: Viewer,
     parent: HTMLElement,
     private readonly said: Said,
-    private readonly options: DeskOptions,
+    private readonly options: ControllerOptions,
   ) {
     const { channels } = viewer.bundle.manifest;
     this.ranges = new Map(channels.map(({ id, window }) => [id, window]));

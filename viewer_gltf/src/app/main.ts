@@ -15,7 +15,7 @@ import { keepOffline } from "../offline/register";
 import { Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
 import { findXrSupport } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
-import { Desk } from "./controller";
+import { Controller } from "./controller";
 import { Viewer } from "./viewer";
 
 function checkWebGl2(): void {
@@ -50,29 +50,29 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const said = new Said();
   const over = [progress.root, said.root, notices.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
-  let desk: Desk | null = null;
+  let controller: Controller | null = null;
   const viewer: Viewer = new Viewer(
     bundle,
     stage,
     (state) => {
-      desk?.refresh();
+      controller?.refresh();
       notices.update(state);
     },
     () => {
       progress.update(viewer.snapshot().overview);
-      desk?.refreshSoon();
+      controller?.refreshSoon();
     },
   );
-  desk = new Desk(viewer, parent, said, {
+  controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
     onStereo: () => void enterStereo(viewer),
     onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
   });
-  const { layOut } = desk;
-  viewer.layOut = layOut.bind(desk);
+  const { layOut } = controller;
+  viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
-  desk.followAddress(location.search, location.hash);
-  desk.setStereo(await findXrSupport(navigator.xr, isSecureContext));
+  controller.followAddress(location.search, location.hash);
+  controller.setStereo(await findXrSupport(navigator.xr, isSecureContext));
   return viewer;
 }
 

@@ -5,10 +5,10 @@ import { initialState, VOLUME_TILES_AT_START } from "./initial_state";
 import { DISC_RADIUS, SWITCH_DISTANCE } from "./parameters/volumes";
 import { newNotice, reduce } from "./reduce";
 import {
-  drawnAs,
   isInDisc,
   type Nearby,
   NOTHING_NEAR,
+  representationOf,
   takenFrom,
   wantedTiles,
   wantsSurface,
@@ -64,7 +64,7 @@ function find(state: ViewerState, channel: string, id: string) {
 /** How a channel is drawn in a tile once all has arrived. */
 function looks(state: ViewerState, channel: string, id: string, nearby = NOTHING_NEAR): string {
   const [c, t] = find(state, channel, id);
-  const as = drawnAs(state, c, t, nearby);
+  const as = representationOf(state, c, t, nearby);
   return as === null ? "" : { mesh: "surface", volume: "volume", both: "surface + volume" }[as];
 }
 

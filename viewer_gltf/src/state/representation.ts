@@ -34,7 +34,7 @@ export function followedTile(state: ViewerState, nearby: Nearby): string | null 
 }
 
 /** How a channel is drawn in a tile, once all has arrived; null: not at all. */
-export function drawnAs(
+export function representationOf(
   state: ViewerState,
   channel: ChannelState,
   tile: TileState,
@@ -75,7 +75,7 @@ export function wantedTiles(state: ViewerState, nearby: Nearby): readonly Wanted
   const channels = volumeChannels(state);
   const wanted = state.tiles.flatMap((tile) => {
     const drawn = channels.filter((channel) => {
-      const as = drawnAs(state, channel, tile, nearby);
+      const as = representationOf(state, channel, tile, nearby);
       return as === "volume" || as === "both";
     });
     if (drawn.length === 0) return [];
@@ -109,7 +109,7 @@ export function takenFrom(
   nearby: Nearby,
   presence: number,
 ): number | null {
-  const as = drawnAs(state, channel, tile, nearby);
+  const as = representationOf(state, channel, tile, nearby);
   if (as === null || (as === "volume" && (channel.prefersVolume || isTraced(state)))) return null;
   return as === "both" ? 0 : presence;
 }
