@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from pxr import Usd
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
@@ -119,3 +120,8 @@ def _extract(field: NDArray[np.float32], start: int, step: int) -> Mesh:
     if (np.cross(b - a, c - a) * normals[faces[:, 0]]).sum() < 0:
         faces = faces[:, ::-1]
     return Mesh(world.astype(np.float32), faces.astype(np.uint32), normals.astype(np.float32))
+
+
+def has_schema() -> bool:
+    definition = Usd.SchemaRegistry().FindAppliedAPIPrimDefinition("StereoCellChannelAPI")
+    return definition is not None and "stereocell:lut" in definition.GetPropertyNames()

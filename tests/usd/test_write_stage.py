@@ -25,6 +25,7 @@ from support.stages import (
     SHAPE,
     SPACING_UM,
     TILES,
+    has_schema,
     leaf,
     make_tiles,
     write_whole,
@@ -294,11 +295,6 @@ def test_another_process_writes_the_same_bytes(stage_path: Path, tmp_path: Path)
     written = digests_of(stage_path.parent)
     assert written == digests_of(tmp_path / "again")
     assert not [name for name in written if "/." in name or name.startswith(".")]
-
-
-def has_schema() -> bool:
-    definition = Usd.SchemaRegistry().FindAppliedAPIPrimDefinition("StereoCellChannelAPI")
-    return definition is not None and "stereocell:lut" in definition.GetPropertyNames()
 
 
 def test_the_generated_schema_is_what_usd_makes_of_its_source(
