@@ -44,10 +44,10 @@ def build(
 
     Progress goes to stderr. Raises StereoCellError, one line that says what and where.
     """
-    from stereocell import report
     from stereocell.building import phases
     from stereocell.building.settings import load
     from stereocell.engine.run import Engine
+    from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
     from stereocell.storage.lock import alone_in
@@ -87,7 +87,7 @@ def build(
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
         phases.run_bundle(folder, engine)
-        report.run_report(folder)
+        report_phase.run_report(folder)
     shown = place.source if place.is_local else place.shown.rstrip("/")
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
     return Built(shown, *(f"{shown}/{part}" for part in parts))

@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell import report
 from stereocell.building import input_unchanged, phases
 from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import Store
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
+from stereocell.report import phase as report
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.claim import LOCK
 from stereocell.tissue.classify import TissueOptions

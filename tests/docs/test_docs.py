@@ -24,10 +24,10 @@ import pytest
 import yaml
 
 import stereocell
-from stereocell import report as drawing
 from stereocell.cli import __main__ as cli
 from stereocell.model.errors import UsageError
 from stereocell.read import open_dataset
+from stereocell.report import phase as drawing
 from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import write_dicom
 from stereocell.storage.location import Location
@@ -41,11 +41,11 @@ PAGES = [*FIRST, *sorted({*DOCS.rglob("*.md"), ROOT / "README.md"} - set(FIRST))
 
 # Only parsed: what it takes that is not at hand here, and where it is run
 PARSED = {
-    "view": "does not end: test_serve.py",
-    "serve": "does not end: test_serve.py, test_serve_bricks.py",
-    "tissue": "half a minute: test_tissue_channels.py",
-    "build big.ome.zarr": "a cluster: test_cluster.py",
-    "build s3://": "object storage: test_mirror.py",
+    "view": "does not end: serve/test_server.py",
+    "serve": "does not end: serve/test_server.py, serve/test_brick_session.py",
+    "tissue": "half a minute: building/test_tissue.py",
+    "build big.ome.zarr": "a cluster: engine/test_cluster.py",
+    "build s3://": "object storage: storage/test_object_store.py",
 }
 # ... and run, but on less
 SMALLER = {
@@ -147,7 +147,7 @@ def _runs_the_workflow(folder: Path) -> None:
     workflow = yaml.safe_load((DOCS / "examples" / "check-bundle.yml").read_text())
     job = workflow["jobs"]["check"]
     *_, install, check = job["steps"]
-    assert install["run"] == "pip install wheels/stereocell-*.whl"  # test_wheel.py installs one
+    assert install["run"] == "pip install wheels/stereocell-*.whl"  # as system/test_wheel.py
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     command = ["bash", "-e", "-c", check["run"]]
     answer = subprocess.run(
@@ -173,7 +173,7 @@ def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() ->
 
 
 def test_other_programs_are_those_that_other_tests_run() -> None:
-    """`dask` by test_cluster.py, `pip install` of a wheel by test_wheel.py."""
+    """`dask` by engine/test_cluster.py, `pip install` of a wheel by system/test_wheel.py."""
     found = {line for page in PAGES for block in blocks(page, "sh") for line in block.splitlines()}
     others = {line.split()[0] for line in found if line.strip() and line.lstrip()[0] != "#"}
     others -= {"stereocell", ".venv/bin/stereocell", "make"}

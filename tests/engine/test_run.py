@@ -1,21 +1,11 @@
 """The engine runs everything, in order of the tasks, whatever fails."""
 
-import os
-
 import dask
 import pytest
 
 from stereocell.engine.cluster import ClusterError
 from stereocell.engine.run import _AHEAD, Engine, TasksFailedError, _outcome_of
-from stereocell.model.errors import SourceError
-
-
-def double(value: int) -> int:
-    if value in (3, 6):
-        raise SourceError("it is\nbroken")
-    if value == 4:
-        raise ValueError("four is a bug")
-    return 2 * value
+from support.worker_tasks import die, double
 
 
 @pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
@@ -55,12 +45,6 @@ def test_few_tasks_wait_at_a_time_however_many_there_are(monkeypatch: pytest.Mon
     assert doubled == [2 * n for n in numbers]
     assert len(open_) == len(numbers)
     assert max(open_) <= _AHEAD + 2
-
-
-def die(value: int) -> int:
-    if value == 1:
-        os._exit(9)  # as when the system takes a process's memory back
-    return value
 
 
 @pytest.mark.slow

@@ -83,7 +83,7 @@ def test_cycif_again_is_a_no_op_and_anything_else_stays(cycif: Path, tmp_path: P
 
 
 def test_cycif_interrupted_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*args: object) -> None:
+    def full(*args: object, **options: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(microscope, "record", full)

@@ -1,4 +1,4 @@
-"""Whoever means ill is refused, whoever does not is served: server_attacks.py has the attacks."""
+"""Whoever means ill is refused, whoever does not is served (support/server/attacks.py)."""
 
 import asyncio
 import os

@@ -1,7 +1,7 @@
 """Parts of uvicorn and websockets that they promise to nobody, and the server builds on.
 
 pyproject.toml holds both to the versions that have them. Where a newer one is allowed in, this
-names what it changed; the attacks of test_serve_attacks.py then tell whether the server holds.
+names what it changed; the attacks of serve/test_attacks.py then tell whether the server holds.
 """
 
 import ast

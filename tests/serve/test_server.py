@@ -290,8 +290,8 @@ def test_both_commands_serve_here_or_on_the_lan(
     command, *flags = arguments
     assert main([command, "out", *flags]) == 0
     ((given, more),) = asked
-    open_browser = more["open_browser"] if more else given[-1]
-    assert (given[:3], open_browser) == ((Path("out"), 8000, lan), browser)
+    assert given == (Path("out"), 8000)
+    assert (more["lan"], more["open_browser"]) == (lan, browser)
 
 
 def test_writing_is_not_offered(port: int) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from stereocell.model.channel import ChannelContent, Look, TileContent
 from stereocell.model.mesh import Lod, Mesh
@@ -94,8 +93,3 @@ def open_unloaded(stage: Path) -> dict[str, Any]:
     assert run.returncode == 0, run.stderr
     seen: dict[str, Any] = json.loads(run.stdout)
     return seen
-
-
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return open_unloaded(write_many(tmp_path_factory.mktemp("many")))

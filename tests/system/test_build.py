@@ -285,7 +285,8 @@ def test_fewer_channels_leave_no_stale_file_in_the_stage(built: Path, tmp_path: 
     assert main(["build", source, "-o", str(out), *BUILD, "--channels", "F body"]) == 0
     assert list(out.rglob("empty*")) != []  # the units stay: they may be wanted again
     for part in ("stage", "bundle"):
-        assert not list((out / part).rglob("*empty*"))
+        left = [f for f in (out / part).rglob("*empty*") if f.parent.name != "assets"]
+        assert not left
 
 
 @pytest.mark.parametrize("change", [["--grid", "1x1"], ["--iso-value", "F body=400"]])

@@ -174,7 +174,7 @@ def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_no_color_leaves_the_colours_out() -> None:
     progress = (
-        "from stereocell import engine\n"
+        "from stereocell.engine import run as engine\n"
         "with engine._progress('units', 2) as advance:\n"
         "    advance('r0_c0/CD31', True)"
     )

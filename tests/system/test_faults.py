@@ -138,7 +138,7 @@ def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
 # The command: killed, or with an OUT that can't be written, once the first tile of a phase is done
 IN_THE_MIDDLE = """
 import os, signal, sys
-from stereocell import engine
+from stereocell.engine import run as engine
 from stereocell.cli.__main__ import main
 
 phase, out, fault = sys.argv[1:4]

@@ -239,10 +239,10 @@ _INTERRUPTED = """
 import os, signal, sys, threading, time
 from pathlib import Path
 from stereocell.cli.__main__ import main
-from stereocell.write import bundle
+from stereocell.bundle import write as bundle
 
 out = Path(sys.argv[1])
-bundle.describe_bundle = lambda *_: time.sleep(60)
+bundle.describe_bundle = lambda *_, **__: time.sleep(60)
 
 def interrupt():
     while not list(out.glob(".bundle.*.partial/volumes/*/*")):
@@ -282,7 +282,7 @@ def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(
         _, printed = bundle.communicate(timeout=PATIENCE_S)
     finally:
         bundle.kill()
-    assert bundle.returncode == code
+    assert bundle.returncode == code, printed
     assert printed.endswith("stereocell: stopped; the same command goes on from here\n")
     assert "Traceback" not in printed
     assert not list(out.glob(".bundle*"))

@@ -1,6 +1,6 @@
 """A little of what `make torture` does: two kills, in phases whose results are put together last.
 
-Of the command alone tells test_resume.py too, of a worker test_engine.py.
+Of the command alone tells test_resume.py too, of a worker engine/test_run.py.
 """
 
 from pathlib import Path

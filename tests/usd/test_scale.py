@@ -7,10 +7,15 @@ from typing import Any
 
 import pytest
 
-from support.many_tiles import CHANNELS, COLUMNS, EDGE, ROWS
+from support.many_tiles import CHANNELS, COLUMNS, EDGE, ROWS, open_unloaded, write_many
 
 OPENS_S = 10.0
 GROWTH_MIB = 300  # of the memory of a process that opens it
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return open_unloaded(write_many(tmp_path_factory.mktemp("many")))
 
 
 @pytest.mark.slow

@@ -167,9 +167,9 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
             elif name == "bundle":
                 phases.run_bundle(out, engine, edited)
             else:
-                from stereocell import report  # what draws takes a while to import
+                from stereocell.report import phase  # slow to import: it draws
 
-                report.run_report(out)
+                phase.run_report(out)
     finally:
         engine.close()
     seconds = {name: phase["seconds"] for name, phase in Store(out).phases().items()}

@@ -65,7 +65,7 @@ class ComposedLod:
     shape   hash of the points and faces as composed; `built`: as the pipeline made them, or empty
     own     the mesh prim's own transform
     lost    what an edit left without sense: values for other vertices
-    images  maps in memory, where the level was made anew: see composed_edits.py
+    images  maps in memory, where the level was made anew: see bundle/edited_meshes.py
     """
 
     level: int
