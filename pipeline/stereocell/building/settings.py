@@ -6,19 +6,23 @@ Order of precedence: defaults < preset < configuration file < flags. Unknown key
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
+from functools import cache
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions
 from stereocell.meshes.options import LodOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
-from stereocell.model.settings import AUTO, setting
+from stereocell.model.settings import AUTO, Flag, setting
 from stereocell.textures.options import UnwrapOptions
 from stereocell.transfer.options import WindowOptions
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length
@@ -35,17 +39,58 @@ RECORD = (
 class PlanOptions:
     """What of the dataset is built, and how it is cut."""
 
-    level: int | str = setting(AUTO, "resolution level, 0 is the finest; auto: see max_voxels")
+    level: int | str = setting(
+        AUTO,
+        "resolution level, 0 is the finest; auto: see max_voxels",
+        Flag("--level", "resolution level, 0 is the finest (default auto: see plan.max_voxels)"),
+    )
     max_voxels: int = setting(
         2_000_000_000, "auto takes the finest level within this: the region, all channels"
     )
-    channels: tuple[str, ...] = setting((), "names or indices; empty: all")
-    region: str = setting("", "z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all")
-    tile_size: tuple[int, ...] = setting((194, 512, 512), "voxels z, y, x, clipped to the data")
-    grid: str = setting("", "columns x rows of equal tiles, as 5x2; instead of tile_size")
-    time: int = setting(0, "index into a time series")
-    series: int = setting(0, "which series of DICOM, from 1 as --series list counts; 0: largest")
-    spacing_um: tuple[float, ...] = setting((), "voxel spacing z, y, x, instead of the file's")
+    channels: tuple[str, ...] = setting(
+        (),
+        "names or indices; empty: all",
+        Flag("--channels", "names or indices, as CD31,MART1", "names or indices, as CD31,MART1"),
+    )
+    region: str = setting(
+        "",
+        "z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all",
+        Flag(
+            "--region",
+            "z0:z1,y0:y1,x0:x1 in voxels of the level that is built: without --level the finest "
+            "whose region stays within plan.max_voxels",
+        ),
+    )
+    tile_size: tuple[int, ...] = setting(
+        (194, 512, 512),
+        "voxels z, y, x, clipped to the data",
+        Flag("--tile-size", "z,y,x in voxels", "three numbers z,y,x"),
+    )
+    grid: str = setting(
+        "",
+        "columns x rows of equal tiles, as 5x2; instead of tile_size",
+        Flag("--grid", "columns x rows of equal tiles, as 5x2; not with --tile-size"),
+    )
+    time: int = setting(0, "index into a time series", Flag("--time"))
+    series: int = setting(
+        0,
+        "which series of DICOM, from 1 as --series list counts; 0: largest",
+        Flag(
+            "--series",
+            "which series of a DICOM folder (default: the largest); `list` shows them and does "
+            "nothing else",
+            "N|list",
+        ),
+    )
+    spacing_um: tuple[float, ...] = setting(
+        (),
+        "voxel spacing z, y, x, instead of the file's",
+        Flag(
+            "--spacing-um",
+            "z,y,x voxel spacing in um, instead of the file's",
+            "three numbers z,y,x",
+        ),
+    )
     modality: str = setting(
         "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
     )
@@ -79,16 +124,35 @@ class Settings:
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     lod: LodOptions = field(default_factory=LodOptions)
     unwrap: UnwrapOptions = field(default_factory=UnwrapOptions)
-    # voxel values that override what is found, by channel name
-    iso_values: Mapping[str, float] = field(default_factory=dict)
-    # whose intensity is painted on a channel's surface, by that channel's name
-    paint: Mapping[str, str] = field(default_factory=dict)
+    iso_values: Mapping[str, float] = setting(
+        {},
+        "channel = voxel value, instead of the iso-value that is found",
+        Flag(
+            "--iso-value",
+            "use this iso-value (voxel values) for a channel, by name or index; may be repeated",
+            "CHANNEL=VALUE",
+        ),
+    )
+    paint: Mapping[str, str] = setting(
+        {},
+        "channel = channel whose intensity is painted on its surface",
+        Flag(
+            "--paint",
+            "paint the second channel's intensity on the first one's surface, as CD31=MART1; "
+            "may be repeated",
+            "CHANNEL=CHANNEL",
+        ),
+    )
 
 
-# sections that are no fixed keys but channels: what a value is, and what the file says of them
-_BY_CHANNEL = {
-    "iso_values": ("float", "channel = voxel value, instead of the iso-value that is found"),
-    "paint": ("str", "channel = channel whose intensity is painted on its surface"),
+# What is expected where pydantic finds another type
+_EXPECTED = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "tuple_type": "a list",
 }
 
 
@@ -111,50 +175,93 @@ def load(
     return apply(settings, flags, where)
 
 
+def preset_names() -> list[str]:
+    """Return the names that --preset takes."""
+    return sorted(path.stem for path in PRESETS.glob("*.toml"))
+
+
 def preset_path(preset: str) -> Path:
     """Return the file of a preset: one of ours by name, or the user's own TOML file."""
     if preset.endswith(".toml"):
         return Path(preset)
     path = PRESETS / f"{preset}.toml"
     if not path.is_file():
-        known = sorted(p.stem for p in PRESETS.glob("*.toml"))
-        raise UsageError(
-            f"preset {preset!r} is unknown, expected one of {', '.join(known)} or a .toml file"
-        )
+        known = ", ".join(preset_names())
+        raise UsageError(f"preset {preset!r} is unknown, expected one of {known} or a .toml file")
     return path
 
 
 def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings:
     """Return the settings with `values` ({section: {key: value}}) put in. Raises UsageError."""
+    merged = to_dict(settings)
+    by_channel = {section for section in merged if not is_dataclass(getattr(settings, section))}
     for section, content in values.items():
-        _known(section, [f.name for f in fields(settings)], where, "section")
+        _known(section, list(merged), where, "section")
         if not isinstance(content, Mapping):
-            raise UsageError(f"{where}: {section} is {content!r}, expected a table")
-        if section in _BY_CHANNEL:
-            type_ = _BY_CHANNEL[section][0]
-            given = {k: _typed(f"{where}: {section}.{k}", v, type_) for k, v in content.items()}
-            merged: dict[str, Any] = {section: {**getattr(settings, section), **given}}
-            settings = replace(settings, **merged)
-            continue
-        current = getattr(settings, section)
-        types = {f.name: _annotation(f.type) for f in fields(current)}
-        for key in content:
-            _known(key, list(types), f"{where}: {section}", "key")
-        typed = {k: _typed(f"{where}: {section}.{k}", v, types[k]) for k, v in content.items()}
-        if section == "plan" and "tile_size" in typed:
-            typed = {"grid": "", **typed}  # later settings win over an earlier grid
-        settings = replace(settings, **{section: replace(current, **typed)})
-    return settings
+            raise UsageError(f"{where}: {section} is {content!r:.80}, expected a table")
+        if section not in by_channel:
+            for key in content:
+                _known(key, list(merged[section]), f"{where}: {section}", "key")
+        if section == "plan" and "tile_size" in content:
+            merged["plan"]["grid"] = ""  # later settings win over an earlier grid
+        merged[section] |= content
+    return _validate(merged, where)
+
+
+def _validate(content: Mapping[str, Any], where: str) -> Settings:
+    """Return the settings that plain values are, each of its field's type; or raise UsageError.
+
+    In JSON's strictness a whole number is a number, a list a tuple, a table a dataclass, and
+    nothing else is taken for another.
+    """
+    from pydantic import ValidationError  # slow to import
+
+    try:
+        return _adapter().validate_json(json.dumps(_finite(content), default=str), strict=True)
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+    place = faults[0]["loc"][:2]
+    value: Any = content
+    for key in place:
+        value = value[key]
+    # a list's fault may lie in one of its values; of a union each type has a fault of its own
+    inner = [fault["loc"][2] for fault in faults if len(fault["loc"]) > 2]
+    if inner and isinstance(inner[0], int):
+        value = value[inner[0]]
+    wanted = [_EXPECTED.get(f["type"], f["msg"]) for f in faults if f["loc"][:2] == place]
+    if len(wanted) > 1:
+        wanted = [repr(AUTO) if word == "text" else word for word in wanted]
+    expected = " or ".join(dict.fromkeys(wanted))
+    name = ".".join(map(str, place)) or "settings"
+    raise UsageError(f"{where}: {name} is {value!r:.80}, expected {expected}")
+
+
+@cache
+def _adapter() -> "TypeAdapter[Settings]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Settings)
+
+
+def _finite(value: Any) -> Any:
+    """Return plain values with nothing in the place of numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, int | float):
+        try:
+            return value if isfinite(value) else None
+        except OverflowError:  # TOML's whole numbers have no end
+            return None
+    return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def to_dict(settings: Settings) -> dict[str, Any]:
     """Return the settings as plain values, tuples as lists."""
-    sections = {}
-    for f in fields(settings):
-        value = getattr(settings, f.name)
-        content = _plain(value) if is_dataclass(value) else dict(value)
-        sections[f.name] = content
-    return sections
+    sections = asdict(settings)
+    return {
+        name: {k: list(v) if isinstance(v, tuple) else v for k, v in content.items()}
+        for name, content in sections.items()
+    }
 
 
 def from_dict(values: Mapping[str, Any]) -> Settings:
@@ -169,17 +276,12 @@ def to_toml(settings: Settings, header: str = RECORD) -> str:
         value = getattr(settings, section.name)
         lines += ["", f"[{section.name}]"]
         if not is_dataclass(value):
-            lines.append(f"# {_BY_CHANNEL[section.name][1]}")
+            lines.append(f"# {section.metadata['comment']}")
             lines += [f"{_toml(key)} = {_toml(given)}" for key, given in value.items()]
             continue
         for f in fields(value):
             lines.append(f"{f.name} = {_toml(getattr(value, f.name))}  # {f.metadata['comment']}")
     return "\n".join(lines) + "\n"
-
-
-def _plain(value: Any) -> dict[str, Any]:
-    content = {f.name: getattr(value, f.name) for f in fields(value)}
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in content.items()}
 
 
 def _toml(value: Any) -> str:
@@ -216,38 +318,3 @@ def _known(key: str, known: list[str], where: str, what: str) -> None:
     near = get_close_matches(key, known, 1)
     hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
     raise UsageError(f"{where}: unknown {what} {key!r:.80}; {hint}")
-
-
-def _annotation(type_: Any) -> str:
-    """Return a field's type as its annotation is written: `bool`, `float | str`."""
-    return type_.__name__ if isinstance(type_, type) else str(type_)
-
-
-def _typed(where: str, value: Any, expected: str) -> Any:
-    """Return the value as the field's type (its annotation as text), or raise UsageError."""
-    number = isinstance(value, int | float) and not isinstance(value, bool) and _is_finite(value)
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    if expected.startswith("tuple["):
-        inner = expected.removeprefix("tuple[").split(",")[0]
-        if isinstance(value, list | tuple):
-            return tuple(_typed(where, v, inner) for v in value)
-    elif ("str" in expected and isinstance(value, str)) or (
-        "bool" in expected and isinstance(value, bool)
-    ):
-        return value
-    elif ("float" in expected and number) or ("int" in expected and whole):
-        return float(value) if "float" in expected else value
-    plain = {
-        "str": "text", "int": "a whole number", "float": "a number", "bool": "true or false"
-    }  # fmt: skip
-    wanted = "a list" if expected.startswith("tuple[") else plain.get(expected, expected)
-    if wanted == expected:
-        wanted = f"{'a number' if 'float' in expected else 'a whole number'} or {AUTO!r}"
-    raise UsageError(f"{where} is {value!r:.80}, expected {wanted}")
-
-
-def _is_finite(value: float) -> bool:
-    try:
-        return isfinite(value)
-    except OverflowError:  # TOML's whole numbers have no end
-        return False

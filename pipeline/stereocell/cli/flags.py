@@ -1,11 +1,15 @@
 """The flags of each command, and what they say as settings."""
 
 import argparse
-from collections.abc import Container
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, fields
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 from urllib.parse import unquote
 
+from stereocell.model.errors import UsageError
+from stereocell.model.settings import AUTO, Flag
 from stereocell.storage.processes import cores
 
 
@@ -27,51 +31,40 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
         help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
         "file) or NIfTI: a path",
     )
-    parser.add_argument("--preset", help="cycif, lightsheet, mri, or a TOML file of your own")
-    parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
+    declare_settings(parser)
     plan = parser.add_argument_group("what to build")
-    plan.add_argument("--level", type=int, help="resolution level, 0 is the finest")
-    plan.add_argument("--channels", help="names or indices, as CD31,MART1")
-    plan.add_argument(
-        "--region",
-        help="z0:z1,y0:y1,x0:x1 in voxels of the level that is built: without --level the finest "
-        "whose region stays within plan.max_voxels",
-    )
-    plan.add_argument("--tile-size", help="z,y,x in voxels")
-    plan.add_argument("--grid", help="columns x rows of equal tiles, as 5x2; not with --tile-size")
-    plan.add_argument("--time", type=int, help="index into a time series")
-    plan.add_argument(
-        "--series",
-        metavar="N|list",
-        help="which series of a DICOM folder (default: the largest); `list` shows them and does "
-        "nothing else",
-    )
-    plan.add_argument("--spacing-um", help="z,y,x voxel spacing in um, instead of the file's")
-    plan.add_argument(
-        "--iso-criterion", help="how iso-values are found: edges (default), adaptive, ..."
-    )
-    plan.add_argument(
-        "--wrap", help="how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"
-    )
-    plan.add_argument(
-        "--closed-tiles",
-        action="store_const",
-        const=True,
-        help="also a closed STL of every tile and channel, for printing and booleans",
-    )
-    plan.add_argument(
-        "--iso-value",
-        action="append",
-        metavar="CHANNEL=VALUE",
-        help="use this iso-value (voxel values) for a channel, by name or index; may be repeated",
-    )
-    plan.add_argument(
-        "--paint",
-        action="append",
-        metavar="CHANNEL=CHANNEL",
-        help="paint the second channel's intensity on the first one's surface, as CD31=MART1; "
-        "may be repeated",
-    )
+    for flag, _, field in _settings():
+        declare_setting(plan, flag, field)
+
+
+def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
+    """Declare a setting's flag, whose text becomes the setting's type."""
+    about = {"help": flag.help or field.metadata["comment"]}
+    kind = field.type
+    if kind is bool:
+        parser.add_argument(flag.name, action="store_const", const=True, **about)
+    elif get_origin(kind) is Mapping:
+        read = partial(_pair, flag, get_args(kind)[1])
+        parser.add_argument(flag.name, action="append", metavar=flag.form, type=read, **about)
+    elif get_origin(kind) is tuple:
+        parser.add_argument(flag.name, type=partial(_listed, flag, get_args(kind)[0]), **about)
+    elif flag.name == "--series":
+        parser.add_argument(flag.name, metavar=flag.form, type=_series, **about)
+    else:
+        parser.add_argument(flag.name, type=_number_or_auto if kind == int | str else kind, **about)
+
+
+def _settings() -> Iterator[tuple[Flag, tuple[str, ...], Field[Any]]]:
+    """Yield each setting that has a flag: the flag, the section and key, the field."""
+    from stereocell.building.settings import Settings
+
+    for section in fields(Settings()):
+        if section.metadata:
+            yield section.metadata["flag"], (section.name,), section
+            continue
+        for field in fields(getattr(Settings(), section.name)):
+            if field.metadata["flag"] is not None:
+                yield field.metadata["flag"], (section.name, field.name), field
 
 
 def declare_workers(parser: argparse.ArgumentParser) -> None:
@@ -117,9 +110,33 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
-    from stereocell.model.errors import UsageError
+def _number_or_auto(text: str) -> int | str:
+    try:
+        return text if text == AUTO else int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"invalid int value: {text!r}") from None
 
+
+def _series(text: str) -> int | str:
+    if text == "list":
+        return text
+    if not text.isdecimal() or int(text) < 1:
+        raise UsageError(f"--series is {text!r}, expected a number from 1, or `list` to see them")
+    return int(text)
+
+
+def _listed(flag: Flag, kind: type, text: str) -> list[Any]:
+    """Return the values between commas: names, or three numbers."""
+    if kind is not str:
+        return numbers(text, kind, flag.name)
+    values = [value.strip() for value in text.split(",")]
+    if not all(values):
+        raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}")
+    return values
+
+
+def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
+    """Return three numbers between commas. Raises UsageError."""
     try:
         values = [kind(part) for part in text.split(",")]
     except ValueError:
@@ -129,75 +146,45 @@ def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
     return values
 
 
-def _once(flag: str, name: str, given: Container[str]) -> None:
-    from stereocell.model.errors import UsageError
-
-    if name in given:
-        raise UsageError(f"{flag} names channel {name!r} twice, expected once")
+def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
+    """Return a channel and what is given for it."""
+    name, _, value = text.rpartition("=")
+    try:
+        given = kind(value)
+    except ValueError:
+        given = ""
+    if not name or given == "":
+        example = ", as CD31=MART1" if kind is str else ""
+        raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}{example}")
+    return name, given
 
 
 def flags_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the flags as the TOML's sections and keys."""
-    from stereocell.model.errors import UsageError
-
+    """Return the flags as the TOML's sections and keys. Raises UsageError."""
     if options.grid is not None and options.tile_size is not None:
         raise UsageError("--grid and --tile-size both say how to cut, expected one of them")
-    plan: dict[str, Any] = {}
-    for key in ("level", "region", "grid", "time"):
-        if getattr(options, key) is not None:
-            plan[key] = getattr(options, key)
-    if options.series is not None:
-        if not options.series.isdecimal() or int(options.series) < 1:
-            raise UsageError(
-                f"--series is {options.series!r}, expected a number from 1, or `list` to see them"
-            )
-        plan["series"] = int(options.series)
-    if options.channels is not None:
-        plan["channels"] = [name.strip() for name in options.channels.split(",")]
-        if not all(plan["channels"]):
-            raise UsageError(
-                f"--channels is {options.channels!r}, expected names or indices, as CD31,MART1"
-            )
-    if options.tile_size is not None:
-        plan["tile_size"] = numbers(options.tile_size, int, "--tile-size")
-    if options.spacing_um is not None:
-        plan["spacing_um"] = numbers(options.spacing_um, float, "--spacing-um")
-    iso_values: dict[str, float] = {}
-    for text in options.iso_value or []:
-        name, _, value = text.rpartition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            name = ""
-        if not name:
-            raise UsageError(f"--iso-value is {text!r}, expected CHANNEL=VALUE")
-        _once("--iso-value", name, iso_values)
-        iso_values[name] = number
-    paint: dict[str, str] = {}
-    for text in options.paint or []:
-        name, _, painted = text.rpartition("=")
-        if not name or not painted:
-            raise UsageError(f"--paint is {text!r}, expected CHANNEL=CHANNEL, as CD31=MART1")
-        _once("--paint", name, paint)
-        paint[name] = painted
-    isovalue = {} if options.iso_criterion is None else {"criterion": options.iso_criterion}
-    surface = {
-        key: getattr(options, key)
-        for key in ("wrap", "closed_tiles")
-        if getattr(options, key) is not None
-    }
-    return {
-        "plan": plan,
-        "isovalue": isovalue,
-        "surface": surface,
-        "iso_values": iso_values,
-        "paint": paint,
-    }
+    given: dict[str, Any] = {}
+    for flag, place, _ in _settings():
+        value = getattr(options, flag.name.removeprefix("--").replace("-", "_"))
+        if value is None:
+            continue
+        section = given.setdefault(place[0], {})
+        if len(place) == 2:
+            section[place[1]] = value
+            continue
+        for channel, one in value:
+            if channel in section:
+                raise UsageError(f"{flag.name} names channel {channel!r} twice, expected once")
+            section[channel] = one
+    return given
 
 
 def declare_settings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--preset", help="cycif, lightsheet, mri, or a TOML file of your own")
-    parser.add_argument("--config", type=Path, help="a TOML file of settings")
+    from stereocell.building.settings import preset_names
+
+    presets = ", ".join(preset_names())
+    parser.add_argument("--preset", help=f"{presets}, or a TOML file of your own")
+    parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
 
 
 def declare_build(parser: argparse.ArgumentParser) -> None:

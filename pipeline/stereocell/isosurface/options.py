@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import AUTO, length_um, setting
+from stereocell.model.settings import AUTO, Flag, length_um, setting
 
 CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
 ADAPTIVE = "adaptive"  # the channel's threshold, in all tiles; its curves are those of `edges`
@@ -17,6 +17,7 @@ class IsoValueOptions:
     criterion: str = setting(
         "edges",
         "edges, compromise, pekar-mean, pekar-total, pekar-area; adaptive: the channel's threshold",
+        Flag("--iso-criterion", "how iso-values are found: edges (default), adaptive, ..."),
     )
     bins: int = setting(256, "levels tried over the range of a tile's voxels")
     clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
@@ -78,10 +79,17 @@ class SurfaceOptions:
     )
     max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
     wrap: str = setting(
-        "voxels", "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)"
+        "voxels",
+        "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)",
+        Flag("--wrap", "how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"),
     )
     closed_tiles: bool = setting(
-        False, "whether the stage gets a closed STL of every tile and channel, in um"
+        False,
+        "whether the stage gets a closed STL of every tile and channel, in um",
+        Flag(
+            "--closed-tiles",
+            "also a closed STL of every tile and channel, for printing and booleans",
+        ),
     )
     background_um: float | str = setting(
         AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"

@@ -1,6 +1,6 @@
-"""Settings declared once: a frozen dataclass field with its default and the comment users read."""
+"""Settings declared once: a dataclass field with its default, its comment and its flag."""
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from stereocell.model.errors import UsageError
@@ -8,9 +8,26 @@ from stereocell.model.errors import UsageError
 AUTO = "auto"
 
 
-def setting(default: Any, comment: str) -> Any:
-    """Return a dataclass field whose default and comment become lines of `stereocell.toml`."""
-    return field(default=default, metadata={"comment": comment})
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """How a setting is given to a command.
+
+    name  as `--tile-size`
+    help  what `--help` says of it; empty: the setting's comment
+    form  what its text looks like, where its type does not tell: `z,y,x`, `CHANNEL=VALUE`
+    """
+
+    name: str
+    help: str = ""
+    form: str = ""
+
+
+def setting(default: Any, comment: str, flag: Flag | None = None) -> Any:
+    """Return a dataclass field: its default and comment become a line of `stereocell.toml`."""
+    metadata = {"comment": comment, "flag": flag}
+    if isinstance(default, dict):
+        return field(default_factory=default.copy, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 def length_um(where: str, value: float | str, auto: float) -> float:
