@@ -1,39 +1,35 @@
 """The plan as plan.json holds it (plan.schema.json), and back."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from functools import cache
 from typing import Any
 
-from stereocell.building.plan import Channel, Plan
-from stereocell.building.settings import from_dict, to_dict
+from pydantic import TypeAdapter, ValidationError
+
+from stereocell.building.plan import Plan
+from stereocell.building.settings import from_dict
 from stereocell.model.errors import OutputError
-from stereocell.model.rigid_transform import to_matrix
 from stereocell.model.settings import AUTO
-from stereocell.model.tiling import Box, Tile
+from stereocell.model.tiling import Box
 
 _FORMAT, _VERSION = "stereocell-plan", 1
 
 
+@cache
+def _adapter() -> TypeAdapter[Plan]:
+    return TypeAdapter(Plan)
+
+
 def to_json(plan: Plan) -> dict[str, Any]:
-    """Return the plan as plain values, as plan.json holds it."""
-    return {
-        "format": _FORMAT,
-        "version": _VERSION,
-        "source": plan.source,
-        "name": plan.name,
-        "fingerprint": plan.fingerprint,
-        "level": plan.level,
-        "level_reason": plan.level_reason,
-        "spacing_um": list(plan.spacing_um),
-        "origin_um": list(plan.origin_um),
-        "region": _box_json(plan.region),
-        "halo": list(plan.halo),
-        "tiles": [{"id": tile.id, **_box_json(tile.box)} for tile in plan.tiles],
-        "channels": [_channel_json(c) for c in plan.channels],
-        "settings": to_dict(plan.settings),
-        "modality": plan.modality,
-        "placement": [list(row) for row in plan.placement],
-    }
+    """Return the plan as plain values, as plan.json holds it: a tile and its box are one."""
+    content = _adapter().dump_python(plan, mode="json")
+    for tile in content["tiles"]:
+        tile |= tile.pop("box")
+    for channel in content["channels"]:
+        for key in ("source", "fingerprint"):
+            if not channel[key]:
+                del channel[key]
+    return {"format": _FORMAT, "version": _VERSION, **content}
 
 
 def from_json(content: Mapping[str, Any]) -> Plan:
@@ -41,8 +37,14 @@ def from_json(content: Mapping[str, Any]) -> Plan:
 
     Raises OutputError for what no plan of ours says.
     """
-    plan = _from_json(content)
-    fault = _find_fault(plan)
+    tiles = [{"id": tile["id"], "box": tile} for tile in content["tiles"]]
+    settings = from_dict(content["settings"])
+    try:
+        plan = _adapter().validate_python({**content, "tiles": tiles, "settings": settings})
+        fault = _find_fault(plan)
+    except ValidationError as error:  # text with half a surrogate pair
+        first = error.errors(include_url=False)[0]
+        fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     if fault is not None:
         raise OutputError(f"plan.json: {fault}: remove it and run `stereocell plan INPUT -o OUT`")
     return plan
@@ -66,44 +68,3 @@ def _find_fault(plan: Plan) -> str | None:
 def _is_inside(box: Box, region: Box) -> bool:
     ends = zip(region.start, box.start, box.stop, region.stop, strict=True)
     return all(low <= start < stop <= high for low, start, stop, high in ends)
-
-
-def _from_json(content: Mapping[str, Any]) -> Plan:
-    return Plan(
-        source=content["source"],
-        name=content["name"],
-        fingerprint=content["fingerprint"],
-        level=content["level"],
-        level_reason=content["level_reason"],
-        spacing_um=tuple(content["spacing_um"]),
-        origin_um=tuple(content["origin_um"]),
-        region=_box(content["region"]),
-        halo=tuple(content["halo"]),
-        tiles=tuple(Tile(tile["id"], _box(tile)) for tile in content["tiles"]),
-        channels=tuple(
-            Channel(
-                c["index"],
-                c["name"],
-                tuple(c["color"]),
-                c.get("source", ""),
-                c.get("fingerprint", ""),
-            )
-            for c in content["channels"]
-        ),
-        settings=from_dict(content["settings"]),
-        modality=content["modality"],
-        placement=to_matrix(content["placement"]),
-    )
-
-
-def _channel_json(channel: Channel) -> dict[str, Any]:
-    own = {k: v for k, v in asdict(channel).items() if v or k not in ("source", "fingerprint")}
-    return {**own, "color": list(channel.color)}
-
-
-def _box_json(box: Box) -> dict[str, list[int]]:
-    return {"start": list(box.start), "stop": list(box.stop)}
-
-
-def _box(content: Mapping[str, Any]) -> Box:
-    return Box(tuple(content["start"]), tuple(content["stop"]))
