@@ -1,0 +1,85 @@
+"""The flags of settings: declared beside them, offered by each command that takes an input."""
+
+import argparse
+from dataclasses import fields, make_dataclass
+from typing import Any
+
+import pytest
+
+from stereocell.building.settings import Settings, apply
+from stereocell.cli import flags
+from stereocell.model.errors import UsageError
+from stereocell.model.settings import Flag, setting
+
+# what a person types, and the setting that it has to become
+TYPED: dict[str, tuple[list[str], str, str, Any]] = {
+    "--level": (["2"], "plan", "level", 2),
+    "--channels": (["CD31, 2"], "plan", "channels", ("CD31", "2")),
+    "--region": (["0:1,2:3,4:5"], "plan", "region", "0:1,2:3,4:5"),
+    "--tile-size": (["8,9,10"], "plan", "tile_size", (8, 9, 10)),
+    "--grid": (["5x2"], "plan", "grid", "5x2"),
+    "--time": (["3"], "plan", "time", 3),
+    "--series": (["4"], "plan", "series", 4),
+    "--spacing-um": (["2,.5,.5"], "plan", "spacing_um", (2.0, 0.5, 0.5)),
+    "--iso-criterion": (["adaptive"], "isovalue", "criterion", "adaptive"),
+    "--wrap": (["alpha-wrap"], "surface", "wrap", "alpha-wrap"),
+    "--closed-tiles": ([], "surface", "closed_tiles", True),
+    "--iso-value": (["a=b=400"], "iso_values", "a=b", 400.0),
+    "--paint": (["CD31=MART1"], "paint", "CD31", "MART1"),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser()
+    flags.declare_source(made)
+    return made
+
+
+def test_each_setting_s_flag_is_typed_here() -> None:
+    declared = {
+        field.metadata["flag"].name
+        for section in fields(Settings())
+        for field in ([section] if section.metadata else fields(getattr(Settings(), section.name)))
+        if field.metadata["flag"]
+    }
+    assert declared == set(TYPED)
+
+
+@pytest.mark.parametrize("flag", TYPED)
+def test_a_flag_becomes_its_setting(flag: str) -> None:
+    words, section, key, value = TYPED[flag]
+    given = flags.flags_of(parser().parse_args(["in.tif", flag, *words]))
+    assert list(given) == [section]
+    found = getattr(apply(Settings(), given, "here"), section)
+    assert (found[key] if isinstance(found, dict) else getattr(found, key)) == value
+
+
+def test_auto_is_a_level() -> None:
+    options = parser().parse_args(["in.tif", "--level", "auto"])
+    assert apply(Settings(), flags.flags_of(options), "here").plan.level == "auto"
+
+
+def test_a_setting_s_comment_is_its_flag_s_help(capsys: pytest.CaptureFixture[str]) -> None:
+    (field,) = fields(make_dataclass("O", [("n", int, setting(1, "how many", Flag("--n")))]))
+    made = argparse.ArgumentParser()
+    flags.declare_setting(made, field.metadata["flag"], field)
+    made.print_help()
+    assert "how many" in capsys.readouterr().out
+    assert made.parse_args(["--n", "7"]).n == 7
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--series", "0"], "--series is '0', expected a number from 1, or `list`"),
+        (["--tile-size", "8,9"], "--tile-size is '8,9', expected three numbers z,y,x"),
+        (["--channels", "a,,b"], "--channels is 'a,,b', expected names or indices"),
+        (["--iso-value", "=3"], "--iso-value is '=3', expected CHANNEL=VALUE"),
+        (["--iso-value", "a=b"], "--iso-value is 'a=b', expected CHANNEL=VALUE"),
+        (["--paint", "a="], "--paint is 'a=', expected CHANNEL=CHANNEL, as CD31=MART1"),
+    ],
+)
+def test_what_is_no_setting_is_told_by_its_flag(words: list[str], message: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        parser().parse_args(["in.tif", *words])
+    assert message in str(raised.value)
