@@ -1,0 +1,57 @@
+"""docs/architecture.md has the layers that `make lint` holds, and names what is there."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text()
+PYTHON = ROOT / "pipeline" / "stereocell"
+VIEWER = ROOT / "viewer_gltf" / "src"
+PYTHON_LAYERS, VIEWER_LAYERS, WAY = re.findall(r"^```\n(.*?)^```", PAGE, re.M | re.S)
+
+
+def names(picture: str) -> list[str]:
+    """Return the packages of a picture, from the top: what stands left of two spaces' gap."""
+    lines = [line[:40] for line in picture.splitlines() if not line.startswith(" ---")]
+    return [name for line in lines for name in line.split()]
+
+
+def table(title: str) -> list[str]:
+    section = PAGE.partition(f"## {title}")[2].partition("\n## ")[0]
+    return re.findall(r"^\| `(\w+)` \|", section, re.M)
+
+
+def test_python_s_layers_are_those_that_lint_holds() -> None:
+    tool = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    (layers,) = [c["layers"] for c in tool["contracts"] if c["type"] == "layers"]
+    assert names(PYTHON_LAYERS) == layers
+
+
+def test_the_viewer_s_layers_are_those_that_lint_holds() -> None:
+    code = (ROOT / "viewer_gltf" / "scripts" / "layers.ts").read_text()
+    layers = re.findall(r'^  "(\w+)",$', code, re.M)
+    assert names(VIEWER_LAYERS) == layers[::-1]
+
+
+@pytest.mark.parametrize(
+    ("title", "folder"), [("Packages of Python", PYTHON), ("Folders of the viewer", VIEWER)]
+)
+def test_each_package_has_its_line(title: str, folder: Path) -> None:
+    there = {p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("__")}
+    there |= {"api"} if folder == PYTHON else set()
+    found = table(title)
+    assert len(found) == len(set(found))
+    assert set(found) == there
+
+
+def test_the_way_of_a_tile_leads_through_files_that_are_there() -> None:
+    packages = [p.name for p in (*PYTHON.iterdir(), *VIEWER.iterdir()) if p.is_dir()]
+    steps = re.findall(rf"\b(?:{'|'.join(packages)})/[\w/*]+", WAY)
+    assert len(steps) > 15
+    for step in steps:
+        files = [*PYTHON.glob(f"{step}*"), *VIEWER.glob(f"{step}*")]
+        made = step.startswith(("bundle/index", "units/"))  # what a build leaves
+        assert made or files, step
