@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import Store
-from stereocell.building.rounds import display_task, iso_task
+from stereocell.building.passes import display_task, iso_task
 from stereocell.building.tasks.iso_value import read_iso_field
 from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, run_display
 from stereocell.model.tiling import Box, cut

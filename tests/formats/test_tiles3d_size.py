@@ -10,7 +10,7 @@ from stereocell.bundle.write import describe_bundle, describe_channel
 from stereocell.bundle.write_tile import BundleTile, FileRef
 from stereocell.formats.tiles3d import TILESET, TileLod, make_tilesets
 from stereocell.storage.assets import schema_path
-from stereocell.usd.read_looks import ComposedLook
+from stereocell.usd.read_appearances import ComposedLook
 
 COLUMNS, ROWS, CHANNELS, LODS = 22, 11, 70, 4
 EDGE_UM = np.array([512, 512, 194]) * [0.14, 0.14, 0.28]  # x, y, z of a tile

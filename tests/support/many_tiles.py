@@ -27,7 +27,7 @@ import json, re, sys, time
 from pathlib import Path
 from pxr import UsdGeom
 from stereocell.usd.read_stage import open_stage
-from stereocell.usd.read_looks import read_looks
+from stereocell.usd.read_appearances import read_looks
 
 def peak_kib():
     status = Path("/proc/self/status")

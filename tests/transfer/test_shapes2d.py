@@ -30,7 +30,7 @@ from stereocell.transfer.shapes2d import (
     find_fault,
     shapes_from,
 )
-from stereocell.usd.read_looks import read_looks
+from stereocell.usd.read_appearances import read_looks
 from stereocell.usd.read_stage import open_stage
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.verify.formats import CheckLine, check

@@ -15,8 +15,8 @@ from typing import Any
 from stereocell.building import stage_tasks
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import Store
+from stereocell.building.passes import run_rounds
 from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
-from stereocell.building.rounds import run_rounds
 from stereocell.building.settings import Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
 from stereocell.building.tasks import iso_value, unit, window

@@ -39,7 +39,7 @@ from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import encode, to_json
 from stereocell.storage.json_files import compact_json
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
-from stereocell.usd.read_looks import ComposedLook, read_looks
+from stereocell.usd.read_appearances import ComposedLook, read_looks
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,

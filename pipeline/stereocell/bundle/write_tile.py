@@ -34,8 +34,8 @@ from stereocell.storage.atomic_write import replacing_folder, write_bytes
 from stereocell.storage.json_files import read_json, write_json
 from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
+from stereocell.usd.read_appearances import ComposedLook
 from stereocell.usd.read_attributes import Point
-from stereocell.usd.read_looks import ComposedLook
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
-from stereocell.usd.read_looks import ComposedLook
+from stereocell.usd.read_appearances import ComposedLook
 from stereocell.usd.read_stage import ComposedVolume
 
 COUNTED_VOXELS = 4_000_000  # of a tile: of a larger one only some of the planes

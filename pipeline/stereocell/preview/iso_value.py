@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+from stereocell.building.passes import display_task, iso_task
 from stereocell.building.phases import settle
 from stereocell.building.plan import Channel, Plan
-from stereocell.building.rounds import display_task, iso_task
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.iso_value import IsoField, read_iso_field
 from stereocell.building.tasks.window import run_display

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.open_source import open_source, source_of
+from stereocell.building.passes import display_task
 from stereocell.building.plan import Plan
-from stereocell.building.rounds import display_task
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.window import run_display
 from stereocell.isosurface.options import SurfaceOptions

@@ -29,6 +29,7 @@ from stereocell.usd.layer import (
     hash_shape,
     move_box,
 )
+from stereocell.usd.read_appearances import material_of, surface_of
 from stereocell.usd.read_attributes import (
     Point,
     file_of,
@@ -39,7 +40,6 @@ from stereocell.usd.read_attributes import (
     shortest,
     sizes_of,
 )
-from stereocell.usd.read_looks import material_of, surface_of
 from stereocell.usd.read_mesh import read_mesh
 from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice

@@ -1,7 +1,7 @@
 """Write the stage of a specimen: stage.usda, which only composes, and its looks.
 
 stage.usda                    /Specimen: tiles by payload, cameras; sublayers the two looks/ layers
-looks/channels.usda           /Specimen/Channels, see usd/write_looks.py
+looks/channels.usda           /Specimen/Channels, see usd/write_appearances.py
 looks/lights.usda             a copy of usd_assets/lights.usda
 tiles/<tile>/tile.usdc        see usd/write_tile.py
 
@@ -41,7 +41,7 @@ from stereocell.usd.layer import (
     vec3f,
     world_box,
 )
-from stereocell.usd.write_looks import write_looks
+from stereocell.usd.write_appearances import write_looks
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import STAGE_NAME
 

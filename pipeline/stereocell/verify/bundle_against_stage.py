@@ -38,7 +38,7 @@ from stereocell.model.errors import CheckError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.json_files import read_json
 from stereocell.transfer.joint_histogram import log_scaled
-from stereocell.usd.read_looks import ComposedLook, read_looks
+from stereocell.usd.read_appearances import ComposedLook, read_looks
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,

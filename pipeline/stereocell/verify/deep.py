@@ -6,13 +6,13 @@ from pathlib import Path
 
 from stereocell.building.input_unchanged import require_added, require_input
 from stereocell.building.out_folder import Store
+from stereocell.building.passes import unit_tasks
 from stereocell.building.plan import Channel, Plan
-from stereocell.building.rounds import unit_tasks
 from stereocell.bundle.write import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError, StageError, StereoCellError
+from stereocell.usd.read_appearances import read_looks
 from stereocell.usd.read_attributes import shortest
-from stereocell.usd.read_looks import read_looks
 from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
 from stereocell.verify.bundle_against_stage import (
     BundleTask,

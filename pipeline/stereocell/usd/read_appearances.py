@@ -21,7 +21,7 @@ from stereocell.usd.read_attributes import (
 )
 from stereocell.usd.read_shapes2d import read_gradient_max, read_shapes
 from stereocell.usd.read_textures import feeder
-from stereocell.usd.write_looks import DEFAULT_FUNCTION
+from stereocell.usd.write_appearances import DEFAULT_FUNCTION
 
 WHITE = (1.0, 1.0, 1.0)
 _VOLUME_WINDOW = "stereocell:volumeWindow"
