@@ -51,11 +51,11 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _looks(out: Path) -> Iterator[tuple[str, str, float]]:
     for entry in Store(out).survey().values():
-        look = entry["look"]
-        yield look["name"], look["surface"], look["iso_confidence"]
+        appearance = entry["look"]
+        yield appearance["name"], appearance["surface"], appearance["iso_confidence"]
 
 
-def test_verdicts_follow_the_confidence(out: Path) -> None:
+def test_clearness_follows_the_confidence(out: Path) -> None:
     least = Store(out).plan().settings.isovalue.min_confidence
     found = {name: (surface, confidence) for name, surface, confidence in _looks(out)}
     assert {name: surface for name, (surface, _) in found.items()} == VERDICTS
@@ -68,14 +68,14 @@ def test_stage_and_manifest_say_so_and_the_unclear_surface_is_there(out: Path) -
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     manifest = json.loads((out / "bundle" / "manifest.json").read_text())
     for channel in manifest["channels"]:
-        verdict = VERDICTS[channel["name"]]
+        surface_confidence = VERDICTS[channel["name"]]
         prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel['id']}")
-        assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == verdict
-        assert channel["surface"] == verdict
-        assert (channel["tileset"] is None) == (verdict == "none")
+        assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == surface_confidence
+        assert channel["surface"] == surface_confidence
+        assert (channel["tileset"] is None) == (surface_confidence == "none")
 
 
-def _edit(out: Path, path: Path, verdict: str) -> Path:
+def _edit(out: Path, path: Path, surface_confidence: str) -> Path:
     stage = out / "stage" / "stage.usda"
     path.write_text(f"""#usda 1.0
 (
@@ -90,7 +90,7 @@ over "Specimen"
     {{
         over "noise"
         {{
-            token stereocell:surfaceVerdict = "{verdict}"
+            token stereocell:surfaceVerdict = "{surface_confidence}"
         }}
     }}
 }}
@@ -98,14 +98,14 @@ over "Specimen"
     return path
 
 
-def test_a_bundle_follows_a_verdict_that_was_edited(out: Path, tmp_path: Path) -> None:
+def test_a_bundle_follows_a_surface_confidence_that_was_edited(out: Path, tmp_path: Path) -> None:
     edit = _edit(out, tmp_path / "edit.usda", "clear")
     assert main(["bundle", str(out), "--stage", str(edit), "--workers", "0"]) == 0
     manifest = json.loads((out / "bundle" / "manifest.json").read_text())
     assert [channel["surface"] for channel in manifest["channels"]] == ["clear", "clear", "none"]
 
 
-def test_a_verdict_that_is_none_is_named(
+def test_a_surface_confidence_that_is_none_is_named(
     out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     edit = _edit(out, tmp_path / "edit.usda", "perhaps")
@@ -135,9 +135,9 @@ def test_calm_surface_reads_no_more_voxels_and_the_halo_holds(out: Path) -> None
     assert float(after.smoothing_um) > 2 * float(before.smoothing_um)
     assert choose(plan, "unclear", []).alpha_um == 0
     reaches = [
-        choose(plan, verdict, []).reach_um(plan.spacing_um)
+        choose(plan, surface_confidence, []).reach_um(plan.spacing_um)
         + SMOOTHING_REACH * float(surface.smoothing_um)
-        for verdict, surface in (("clear", before), ("unclear", after))
+        for surface_confidence, surface in (("clear", before), ("unclear", after))
     ]
     assert reaches[1] == pytest.approx(reaches[0])
     assert calm.halo == plan.halo

@@ -8,9 +8,9 @@ import pytest
 from stereocell.building.settings import Settings
 from stereocell.building.unit import UnitInput, build_unit, to_eight_bit
 from stereocell.isosurface.repair import RepairOptions
-from stereocell.model.channel import APRON
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from support.phantoms import blurred_ball

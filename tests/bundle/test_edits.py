@@ -645,9 +645,13 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
     tile = replace(tile, channels=(painted, *others))
     write_tile(tmp_path, tile)
     settings = {"lod": {"errors": [0.1, 0.5, 0.8]}, "unwrap": {"first_lod": first_lod}}
-    looks = (replace(spheres.RED, painted_by="Hoechst_x20_33342"), spheres.BLUE)
+    appearances = (replace(spheres.RED, painted_by="Hoechst_x20_33342"), spheres.BLUE)
     write_stage(
-        tmp_path, "one", looks=looks, tiles=[TileExtent.of(tile)], provenance={"settings": settings}
+        tmp_path,
+        "one",
+        appearances=appearances,
+        tiles=[TileExtent.of(tile)],
+        provenance={"settings": settings},
     )
     layer = Sdf.Layer.CreateNew(str(tmp_path / "edit.usda"))
     layer.subLayerPaths = ["./stage.usda"]

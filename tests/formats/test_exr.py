@@ -5,8 +5,8 @@ import OpenEXR
 import pytest
 
 from stereocell.formats.exr import check_exr, read_atlas, write_atlas, write_lut
-from stereocell.model.channel import evaluate
 from stereocell.model.errors import StageError
+from stereocell.transfer.opacity import evaluate
 
 
 @pytest.mark.parametrize("shape", [(1, 5, 9), (7, 3, 30), (5, 5, 5), (26, 66, 51)])

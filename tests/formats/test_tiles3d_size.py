@@ -10,7 +10,7 @@ from stereocell.bundle.write import describe_bundle, describe_channel
 from stereocell.bundle.write_tile import BundleTile, FileRef
 from stereocell.formats.tiles3d import TILESET, TileLod, make_tilesets
 from stereocell.storage.assets import schema_path
-from stereocell.usd.read_appearances import ComposedLook
+from stereocell.usd.read_appearances import ComposedAppearance
 
 COLUMNS, ROWS, CHANNELS, LODS = 22, 11, 70, 4
 EDGE_UM = np.array([512, 512, 194]) * [0.14, 0.14, 0.28]  # x, y, z of a tile
@@ -65,7 +65,7 @@ def manifest(rng, tiles, files):
         name = f"Marker_x20_{k:03}"
         low, iso, high = np.cumsum(1000 * rng.random(3)).tolist()
         window = (round(low), round(high))
-        look = ComposedLook(
+        appearance = ComposedAppearance(
             name,
             name.replace("_x20_", " "),
             tuple(float(c) for c in rng.random(3).astype(np.float32)),
@@ -80,7 +80,7 @@ def manifest(rng, tiles, files):
             iso,
         )
         entry = describe_channel(
-            look,
+            appearance,
             [(137_218, 38_314, 26_304, 17_454)] * len(tiles),
             transfer2d=ref(f"channels/{name}/transfer2d.json"),
             lut=ref(f"luts/{name}.ktx2"),

@@ -25,8 +25,14 @@ def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
     tile = spheres.tile(0)
     write_tile(out / "stage", tile)
-    looks = (spheres.RED, spheres.BLUE)
-    write_stage(out / "stage", "one tile", looks=looks, tiles=[TileExtent.of(tile)], provenance={})
+    appearances = (spheres.RED, spheres.BLUE)
+    write_stage(
+        out / "stage",
+        "one tile",
+        appearances=appearances,
+        tiles=[TileExtent.of(tile)],
+        provenance={},
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tiles3d, "MOST_WHOLE_TILES", 0)
         write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)

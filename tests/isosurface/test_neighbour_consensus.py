@@ -58,13 +58,13 @@ def test_tiles_without_a_value_have_no_say_and_get_none() -> None:
     found = {tile.id: nothing for tile in TILES} | {"r0_c0": _found(500, 100)}
     agreed = _agree(TILES, found)
     assert agreed.values == {tile.id: None for tile in TILES} | {"r0_c0": 500}
-    assert agreed.verdict == "clear"
+    assert agreed.surface_confidence == "clear"
     assert agreed.confidence == 0.9
 
 
 def test_channel_without_any_value_has_no_surface() -> None:
     agreed = _agree(TILES, {tile.id: {"value": None} for tile in TILES})
-    assert (agreed.verdict, agreed.confidence) == ("none", 0)
+    assert (agreed.surface_confidence, agreed.confidence) == ("none", 0)
     assert set(agreed.values.values()) == {None}
 
 
@@ -90,7 +90,7 @@ def test_neighbours_that_are_not_sure_are_no_reason_for_doubt() -> None:
 def test_a_stain_in_few_tiles_is_clear_by_the_strength_of_its_edges() -> None:
     found = {tile.id: _found(20, 10, 0.1, 0.001) for tile in TILES}
     agreed = _agree(TILES, found | {"r0_c1": _found(400, 100, 0.9)})
-    assert agreed.verdict == "clear"
+    assert agreed.surface_confidence == "clear"
     assert agreed.confidence == pytest.approx(0.9, abs=0.01)
     assert {tile for tile, value in agreed.values.items() if value is not None} == {"r0_c1"}
 
@@ -98,13 +98,13 @@ def test_a_stain_in_few_tiles_is_clear_by_the_strength_of_its_edges() -> None:
 def test_channel_of_doubtful_tiles_is_unclear_and_keeps_what_was_found() -> None:
     found = {tile.id: _found(100, 10, 0.1) for tile in TILES}
     agreed = _agree(TILES, found | {"r0_c1": _found(100, 10, 0.41)})  # one by chance
-    assert agreed.verdict == "unclear"
+    assert agreed.surface_confidence == "unclear"
     assert set(agreed.values.values()) == {100}
 
 
 def test_channel_without_any_edge_is_judged_by_the_plain_mean() -> None:
     agreed = _agree(TILES, {tile.id: _found(100, 10, 0.2, 0.0) for tile in TILES})
-    assert agreed.verdict == "unclear"
+    assert agreed.surface_confidence == "unclear"
     assert agreed.confidence == pytest.approx(0.2)
 
 

@@ -16,7 +16,7 @@ def write_tiles(folder, tiles=TILES):
     write_stage(
         folder,
         "two tiles",
-        looks=(spheres.RED, spheres.BLUE),
+        appearances=(spheres.RED, spheres.BLUE),
         tiles=[TileExtent.of(t) for t in tiles],
         provenance={},
     )

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.model.channel import ChannelContent, Look, TileContent
+from stereocell.model.channel import Appearance
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.usd.write_tile import LAYER_NAME
 
@@ -27,7 +28,7 @@ import json, re, sys, time
 from pathlib import Path
 from pxr import UsdGeom
 from stereocell.usd.read_stage import open_stage
-from stereocell.usd.read_appearances import read_looks
+from stereocell.usd.read_appearances import read_appearances
 
 def peak_kib():
     status = Path("/proc/self/status")
@@ -39,21 +40,21 @@ stage = open_stage(Path(sys.argv[1]))
 tiles = stage.GetPrimAtPath("/Specimen/Tiles").GetAllChildren()
 cache = UsdGeom.BBoxCache(0, ["default"], useExtentsHint=True)
 box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
-looks = len(read_looks(stage))
+appearances = len(read_appearances(stage))
 seconds, after = time.perf_counter() - start, peak_kib()
 print(json.dumps({
     "tiles": len(tiles),
     "loaded": sum(tile.IsLoaded() for tile in tiles),
     "lods": sorted({t.GetVariantSets().GetAllVariantSelections()["lod"] for t in tiles}),
     "width_um": box.GetSize()[0],
-    "looks": looks,
+    "appearances": appearances,
     "seconds": seconds,
     "growth_kib": None if before is None or after is None else after - before,
 }))
 """
 
 
-def content(row: int, column: int, looks: list[Look]) -> TileContent:
+def content(row: int, column: int, appearances: list[Appearance]) -> TileContent:
     first = (0.0, row * EDGE * 1.0, column * EDGE * 1.0)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     corners += np.array([first[2], -first[1] - 1, 1], np.float32)
@@ -62,7 +63,7 @@ def content(row: int, column: int, looks: list[Look]) -> TileContent:
     lods = (Lod(mesh, 0.0), Lod(mesh, 0.5))
     volume = np.full((EDGE + 2,) * 3, 7, np.uint8)
     last = tuple(start + EDGE - 1 for start in first)
-    channels = tuple(ChannelContent(look.id, lods, volume) for look in looks)
+    channels = tuple(ChannelContent(appearance.id, lods, volume) for appearance in appearances)
     return TileContent(f"r{row}_c{column}", (1.0, 1.0, 1.0), first, last, (EDGE,) * 3, channels)
 
 
@@ -70,18 +71,18 @@ def write_many(folder: Path) -> Path:
     """Write the stage; return its root layer."""
     functions = ("default", "sharp", "soft", "surface", "threshold")
     ramps = dict.fromkeys(functions, ((0.0, 0.0), (1.0, 1.0)))
-    looks = [
-        Look(f"channel {k}", (k / CHANNELS, 0.5, 0.5), (0.0, 9.0), 4.0, 1.0, "clear", ramps)
+    appearances = [
+        Appearance(f"channel {k}", (k / CHANNELS, 0.5, 0.5), (0.0, 9.0), 4.0, 1.0, "clear", ramps)
         for k in range(CHANNELS)
     ]
     places = [(row, column) for row in range(ROWS) for column in range(COLUMNS)]
-    extents = [TileExtent.of(content(row, column, looks[:1])) for row, column in places]
-    write_tile(folder, content(*places[0], looks))
+    extents = [TileExtent.of(content(row, column, appearances[:1])) for row, column in places]
+    write_tile(folder, content(*places[0], appearances))
     first, *others = (folder / "tiles" / extent.id / LAYER_NAME for extent in extents)
     for layer in others:
         layer.parent.mkdir()
         shutil.copyfile(first, layer)
-    write_stage(folder, "many", looks=looks, tiles=extents, provenance={})
+    write_stage(folder, "many", appearances=appearances, tiles=extents, provenance={})
     return folder / "stage.usda"
 
 

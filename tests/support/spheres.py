@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.channel import ChannelContent, Look, TileContent
+from stereocell.model.channel import Appearance
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.tile_content import ChannelContent, TileContent
 
 SPACING = (1.0, 0.5, 0.5)  # um, (z, y, x)
 OWN_SHAPE = (9, 20, 20)
@@ -12,7 +13,7 @@ CENTER = np.array([10.0, -5.0, 4.0])  # on the border of the two tiles
 RADIUS = 3.5
 LEVELS = ((24, 0.02), (16, 0.1), (8, 0.4))  # rings of the sphere, measured distance in um
 
-RED = Look(
+RED = Appearance(
     "CD31",
     (1.0, 0.2, 0.1),
     (100.0, 4000.0),
@@ -21,7 +22,7 @@ RED = Look(
     "clear",
     {"default": ((0.0, 0.0), (1.0, 0.8)), "sharp": ((0.3, 0.0), (0.31, 1.0))},
 )
-BLUE = Look(
+BLUE = Appearance(
     "Hoechst 33342",
     (0.1, 0.3, 1.0),
     (0.0, 255.0),
@@ -71,7 +72,7 @@ def ball(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[n
     return np.clip(128 + 60 * (RADIUS - distance), 0, 255).astype(np.uint8)
 
 
-def tile(column: int, looks: tuple[Look, ...] = (RED, BLUE)) -> TileContent:
+def tile(column: int, appearances: tuple[Appearance, ...] = (RED, BLUE)) -> TileContent:
     """Return tile r0_c0 (x 0 to 10 um) or r0_c1 (10 to 19.5 um); only CD31 has a surface."""
     lattice = (9, 20, 21) if column == 0 else OWN_SHAPE
     first = (0.0, 0.0, 10.0 * column)
@@ -84,6 +85,7 @@ def tile(column: int, looks: tuple[Look, ...] = (RED, BLUE)) -> TileContent:
         keep = slice(0, rings + 1) if column == 0 else slice(rings, None)
         lods.append(Lod(sphere(rings, keep), distance, flat if level else None))
     contents = tuple(
-        ChannelContent(look.id, tuple(lods) if look.iso_value else (), volume) for look in looks
+        ChannelContent(appearance.id, tuple(lods) if appearance.iso_value else (), volume)
+        for appearance in appearances
     )
     return TileContent(f"r0_c{column}", SPACING, first, last, OWN_SHAPE, contents)

@@ -12,9 +12,10 @@ from pxr import Usd
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
-from stereocell.model.channel import ChannelContent, Look, TileContent
+from stereocell.model.channel import Appearance
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support.phantoms import F_BACKGROUND, F_BODY, blurred_ball, f_phantom
@@ -64,11 +65,11 @@ def make_tiles() -> list[TileContent]:
     return tiles
 
 
-def make_looks() -> list[Look]:
+def make_appearances() -> list[Appearance]:
     return [
-        Look(name, color, (100.0, 1100.0), None, 0.0, "none", FUNCTIONS)
+        Appearance(name, color, (100.0, 1100.0), None, 0.0, "none", FUNCTIONS)
         if name == "1st"
-        else Look(name, color, (100.0, 1100.0), 600.0, 0.75, "clear", FUNCTIONS)
+        else Appearance(name, color, (100.0, 1100.0), 600.0, 0.75, "clear", FUNCTIONS)
         for name, color in zip(NAMES, COLORS, strict=True)
     ]
 
@@ -82,7 +83,7 @@ def write_whole(folder: Path) -> Path:
     write_stage(
         folder,
         "F",
-        looks=make_looks(),
+        appearances=make_appearances(),
         tiles=[TileExtent.of(t) for t in tiles],
         provenance=provenance,
     )

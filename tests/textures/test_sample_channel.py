@@ -12,7 +12,8 @@ from pxr import Usd, UsdGeom, UsdShade
 from stereocell.building.out_folder import Store
 from stereocell.building.unit_files import load_lods, load_record
 from stereocell.cli.__main__ import main
-from stereocell.model.channel import PaintColors, to_srgb8
+from stereocell.model.channel import PaintColors
+from stereocell.model.color import to_srgb8
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box

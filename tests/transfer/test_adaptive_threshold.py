@@ -13,7 +13,6 @@ from scipy.stats import norm
 from skimage import filters
 
 from stereocell.cli.__main__ import main
-from stereocell.model.channel import evaluate
 from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
@@ -26,9 +25,9 @@ from stereocell.transfer.channel_statistics import (
     display_from_json,
     display_to_json,
     find_display,
-    make_look,
+    make_appearance,
 )
-from stereocell.transfer.opacity import THRESHOLD
+from stereocell.transfer.opacity import THRESHOLD, evaluate
 from stereocell.transfer.options import WindowOptions
 from stereocell.verify.formats import check
 from support import phantoms
@@ -245,21 +244,23 @@ def two_bodies() -> NDArray[np.uint16]:
 
 def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     display = find_display(two_bodies(), WindowOptions(0, 100))
-    look = make_look(
+    appearance = make_appearance(
         "MR", (1, 1, 1), display=display, iso_values={"a": 500.0}, confidence=0.9, surface="clear"
     )
-    assert look.threshold is not None
-    assert 250 < look.threshold < 850
-    assert look.threshold_normalized is not None
-    table = evaluate(look.transfer_functions[THRESHOLD], 1024)
+    assert appearance.threshold is not None
+    assert 250 < appearance.threshold < 850
+    assert appearance.threshold_normalized is not None
+    table = evaluate(appearance.transfer_functions[THRESHOLD], 1024)
     levels = np.linspace(0, 1, 1024)
-    assert (table[levels <= look.threshold_normalized - 1e-3] == 0).all()
-    assert table[np.searchsorted(levels, look.threshold_normalized) + 2] > 0
+    assert (table[levels <= appearance.threshold_normalized - 1e-3] == 0).all()
+    assert table[np.searchsorted(levels, appearance.threshold_normalized) + 2] > 0
     assert (np.diff(table) >= 0).all()
     again = display_from_json(json.loads(json.dumps(display_to_json(display))))
     assert again == display
     flat = find_display(np.full(100, 7, np.uint8), WindowOptions())
-    bare = make_look("MR", (1, 1, 1), display=flat, iso_values={}, confidence=0.0, surface="none")
+    bare = make_appearance(
+        "MR", (1, 1, 1), display=flat, iso_values={}, confidence=0.0, surface="none"
+    )
     assert bare.threshold is None
     assert THRESHOLD not in bare.transfer_functions
 

@@ -8,9 +8,8 @@ import pytest
 from stereocell.building.out_folder import Store
 from stereocell.building.tasks import window as window_task
 from stereocell.cli.__main__ import main
-from stereocell.model.channel import evaluate
-from stereocell.transfer.channel_statistics import find_display, make_look
-from stereocell.transfer.opacity import NAMES, make_transfer_functions
+from stereocell.transfer.channel_statistics import find_display, make_appearance
+from stereocell.transfer.opacity import NAMES, evaluate, make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
 
@@ -123,26 +122,26 @@ def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
 def test_look_means_over_the_tiles_that_have_a_surface() -> None:
     display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     values = {"a": 20.0, "b": 40.0, "c": None}
-    look = make_look(
+    appearance = make_appearance(
         "CD31", (0, 1, 0), display=display, iso_values=values, confidence=0.75, surface="clear"
     )
-    assert look.iso_value == 30
-    assert look.iso_confidence == 0.75
-    assert look.iso_normalized == pytest.approx(0.3)
+    assert appearance.iso_value == 30
+    assert appearance.iso_confidence == 0.75
+    assert appearance.iso_normalized == pytest.approx(0.3)
 
 
 def test_opacity_of_an_unclear_channel_does_not_begin_at_its_level() -> None:
     display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     clear, unclear, none = (
-        make_look(
+        make_appearance(
             "CD31",
             (0, 1, 0),
             display=display,
             iso_values={"a": value},
             confidence=0.3,
-            surface=verdict,
+            surface=surface_confidence,
         ).transfer_functions
-        for value, verdict in ((30.0, "clear"), (30.0, "unclear"), (None, "none"))
+        for value, surface_confidence in ((30.0, "clear"), (30.0, "unclear"), (None, "none"))
     )
     assert unclear == none
     assert unclear["sharp"] != clear["sharp"]

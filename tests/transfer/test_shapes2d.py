@@ -17,11 +17,12 @@ from stereocell.building.out_folder import Store
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
-from stereocell.model.channel import Shape, Shapes, evaluate
+from stereocell.model.channel import Shape, Shapes
 from stereocell.model.errors import StageError
 from stereocell.storage.assets import find_asset, schema_path
-from stereocell.transfer.channel_statistics import look_from
+from stereocell.transfer.channel_statistics import appearance_from
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
+from stereocell.transfer.opacity import evaluate
 from stereocell.transfer.shapes2d import (
     MAX_SHAPES,
     NAME,
@@ -30,7 +31,7 @@ from stereocell.transfer.shapes2d import (
     find_fault,
     shapes_from,
 )
-from stereocell.usd.read_appearances import read_looks
+from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_stage import open_stage
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.verify.formats import CheckLine, check
@@ -51,8 +52,8 @@ LOOK = replace(
     shapes={NAME: SHAPES},
     gradient_max=0.37,
 )
-LOOKS = (LOOK, spheres.BLUE)
-TILES = tuple(spheres.tile(column, LOOKS) for column in (0, 1))
+APPEARANCES = (LOOK, spheres.BLUE)
+TILES = tuple(spheres.tile(column, APPEARANCES) for column in (0, 1))
 CD31 = "/Specimen/Channels/CD31"
 
 
@@ -182,7 +183,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_stage(
         folder,
         "two tiles",
-        looks=LOOKS,
+        appearances=APPEARANCES,
         tiles=[TileExtent.of(tile) for tile in TILES],
         provenance={},
     )
@@ -211,7 +212,7 @@ def edit(stage: Path, folder: Path, variant: str = NAME, **arrays: object) -> Pa
 
 
 def test_the_stage_gives_back_the_shapes_as_they_were(stage: Path) -> None:
-    red, blue = read_looks(open_stage(stage))
+    red, blue = read_appearances(open_stage(stage))
     assert red.shapes == {NAME: SHAPES}
     assert red.gradient_max == 0.37
     assert list(red.transfer_functions) == ["default", NAME, "sharp"]
@@ -226,7 +227,7 @@ def test_what_an_artist_leaves_out_has_its_default(stage: Path, tmp_path: Path) 
         shapes=Vt.Vec4fArray([Gf.Vec4f(0.25, 0.75, 0, 1)]),
         shapeKinds=Vt.TokenArray(["triangle"]),
     )
-    red, _ = read_looks(open_stage(path))
+    red, _ = read_appearances(open_stage(path))
     expected = Shape("triangle", (0.25, 0.75), (0, 1), 0.5, (1, 1, 1), 1, 0.5)
     assert red.shapes == {NAME: SHAPES, "sharp": (expected,)}
     assert red.chosen == "sharp"
@@ -236,7 +237,7 @@ def test_emptied_shapes_leave_the_opacity_points(stage: Path, tmp_path: Path) ->
     empty = {"shapes": Vt.Vec4fArray(), "shapeKinds": Vt.TokenArray()}
     empty |= {"shapeTips": Vt.FloatArray(), "shapeSoftness": Vt.FloatArray()}
     path = edit(stage, tmp_path, **empty, shapeColors=Vt.Vec4fArray())
-    red, _ = read_looks(open_stage(path))
+    red, _ = read_appearances(open_stage(path))
     assert red.shapes == {}
     assert NAME in red.transfer_functions
 
@@ -280,7 +281,7 @@ def test_a_faulty_edit_is_one_clear_line(
 ) -> None:
     path = edit(stage, tmp_path, **dict(arrays))
     with pytest.raises(StageError, match=rf"^{CD31}\.stereocell:{message}") as caught:
-        read_looks(open_stage(path))
+        read_appearances(open_stage(path))
     assert "\n" not in str(caught.value)
 
 
@@ -389,9 +390,9 @@ def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Pa
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0
     ball_entry, flat_entry = Store(out).survey().values()
-    look = look_from(ball_entry["look"])
-    (triangle,) = look.shapes[NAME]
-    low, high = look.window
+    appearance = appearance_from(ball_entry["look"])
+    (triangle,) = appearance.shapes[NAME]
+    low, high = appearance.window
     # half-way between the ball's and the background's counts
     assert low + triangle.tip * (high - low) == pytest.approx(600, abs=20)
     assert flat_entry["look"]["shapes"] == {}

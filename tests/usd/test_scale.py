@@ -23,7 +23,7 @@ def test_242_tiles_are_known_without_their_payloads(seen: dict[str, Any]) -> Non
     assert (seen["tiles"], seen["loaded"]) == (COLUMNS * ROWS, 0)
     assert seen["lods"] == ["lod1"]
     assert seen["width_um"] == COLUMNS * EDGE
-    assert seen["looks"] == CHANNELS
+    assert seen["appearances"] == CHANNELS
 
 
 @pytest.mark.slow

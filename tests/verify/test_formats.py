@@ -28,8 +28,14 @@ def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
     tile = spheres.tile(0)
     write_tile(out / "stage", tile)
-    looks = (spheres.RED, spheres.BLUE)
-    write_stage(out / "stage", "one tile", looks=looks, tiles=[TileExtent.of(tile)], provenance={})
+    appearances = (spheres.RED, spheres.BLUE)
+    write_stage(
+        out / "stage",
+        "one tile",
+        appearances=appearances,
+        tiles=[TileExtent.of(tile)],
+        provenance={},
+    )
     write_list(out / "stage", {}, out / "stage")
     write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)
     return out
@@ -187,7 +193,7 @@ def test_a_build_without_any_surface_passes(tmp_path):
     write_stage(
         tmp_path / "stage",
         "empty",
-        looks=[spheres.BLUE],
+        appearances=[spheres.BLUE],
         tiles=[TileExtent.of(tile)],
         provenance={},
     )

@@ -37,7 +37,7 @@ from stereocell.transfer.channel_statistics import (
     Display,
     display_from_json,
     display_to_json,
-    make_look,
+    make_appearance,
 )
 
 T = TypeVar("T")
@@ -142,7 +142,7 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
             else agree(neighbours, found, plan.settings.isovalue.min_confidence)
         )
         display, painter = displays[channel.id], plan.painter(channel)
-        look = make_look(
+        appearance = make_appearance(
             channel.name,
             channel.color,
             display=display,
@@ -151,7 +151,7 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
                 for tile, value in agreed.values.items()
             },
             confidence=agreed.confidence,
-            surface=agreed.verdict,
+            surface=agreed.surface_confidence,
         )
         content[channel.id] = {
             "display": display_to_json(display),
@@ -171,10 +171,10 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
                     plan.repair,
                     surface=plan.settings.surface,
                     spacing_um=plan.spacing_um,
-                    verdict=agreed.verdict,
+                    surface_confidence=agreed.surface_confidence,
                 )
             ),
-            "look": asdict(replace(look, painted_by=painter.id if painter else "")),
+            "look": asdict(replace(appearance, painted_by=painter.id if painter else "")),
         }
     write_json(store.survey_file, content)
     return content

@@ -33,7 +33,7 @@ from stereocell.storage.file_list import find_faults, read_list
 from stereocell.storage.json_files import write_json
 from stereocell.storage.location import Location, require_apart
 from stereocell.storage.workspace import is_file, objects_below, remove, sizes_below
-from stereocell.transfer.channel_statistics import look_from
+from stereocell.transfer.channel_statistics import appearance_from
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd import written_files
@@ -144,11 +144,17 @@ def run_stage(out: Path, engine: Engine) -> None:
     with phase_of(store, "stage") as phase:
         store.require_units_of(plan)
         index, content = store.index(), store.survey()
-        looks = [look_from(content[channel.id]["look"]) for channel in plan.channels]
+        appearances = [appearance_from(content[channel.id]["look"]) for channel in plan.channels]
         tiles = [(tile.id, tile_task(store, plan, index=index, tile=tile)) for tile in plan.tiles]
         about = provenance(plan)
         names = [plan.name, plan.modality]
-        depends = [index, [asdict(look) for look in looks], about, names, list(plan.placement)]
+        depends = [
+            index,
+            [asdict(appearance) for appearance in appearances],
+            about,
+            names,
+            list(plan.placement),
+        ]
         key = key_of(depends, stage_tasks, usdz_writer)
         if phase.is_done(key, partial(_digest_of_stage, store)):
             return
@@ -163,7 +169,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         stage_writer.write_stage(
             store.stage_dir,
             plan.name,
-            looks=looks,
+            appearances=appearances,
             tiles=extents,
             provenance=about,
             modality=plan.modality,

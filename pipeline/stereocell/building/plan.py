@@ -13,7 +13,7 @@ from typing import Protocol, TypeVar
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.isosurface.repair import RepairOptions
-from stereocell.model.channel import Verdict
+from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.rigid_transform import IDENTITY, Matrix
@@ -382,7 +382,7 @@ def _by(numbers: Sequence[float]) -> str:
     return " x ".join(f"{n:.15g}" for n in numbers)
 
 
-def plan_for(plan: Plan, verdict: Verdict) -> Plan:
+def plan_for(plan: Plan, surface_confidence: SurfaceConfidence) -> Plan:
     """Return the plan by which a channel is built; one whose surface is unclear is smoothed more.
 
     At the level of a surface that nothing tells from noise the field is frayed, in solids that join
@@ -392,7 +392,7 @@ def plan_for(plan: Plan, verdict: Verdict) -> Plan:
     on smoothing: the unit reads no more voxels, neighbours still see the same field, and that tile
     has 65 thousand triangles after 4.5 s.
     """
-    if verdict != "unclear":
+    if surface_confidence != "unclear":
         return plan
     surface = plan.settings.surface
     repair, step = plan.repair, plan.spacing_um

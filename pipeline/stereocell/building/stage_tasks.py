@@ -12,7 +12,8 @@ from typing import Any
 from stereocell.building.out_folder import Store
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import find_closed, is_whole, load_lods, load_volume
-from stereocell.model.channel import ChannelContent, PaintColors, TileContent
+from stereocell.model.channel import PaintColors
+from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.file_list import FileList

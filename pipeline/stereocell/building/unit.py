@@ -12,10 +12,10 @@ from stereocell.filters.denoise import denoise
 from stereocell.isosurface.extract import extract_surface, signed_distance
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
 from stereocell.meshes.alpha_wrap import alpha_wrap
-from stereocell.model.channel import APRON
 from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
+from stereocell.model.tile_content import APRON
 from stereocell.model.timing import Clock
 from stereocell.model.unit import Closed, Unit
 from stereocell.model.volume import Volume

@@ -27,7 +27,7 @@ from stereocell.meshes.distance import Nearest, measure_distance
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.validity import Faults, border, certify
-from stereocell.model.channel import to_srgb8
+from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh

@@ -32,14 +32,14 @@ from stereocell.bundle.write_transfer2d import describe, encode_histogram, sum_t
 from stereocell.formats.gltf import choose_step
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.formats.tiles3d import make_tilesets
-from stereocell.model.channel import evaluate
 from stereocell.model.errors import OutputError, StageError
 from stereocell.model.version import GENERATOR
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import encode, to_json
 from stereocell.storage.json_files import compact_json
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
-from stereocell.usd.read_appearances import ComposedLook, read_looks
+from stereocell.transfer.opacity import evaluate
+from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
@@ -120,7 +120,7 @@ def _fill(
     for layer in stage.GetUsedLayers():
         if layer.realPath:
             as_written.require(Path(layer.realPath))
-    looks = read_looks(stage)
+    appearances = read_appearances(stage)
     prims = tile_prims(stage)
     if not prims:
         raise StageError(f"{stage_path}: no tile is visible")
@@ -130,7 +130,7 @@ def _fill(
         export_tile,
         stage_path,
         parts,
-        looks=tuple(looks),
+        appearances=tuple(appearances),
         step_m=step_m,
     )
     names = [str(prim.GetName()) for prim in prims]
@@ -150,8 +150,8 @@ def _fill(
             move(parts / tile.id / ref.path, root / ref.path)
         files += refs
     channels = []
-    for i, look in enumerate(looks):
-        entry, written = _write_channel(root, look, [(t.id, t.channels[i]) for t in tiles])
+    for i, appearance in enumerate(appearances):
+        entry, written = _write_channel(root, appearance, [(t.id, t.channels[i]) for t in tiles])
         channels.append(entry)
         files += written
     if viewer_dist is not None:
@@ -195,10 +195,10 @@ def describe_bundle(
 
 
 def _write_channel(
-    root: Path, look: ComposedLook, tiles: Sequence[tuple[str, TileChannel]]
+    root: Path, appearance: ComposedAppearance, tiles: Sequence[tuple[str, TileChannel]]
 ) -> tuple[dict[str, Any], list[FileRef]]:
     """Write what a channel has once; return its entry in the manifest, and the files."""
-    folder = f"channels/{look.id}"
+    folder = f"channels/{appearance.id}"
     drawn = [channel.lods for _, channel in tiles if channel.lods]
     tilesets = [
         write_file(root, f"{folder}/{address}", content)
@@ -206,13 +206,13 @@ def _write_channel(
     ]
     entries = [channel.volume for _, channel in tiles if channel.volume is not None]
     volumes = write_file(root, f"{folder}/volumes.json", compact_json({"volumes": entries}))
-    lut = write_file(root, f"luts/{look.id}.ktx2", encode_2d(_bake(look)).data)
+    lut = write_file(root, f"luts/{appearance.id}.ktx2", encode_2d(_bake(appearance)).data)
     counts = sum_tiles(channel.joint for _, channel in tiles if channel.joint is not None)
     histogram = write_file(root, f"{folder}/histogram2d.ktx2", encode_histogram(counts))
-    joint = compact_json(describe(look, counts, asdict(histogram)))
+    joint = compact_json(describe(appearance, counts, asdict(histogram)))
     transfer2d = write_file(root, f"{folder}/transfer2d.json", joint)
     entry = describe_channel(
-        look,
+        appearance,
         [channel.triangles for _, channel in tiles],
         transfer2d=transfer2d,
         lut=lut,
@@ -223,7 +223,7 @@ def _write_channel(
 
 
 def describe_channel(
-    look: ComposedLook,
+    appearance: ComposedAppearance,
     triangles: Iterable[Sequence[int]],
     *,
     transfer2d: FileRef,
@@ -233,17 +233,17 @@ def describe_channel(
 ) -> dict[str, Any]:
     """Return a channel's entry in the manifest; `triangles` of each tile by level."""
     return {
-        "id": look.id,
-        "name": look.name,
-        "color": list(look.color),
-        "window": list(look.window),
-        "iso_value": look.iso_value,
-        "iso_normalized": look.iso_normalized,
-        "threshold_normalized": look.threshold_normalized,
-        "surface": "none" if tileset is None else look.surface,
-        "transfer_function": look.chosen,
-        "transfer_functions": list(look.transfer_functions),
-        "transfer_functions_2d": {"names": list(look.shapes), "file": asdict(transfer2d)},
+        "id": appearance.id,
+        "name": appearance.name,
+        "color": list(appearance.color),
+        "window": list(appearance.window),
+        "iso_value": appearance.iso_value,
+        "iso_normalized": appearance.iso_normalized,
+        "threshold_normalized": appearance.threshold_normalized,
+        "surface": "none" if tileset is None else appearance.surface,
+        "transfer_function": appearance.chosen,
+        "transfer_functions": list(appearance.transfer_functions),
+        "transfer_functions_2d": {"names": list(appearance.shapes), "file": asdict(transfer2d)},
         "lut": asdict(lut),
         "tileset": None if tileset is None else asdict(tileset),
         "triangles": _totals(triangles),
@@ -251,10 +251,10 @@ def describe_channel(
     }
 
 
-def _bake(look: ComposedLook) -> np.ndarray[Any, np.dtype[np.uint8]]:
+def _bake(appearance: ComposedAppearance) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Return a row of 256 texels RGBA for each transfer function, uint8 (n, 256, 4)."""
-    table = np.full((len(look.transfer_functions), 256, 4), 255, dtype=np.uint8)
-    for row, points in zip(table, look.transfer_functions.values(), strict=True):
+    table = np.full((len(appearance.transfer_functions), 256, 4), 255, dtype=np.uint8)
+    for row, points in zip(table, appearance.transfer_functions.values(), strict=True):
         row[:, 3] = np.rint(evaluate(points) * 255)
     return table
 

@@ -34,7 +34,7 @@ from stereocell.storage.atomic_write import replacing_folder, write_bytes
 from stereocell.storage.json_files import read_json, write_json
 from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
-from stereocell.usd.read_appearances import ComposedLook
+from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_attributes import Point
 from stereocell.usd.read_stage import (
     ComposedLod,
@@ -123,7 +123,12 @@ def find_part(part: Path) -> BundleTile | None:
 
 
 def export_tile(
-    stage_path: Path, parts: Path, tile_id: str, *, looks: tuple[ComposedLook, ...], step_m: float
+    stage_path: Path,
+    parts: Path,
+    tile_id: str,
+    *,
+    appearances: tuple[ComposedAppearance, ...],
+    step_m: float,
 ) -> tuple[BundleTile, set[Path]]:
     """Write one tile's part, `parts`/<tile>/; see gltf.py for the lattice step, in metres.
 
@@ -138,10 +143,10 @@ def export_tile(
         replacing_folder(parts / tile_id) as root,
         loaded(stage, tile_id, as_written) as (tile, choice),
     ):
-        volumes = [read_volume(tile, look.id) for look in looks]
+        volumes = [read_volume(tile, appearance.id) for appearance in appearances]
         channels = [
-            _export_channel(root, tile, look, volume, choice.finest_lod, step_m, as_written)
-            for look, volume in zip(looks, volumes, strict=True)
+            _export_channel(root, tile, appearance, volume, choice.finest_lod, step_m, as_written)
+            for appearance, volume in zip(appearances, volumes, strict=True)
         ]
         low, high = find_bounds(tile, volumes)
         made = BundleTile(tile_id, choice.representation, low, high, tuple(channels))
@@ -166,13 +171,13 @@ def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tup
 def _export_channel(
     root: Path,
     tile: Usd.Prim,
-    look: ComposedLook,
+    appearance: ComposedAppearance,
     volume: ComposedVolume | None,
     finest_lod: int,
     step_m: float,
     as_written: AsWritten,
 ) -> TileChannel:
-    channel_id = look.id
+    channel_id = appearance.id
     files: list[FileRef] = []
     lods: list[TileLod] = []
     triangles: list[int] = []
@@ -197,7 +202,7 @@ def _export_channel(
     entry = joint = None
     if volume is not None:
         as_written.require(volume.atlas)
-        entry, written, joint = _export_volume(root, tile.GetName(), look, volume)
+        entry, written, joint = _export_volume(root, tile.GetName(), appearance, volume)
         files += written
     return TileChannel(
         channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint, shown.edit
@@ -262,16 +267,16 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
 
 
 def _export_volume(
-    root: Path, tile_id: str, look: ComposedLook, volume: ComposedVolume
+    root: Path, tile_id: str, appearance: ComposedAppearance, volume: ComposedVolume
 ) -> tuple[dict[str, Any], list[FileRef], bytes]:
     voxels = read_atlas(volume.atlas)
     if voxels.shape != volume.size[::-1]:
         found = tuple(voxels.shape[::-1])
         raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
-    voxels = look.window_voxels(voxels)
+    voxels = appearance.window_voxels(voxels)
     texture = encode_3d(mip_levels(voxels))
     bricks = encode_3d([min_max_bricks(voxels)])
-    path = f"volumes/{tile_id}/{look.id}"
+    path = f"volumes/{tile_id}/{appearance.id}"
     files = [
         write_file(root, f"{path}.ktx2", texture.data),
         write_file(root, f"{path}_bricks.ktx2", bricks.data),
@@ -297,7 +302,7 @@ def _export_volume(
             for level in texture.levels
         ],
     }
-    return entry, files, count_tile(voxels, volume, look.gradient_max)
+    return entry, files, count_tile(voxels, volume, appearance.gradient_max)
 
 
 def _point(values: Any) -> Point:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
-from stereocell.usd.read_appearances import ComposedLook
+from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_stage import ComposedVolume
 
 COUNTED_VOXELS = 4_000_000  # of a tile: of a larger one only some of the planes
@@ -57,13 +57,13 @@ def encode_histogram(counts: NDArray[np.int64]) -> bytes:
 
 
 def describe(
-    look: ComposedLook, counts: NDArray[np.int64], histogram: dict[str, Any]
+    appearance: ComposedAppearance, counts: NDArray[np.int64], histogram: dict[str, Any]
 ) -> dict[str, Any]:
     """Return what transfer2d.json holds; `histogram`: the reference to its file."""
     return {
-        "gradient_max": look.gradient_max,
+        "gradient_max": appearance.gradient_max,
         "functions": {
-            name: [asdict(shape) for shape in shapes] for name, shapes in look.shapes.items()
+            name: [asdict(shape) for shape in shapes] for name, shapes in appearance.shapes.items()
         },
         "histogram": histogram,
         "most": int(counts.max()),

@@ -15,9 +15,11 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from stereocell.model.channel import APRON, OpacityPoints, evaluate
+from stereocell.model.channel import OpacityPoints
 from stereocell.model.errors import OutputError, StageError
+from stereocell.model.tile_content import APRON
 from stereocell.storage.atomic_write import replacing
+from stereocell.transfer.opacity import evaluate
 
 _MAGIC = b"\x76\x2f\x31\x01"
 _OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # tiles, deep data, several parts

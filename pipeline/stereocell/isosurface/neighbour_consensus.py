@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.model.channel import Verdict
+from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.tiling import Box, Tile
 
 SUMMIT = 0.99  # of the best score: levels that are as good; .95 cost a lone ball 11 % of volume
@@ -36,16 +36,16 @@ Neighbours = Mapping[str, Sequence[str]]
 class Agreed:
     """One channel's iso-values.
 
-    values       by tile id; None: the tile takes the mean of the others
-    confidences  by tile id, 0..1
-    confidence   the channel's, 0..1
-    verdict      on its surface
+    values              by tile id; None: the tile takes the mean of the others
+    confidences         by tile id, 0..1
+    confidence          the channel's, 0..1
+    surface_confidence  whether its surface is clear
     """
 
     values: dict[str, float | None]
     confidences: dict[str, float]
     confidence: float
-    verdict: Verdict
+    surface_confidence: SurfaceConfidence
 
 
 def agree(
@@ -74,13 +74,13 @@ def agree(
     confidence = float(
         np.average([confidences[tile] for tile in known], weights=weights if any(weights) else None)
     )
-    verdict: Verdict = "clear" if confidence >= min_confidence else "unclear"
-    if verdict == "clear":
+    surface_confidence: SurfaceConfidence = "clear" if confidence >= min_confidence else "unclear"
+    if surface_confidence == "clear":
         values = {
             tile: value if confidences[tile] >= min_confidence else None
             for tile, value in values.items()
         }
-    return Agreed(_drawn(neighbours, values, found), confidences, confidence, verdict)
+    return Agreed(_drawn(neighbours, values, found), confidences, confidence, surface_confidence)
 
 
 def find_neighbours(tiles: Sequence[Tile]) -> dict[str, list[str]]:

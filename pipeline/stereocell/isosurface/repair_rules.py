@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from stereocell.isosurface.components import find_solids
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
-from stereocell.model.channel import Verdict
+from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.settings import AUTO
 
 SHARE = 0.5  # of the means: what is smaller goes
@@ -72,7 +72,7 @@ def choose_repair(
     *,
     surface: SurfaceOptions,
     spacing_um: tuple[float, float, float],
-    verdict: Verdict,
+    surface_confidence: SurfaceConfidence,
 ) -> RepairOptions:
     """Return what is cleaned of a channel's surface.
 
@@ -101,7 +101,7 @@ def choose_repair(
             alpha = ALPHA_SIDES * diagonal / faces**0.5
         least = LEAST_ALPHA * max(spacing_um)
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
-    if verdict == "unclear":
+    if surface_confidence == "unclear":
         options = replace(options, alpha_um=0.0)
     wraps_triangles = surface.wrap == "alpha-wrap"  # which knows no offset of 0
     if surface.offset_um == AUTO or (wraps_triangles and not options.offset_um):

@@ -1,18 +1,15 @@
-"""What the stages make of a volume, and the stage writer takes: looks, and the content of tiles."""
+"""How a channel is drawn: colour, window, iso-value and transfer functions."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.identifiers import to_identifier
-from stereocell.model.mesh import Lod
 
-APRON = 1  # voxels around the lattice's on every side of a volume: what trilinear filtering reads
-# on a channel's surface; `unclear`: built where a level was found, and nothing to rely on
-Verdict = Literal["clear", "unclear", "none"]
+# `unclear`: a surface is built where a level was found, and nothing to rely on
+SurfaceConfidence = Literal["clear", "unclear", "none"]
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 DEFAULT_GRADIENT_MAX = 0.5  # the fallback in schemas/usd: half of the window over two voxels
 ShapeKind = Literal["rectangle", "triangle"]
@@ -43,14 +40,14 @@ Shapes = tuple[Shape, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Appearance:
     """How one channel is drawn in all tiles.
 
     color             linear RGB, 0..1
     window            the voxel values that become 0 and 1 in the 8-bit volumes
     iso_value         mean over the tiles, in voxel values; None: no tile has a surface
     iso_confidence    0..1, of the channel
-    surface           the verdict on it
+    surface           how clear it is
     painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
     shapes            of those functions that are two-dimensional, by name
@@ -63,7 +60,7 @@ class Look:
     window: tuple[float, float]
     iso_value: float | None
     iso_confidence: float
-    surface: Verdict
+    surface: SurfaceConfidence
     transfer_functions: dict[str, OpacityPoints]
     painted_by: str = ""
     shapes: dict[str, Shapes] = field(default_factory=dict)
@@ -106,57 +103,3 @@ class PaintColors:
         share = intensity[..., None].astype(np.float32) / 255
         base, painted = (np.array(color, np.float32) for color in (self.base, self.painted))
         return base + share * (painted - base)
-
-
-def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return sRGB, uint8, of linear 0..1 (IEC 61966-2-1)."""
-    clipped = np.clip(linear.astype(np.float64), 0, 1)
-    bent = 1.055 * clipped ** (1 / 2.4) - 0.055
-    return np.round(255 * np.where(clipped <= 0.0031308, 12.92 * clipped, bent)).astype(np.uint8)
-
-
-@dataclass(frozen=True, slots=True)
-class ChannelContent:
-    """One (tile, channel): what a unit of work leaves.
-
-    lods    finest first; empty: no surface
-    volume  uint8 (z, y, x), window applied, with an apron of APRON voxels on every side
-    paint   colours of the channel that is painted on the surface; None: none is
-    closed  the STL of a closed copy of the surface; None: there is none
-    """
-
-    channel_id: str
-    lods: tuple[Lod, ...]
-    volume: NDArray[np.uint8]
-    paint: PaintColors | None = None
-    closed: Path | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class TileContent:
-    """One tile with all its channels.
-
-    first_um, last_um  (z, y, x) centres of its first own voxel and of its last lattice point: the
-                       box that its meshes fill and that its volume shows
-    own_shape          voxels (z, y, x) without the apron and without the neighbours' shared plane.
-                       The volumes' shape is the lattice's (own + shared planes) + 2
-    """
-
-    id: str
-    spacing_um: tuple[float, float, float]
-    first_um: tuple[float, float, float]
-    last_um: tuple[float, float, float]
-    own_shape: tuple[int, int, int]
-    channels: tuple[ChannelContent, ...]
-
-
-Provenance = dict[str, Any]
-
-
-def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:
-    """Return the opacity at `size` intensities from 0 to 1, straight lines between the points.
-
-    float32 (size,). Before the first and after the last point the opacity stays as it is there.
-    """
-    intensities, opacities = np.array(points, dtype=np.float64).T
-    return np.interp(np.linspace(0, 1, size), intensities, opacities).astype(np.float32)

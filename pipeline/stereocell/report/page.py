@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from stereocell.building.out_folder import Store
 from stereocell.building.plan import plan_for
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
-from stereocell.model.channel import APRON
 from stereocell.model.identifiers import from_identifier
 from stereocell.model.lattice_field import LatticeField, make_iso_field
+from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.version import GENERATOR
 from stereocell.model.volume import zyx_to_xyz
@@ -36,7 +36,7 @@ from stereocell.report.thresholds import draw_cut, draw_threshold
 from stereocell.report.tissue import TissueFacts, find_tissue
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.textures.unwrap import mip_levels_apart
-from stereocell.transfer.channel_statistics import display_from_json, look_from
+from stereocell.transfer.channel_statistics import appearance_from, display_from_json
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 MOST_PICTURED = 60  # units
@@ -138,29 +138,31 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
     rows = []
     for channel in facts.plan.channels:
         entry = facts.survey[channel.id]
-        look = look_from(entry["look"])
+        appearance = appearance_from(entry["look"])
         units = [unit for unit in facts.units if unit.channel == channel]
         values = [u.iso_value + u.background for u in units if u.iso_value is not None]
         rows.append(
             {
                 "name": channel.name,
                 "color": css_color(channel.color),
-                "window": look.window,
-                "iso_value": look.iso_value,
-                "confidence": look.iso_confidence,
-                "surface": look.surface,
+                "window": appearance.window,
+                "iso_value": appearance.iso_value,
+                "confidence": appearance.iso_confidence,
+                "surface": appearance.surface,
                 "repair": entry["repair"],
                 "spread": (min(values), max(values)) if values else None,
                 "arcs": len(entry["display"]["proposal"]["shapes"]),
                 "no_arcs": entry["display"]["proposal"]["reason"],
                 "given": channel.name in facts.plan.settings.iso_values,
                 "histogram": charts.histogram(
-                    entry["display"]["histogram"], look.transfer_functions, look.iso_normalized
+                    entry["display"]["histogram"],
+                    appearance.transfer_functions,
+                    appearance.iso_normalized,
                 ),
-                "functions": list(look.transfer_functions),
+                "functions": list(appearance.transfer_functions),
                 "total": sum_up(units),
                 "maps": sum_up_maps(units),
-                "painted_by": from_identifier(look.painted_by),
+                "painted_by": from_identifier(appearance.painted_by),
             }
         )
     return rows
@@ -175,7 +177,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
     for unit in (u for u in facts.units if u.tile == middle and not u.channel.source):
         entry = facts.survey[unit.channel.id]
         figure = draw_threshold(display_from_json(entry["display"]))
-        share = look_from(entry["look"]).threshold_normalized
+        share = appearance_from(entry["look"]).threshold_normalized
         if figure is None or share is None:
             continue
         volume = load_volume(unit.directory)[inner, inner, inner]
@@ -201,7 +203,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
     inner = slice(APRON, -APRON)
     volume = load_volume(unit.directory)[inner, inner, inner]
     display = display_from_json(facts.survey[unit.channel.id]["display"])
-    verdict = facts.survey[unit.channel.id]["look"]["surface"]
+    surface_confidence = facts.survey[unit.channel.id]["look"]["surface"]
     low, high = display.window
     slices = cut_unit(
         volume,
@@ -209,7 +211,7 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
         first_um=plan.position_um(lattice.start),
         spacing_um=plan.spacing_um,
         mesh=load_lods(unit.directory)[0].mesh if unit.lods else None,
-        sigma_um=float(plan_for(plan, verdict).settings.surface.smoothing_um),
+        sigma_um=float(plan_for(plan, surface_confidence).settings.surface.smoothing_um),
         iso_at=None if iso is None else partial(_in_eight_bits, iso, display.background, low, high),
     )
     curve = read_curve(store.out, unit)

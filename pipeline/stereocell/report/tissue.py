@@ -13,7 +13,7 @@ from stereocell.building.input_unchanged import require_added
 from stereocell.building.open_source import open_source, source_of
 from stereocell.building.plan import Plan
 from stereocell.building.tissue_files import FOLDER, read_record
-from stereocell.model.channel import to_srgb8
+from stereocell.model.color import to_srgb8
 from stereocell.model.tiling import Box
 from stereocell.preview.draw_slices import VIEWS, encode
 

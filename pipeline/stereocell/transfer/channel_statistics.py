@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Look, Verdict
+from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Appearance, SurfaceConfidence
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
@@ -104,46 +104,46 @@ def display_from_json(content: Mapping[str, Any]) -> Display:
     )
 
 
-def make_look(
+def make_appearance(
     name: str,
     color: tuple[float, float, float],
     *,
     display: Display,
     iso_values: Mapping[str, float | None],
     confidence: float,
-    surface: Verdict,
-) -> Look:
-    """Return how a channel is drawn; iso-values by tile id, confidence and verdict for all."""
+    surface: SurfaceConfidence,
+) -> Appearance:
+    """Return how a channel is drawn; iso-values by tile id, both confidences for all."""
     known = [value for value in iso_values.values() if value is not None]
     iso_value = float(np.mean(known)) if known else None
     found = display.threshold
-    look = replace(
-        Look(name, color, display.window, iso_value, confidence, surface, {}),
+    appearance = replace(
+        Appearance(name, color, display.window, iso_value, confidence, surface, {}),
         threshold=None if found is None else found.value,
     )
     # a level that nothing tells from noise is no place for opacity to begin
-    level = look.iso_normalized if surface == "clear" else None
+    level = appearance.iso_normalized if surface == "clear" else None
     functions = make_transfer_functions(
-        np.asarray(display.histogram), level, look.threshold_normalized
+        np.asarray(display.histogram), level, appearance.threshold_normalized
     )
     shapes = display.proposal.shapes
     if shapes:
         functions[NAME_2D] = fall_back(shapes)
     return replace(
-        look,
+        appearance,
         transfer_functions=functions,
         shapes={NAME_2D: shapes} if shapes else {},
         gradient_max=display.proposal.gradient_max,
     )
 
 
-def look_from(content: Mapping[str, Any]) -> Look:
-    """Return the look that survey.json holds."""
+def appearance_from(content: Mapping[str, Any]) -> Appearance:
+    """Return the appearance that survey.json holds."""
     functions = {
         name: tuple((float(x), float(opacity)) for x, opacity in points)
         for name, points in content["transfer_functions"].items()
     }
-    return Look(
+    return Appearance(
         content["name"],
         tuple(content["color"]),
         tuple(content["window"]),

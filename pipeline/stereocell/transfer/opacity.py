@@ -48,6 +48,15 @@ def make_transfer_functions(
     return functions
 
 
+def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:
+    """Return the opacity at `size` intensities from 0 to 1, straight lines between the points.
+
+    float32 (size,). Before the first and after the last point the opacity stays as it is there.
+    """
+    intensities, opacities = np.array(points, dtype=np.float64).T
+    return np.interp(np.linspace(0, 1, size), intensities, opacities).astype(np.float32)
+
+
 def _points(*points: tuple[float, float]) -> OpacityPoints:
     """Return the points after the origin, rounded so that text files repeat."""
     inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]

@@ -1,4 +1,4 @@
-"""Read the looks of a composed stage: the channels', and what a tile's own mesh is drawn with."""
+"""Read the appearances of a composed stage: the channels', and that of a tile's own mesh."""
 
 import itertools
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdShade
 
 from stereocell.formats.gltf import Material
-from stereocell.model.channel import OpacityPoints, Shapes, Verdict, normalized
+from stereocell.model.channel import OpacityPoints, Shapes, SurfaceConfidence, normalized
 from stereocell.model.errors import StageError
 from stereocell.usd.layer import CHANNELS
 from stereocell.usd.read_attributes import (
@@ -28,12 +28,12 @@ _VOLUME_WINDOW = "stereocell:volumeWindow"
 
 
 @dataclass(frozen=True, slots=True)
-class ComposedLook:
-    """One channel as the stage draws it; see specimen.Look.
+class ComposedAppearance:
+    """One channel as the stage draws it; see model.channel.Appearance.
 
     window         the voxel values to be shown as 0 and 1
     volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
-    surface        the verdict on it
+    surface        how clear it is
     chosen         a transfer function
     shapes         of those functions that are two-dimensional, by name
     gradient_max   the gradient magnitude that is 1 to shapes
@@ -46,7 +46,7 @@ class ComposedLook:
     window: tuple[float, float]
     volume_window: tuple[float, float]
     iso_value: float | None
-    surface: Verdict
+    surface: SurfaceConfidence
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
     shapes: dict[str, Shapes]
@@ -75,10 +75,10 @@ class ComposedLook:
         return table[voxels]
 
 
-def read_looks(stage: Usd.Stage) -> list[ComposedLook]:
-    """Return the channels' looks, in the stage's order. Raises StageError for a faulty one."""
+def read_appearances(stage: Usd.Stage) -> list[ComposedAppearance]:
+    """Return the channels' appearances, in the stage's order. Raises StageError."""
     prims = stage.GetPrimAtPath(CHANNELS).GetChildren()
-    return [_read_look(prim) for prim in prims if prim.IsA(UsdShade.Material)]
+    return [_read_appearance(prim) for prim in prims if prim.IsA(UsdShade.Material)]
 
 
 def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
@@ -106,7 +106,7 @@ def material_of(surface: UsdShade.Shader) -> Material:
     return Material(color, _share(surface, "metallic", 0.0), _share(surface, "roughness", 0.5))
 
 
-def _read_look(prim: Usd.Prim) -> ComposedLook:
+def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
     variants = prim.GetVariantSet("transferFunction")
     chosen = variants.GetVariantSelection() or DEFAULT_FUNCTION
     names = sorted(variants.GetVariantNames(), key=lambda name: (name != DEFAULT_FUNCTION, name))
@@ -120,7 +120,7 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
     if chosen not in functions:
         raise StageError(f"{prim.GetPath()}: no transferFunction variant {chosen!r}")
     window = _window(prim, "stereocell:window")
-    return ComposedLook(
+    return ComposedAppearance(
         prim.GetName(),
         prim.GetDisplayName() or prim.GetName(),
         color_of(prim.GetAttribute("inputs:color")),
@@ -128,7 +128,7 @@ def _read_look(prim: Usd.Prim) -> ComposedLook:
         # only stages of other programs lack it
         _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
         _number(prim, "stereocell:isoValue"),
-        _verdict(prim, "stereocell:surfaceVerdict"),
+        _surface_confidence(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
         shapes,
@@ -149,16 +149,15 @@ def _number(prim: Usd.Prim, name: str) -> float | None:
     return None if value is None else shortest(value)
 
 
-def _verdict(prim: Usd.Prim, name: str) -> Verdict:
+def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
     value = prim.GetAttribute(name).Get()
     if value is None:  # only stages of other programs lack it
         return "clear"
-    for verdict in get_args(Verdict):
-        if value == verdict:
-            return verdict
-    raise StageError(
-        f"{prim.GetPath()}.{name}: {value!r}, expected one of {', '.join(get_args(Verdict))}"
-    )
+    for confidence in get_args(SurfaceConfidence):
+        if value == confidence:
+            return confidence
+    known = ", ".join(get_args(SurfaceConfidence))
+    raise StageError(f"{prim.GetPath()}.{name}: {value!r}, expected one of {known}")
 
 
 def _opacity_points(prim: Usd.Prim) -> OpacityPoints:

@@ -1,4 +1,4 @@
-"""Write the looks of a stage: looks/channels.usda, the one place where a channel's look lives.
+"""Write the appearances of a stage: looks/channels.usda, the one place where a channel's lives.
 
 Each channel is a material below /Specimen/Channels that the materials of all tiles inherit. The
 colour is an input of the material: the surface shader is connected to it, volume renderers and the
@@ -6,7 +6,7 @@ bundle read it. The opacity points are the transfer function; the LUT is baked f
 with shapes is a 2D function, and its opacity points what stands for it where gradients are unknown.
 
 The material has no volume output: USD ships no volume shader that renderers agree on, only
-UsdPreviewSurface. So the binding of a Volume prim to its look hands over the channel's values
+UsdPreviewSurface. So the binding of a Volume prim to its appearance hands over the channel's values
 (colour, opacity points, LUT), and does NOT make a renderer draw the volume by them: an artist
 connects `outputs:volume` to the renderer's own shader, in a layer over the stage, and feeds its
 colour from `inputs:color`. The bundle's viewer has its own ray caster. docs/stage.md has what was
@@ -19,7 +19,7 @@ from pathlib import Path
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from stereocell.formats.exr import write_lut
-from stereocell.model.channel import Look, OpacityPoints, Shapes
+from stereocell.model.channel import Appearance, OpacityPoints, Shapes
 from stereocell.usd.layer import (
     CHANNEL_API,
     CHANNELS,
@@ -34,48 +34,51 @@ DEFAULT_FUNCTION = "default"
 _Types = Sdf.ValueTypeNames
 
 
-def write_looks(folder: Path, looks: Sequence[Look]) -> None:
+def write_appearances(folder: Path, appearances: Sequence[Appearance]) -> None:
     """Write channels.usda and <channel>_<function>.exr into `folder`. Raises OutputError."""
     stage = new_stage(".usda", ROOT.name)
     stage.OverridePrim(ROOT)
     UsdGeom.Scope.Define(stage, CHANNELS)
-    for look in looks:
-        material = UsdShade.Material.Define(stage, CHANNELS.AppendChild(look.id))
-        _author_look(material, look)
-        _author_surface(material, look)
-        _author_functions(material.GetPrim(), look)
-        for name, points in look.transfer_functions.items():
-            write_lut(folder / _lut_name(look, name), points)
+    for appearance in appearances:
+        material = UsdShade.Material.Define(stage, CHANNELS.AppendChild(appearance.id))
+        _author_appearance(material, appearance)
+        _author_surface(material, appearance)
+        _author_functions(material.GetPrim(), appearance)
+        for name, points in appearance.transfer_functions.items():
+            write_lut(folder / _lut_name(appearance, name), points)
     export(stage.GetRootLayer(), folder / "channels.usda")
 
 
-def _lut_name(look: Look, function: str) -> str:
-    return f"{look.id}_{function}.exr"
+def _lut_name(appearance: Appearance, function: str) -> str:
+    return f"{appearance.id}_{function}.exr"
 
 
-def _author_look(material: UsdShade.Material, look: Look) -> None:
+def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> None:
     prim = material.GetPrim()
-    prim.SetDisplayName(look.name)
+    prim.SetDisplayName(appearance.name)
     prim.AddAppliedSchema(CHANNEL_API)
-    material.CreateInput("color", _Types.Color3f).Set(Gf.Vec3f(*look.color))
+    material.CreateInput("color", _Types.Color3f).Set(Gf.Vec3f(*appearance.color))
     for name in ("window", "volumeWindow"):
-        set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*look.window))
-    set_attribute(prim, "stereocell:isoConfidence", _Types.Float, look.iso_confidence)
-    set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, look.surface)
-    set_attribute(prim, "stereocell:gradientMax", _Types.Float, look.gradient_max)
-    if look.painted_by:
-        set_attribute(prim, "stereocell:paintedBy", _Types.String, look.painted_by, custom=True)
-    if look.iso_value is not None:
-        set_attribute(prim, "stereocell:isoValue", _Types.Float, look.iso_value)
-    if look.threshold is not None:
-        set_attribute(prim, "stereocell:threshold", _Types.Float, look.threshold)
+        set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*appearance.window))
+    set_attribute(prim, "stereocell:isoConfidence", _Types.Float, appearance.iso_confidence)
+    set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, appearance.surface)
+    set_attribute(prim, "stereocell:gradientMax", _Types.Float, appearance.gradient_max)
+    if appearance.painted_by:
+        set_attribute(
+            prim, "stereocell:paintedBy", _Types.String, appearance.painted_by, custom=True
+        )
+    if appearance.iso_value is not None:
+        set_attribute(prim, "stereocell:isoValue", _Types.Float, appearance.iso_value)
+    if appearance.threshold is not None:
+        set_attribute(prim, "stereocell:threshold", _Types.Float, appearance.threshold)
 
 
-def _author_surface(material: UsdShade.Material, look: Look) -> None:
+def _author_surface(material: UsdShade.Material, appearance: Appearance) -> None:
     stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface")
     surface = UsdShade.Shader.Define(stage, path)
     surface.CreateIdAttr("UsdPreviewSurface")
-    if not look.painted_by:  # else tiles feed it: an opinion here would be stronger than theirs
+    # else tiles feed it: an opinion here would be stronger than theirs
+    if not appearance.painted_by:
         color = surface.CreateInput("diffuseColor", _Types.Color3f)
         color.ConnectToSource(material.GetInput("color"))
     surface.CreateInput("metallic", _Types.Float).Set(0.0)
@@ -84,17 +87,17 @@ def _author_surface(material: UsdShade.Material, look: Look) -> None:
     material.CreateSurfaceOutput().ConnectToSource(output)
 
 
-def _author_functions(prim: Usd.Prim, look: Look) -> None:
+def _author_functions(prim: Usd.Prim, appearance: Appearance) -> None:
     variants = prim.GetVariantSets().AddVariantSet("transferFunction")
-    for name, points in look.transfer_functions.items():
+    for name, points in appearance.transfer_functions.items():
         variants.AddVariant(name)
         variants.SetVariantSelection(name)
         with variants.GetVariantEditContext():
             pairs = _pairs(points)
             set_attribute(prim, "stereocell:opacityPoints", _Types.Float2Array, pairs)
-            set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(look, name)}")
-            if name in look.shapes:
-                _author_shapes(prim, look.shapes[name])
+            set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(appearance, name)}")
+            if name in appearance.shapes:
+                _author_shapes(prim, appearance.shapes[name])
     variants.SetVariantSelection(DEFAULT_FUNCTION)
 
 

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
-from stereocell.model.channel import Look, Provenance, TileContent
+from stereocell.model.channel import Appearance
 from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.model.tile_content import Provenance, TileContent
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.workspace import at_hand
@@ -41,7 +42,7 @@ from stereocell.usd.layer import (
     vec3f,
     world_box,
 )
-from stereocell.usd.write_appearances import write_looks
+from stereocell.usd.write_appearances import write_appearances
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import STAGE_NAME
 
@@ -75,7 +76,7 @@ def write_stage(
     stage_dir: Path,
     name: str,
     *,
-    looks: Sequence[Look],
+    appearances: Sequence[Appearance],
     tiles: Sequence[TileExtent],
     provenance: Provenance,
     modality: str = "",
@@ -94,7 +95,7 @@ def write_stage(
     Raises OutputError.
     """
     with replacing_folder(stage_dir / "looks") as folder:
-        write_looks(folder, looks)
+        write_appearances(folder, appearances)
         shutil.copyfile(find_asset("usd_assets/lights.usda"), folder / "lights.usda")
 
     stage = new_stage(".usda", ROOT.name)

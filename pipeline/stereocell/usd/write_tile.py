@@ -24,10 +24,11 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.exr import write_atlas
 from stereocell.formats.vdb import GRID_NAME, write_vdb
-from stereocell.model.channel import APRON, ChannelContent, TileContent, to_srgb8
+from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.identifiers import from_identifier
 from stereocell.model.mesh import Lod
+from stereocell.model.tile_content import APRON, ChannelContent, TileContent
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import FileList, measure
 from stereocell.usd.layer import (

@@ -33,12 +33,12 @@ from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.gltf_decode import Drawn, read_glb
 from stereocell.formats.ktx2 import encode_color_map, encode_normal_map, encode_occlusion_map
 from stereocell.formats.tiles3d_walk import Content, walk
-from stereocell.model.channel import evaluate
 from stereocell.model.errors import CheckError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.json_files import read_json
 from stereocell.transfer.joint_histogram import log_scaled
-from stereocell.usd.read_appearances import ComposedLook, read_looks
+from stereocell.transfer.opacity import evaluate
+from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,
@@ -110,46 +110,56 @@ def hold_manifest(stage_file: Path, bundle: Path) -> list[str]:
     ]
     whole = {"bounds_um": dict(zip(("min", "max"), ends, strict=True))}
     problems += _unlike("specimen", manifest["specimen"], whole, "its tiles'")
-    looks = read_looks(stage)
-    if [look.id for look in looks] != [channel["id"] for channel in manifest["channels"]]:
+    appearances = read_appearances(stage)
+    if [appearance.id for appearance in appearances] != [
+        channel["id"] for channel in manifest["channels"]
+    ]:
         return [*problems, "the channels are not the stage's"]
-    for look, channel in zip(looks, manifest["channels"], strict=True):
-        problems += _hold_channel(look, channel, bundle)
+    for appearance, channel in zip(appearances, manifest["channels"], strict=True):
+        problems += _hold_channel(appearance, channel, bundle)
     return problems
 
 
-def _hold_channel(look: ComposedLook, channel: dict[str, Any], bundle: Path) -> Iterator[str]:
-    away = max(abs(a - b) for a, b in zip(look.color, channel["color"], strict=True))
+def _hold_channel(
+    appearance: ComposedAppearance, channel: dict[str, Any], bundle: Path
+) -> Iterator[str]:
+    away = max(abs(a - b) for a, b in zip(appearance.color, channel["color"], strict=True))
     if away > _COLOR:
-        yield f"{look.id}: color is {channel['color']}, the stage's {list(look.color)}"
+        yield f"{appearance.id}: color is {channel['color']}, the stage's {list(appearance.color)}"
     expected = {
-        "name": look.name,
-        "window": list(look.window),
-        "iso_value": look.iso_value,
-        "iso_normalized": look.iso_normalized,
-        "threshold_normalized": look.threshold_normalized,
-        "surface": "none" if channel["tileset"] is None else look.surface,
-        "transfer_function": look.chosen,
-        "transfer_functions": list(look.transfer_functions),
+        "name": appearance.name,
+        "window": list(appearance.window),
+        "iso_value": appearance.iso_value,
+        "iso_normalized": appearance.iso_normalized,
+        "threshold_normalized": appearance.threshold_normalized,
+        "surface": "none" if channel["tileset"] is None else appearance.surface,
+        "transfer_function": appearance.chosen,
+        "transfer_functions": list(appearance.transfer_functions),
     }
-    yield from _unlike(look.id, channel, expected)
-    yield from _unlike(look.id, channel["transfer_functions_2d"], {"names": list(look.shapes)})
+    yield from _unlike(appearance.id, channel, expected)
+    yield from _unlike(
+        appearance.id, channel["transfer_functions_2d"], {"names": list(appearance.shapes)}
+    )
     shapes = _transfer2d(bundle, channel)
     drawn = {
-        "gradient_max": look.gradient_max,
-        "functions": {name: [asdict(one) for one in all_] for name, all_ in look.shapes.items()},
+        "gradient_max": appearance.gradient_max,
+        "functions": {
+            name: [asdict(one) for one in all_] for name, all_ in appearance.shapes.items()
+        },
     }
-    yield from _unlike(look.id, shapes, json.loads(json.dumps(drawn)))
+    yield from _unlike(appearance.id, shapes, json.loads(json.dumps(drawn)))
     rows = _texels(bundle / channel["lut"]["path"])[0][0]
-    if rows.shape != (len(look.transfer_functions), 256, 4):
+    if rows.shape != (len(appearance.transfer_functions), 256, 4):
+        shape = " x ".join(map(str, rows.shape))
         yield (
-            f"{look.id}: its lookup table has {' x '.join(map(str, rows.shape))} values, expected "
-            f"{len(look.transfer_functions)} x 256 x 4"
+            f"{appearance.id}: its lookup table has {shape} values, expected "
+            f"{len(appearance.transfer_functions)} x 256 x 4"
         )
         return
-    for row, (name, points) in zip(rows, look.transfer_functions.items(), strict=True):
-        if (row[:, :3] != 255).any() or np.abs(row[:, 3] / 255 - evaluate(points)).max() > _COLOR:
-            yield f"{look.id}: the lookup table of {name!r} is not the stage's"
+    for row, (name, points) in zip(rows, appearance.transfer_functions.items(), strict=True):
+        off = np.abs(row[:, 3] / 255 - evaluate(points)).max()
+        if (row[:, :3] != 255).any() or off > _COLOR:
+            yield f"{appearance.id}: the lookup table of {name!r} is not the stage's"
 
 
 def hold_histograms(bundle: Path, tiles: Sequence[TileFinding]) -> Iterator[str]:
@@ -190,18 +200,20 @@ def hold_tile(task: BundleTask) -> TileFinding:
     worst = 0.0
     stage = open_stage(task.stage_file)
     # what the manifest lacks is told of the manifest
-    looks = [look for look in read_looks(stage) if look.id in channels]
+    appearances = [
+        appearance for appearance in read_appearances(stage) if appearance.id in channels
+    ]
     listed = next((one for one in manifest["tiles"] if one["id"] == task.tile_id), None)
     with loaded(stage, task.tile_id) as (tile, choice):
-        volumes = [read_volume(tile, look.id) for look in looks]
+        volumes = [read_volume(tile, appearance.id) for appearance in appearances]
         if listed is not None:
             low, high = find_bounds(tile, volumes)
             bounds = {"min": list(low), "max": list(high)}
             told = {"representation": choice.representation, "bounds_um": bounds}
             problems += _unlike(task.tile_id, listed, told)
-        for look, composed in zip(looks, volumes, strict=True):
-            channel, name = channels[look.id], f"{task.tile_id}/{look.id}"
-            shown = shown_lods(tile, look.id, choice.finest_lod)
+        for appearance, composed in zip(appearances, volumes, strict=True):
+            channel, name = channels[appearance.id], f"{task.tile_id}/{appearance.id}"
+            shown = shown_lods(tile, appearance.id, choice.finest_lod)
             lods = dict(_without_repeats(shown.lods))
             edits += [f"{name}: {shown.edit}"] if shown.edit else []
             contents = dict(_contents(task.bundle, channel, task.tile_id))
@@ -215,9 +227,9 @@ def hold_tile(task: BundleTask) -> TileFinding:
                 problems.append(f"{name}: the {which[0]} has no volume, the {which[1]} has one")
             elif composed is not None and entry is not None:
                 problems += _unlike(name, entry, _placed(composed))
-                voxels = look.window_voxels(read_atlas(composed.atlas))
+                voxels = appearance.window_voxels(read_atlas(composed.atlas))
                 problems += [f"{name}: {fault}" for fault in _hold_volume(task, entry, voxels)]
-                joints[look.id] = count_tile(voxels, composed, look.gradient_max)
+                joints[appearance.id] = count_tile(voxels, composed, appearance.gradient_max)
     return TileFinding(
         task.tile_id, surfaces, len(joints), worst, joints, tuple(problems), tuple(edits)
     )

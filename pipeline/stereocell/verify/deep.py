@@ -11,7 +11,7 @@ from stereocell.building.plan import Channel, Plan
 from stereocell.bundle.write import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError, StageError, StereoCellError
-from stereocell.usd.read_appearances import read_looks
+from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
 from stereocell.verify.bundle_against_stage import (
@@ -95,16 +95,16 @@ def _odd_values(store: Store, plan: Plan) -> Iterator[str]:
     """
     stage = open_stage(store.stage_file)
     survey = store.survey()
-    looks = {look.id: look for look in read_looks(stage)}
+    appearances = {appearance.id: appearance for appearance in read_appearances(stage)}
     for channel in plan.channels:
-        built, look = survey[channel.id]["look"], looks.get(channel.id)
-        if look is None:
+        built, appearance = survey[channel.id]["look"], appearances.get(channel.id)
+        if appearance is None:
             yield f"{channel.id}: it is not in the stage"
             continue
         for name, found, wanted in (
-            ("isoValue", (look.iso_value,), (built["iso_value"],)),
-            ("threshold", (look.threshold,), (built["threshold"],)),
-            ("volumeWindow", look.volume_window, built["window"]),
+            ("isoValue", (appearance.iso_value,), (built["iso_value"],)),
+            ("threshold", (appearance.threshold,), (built["threshold"],)),
+            ("volumeWindow", appearance.volume_window, built["window"]),
         ):
             if found != tuple(None if value is None else shortest(value) for value in wanted):
                 told, here = (", ".join(map(str, one)) for one in (found, wanted))

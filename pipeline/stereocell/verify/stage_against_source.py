@@ -24,10 +24,10 @@ from stereocell.building.unit_files import load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import write_vdb
 from stereocell.meshes.distance import Nearest, measure_distance, measure_spread
-from stereocell.model.channel import APRON
 from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
+from stereocell.model.tile_content import APRON
 from stereocell.storage.workspace import at_hand
 from stereocell.usd.read_stage import (
     ComposedLod,

@@ -10,8 +10,7 @@ from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.ktx2 import encode_2d, encode_3d
-from stereocell.model.channel import evaluate
-from stereocell.transfer.opacity import make_transfer_functions
+from stereocell.transfer.opacity import evaluate, make_transfer_functions
 from support.bundles import write_tiles
 
 
