@@ -21,6 +21,7 @@ from stereocell.building import settings as settings_module
 from stereocell.engine.run import Engine
 from stereocell.filters import denoise
 from stereocell.isosurface import extract, repair
+from stereocell.isosurface.distance_field import signed_distance
 from stereocell.meshes import simplify
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
@@ -63,9 +64,7 @@ def main() -> None:
     volume = Volume(voxels, SPACING)
     region = Box((0, 0, 0), shape)
     field = denoise.smooth(volume, 0.14)
-    distance = extract.signed_distance(
-        field, np.float32(700), spacing_um=SPACING, value_range=1000.0
-    )
+    distance = signed_distance(field, np.float32(700), spacing_um=SPACING, value_range=1000.0)
     print(f"phantom {shape}, {voxels.size / 1e6:.1f} M voxels; medians of {ROUNDS}")
     compare(
         "extract_surface",

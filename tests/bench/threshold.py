@@ -17,7 +17,7 @@ import stereocell.read
 from stereocell.model.tiling import Box
 from stereocell.report.thresholds import describe, find_peers
 from stereocell.samples.head import BACKGROUND, GREY, WHITE, make_head
-from stereocell.transfer.channel_statistics import find_display
+from stereocell.transfer.channel_statistics import find_statistics
 from stereocell.transfer.options import WindowOptions
 from support.iso_value_family import dice
 
@@ -30,11 +30,11 @@ def main(images: str | None) -> None:
     print("|---|---|---|---|---|---|")
     for noise in (0.0, 0.01, 0.02, 0.05, 0.09):
         head = make_head(noise=noise, bias=0.2)
-        display = find_display(head.voxels.copy(), WINDOW)
-        found = display.threshold
+        statistics = find_statistics(head.voxels.copy(), WINDOW)
+        found = statistics.threshold
         assert found is not None
         readings.append((f"{noise:.0%}", found))
-        otsu, li = find_peers(display.values)
+        otsu, li = find_peers(statistics.values)
         body, matter = head.labels != BACKGROUND, np.isin(head.labels, (GREY, WHITE))
         for name, value in (("adaptive", found.value), ("Otsu", otsu), ("Li", li)):
             above = head.voxels >= value
@@ -46,7 +46,7 @@ def main(images: str | None) -> None:
         dataset = stereocell.read.open(images)
         voxels = dataset.read(0, Box((0, 0, 0), dataset.levels[0].shape), 0).voxels
         for name, window in (("images", WINDOW), ("full range", WindowOptions(0.0, 100.0))):
-            found = find_display(voxels.copy(), window).threshold
+            found = find_statistics(voxels.copy(), window).threshold
             if found is not None:
                 readings.append((name, found))
     print("\n| of | adaptive | how it was read |\n|---|---|---|")

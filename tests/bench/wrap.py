@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from stereocell import read
 from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise
-from stereocell.isosurface.components import find_solids
-from stereocell.isosurface.extract import extract_surface, signed_distance
+from stereocell.isosurface.components import find_components
+from stereocell.isosurface.distance_field import signed_distance
+from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.isovalue import find_iso_value
 from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.repair import RepairOptions, repair
@@ -107,12 +108,12 @@ def wrap(given: Input) -> Mesh:
     distance = signed_distance(
         field, np.float32(given.iso), spacing_um=spacing, value_range=float(np.ptp(field))
     )
-    solids = find_solids(distance > 0, spacing, 26)
+    components = find_components(distance > 0, spacing, 26)
     options = RepairOptions(
         alpha_um=alpha,
         offset_um=OFFSET * alpha,
-        min_diagonal_um=float(solids.diagonal_um.mean()) / 2,
-        min_faces=float(solids.faces().mean()) / 2,
+        min_diagonal_um=float(components.diagonal_um.mean()) / 2,
+        min_faces=float(components.faces().mean()) / 2,
         max_fragment_um=np.inf,
         max_cavity_um=np.inf,
     )

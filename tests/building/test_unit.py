@@ -44,7 +44,7 @@ def test_voxels_whose_squares_leave_float32_give_the_same_unit(scale: float) -> 
 def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end() -> None:
     voxels = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE) % 251
     lattice = Lattice(BOX, Box((0, 10, 20), (10, 20, 40)), BOX, SPACING, (0.0, 0.0, 0.0))
-    given = replace(_given(1.0), lattice=lattice, display=(0.0, 255.0))
+    given = replace(_given(1.0), lattice=lattice, intensity_window=(0.0, 255.0))
     eight_bit = to_eight_bit(voxels, given)
     padded = np.pad(voxels, APRON, mode="edge")
     np.testing.assert_array_equal(eight_bit, padded[0:12, 10:22, 20:42])

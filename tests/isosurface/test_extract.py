@@ -5,7 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.filters.denoise import SMOOTHING_REACH, smooth
-from stereocell.isosurface.extract import extract_surface, gradient_magnitude, signed_distance
+from stereocell.isosurface.distance_field import gradient_magnitude, signed_distance
+from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from stereocell.filters.denoise import smooth
-from stereocell.isosurface.extract import extract_surface, signed_distance
+from stereocell.isosurface.distance_field import signed_distance
+from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.isovalue import PEAK_SHARE, _peak, find_iso_value
 from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 from stereocell.model.errors import NoSurfaceError, UsageError

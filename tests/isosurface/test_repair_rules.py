@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.plan import Plan
-from stereocell.isosurface.components import find_solids
+from stereocell.isosurface.components import find_components
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import RepairOptions, repair
-from stereocell.isosurface.repair_rules import sum_solids
+from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from stereocell.read import Level
@@ -33,19 +33,21 @@ def _distance() -> NDArray[np.float32]:
 
 def test_faces_are_those_of_the_extracted_surface() -> None:
     distance, whole = _distance(), Box((0, 0, 0), SHAPE)
-    solids = find_solids(distance > 0, SPACING, 26)
+    components = find_components(distance > 0, SPACING, 26)
     mesh = extract_surface(distance, Lattice.of_whole(whole, SPACING))
-    assert len(solids.diagonal_um) == len(RADII)
+    assert len(components.diagonal_um) == len(RADII)
     # twice the vertices, and four less for each ball
-    assert solids.faces().sum() - 4 * len(RADII) == len(mesh.triangles)
-    for diagonal, radius in zip(sorted(solids.diagonal_um), sorted(RADII.values()), strict=True):
+    assert components.faces().sum() - 4 * len(RADII) == len(mesh.triangles)
+    for diagonal, radius in zip(
+        sorted(components.diagonal_um), sorted(RADII.values()), strict=True
+    ):
         assert diagonal == pytest.approx(2 * 3**0.5 * radius, rel=0.2)
-    assert solids.whole.all()
+    assert components.whole.all()
 
 
 def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
     distance = _distance()
-    sums = sum_solids(distance > 0, SPACING, 1.0)
+    sums = sum_components(distance > 0, SPACING, 1.0)
     assert (sums.count, sums.kept) == (3, 2)
     options = choose(_plan_with(max_fragment_um=4.0), "clear", [asdict(sums)])
     dropped = repair(distance, SPACING, options)
@@ -55,7 +57,7 @@ def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
 
 
 def test_rule_ends_where_the_halo_does_and_can_be_left_out() -> None:
-    sums = asdict(sum_solids(_distance() > 0, SPACING, 1.0))
+    sums = asdict(sum_components(_distance() > 0, SPACING, 1.0))
     # what would go is larger than what a unit is sure to see whole
     for length in (3.0, 0.0):
         options = choose(_plan_with(max_fragment_um=length), "clear", [sums])
@@ -67,8 +69,8 @@ def test_specks_do_not_rule_the_means() -> None:
     rng = np.random.default_rng(0)
     inside = _distance() > 0
     specks = inside | (rng.random(SHAPE) > 0.999)
-    assert sum_solids(specks, SPACING, 1.5).count == sum_solids(inside, SPACING, 1.5).count
-    assert sum_solids(np.zeros(SHAPE, bool), SPACING, 1.5).count == 0
+    assert sum_components(specks, SPACING, 1.5).count == sum_components(inside, SPACING, 1.5).count
+    assert sum_components(np.zeros(SHAPE, bool), SPACING, 1.5).count == 0
 
 
 def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:

@@ -44,7 +44,7 @@ def lods() -> tuple[Lod, ...]:
         background=None,
         repair=RepairOptions(2.0, 3.0, 4.0),
         step=(1, 1, 1),
-        display=(0.0, 1000.0),
+        intensity_window=(0.0, 1000.0),
         settings=settings,
     )
     volume = Volume((1000 * field).astype(np.float32), SPACING)

@@ -187,7 +187,7 @@ def neighbours() -> tuple[tuple[Lod, ...], ...]:
             background=None,
             repair=RepairOptions(2.0, 3.0, 3.0),
             step=(1, 1, 1),
-            display=(0.0, 1000.0),
+            intensity_window=(0.0, 1000.0),
             settings=settings,
         )
         built.append(build_unit(Volume(field[window.slices], SPACING), given).lods)

@@ -36,9 +36,11 @@ def test_paint_is_the_largest_value_down_to_the_stated_depth() -> None:
     floor = Mesh(at, np.zeros((0, 3), np.uint32), up)
     lattice = Lattice.of_whole(Box((0, 0, 0), voxels.shape), (1.0, 1.0, 1.0))
 
-    def painted(depth: float, display: tuple[float, float]) -> float:
+    def painted(depth: float, intensity_window: tuple[float, float]) -> float:
         volume = Volume(voxels, (1.0, 1.0, 1.0))
-        found = find_paint(volume, lattice, floor, display=display, depth_um=depth)
+        found = find_paint(
+            volume, lattice, floor, intensity_window=intensity_window, depth_um=depth
+        )
         return float(found[0])
 
     assert painted(1.5, (100, 500)) == 0

@@ -22,10 +22,10 @@ from stereocell.transfer.adaptive_threshold import (
     smooth,
 )
 from stereocell.transfer.channel_statistics import (
-    display_from_json,
-    display_to_json,
-    find_display,
+    find_statistics,
     make_appearance,
+    statistics_from_json,
+    statistics_to_json,
 )
 from stereocell.transfer.opacity import THRESHOLD, evaluate
 from stereocell.transfer.options import WindowOptions
@@ -243,9 +243,14 @@ def two_bodies() -> NDArray[np.uint16]:
 
 
 def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
-    display = find_display(two_bodies(), WindowOptions(0, 100))
+    statistics = find_statistics(two_bodies(), WindowOptions(0, 100))
     appearance = make_appearance(
-        "MR", (1, 1, 1), display=display, iso_values={"a": 500.0}, confidence=0.9, surface="clear"
+        "MR",
+        (1, 1, 1),
+        statistics=statistics,
+        iso_values={"a": 500.0},
+        confidence=0.9,
+        surface="clear",
     )
     assert appearance.threshold is not None
     assert 250 < appearance.threshold < 850
@@ -255,11 +260,11 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     assert (table[levels <= appearance.threshold_normalized - 1e-3] == 0).all()
     assert table[np.searchsorted(levels, appearance.threshold_normalized) + 2] > 0
     assert (np.diff(table) >= 0).all()
-    again = display_from_json(json.loads(json.dumps(display_to_json(display))))
-    assert again == display
-    flat = find_display(np.full(100, 7, np.uint8), WindowOptions())
+    again = statistics_from_json(json.loads(json.dumps(statistics_to_json(statistics))))
+    assert again == statistics
+    flat = find_statistics(np.full(100, 7, np.uint8), WindowOptions())
     bare = make_appearance(
-        "MR", (1, 1, 1), display=flat, iso_values={}, confidence=0.0, surface="none"
+        "MR", (1, 1, 1), statistics=flat, iso_values={}, confidence=0.0, surface="none"
     )
     assert bare.threshold is None
     assert THRESHOLD not in bare.transfer_functions
@@ -267,11 +272,13 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
 
 def test_the_report_draws_it_beside_otsu_s_and_li_s() -> None:
     voxels = two_bodies()
-    display = find_display(voxels, WindowOptions(0, 100))
-    otsu, li = find_peers(display.values)
-    assert otsu == pytest.approx(filters.threshold_otsu(voxels), abs=2 * display.values.bin_width)
-    assert li == pytest.approx(filters.threshold_li(voxels), abs=2 * display.values.bin_width)
-    figure = draw_threshold(display)
+    statistics = find_statistics(voxels, WindowOptions(0, 100))
+    otsu, li = find_peers(statistics.values)
+    assert otsu == pytest.approx(
+        filters.threshold_otsu(voxels), abs=2 * statistics.values.bin_width
+    )
+    assert li == pytest.approx(filters.threshold_li(voxels), abs=2 * statistics.values.bin_width)
+    figure = draw_threshold(statistics)
     assert figure is not None
     assert [row.name for row in figure.rows] == ["adaptive", "Otsu", "Li"]
     for row in figure.rows:
@@ -279,12 +286,12 @@ def test_the_report_draws_it_beside_otsu_s_and_li_s() -> None:
     for kind in ("mark", "otsu", "li", "curve", "area"):
         assert figure.chart.count(f'class="{kind}"') == 1
     assert figure.chart.count('class="peak"') == 2
-    assert display.threshold is not None
-    dark, bright = display.threshold.between
+    assert statistics.threshold is not None
+    dark, bright = statistics.threshold.between
     assert dark == pytest.approx(100, abs=25)
     assert bright == pytest.approx(1000, abs=25)
     assert f"peak, at {bright:.5g}, and the peak before it, at {dark:.5g}" in figure.reading
-    assert draw_threshold(find_display(np.full(100, 7, np.uint8), WindowOptions())) is None
+    assert draw_threshold(find_statistics(np.full(100, 7, np.uint8), WindowOptions())) is None
 
 
 def test_the_report_names_what_was_left_out_as_chance() -> None:

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from stereocell.samples.head import make_head
-from stereocell.transfer.boundaries import Boundaries, find_boundaries, propose, propose_shapes
-from stereocell.transfer.edge_model import Plane, count_edge, find_steepest
+from stereocell.transfer.boundaries import Boundaries, find_boundaries, suggest, suggest_shapes
+from stereocell.transfer.edge_model import HistogramGrid, count_edge, find_steepest
 from stereocell.transfer.joint_histogram import (
     COLUMNS,
     FINE_ROWS,
@@ -46,7 +46,7 @@ def fine_counts(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> NDArray[n
     return count_joint(voxels, spacing, gradient_max=STEEPEST, rows=FINE_ROWS)
 
 
-def boundaries(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> tuple[Boundaries, float]:
+def boundaries_in(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> tuple[Boundaries, float]:
     fine = fine_counts(voxels, spacing)
     gradient_max = choose_gradient_max(fine)
     return find_boundaries(rebin(fine, gradient_max), gradient_max, spacing), gradient_max
@@ -59,26 +59,26 @@ def test_arcs_of_three_nested_materials_end_at_the_materials(
     sigma: float, noise: float, spacing: Spacing
 ) -> None:
     truth = (0.15, 0.5, 0.85)
-    found, gradient_max = boundaries(nested(truth, (28, 18), sigma, noise, spacing), spacing)
+    found, gradient_max = boundaries_in(nested(truth, (28, 18), sigma, noise, spacing), spacing)
     assert found.reason == ""
     assert found.materials == pytest.approx(truth, abs=noise)
-    assert [(arc.low, arc.high) for arc in found.arcs] == [
+    assert [(boundary.low, boundary.high) for boundary in found.boundaries] == [
         (pytest.approx(0.15, abs=noise), pytest.approx(0.5, abs=noise)),
         (pytest.approx(0.5, abs=noise), pytest.approx(0.85, abs=noise)),
     ]
-    for arc in found.arcs:
-        assert arc.blur == pytest.approx(sigma, rel=0.35)
+    for boundary in found.boundaries:
+        assert boundary.blur == pytest.approx(sigma, rel=0.35)
         # the step of an ideal edge over two voxels: from theory
         step = 0.35 * erf(1 / (sigma * np.sqrt(2)))
-        assert arc.apex * gradient_max == pytest.approx(step, rel=0.2)
-        assert arc.apex <= arc.steepest <= arc.apex * np.sqrt(3)
-        assert 0 < arc.share < 0.2
+        assert boundary.apex * gradient_max == pytest.approx(step, rel=0.2)
+        assert boundary.apex <= boundary.steepest <= boundary.apex * np.sqrt(3)
+        assert 0 < boundary.share < 0.2
 
 
 def test_materials_that_do_not_touch_have_no_arc() -> None:
     """Around the bright shell is 0.1, inside of it 0.45: nothing goes from 0.1 to 0.45."""
-    found, _ = boundaries(nested((0.1, 0.8, 0.45), (30, 20), 1.2, 0.015))
-    assert [(round(arc.low, 1), round(arc.high, 1)) for arc in found.arcs] == [
+    found, _ = boundaries_in(nested((0.1, 0.8, 0.45), (30, 20), 1.2, 0.015))
+    assert [(round(boundary.low, 1), round(boundary.high, 1)) for boundary in found.boundaries] == [
         (0.1, 0.8),
         (0.5, 0.8),
     ]
@@ -86,9 +86,9 @@ def test_materials_that_do_not_touch_have_no_arc() -> None:
 
 def test_a_source_of_few_values_has_its_materials_all_the_same() -> None:
     coarse = np.rint(nested((0.15, 0.5, 0.85), (28, 18), 1.2, 0.02) / 6.0) * 6
-    found, _ = boundaries(coarse.astype(np.uint8))
+    found, _ = boundaries_in(coarse.astype(np.uint8))
     assert found.materials == pytest.approx((0.15, 0.5, 0.85), abs=0.02)
-    assert len(found.arcs) == 2
+    assert len(found.boundaries) == 2
 
 
 @pytest.mark.parametrize(
@@ -106,34 +106,34 @@ def test_a_source_of_few_values_has_its_materials_all_the_same() -> None:
     ],
     ids=["nothing", "constant", "a row", "saturated", "one material", "noise alone"],
 )
-def test_without_a_boundary_nothing_is_proposed_and_it_is_said(
+def test_without_a_boundary_nothing_is_suggested_and_it_is_said(
     voxels: NDArray[np.uint8], reason: str
 ) -> None:
-    proposal = propose(fine_counts(voxels) if voxels.size else np.zeros((FINE_ROWS, COLUMNS), int))
-    assert (proposal.shapes, proposal.reason) == ((), reason)
-    assert proposal.gradient_max > 0
+    suggested = suggest(fine_counts(voxels) if voxels.size else np.zeros((FINE_ROWS, COLUMNS), int))
+    assert (suggested.shapes, suggested.reason) == ((), reason)
+    assert suggested.gradient_max > 0
 
 
-def test_the_proposal_takes_the_boundaries_and_leaves_the_materials() -> None:
+def test_the_suggestion_takes_the_boundaries_and_leaves_the_materials() -> None:
     voxels = nested((0.15, 0.5, 0.85), (28, 18), 1.2, 0.02)
     fine = fine_counts(voxels)
-    proposal = propose(fine)
-    assert proposal == propose(fine)
-    assert [shape.kind for shape in proposal.shapes] == ["triangle", "triangle"]
-    assert not any(find_fault(shape) for shape in proposal.shapes)
-    outer, inner = proposal.shapes
+    suggested = suggest(fine)
+    assert suggested == suggest(fine)
+    assert [shape.kind for shape in suggested.shapes] == ["triangle", "triangle"]
+    assert not any(find_fault(shape) for shape in suggested.shapes)
+    outer, inner = suggested.shapes
     assert (outer.tip, inner.tip) == (
         pytest.approx(0.325, abs=0.02),
         pytest.approx(0.675, abs=0.02),
     )
     assert outer.opacity < inner.opacity
 
-    opacity = evaluate2d(proposal.shapes)[..., 3] > 12
-    apex = 0.35 * erf(1 / (1.2 * np.sqrt(2))) / proposal.gradient_max
+    opacity = evaluate2d(suggested.shapes)[..., 3] > 12
+    apex = 0.35 * erf(1 / (1.2 * np.sqrt(2))) / suggested.gradient_max
     for middle in (0.325, 0.675):
         assert opacity[round(0.95 * apex * (ROWS - 1)), round(255 * middle)]
     # of the voxels far inside of a material all but the noisiest stay clear
-    counts = rebin(fine, proposal.gradient_max)
+    counts = rebin(fine, suggested.gradient_max)
     for material in (0.15, 0.5, 0.85):
         near = np.abs(np.arange(COLUMNS) / 255 - material) < 0.03
         assert counts[opacity & near].sum() < 0.01 * counts[:, near].sum()
@@ -141,11 +141,11 @@ def test_the_proposal_takes_the_boundaries_and_leaves_the_materials() -> None:
 
 def test_a_triangle_ends_below_an_arc_that_passes_over_it() -> None:
     """From 0.1 to 0.8 it is steeper at 0.625 than from 0.45 to 0.8."""
-    found, _ = boundaries(nested((0.1, 0.8, 0.45), (30, 20), 1.2, 0.015))
-    lower, upper = propose_shapes(found)
+    found, _ = boundaries_in(nested((0.1, 0.8, 0.45), (30, 20), 1.2, 0.015))
+    lower, upper = suggest_shapes(found)
     assert lower.tip < upper.tip
     assert lower.gradients[1] == 1
-    inner = found.arcs[1]
+    inner = found.boundaries[1]
     assert inner.apex < upper.gradients[1] < 1.5 * inner.apex
 
 
@@ -159,8 +159,8 @@ def test_the_head_has_the_levels_of_its_tissues() -> None:
     counts = [low + material * (high - low) for material in found.materials]
     assert counts[1:] == pytest.approx([300, 620, 1000], abs=50)
     assert 0 < counts[0] < 100  # Rician noise alone
-    assert found.arcs
-    assert not any(find_fault(shape) for shape in propose_shapes(found))
+    assert found.boundaries
+    assert not any(find_fault(shape) for shape in suggest_shapes(found))
 
 
 AIR, FLUID, GREY_MATTER, SKIN, WHITE_MATTER = 0.0, 300.0, 620.0, 750.0, 1000.0
@@ -170,7 +170,7 @@ def head_boundaries(noise: float) -> tuple[Boundaries, tuple[float, float]]:
     """Return what is found in the phantom in the window of the preset mri."""
     head = make_head(noise=noise)
     low, high = (float(v) for v in np.percentile(head.voxels, (1, 99.8)))
-    found, _ = boundaries(to_eight_bits(head.voxels, (low, high)), head.spacing_um)
+    found, _ = boundaries_in(to_eight_bits(head.voxels, (low, high)), head.spacing_um)
     return found, (low, high)
 
 
@@ -186,7 +186,10 @@ def test_tissues_of_the_head_that_touch_have_arcs_of_their_own(
     noise: float, expected: list[tuple[float, float]]
 ) -> None:
     found, (low, high) = head_boundaries(noise)
-    ends = [(low + arc.low * (high - low), low + arc.high * (high - low)) for arc in found.arcs]
+    ends = [
+        (low + boundary.low * (high - low), low + boundary.high * (high - low))
+        for boundary in found.boundaries
+    ]
     for dark, bright in expected:
         near = [e for e in ends if abs(e[0] - dark) < 70 and abs(e[1] - bright) < 40]
         assert len(near) == 1, (dark, bright, ends)
@@ -199,13 +202,15 @@ def test_no_shape_reaches_the_values_of_its_materials(noise: float) -> None:
     """Rician noise of sigma: a voxel inside of a material lies within one of it, two in three."""
     found, (low, high) = head_boundaries(noise)
     sigma = noise * 1000 / (high - low)
-    arcs = sorted(found.arcs, key=lambda arc: (arc.low + arc.high, arc.low))
-    for arc, shape in zip(arcs, propose_shapes(found), strict=True):
-        room = 1.0 * sigma if arc.low > 0.1 else 0.6 * sigma  # air's: sigma sqrt(2 - pi / 2)
-        assert shape.values[0] >= arc.low + room
-        assert shape.values[1] <= arc.high - room
-        assert (evaluate2d((shape,))[:, round(255 * arc.low), 3] == 0).all()
-        assert (evaluate2d((shape,))[:, round(255 * arc.high), 3] == 0).all()
+    boundaries = sorted(
+        found.boundaries, key=lambda boundary: (boundary.low + boundary.high, boundary.low)
+    )
+    for boundary, shape in zip(boundaries, suggest_shapes(found), strict=True):
+        room = 1.0 * sigma if boundary.low > 0.1 else 0.6 * sigma  # air's: sigma sqrt(2 - pi / 2)
+        assert shape.values[0] >= boundary.low + room
+        assert shape.values[1] <= boundary.high - room
+        assert (evaluate2d((shape,))[:, round(255 * boundary.low), 3] == 0).all()
+        assert (evaluate2d((shape,))[:, round(255 * boundary.high), 3] == 0).all()
 
 
 def test_an_edge_that_is_sharper_than_a_voxel_is_steeper_where_it_lies_aslant() -> None:
@@ -223,9 +228,9 @@ def test_an_edge_counts_as_the_voxels_of_a_ball_do(spacing: Spacing) -> None:
     counted = (
         count_joint(voxels, spacing, gradient_max=1.0).reshape(ROWS, COLUMNS // 4, 4).sum(axis=2)
     )
-    plane = Plane(ROWS, COLUMNS // 4, 1.0, spacing)
+    grid = HistogramGrid(ROWS, COLUMNS // 4, 1.0, spacing)
     area = 4 * np.pi * radius**2 / spacing[0]  # voxels in a layer one finest spacing thick
-    expected = area * count_edge(0.2, 0.8, blur=sigma, sigma=noise, plane=plane)
+    expected = area * count_edge(0.2, 0.8, blur=sigma, sigma=noise, grid=grid)
     # above the noise, by rows and by columns
     steep = slice(20, None)
     for axis in (0, 1):
@@ -235,9 +240,12 @@ def test_an_edge_counts_as_the_voxels_of_a_ball_do(spacing: Spacing) -> None:
 
 
 def test_a_shape_is_proposed_for_every_arc_wherever_it_lies() -> None:
-    found, _ = boundaries(nested((0.02, 0.98), (20,), 0.8, 0.01))
-    (arc,) = found.arcs
-    assert (arc.low, arc.high) == (pytest.approx(0.02, abs=0.01), pytest.approx(0.98, abs=0.01))
-    (shape,) = propose_shapes(found)
+    found, _ = boundaries_in(nested((0.02, 0.98), (20,), 0.8, 0.01))
+    (boundary,) = found.boundaries
+    assert (boundary.low, boundary.high) == (
+        pytest.approx(0.02, abs=0.01),
+        pytest.approx(0.98, abs=0.01),
+    )
+    (shape,) = suggest_shapes(found)
     assert find_fault(shape) == ""
     assert shape.gradients[1] > 0.9

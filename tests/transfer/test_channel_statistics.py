@@ -8,7 +8,7 @@ import pytest
 from stereocell.building.out_folder import Store
 from stereocell.building.tasks import window as window_task
 from stereocell.cli.__main__ import main
-from stereocell.transfer.channel_statistics import find_display, make_appearance
+from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import NAMES, evaluate, make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
@@ -16,19 +16,19 @@ from support import phantoms
 
 def test_window_lies_at_the_percentiles() -> None:
     voxels = np.arange(10001, dtype=np.uint16)
-    display = find_display(voxels, WindowOptions(10, 90))
-    assert display.window == (1000, 9000)
-    assert sum(display.histogram) == voxels.size
+    statistics = find_statistics(voxels, WindowOptions(10, 90))
+    assert statistics.window == (1000, 9000)
+    assert sum(statistics.histogram) == voxels.size
 
 
 def test_constant_channel_has_a_window_and_no_division_by_zero() -> None:
-    assert find_display(np.full(100, 7, np.uint8), WindowOptions()).window == (7, 8)
+    assert find_statistics(np.full(100, 7, np.uint8), WindowOptions()).window == (7, 8)
 
 
 def test_sparse_channel_keeps_its_few_bright_voxels() -> None:
     voxels = np.zeros(100_000, np.uint16)
     voxels[:5] = 900
-    assert find_display(voxels, WindowOptions(1, 99)).window == (0, 900)
+    assert find_statistics(voxels, WindowOptions(1, 99)).window == (0, 900)
 
 
 @pytest.mark.parametrize(
@@ -120,10 +120,15 @@ def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
 
 
 def test_look_means_over_the_tiles_that_have_a_surface() -> None:
-    display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
+    statistics = find_statistics(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     values = {"a": 20.0, "b": 40.0, "c": None}
     appearance = make_appearance(
-        "CD31", (0, 1, 0), display=display, iso_values=values, confidence=0.75, surface="clear"
+        "CD31",
+        (0, 1, 0),
+        statistics=statistics,
+        iso_values=values,
+        confidence=0.75,
+        surface="clear",
     )
     assert appearance.iso_value == 30
     assert appearance.iso_confidence == 0.75
@@ -131,12 +136,12 @@ def test_look_means_over_the_tiles_that_have_a_surface() -> None:
 
 
 def test_opacity_of_an_unclear_channel_does_not_begin_at_its_level() -> None:
-    display = find_display(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
+    statistics = find_statistics(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     clear, unclear, none = (
         make_appearance(
             "CD31",
             (0, 1, 0),
-            display=display,
+            statistics=statistics,
             iso_values={"a": value},
             confidence=0.3,
             surface=surface_confidence,

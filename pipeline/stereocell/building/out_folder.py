@@ -95,7 +95,7 @@ class Store:
 
     # --- results of the units' two rounds
 
-    def display_file(self, channel_id: str, key: str) -> Path:
+    def statistics_file(self, channel_id: str, key: str) -> Path:
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
     def iso_file(self, tile_id: str, channel_id: str, key: str) -> Path:
@@ -108,7 +108,7 @@ class Store:
         return self.out / "units" / tile_id / "stage.json"
 
     def survey(self) -> dict[str, Any]:
-        """Return each channel's display, iso-values by tile, and look, by channel id."""
+        """Return each channel's statistics, iso-values by tile, and appearance, by channel id."""
         return dict(read_json(self.survey_file, "units.schema.json#Survey", _RUN_UNITS))
 
     def index(self) -> dict[str, str]:

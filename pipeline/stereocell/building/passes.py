@@ -17,11 +17,15 @@ from stereocell.building.tasks import unit as unit_maker
 from stereocell.building.tasks import window as window_maker
 from stereocell.building.tasks.iso_value import IsoTask, write_iso
 from stereocell.building.tasks.unit import UnitTask, run_unit
-from stereocell.building.tasks.window import DisplayTask, write_display
+from stereocell.building.tasks.window import StatisticsTask, write_statistics
 from stereocell.building.unit import UnitInput
 from stereocell.building.unit_files import is_whole
 from stereocell.engine.run import Engine
-from stereocell.isosurface.neighbour_consensus import Agreed, agree, find_neighbours
+from stereocell.isosurface.neighbour_consensus import (
+    Reconciled,
+    find_neighbours,
+    reconcile_iso_values,
+)
 from stereocell.isosurface.options import ADAPTIVE
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair
@@ -34,16 +38,16 @@ from stereocell.read.open_dataset import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_json, read_json, write_json
 from stereocell.transfer.channel_statistics import (
-    Display,
-    display_from_json,
-    display_to_json,
+    ChannelStatistics,
     make_appearance,
+    statistics_from_json,
+    statistics_to_json,
 )
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-_DISPLAY, _ISO_VALUE = "units.schema.json#Display", "units.schema.json#IsoValue"
+_STATISTICS, _ISO_VALUE = "units.schema.json#Display", "units.schema.json#IsoValue"
 _AGAIN = "run `stereocell units OUT` again"
 
 
@@ -78,20 +82,22 @@ def unit_tasks(
     store: Store, plan: Plan, content: Mapping[str, Any]
 ) -> Iterator[tuple[str, UnitTask, str]]:
     """Yield `<tile>/<channel>`, task and key of every unit; `content` is what survey.json holds."""
-    displays = {id_: display_from_json(entry["display"]) for id_, entry in content.items()}
+    all_statistics = {id_: statistics_from_json(entry["display"]) for id_, entry in content.items()}
     fields = {
         channel_id: make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
         for channel_id, entry in content.items()
     }
     plans = {id_: plan_for(plan, entry["look"]["surface"]) for id_, entry in content.items()}
     for tile_id, channel in _select(plan, None):
-        display = displays[channel.id]
+        statistics = all_statistics[channel.id]
         painter = plan.painter(channel)
-        painted = None if painter is None else (painter.index, displays[painter.id].window)
+        painted = None if painter is None else (painter.index, all_statistics[painter.id].window)
         as_built = plans[channel.id]
         field = fields[channel.id]
         repair = RepairOptions(**content[channel.id]["repair"])
-        task, key = _unit_task(store, as_built, tile_id, channel, field, repair, display, painted)
+        task, key = _unit_task(
+            store, as_built, tile_id, channel, field, repair, statistics, painted
+        )
         yield f"{tile_id}/{channel.id}", task, key
 
 
@@ -129,38 +135,38 @@ def _names(channel: Channel) -> tuple[str | int, ...]:
 
 
 def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
-    """Return (and write) each channel's display, iso-values and transfer functions."""
-    displays = _displays(store, plan, engine)
-    isos = _isos(store, plan, engine, displays)
+    """Return (and write) each channel's statistics, iso-values and transfer functions."""
+    all_statistics = _all_statistics(store, plan, engine)
+    isos = _isos(store, plan, engine, all_statistics)
     neighbours = find_neighbours(plan.tiles)
     content = {}
     for channel in plan.channels:
         found = {tile.id: isos[tile.id, channel.id] for tile in plan.tiles}
-        agreed = (
+        reconciled = (
             _as_given(found)
             if _is_given(plan, channel)
-            else agree(neighbours, found, plan.settings.isovalue.min_confidence)
+            else reconcile_iso_values(neighbours, found, plan.settings.isovalue.min_confidence)
         )
-        display, painter = displays[channel.id], plan.painter(channel)
+        statistics, painter = all_statistics[channel.id], plan.painter(channel)
         appearance = make_appearance(
             channel.name,
             channel.color,
-            display=display,
+            statistics=statistics,
             iso_values={
                 tile: None if value is None else value + found[tile]["background"]
-                for tile, value in agreed.values.items()
+                for tile, value in reconciled.values.items()
             },
-            confidence=agreed.confidence,
-            surface=agreed.surface_confidence,
+            confidence=reconciled.confidence,
+            surface=reconciled.surface_confidence,
         )
         content[channel.id] = {
-            "display": display_to_json(display),
+            "display": statistics_to_json(statistics),
             "iso": {
                 tile: {
-                    "value": agreed.values[tile],
+                    "value": reconciled.values[tile],
                     "background": f["background"],
-                    "confidence": agreed.confidences[tile],
-                    "reason": f["reason"] or _doubt(f, agreed.confidences[tile], plan),
+                    "confidence": reconciled.confidences[tile],
+                    "reason": f["reason"] or _doubt(f, reconciled.confidences[tile], plan),
                     "file": f["file"],
                 }
                 for tile, f in found.items()
@@ -171,7 +177,7 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
                     plan.repair,
                     surface=plan.settings.surface,
                     spacing_um=plan.spacing_um,
-                    surface_confidence=agreed.surface_confidence,
+                    surface_confidence=reconciled.surface_confidence,
                 )
             ),
             "look": asdict(replace(appearance, painted_by=painter.id if painter else "")),
@@ -180,12 +186,12 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
     return content
 
 
-def _as_given(found: Mapping[str, Mapping[str, Any]]) -> Agreed:
+def _as_given(found: Mapping[str, Mapping[str, Any]]) -> Reconciled:
     """Return the values that the user gave: who gives one is sure of it."""
     values = {tile: f["value"] for tile, f in found.items()}
     is_known = any(value is not None for value in values.values())
     confidences = {tile: f["confidence"] for tile, f in found.items()}
-    return Agreed(values, confidences, float(is_known), "clear" if is_known else "none")
+    return Reconciled(values, confidences, float(is_known), "clear" if is_known else "none")
 
 
 def _doubt(found: Mapping[str, Any], confidence: float, plan: Plan) -> str:
@@ -200,17 +206,17 @@ def _doubt(found: Mapping[str, Any], confidence: float, plan: Plan) -> str:
     )
 
 
-def display_task(plan: Plan, channel: Channel) -> DisplayTask:
+def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
     """Return the task that finds a channel's window and background."""
     settings = plan.settings
     # a value that is given speaks of the voxels as they are
     subtracts = not _is_given(plan, channel) and settings.surface.background_um != 0
     level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
     ref = source_of(plan, channel)
-    return DisplayTask(ref, level, channel.index, plan.region, settings, subtracts, window)
+    return StatisticsTask(ref, level, channel.index, plan.region, settings, subtracts, window)
 
 
-def iso_task(plan: Plan, tile: Tile, *, channel: Channel, display: Display) -> IsoTask:
+def iso_task(plan: Plan, tile: Tile, *, channel: Channel, statistics: ChannelStatistics) -> IsoTask:
     """Return the task that finds one unit's iso-value."""
     return IsoTask(
         source_of(plan, channel),
@@ -218,8 +224,8 @@ def iso_task(plan: Plan, tile: Tile, *, channel: Channel, display: Display) -> I
         channel.index,
         tile.box,
         plan.settings,
-        _given(plan, channel, display),
-        _around(display.background, tile.box),
+        _given(plan, channel, statistics),
+        _around(statistics.background, tile.box),
     )
 
 
@@ -229,17 +235,17 @@ def _is_given(plan: Plan, channel: Channel) -> bool:
     return channel.name in settings.iso_values or settings.isovalue.criterion == ADAPTIVE
 
 
-def _given(plan: Plan, channel: Channel, display: Display) -> float | None:
+def _given(plan: Plan, channel: Channel, statistics: ChannelStatistics) -> float | None:
     given = plan.settings.iso_values.get(channel.name)
-    if given is None and _is_given(plan, channel) and display.threshold is not None:
-        return display.threshold.value
+    if given is None and _is_given(plan, channel) and statistics.threshold is not None:
+        return statistics.threshold.value
     return given
 
 
-def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
+def _all_statistics(store: Store, plan: Plan, engine: Engine) -> dict[str, ChannelStatistics]:
     files, tasks = {}, []
     for channel in plan.channels:
-        task = display_task(plan, channel)
+        task = statistics_task(plan, channel)
         depends = [
             _input_key(plan, channel),
             channel.index,
@@ -247,26 +253,28 @@ def _displays(store: Store, plan: Plan, engine: Engine) -> dict[str, Display]:
             asdict(plan.settings.window),
             plan.settings.surface.background_um if task.subtracts else 0,
         ]
-        file = store.display_file(channel.id, key_of(depends, window_maker, _reader(plan, channel)))
+        file = store.statistics_file(
+            channel.id, key_of(depends, window_maker, _reader(plan, channel))
+        )
         files[channel.id] = file
-        if find_json(file, _DISPLAY) is None:
+        if find_json(file, _STATISTICS) is None:
             tasks.append((channel.id, (task, file)))
-    _run(plan, engine, "windows", write_display, tasks)
+    _run(plan, engine, "windows", write_statistics, tasks)
     found = {}
     for channel_id, file in files.items():
-        content = read_json(file, _DISPLAY, _AGAIN)
-        found[channel_id] = display_from_json(content)
+        content = read_json(file, _STATISTICS, _AGAIN)
+        found[channel_id] = statistics_from_json(content)
     return found
 
 
 def _isos(
-    store: Store, plan: Plan, engine: Engine, displays: Mapping[str, Display]
+    store: Store, plan: Plan, engine: Engine, all_statistics: Mapping[str, ChannelStatistics]
 ) -> dict[tuple[str, str], dict[str, Any]]:
     files, tasks = {}, []
     settings = plan.settings
     for tile in plan.tiles:
         for channel in plan.channels:
-            task = iso_task(plan, tile, channel=channel, display=displays[channel.id])
+            task = iso_task(plan, tile, channel=channel, statistics=all_statistics[channel.id])
             depends = [
                 _input_key(plan, channel),
                 channel.index,
@@ -297,7 +305,7 @@ def _unit_task(
     channel: Channel,
     iso: LatticeField | None,
     repair: RepairOptions,
-    display: Display,
+    statistics: ChannelStatistics,
     painted: tuple[int, tuple[float, float]] | None,
 ) -> tuple[UnitTask, str]:
     tile = plan.tile(tile_id)
@@ -306,10 +314,10 @@ def _unit_task(
     given = UnitInput(
         lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
         iso=_around(iso, window),
-        background=_around(display.background, window),
+        background=_around(statistics.background, window),
         repair=repair,
         step=plan.step,
-        display=display.window,
+        intensity_window=statistics.window,
         settings=plan.settings,
         painted=painted and painted[1],
     )
@@ -318,7 +326,7 @@ def _unit_task(
         channel.index,
         [_box(box) for box in (window, own, plan.region)],
         [None if f is None else f.to_json() for f in (given.iso, given.background)],
-        given.display,
+        given.intensity_window,
         plan.settings.surface.smoothing_um,
         find_wrapper() if plan.settings.surface.wrap == "alpha-wrap" else None,
         plan.settings.surface.closed_tiles,

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from stereocell.building.closed_copy import close_tile
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
-from stereocell.isosurface.extract import extract_surface, signed_distance
+from stereocell.isosurface.distance_field import signed_distance
+from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
 from stereocell.meshes.alpha_wrap import alpha_wrap
 from stereocell.model.lattice import Lattice, Step
@@ -38,7 +39,7 @@ class UnitInput:
     background  what lies under it; None: nothing is subtracted
     repair      what is cleaned of the channel's surface
     step        every so many planes of voxels (z, y, x) carry the surface
-    display     voxel values that become 0 and 255
+    intensity_window  voxel values that become 0 and 255
     painted     those of the channel that is painted on the surface; None: no paint
     """
 
@@ -47,7 +48,7 @@ class UnitInput:
     background: LatticeField | None
     repair: RepairOptions
     step: Step
-    display: tuple[float, float]
+    intensity_window: tuple[float, float]
     settings: Settings
     painted: tuple[float, float] | None = None
 
@@ -111,7 +112,7 @@ def _repaired(
         field -= iso.at(given.lattice.window)
         if given.step != (1, 1, 1):
             field = np.ascontiguousarray(field[given.lattice.slices_of_thinned(given.step)])
-        value_range = given.display[1] - given.display[0]
+        value_range = given.intensity_window[1] - given.intensity_window[0]
         distance = signed_distance(
             field, np.zeros(1, np.float32), spacing_um=spacing, value_range=value_range
         )
@@ -176,7 +177,9 @@ def _with_surroundings(
     openness = find_openness(solid, lattice, mesh, radius_um=radius)
     paint = None
     if painted is not None and given.painted is not None:
-        paint = find_paint(painted, given.lattice, mesh, display=given.painted, depth_um=depth)
+        paint = find_paint(
+            painted, given.lattice, mesh, intensity_window=given.painted, depth_um=depth
+        )
     return FineSurface(mesh, openness, paint)
 
 
@@ -194,4 +197,4 @@ def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
             strict=True,
         )
     ]
-    return to_eight_bits(voxels[np.ix_(*index)], given.display)
+    return to_eight_bits(voxels[np.ix_(*index)], given.intensity_window)

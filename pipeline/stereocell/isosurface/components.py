@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
-class Solids:
+class Components:
     """Connected parts of a mask, numbered from 1; arrays (n,) hold number k at place k - 1.
 
     labels       unsigned integers (z, y, x), 0 outside
@@ -37,9 +37,9 @@ class Solids:
         return 2 * vertices[1:]
 
 
-def find_solids(
+def find_components(
     mask: NDArray[np.bool_], spacing_um: tuple[float, float, float], connectivity: Literal[6, 26]
-) -> Solids:
+) -> Components:
     """Return the connected parts of a mask (z, y, x)."""
     labels = cc3d.connected_components(mask, connectivity=connectivity)
     found = cc3d.statistics(labels, no_slice_conversion=True)["bounding_boxes"]
@@ -47,4 +47,4 @@ def find_solids(
     diagonal = np.linalg.norm((boxes[:, :, 1] - boxes[:, :, 0]) * np.asarray(spacing_um), axis=1)
     end = np.asarray(mask.shape) - 1
     whole = np.all((boxes[:, :, 0] > 0) & (boxes[:, :, 1] < end), axis=1)
-    return Solids(labels, diagonal, np.asarray(whole))
+    return Components(labels, diagonal, np.asarray(whole))

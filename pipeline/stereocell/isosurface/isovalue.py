@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.isosurface.extract import gradient_magnitude
+from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.raggedness import find_raggedness
 from stereocell.model.errors import NoSurfaceError

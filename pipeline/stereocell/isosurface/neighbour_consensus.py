@@ -1,11 +1,11 @@
 """What a channel's tiles say together: how sure each iso-value is, and which one each tile takes.
 
-The summit of a criterion's curve is broad: many levels are nearly as good as the best, and which of
-them wins is chance. Where a neighbour's value lies on the summit too, there is no evidence for a
-jump, and a jump would show as a step in the surface. A value never leaves its own summit.
+The plateau of a criterion's curve is broad: many levels are nearly as good as the best, and which
+of them wins is chance. Where a neighbour's value lies on the plateau too, there is no evidence for
+a discontinuity, which would show as a step in the surface. A value never leaves its own plateau.
 
-A jump from the neighbours also weakens weak evidence: confidence = evidence ^ (1 + jump / 4), where
-jump, 0 to 1, is the distance to the median of those neighbours that are sure by themselves, by the
+A discontinuity also weakens weak evidence: confidence = evidence ^ (1 + discontinuity / 4), where
+it is, 0 to 1, the distance to the median of those neighbours that are sure by themselves, by the
 larger of the two heights above the background. Strong evidence stays (.9 beside a neighbour eight
 times as bright: .88), and no more weight than that: a dark part of a real brain, whose cells are
 outlined well at .44 of its neighbour's value, has .49, and keeps .44.
@@ -27,13 +27,13 @@ import numpy as np
 from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.tiling import Box, Tile
 
-SUMMIT = 0.99  # of the best score: levels that are as good; .95 cost a lone ball 11 % of volume
-JUMP_WEIGHT = 0.25
+PLATEAU = 0.99  # of the best score: levels that are as good; .95 cost a lone ball 11 % of volume
+DISCONTINUITY_WEIGHT = 0.25
 Neighbours = Mapping[str, Sequence[str]]
 
 
 @dataclass(frozen=True, slots=True)
-class Agreed:
+class Reconciled:
     """One channel's iso-values.
 
     values              by tile id; None: the tile takes the mean of the others
@@ -48,10 +48,10 @@ class Agreed:
     surface_confidence: SurfaceConfidence
 
 
-def agree(
+def reconcile_iso_values(
     neighbours: Neighbours, found: Mapping[str, Mapping[str, Any]], min_confidence: float
-) -> Agreed:
-    """Return what the tiles agree on.
+) -> Reconciled:
+    """Return iso-values on which the tiles agree.
 
     neighbours  by tile id, as of `find_neighbours`
     found       by tile id: `value` (None: the tile has none); where it has one `confidence`, by its
@@ -65,11 +65,13 @@ def agree(
     confidences = {}
     for tile, beside in neighbours.items():
         others = [values[other] for other in beside if other in sure]
-        jump = _jump(values[tile], median(others)) if values[tile] is not None and others else 0.0
-        confidences[tile] = evidence[tile] ** (1 + JUMP_WEIGHT * jump)
+        away = 0.0
+        if values[tile] is not None and others:
+            away = _discontinuity(values[tile], median(others))
+        confidences[tile] = evidence[tile] ** (1 + DISCONTINUITY_WEIGHT * away)
     known = [tile for tile, value in values.items() if value is not None]
     if not known:
-        return Agreed(values, confidences, 0.0, "none")
+        return Reconciled(values, confidences, 0.0, "none")
     weights = [found[tile]["strength"] for tile in known]
     confidence = float(
         np.average([confidences[tile] for tile in known], weights=weights if any(weights) else None)
@@ -80,7 +82,9 @@ def agree(
             tile: value if confidences[tile] >= min_confidence else None
             for tile, value in values.items()
         }
-    return Agreed(_drawn(neighbours, values, found), confidences, confidence, surface_confidence)
+    return Reconciled(
+        _pulled_towards(neighbours, values, found), confidences, confidence, surface_confidence
+    )
 
 
 def find_neighbours(tiles: Sequence[Tile]) -> dict[str, list[str]]:
@@ -108,32 +112,32 @@ def _overlap(a: Box, b: Box, axis: int) -> bool:
     )
 
 
-def _jump(value: float, others: float) -> float:
+def _discontinuity(value: float, others: float) -> float:
     height = max(abs(value), abs(others))
     return min(1.0, abs(value - others) / height) if height > 0 else 0.0
 
 
-def _drawn(
+def _pulled_towards(
     neighbours: Neighbours,
     values: Mapping[str, float | None],
     found: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, float | None]:
     """Return each tile's value, drawn half-way to the median of its neighbours'."""
-    drawn = dict(values)
+    pulled = dict(values)
     for tile, value in values.items():
         beside = [v for other in neighbours[tile] if (v := values[other]) is not None]
         if value is not None and beside:
-            low, high = _summit(value, found[tile])
+            low, high = _plateau(value, found[tile])
             # half the way: going all of it, two neighbours would only change places
-            drawn[tile] = min(max((value + median(beside)) / 2, low), high)
-    return drawn
+            pulled[tile] = min(max((value + median(beside)) / 2, low), high)
+    return pulled
 
 
-def _summit(value: float, found: Mapping[str, Any]) -> tuple[float, float]:
+def _plateau(value: float, found: Mapping[str, Any]) -> tuple[float, float]:
     """Return the range of levels about the value that score nearly as well as the best."""
     levels, score = np.asarray(found["levels"]), np.asarray(found["score"])
     best = int(score.argmax())
-    worse = np.flatnonzero(score < SUMMIT * score[best])
+    worse = np.flatnonzero(score < PLATEAU * score[best])
     end = int(np.searchsorted(worse, best))
     first = int(worse[end - 1]) + 1 if end else 0
     last = int(worse[end]) - 1 if end < len(worse) else len(levels) - 1

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.isosurface.components import find_solids
+from stereocell.isosurface.components import find_components
 
 Distance = NDArray[np.float32]
 
@@ -80,20 +80,20 @@ def _drop_fragments(
 ) -> tuple[Distance, int]:
     """Return the distance with small solids inside the window set far outside, and how many."""
     # 26-connected: a fragment joined by a corner belongs to its neighbour
-    solids = find_solids(distance > 0, spacing_um, 26)
-    small = solids.diagonal_um < options.min_diagonal_um
-    doubtful = ~small & (solids.diagonal_um < options.max_fragment_um)
+    components = find_components(distance > 0, spacing_um, 26)
+    small = components.diagonal_um < options.min_diagonal_um
+    doubtful = ~small & (components.diagonal_um < options.max_fragment_um)
     if options.min_faces > 0 and doubtful.any():
-        small |= doubtful & (solids.faces() < options.min_faces)
-    small &= solids.whole
+        small |= doubtful & (components.faces() < options.min_faces)
+    small &= components.whole
     if not small.any():
         return distance, 0
     outside = np.float32(-2 * max(spacing_um))
-    gone = np.concatenate([[False], small])[solids.labels]
+    gone = np.concatenate([[False], small])[components.labels]
     if options.offset_um > 0:
         # just outside a fragment the distance is hardly negative: the offset would bring it back
         near = ndimage.maximum_filter(gone.view(np.uint8), 3, mode="constant")
-        kept = ((solids.labels > 0) & ~gone).view(np.uint8)
+        kept = ((components.labels > 0) & ~gone).view(np.uint8)
         near &= ~ndimage.maximum_filter(kept, 3, mode="constant") & 1
         gone |= near.view(bool)
     return np.where(gone, outside, distance), int(small.sum())
@@ -105,7 +105,7 @@ def _fill_cavities(
     """Return the distance with small holes that no path joins to the outside set far inside, and
     how many.
     """
-    holes = find_solids(distance <= 0, spacing_um, 6)
+    holes = find_components(distance <= 0, spacing_um, 6)
     small = holes.whole & (holes.diagonal_um < max_diagonal_um)
     if not small.any():
         return distance, 0

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.isosurface.components import find_solids
+from stereocell.isosurface.components import find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import SurfaceConfidence
@@ -32,7 +32,7 @@ OFFSET_SHARE = 0.1  # of alpha, as the paper's 0.1 um of 1 um
 
 
 @dataclass(frozen=True, slots=True)
-class SolidSums:
+class ComponentSums:
     """Sums over a tile's solids; of all, and of those that the rule keeps."""
 
     count: int
@@ -43,20 +43,20 @@ class SolidSums:
     kept_diagonal_um: float
 
 
-def sum_solids(
+def sum_components(
     inside: NDArray[np.bool_], spacing_um: tuple[float, float, float], min_diagonal_um: float
-) -> SolidSums:
+) -> ComponentSums:
     """Return the sums over the solids of {field > iso-value} (z, y, x); specks are left out.
 
     They would rule the means: noise has more of them than a tile has bodies.
     """
-    solids = find_solids(inside, spacing_um, 26)
-    large = solids.diagonal_um >= min_diagonal_um
-    faces, diagonal = solids.faces()[large], solids.diagonal_um[large]
+    components = find_components(inside, spacing_um, 26)
+    large = components.diagonal_um >= min_diagonal_um
+    faces, diagonal = components.faces()[large], components.diagonal_um[large]
     if not len(faces):
-        return SolidSums(0, 0, 0.0, 0, 0, 0.0)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
-    return SolidSums(
+    return ComponentSums(
         len(faces),
         int(faces.sum()),
         float(diagonal.sum()),
@@ -76,7 +76,7 @@ def choose_repair(
 ) -> RepairOptions:
     """Return what is cleaned of a channel's surface.
 
-    tiles       SolidSums of each, as plain values
+    tiles       ComponentSums of each, as plain values
     most        the most that may be cleaned: the units' halo covers it
     spacing_um  (z, y, x)
 

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from stereocell.building.passes import display_task, iso_task
+from stereocell.building.passes import iso_task, statistics_task
 from stereocell.building.phases import settle
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.iso_value import IsoField, read_iso_field
-from stereocell.building.tasks.window import run_display
+from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.isovalue import IsoValue
 from stereocell.isosurface.options import ADAPTIVE, CRITERIA
 from stereocell.model.errors import NoSurfaceError, UsageError
@@ -72,8 +72,8 @@ def preview(
         raise UsageError(f"-o is {str(out)!r}, expected a file named .png")
     plan = settle(source, settings)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
-    display = run_display(display_task(plan, channel))
-    task = iso_task(plan, tile, channel=channel, display=display)
+    statistics = measure_statistics(statistics_task(plan, channel))
+    task = iso_task(plan, tile, channel=channel, statistics=statistics)
     field = read_iso_field(task)
     try:
         chosen = field.find_iso_value(plan.settings.isovalue)
@@ -88,7 +88,7 @@ def preview(
     candidates = _candidates(field, found, task.given, "given" if is_users else ADAPTIVE)
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
     picture = _compose(
-        paint_slices(_slices(field, candidates, display.window, plan), _LONGEST_PX, _LONGEST_PX),
+        paint_slices(_slices(field, candidates, statistics.window, plan), _LONGEST_PX, _LONGEST_PX),
         f"{channel.name}, tile {tile.id} of {plan.name}",
         candidates,
         chosen,

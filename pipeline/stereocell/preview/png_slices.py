@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.open_source import open_source, source_of
-from stereocell.building.passes import display_task
+from stereocell.building.passes import statistics_task
 from stereocell.building.plan import Plan
 from stereocell.building.settings import Settings
-from stereocell.building.tasks.window import run_display
+from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.rigid_transform import IDENTITY
@@ -53,7 +53,7 @@ def write_slices(plan: Plan, folder: Path) -> int:
         raise OutputError(f"{folder}: exists and holds no slices: no {INDEX} in it")
     dataset, channel = open_source(source_of(plan)), plan.channels[0]
     volume = dataset.read(channel.index, plan.region, plan.level)
-    window = run_display(display_task(plan, channel)).window
+    window = measure_statistics(statistics_task(plan, channel)).window
     with replacing_folder(folder) as new:
         names = [f"{z:0{len(str(len(volume.voxels)))}d}.png" for z in range(len(volume.voxels))]
         for name, plane in zip(names, volume.voxels, strict=True):

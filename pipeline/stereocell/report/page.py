@@ -36,7 +36,7 @@ from stereocell.report.thresholds import draw_cut, draw_threshold
 from stereocell.report.tissue import TissueFacts, find_tissue
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.textures.unwrap import mip_levels_apart
-from stereocell.transfer.channel_statistics import appearance_from, display_from_json
+from stereocell.transfer.channel_statistics import appearance_from, statistics_from_json
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 MOST_PICTURED = 60  # units
@@ -176,7 +176,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
     # a tissue class has probabilities, not a histogram of bodies
     for unit in (u for u in facts.units if u.tile == middle and not u.channel.source):
         entry = facts.survey[unit.channel.id]
-        figure = draw_threshold(display_from_json(entry["display"]))
+        figure = draw_threshold(statistics_from_json(entry["display"]))
         share = appearance_from(entry["look"]).threshold_normalized
         if figure is None or share is None:
             continue
@@ -202,9 +202,9 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
     lattice = unit.tile.lattice(plan.region)
     inner = slice(APRON, -APRON)
     volume = load_volume(unit.directory)[inner, inner, inner]
-    display = display_from_json(facts.survey[unit.channel.id]["display"])
+    statistics = statistics_from_json(facts.survey[unit.channel.id]["display"])
     surface_confidence = facts.survey[unit.channel.id]["look"]["surface"]
-    low, high = display.window
+    low, high = statistics.window
     slices = cut_unit(
         volume,
         lattice,
@@ -212,7 +212,9 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
         spacing_um=plan.spacing_um,
         mesh=load_lods(unit.directory)[0].mesh if unit.lods else None,
         sigma_um=float(plan_for(plan, surface_confidence).settings.surface.smoothing_um),
-        iso_at=None if iso is None else partial(_in_eight_bits, iso, display.background, low, high),
+        iso_at=None
+        if iso is None
+        else partial(_in_eight_bits, iso, statistics.background, low, high),
     )
     curve = read_curve(store.out, unit)
     levels, found = curve.get("levels"), curve.get("found")

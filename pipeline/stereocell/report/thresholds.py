@@ -16,7 +16,7 @@ from stereocell.preview.draw_slices import VIEWS, Slice, draw_slices
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
-from stereocell.transfer.channel_statistics import Display
+from stereocell.transfer.channel_statistics import ChannelStatistics
 
 READINGS = {  # of the levels of Threshold.between
     "two peaks": "between the second-highest peak, at {1:.5g}, and the peak before it, at {0:.5g}",
@@ -49,14 +49,14 @@ class ThresholdFigure:
     ends: tuple[float, float]
 
 
-def draw_threshold(display: Display) -> ThresholdFigure | None:
+def draw_threshold(statistics: ChannelStatistics) -> ThresholdFigure | None:
     """Return a channel's figure; None where it has no threshold."""
-    found, values = display.threshold, display.values
+    found, values = statistics.threshold, statistics.values
     if found is None:
         return None
     otsu, li = find_peers(values)
     rows = tuple(
-        Row(name, kind, value, _share_above(display, value))
+        Row(name, kind, value, _share_above(statistics, value))
         for name, kind, value in (
             ("adaptive", "mark", found.value), ("Otsu", "otsu", otsu), ("Li", "li", li)
         )
@@ -113,8 +113,8 @@ def draw_cut(
     return Picture(*draw_slices(slices))
 
 
-def _share_above(display: Display, value: float) -> float:
+def _share_above(statistics: ChannelStatistics, value: float) -> float:
     """Return the share of all voxels at or above a value, to within a bin of the window."""
-    counts = np.asarray(display.histogram)
-    upper = np.linspace(*display.window, len(counts) + 1)[1:]
+    counts = np.asarray(statistics.histogram)
+    upper = np.linspace(*statistics.window, len(counts) + 1)[1:]
     return float(counts[upper > value].sum() / counts.sum())

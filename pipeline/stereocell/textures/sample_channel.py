@@ -19,14 +19,14 @@ def find_paint(
     lattice: Lattice,
     mesh: Mesh,
     *,
-    display: tuple[float, float],
+    intensity_window: tuple[float, float],
     depth_um: float,
 ) -> NDArray[np.float32]:
     """Return the intensity at each vertex, float32 (n,), 0..1.
 
     painted  the other channel's voxels (z, y, x); they cover `lattice.window`
     mesh     positions and unit normals in world um (x, y, z); its triangles are not looked at
-    display  voxel values that become 0 and 1
+    intensity_window  voxel values that become 0 and 1
     """
     points, spacing = mesh.positions, np.asarray(painted.spacing_um)
     voxels = painted.voxels.astype(np.float32)
@@ -38,5 +38,5 @@ def find_paint(
         place = (at + depth * inwards).T
         here = ndimage.map_coordinates(voxels, place, order=1, mode="nearest")
         largest = np.maximum(largest, here)
-    low, high = display
+    low, high = intensity_window
     return np.clip((largest - low) / (high - low), 0, 1).astype(np.float32)

@@ -24,7 +24,7 @@ from scipy.special import erf
 from stereocell.model.channel import Shape, Shapes
 from stereocell.transfer.edge_model import (
     COARSER,
-    Plane,
+    HistogramGrid,
     Ratios,
     count_edge,
     count_material,
@@ -43,13 +43,13 @@ LEAST_SHARE = 0.05  # of what all boundaries explain, to one of them
 LEAST_MISSED = 0.05  # more squares left over without a boundary that passes over a third material
 LEAST_VOXELS = 2e-5  # of all, to a boundary: a ball of 40 voxels in 256^3 has twice as many
 FEWEST = 20.0  # voxels: cells of fewer weigh no more, as nothing is quite as ideal
-MAX_ARCS = 6
+MAX_BOUNDARIES = 6
 CLEAR = 2.0  # sigmas of noise that a shape keeps from a material's value
 EVEN: Ratios = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Arc:
+class Boundary:
     """A boundary between two materials.
 
     low, high  values of the materials, 0..1 in the window
@@ -73,18 +73,18 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class Boundaries:
-    """What was found; `reason` says why there is no arc, empty if there is one.
+    """What was found; `reason` says why there is no boundary, empty if there is one.
 
     materials  values 0..1, rising
     """
 
-    arcs: tuple[Arc, ...]
+    boundaries: tuple[Boundary, ...]
     materials: tuple[float, ...]
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class Proposal:
+class SuggestedShapes:
     """A first 2D function for a channel; `reason` says why it has no shapes, empty if it has some.
 
     gradient_max  the gradient magnitude that is 1 to the shapes
@@ -95,11 +95,11 @@ class Proposal:
     reason: str
 
 
-def propose(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> Proposal:
+def suggest(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> SuggestedShapes:
     """Return shapes on the boundaries of a channel; `fine`: counts, see choose_gradient_max."""
     gradient_max = choose_gradient_max(fine)
     found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um)
-    return Proposal(propose_shapes(found), gradient_max, found.reason)
+    return SuggestedShapes(suggest_shapes(found), gradient_max, found.reason)
 
 
 def find_boundaries(
@@ -108,7 +108,7 @@ def find_boundaries(
     """Return materials and boundaries of a histogram, int (rows, columns); see
     transfer/joint_histogram.py.
 
-    Same histogram, same answer. A constant volume, or one of a single material, has no arcs.
+    Same histogram, same answer. A constant volume, or one of a single material, has no boundaries.
     """
     total = int(counts.sum())
     noise = find_noise(counts, gradient_max)
@@ -119,30 +119,38 @@ def find_boundaries(
         return Boundaries((), materials, f"materials found: {len(materials)}, expected at least 2")
     finest = min(spacing_um)
     z, y, x = (h / finest for h in spacing_um)
-    plane = Plane(len(counts), counts.shape[1] // COARSER, gradient_max, (z, y, x))
-    arcs = _explain(counts, noise, materials, plane)
-    arcs = [arc for arc in arcs if arc.share >= LEAST_VOXELS]
-    arcs = sorted(arcs, key=lambda arc: (-arc.share, arc.low, arc.high))[:MAX_ARCS]
-    reason = "" if arcs else f"no boundary rises above the noise between {len(materials)} materials"
-    return Boundaries(tuple(sorted(arcs, key=lambda a: (a.low, a.high))), materials, reason)
+    grid = HistogramGrid(len(counts), counts.shape[1] // COARSER, gradient_max, (z, y, x))
+    boundaries = _explain(counts, noise, materials, grid)
+    boundaries = [boundary for boundary in boundaries if boundary.share >= LEAST_VOXELS]
+    boundaries = sorted(
+        boundaries, key=lambda boundary: (-boundary.share, boundary.low, boundary.high)
+    )[:MAX_BOUNDARIES]
+    reason = (
+        ""
+        if boundaries
+        else f"no boundary rises above the noise between {len(materials)} materials"
+    )
+    return Boundaries(tuple(sorted(boundaries, key=lambda a: (a.low, a.high))), materials, reason)
 
 
-def propose_shapes(boundaries: Boundaries) -> Shapes:
-    """Return a triangle on each arc: its tip below the apex, its sides between the materials.
+def suggest_shapes(found: Boundaries) -> Shapes:
+    """Return a triangle on each boundary: its tip below the apex, its sides between the materials.
 
     What lies within 0.3 of the contrast of the middle value at the apex's height is taken, as far
     as the noise of the two materials leaves room, and up to a little above the boundary's steepest
     voxels. The lower a boundary's value, the more lies behind it: outer ones let more through.
     """
-    arcs = sorted(boundaries.arcs, key=lambda arc: (arc.low + arc.high, arc.low))
+    boundaries = sorted(
+        found.boundaries, key=lambda boundary: (boundary.low + boundary.high, boundary.low)
+    )
     shapes = []
-    for i, arc in enumerate(arcs):
-        middle, contrast = (arc.low + arc.high) / 2, arc.high - arc.low
-        top = min(1.0, 1.2 * arc.steepest)
-        room = max(contrast / 2 - CLEAR * arc.sigma, 0.1 * contrast)
-        half = min(0.3 * contrast * top / min(arc.apex, top), room)
-        bottom = min(max(0.4 * arc.apex, min(arc.noise, 0.7 * arc.apex)), 0.9 * top)
-        opacity = 0.7 if len(arcs) == 1 else 0.15 + 0.55 * i / (len(arcs) - 1)
+    for i, boundary in enumerate(boundaries):
+        middle, contrast = (boundary.low + boundary.high) / 2, boundary.high - boundary.low
+        top = min(1.0, 1.2 * boundary.steepest)
+        room = max(contrast / 2 - CLEAR * boundary.sigma, 0.1 * contrast)
+        half = min(0.3 * contrast * top / min(boundary.apex, top), room)
+        bottom = min(max(0.4 * boundary.apex, min(boundary.noise, 0.7 * boundary.apex)), 0.9 * top)
+        opacity = 0.7 if len(boundaries) == 1 else 0.15 + 0.55 * i / (len(boundaries) - 1)
         shapes.append(
             Shape(
                 "triangle",
@@ -190,15 +198,15 @@ def _explain(
     counts: NDArray[np.int64],
     noise: NDArray[np.float64],
     materials: tuple[float, ...],
-    plane: Plane,
-) -> list[Arc]:
+    grid: HistogramGrid,
+) -> list[Boundary]:
     """Return the boundaries that have their share of what lies above the noise."""
     pairs = [(a, b) for a, b in combinations(materials, 2) if b - a >= LEAST_CONTRAST]
-    terms = _make_terms(counts, noise, materials, pairs, plane)
+    terms = _make_terms(counts, noise, materials, pairs, grid)
     if terms is None:
         return []
     voxels, left = terms.fit()
-    arcs = []
+    boundaries = []
     for number, (low, high) in enumerate(pairs):
         own = terms.pairs == number
         held = float(voxels[own].sum())
@@ -206,7 +214,7 @@ def _explain(
             continue
         here = _noise_at(noise, (low + high) / 2)
         blur = float(np.exp(np.average(np.log(terms.blurs[own]), weights=voxels[own])))
-        per_step = (high - low) / plane.gradient_max
+        per_step = (high - low) / grid.gradient_max
         apex = per_step * float(erf(1 / blur / np.sqrt(2)))
         if apex < OVER_NOISE * here:
             continue
@@ -214,19 +222,19 @@ def _explain(
             _, without = terms.fit(number)
             if without < (1 + LEAST_MISSED) * left:
                 continue
-        arcs.append(
-            Arc(
+        boundaries.append(
+            Boundary(
                 low,
                 high,
                 apex,
-                per_step * find_steepest(blur, plane.ratios),
+                per_step * find_steepest(blur, grid.ratios),
                 blur,
                 held / float(counts.sum()),
                 here,
-                value_noise(here, plane.gradient_max),
+                value_noise(here, grid.gradient_max),
             )
         )
-    return arcs
+    return boundaries
 
 
 def _make_terms(
@@ -234,19 +242,19 @@ def _make_terms(
     noise: NDArray[np.float64],
     materials: tuple[float, ...],
     pairs: list[tuple[float, float]],
-    plane: Plane,
+    grid: HistogramGrid,
 ) -> _Sum | None:
     """Return the sum for all pairs and blurs; None where no boundary rises above the noise."""
-    cells = counts.reshape(plane.rows, plane.columns, COARSER).sum(axis=2).astype(np.float64)
-    level = noise.reshape(plane.columns, COARSER).max(axis=1)
-    is_steep = np.arange(plane.rows)[:, np.newaxis] > level * (plane.rows - 1)
+    cells = counts.reshape(grid.rows, grid.columns, COARSER).sum(axis=2).astype(np.float64)
+    level = noise.reshape(grid.columns, COARSER).max(axis=1)
+    is_steep = np.arange(grid.rows)[:, np.newaxis] > level * (grid.rows - 1)
     weight = 1 / np.sqrt(cells[is_steep] + FEWEST)  # counts are off by their root
     terms: list[NDArray[np.float64]] = []
     edges: list[tuple[int, float, float]] = []
     for number, (low, high) in enumerate(pairs):
-        sigma = value_noise(_noise_at(noise, (low + high) / 2), plane.gradient_max)
+        sigma = value_noise(_noise_at(noise, (low + high) / 2), grid.gradient_max)
         for blur in BLURS:
-            share = count_edge(low, high, blur=float(blur), sigma=sigma, plane=plane)
+            share = count_edge(low, high, blur=float(blur), sigma=sigma, grid=grid)
             seen = share[is_steep]
             if seen.sum() > LEAST_SEEN * share.sum():
                 terms.append(seen * weight)
@@ -255,8 +263,8 @@ def _make_terms(
         return None
     for value in materials:
         for wider in NOISES:
-            sigma = wider * value_noise(_noise_at(noise, value), plane.gradient_max)
-            terms.append(count_material(value, sigma, plane)[is_steep] * weight)
+            sigma = wider * value_noise(_noise_at(noise, value), grid.gradient_max)
+            terms.append(count_material(value, sigma, grid)[is_steep] * weight)
     numbers, blurs, seen_of = (np.array(column) for column in zip(*edges, strict=True))
     return _Sum(np.stack(terms, axis=1), cells[is_steep] * weight, numbers, blurs, seen_of)
 

@@ -19,7 +19,7 @@ from stereocell.transfer.adaptive_threshold import (
     find_adaptive_threshold,
     make_histogram,
 )
-from stereocell.transfer.boundaries import Proposal
+from stereocell.transfer.boundaries import SuggestedShapes
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import NAME as NAME_2D
@@ -27,20 +27,20 @@ from stereocell.transfer.shapes2d import fall_back, shapes_from
 
 BINS = 256
 _AT_ONCE = 1 << 20  # voxels
-NO_PROPOSAL = Proposal((), DEFAULT_GRADIENT_MAX, "not looked for")
+NO_SUGGESTION = SuggestedShapes((), DEFAULT_GRADIENT_MAX, "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Display:
+class ChannelStatistics:
     """One channel's window in voxel values, voxel counts (256 bins) inside it, its background, the
-    2D function that is proposed for it, and the counts that its threshold is read from.
+    2D function that is suggested for it, and the counts that its threshold is read from.
     """
 
     window: tuple[float, float]
     histogram: tuple[int, ...]
     background: LatticeField | None
-    proposal: Proposal = NO_PROPOSAL
+    suggested: SuggestedShapes = NO_SUGGESTION
     values: Histogram = NOTHING_COUNTED
 
     @property
@@ -48,13 +48,13 @@ class Display:
         return find_adaptive_threshold(self.values)
 
 
-def find_display(
+def find_statistics(
     voxels: NDArray[Any],
     options: WindowOptions,
     *,
     background: LatticeField | None = None,
     window: tuple[float, float] | None = None,
-) -> Display:
+) -> ChannelStatistics:
     """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide.
 
     `window`, where it is known, is not sought. The voxels are left in another order: a sorted copy
@@ -76,30 +76,32 @@ def find_display(
         part = np.clip(voxels[start : start + _AT_ONCE], low, high)
         counts += np.histogram(part, BINS, (low, high))[0]
     values = make_histogram(voxels, (low, high))
-    return Display((low, high), tuple(int(n) for n in counts), background, values=values)
+    return ChannelStatistics((low, high), tuple(int(n) for n in counts), background, values=values)
 
 
-def display_to_json(display: Display) -> dict[str, Any]:
-    """Return a display as plain values, as survey.json holds it."""
-    field = display.background
+def statistics_to_json(statistics: ChannelStatistics) -> dict[str, Any]:
+    """Return statistics as plain values, as survey.json holds it."""
+    field = statistics.background
     return {
-        "window": list(display.window),
-        "histogram": list(display.histogram),
+        "window": list(statistics.window),
+        "histogram": list(statistics.histogram),
         "background": None if field is None else field.to_json(),
-        "proposal": asdict(display.proposal),
-        "values": asdict(display.values),
+        "proposal": asdict(statistics.suggested),
+        "values": asdict(statistics.values),
     }
 
 
-def display_from_json(content: Mapping[str, Any]) -> Display:
-    """Return the display that `display_to_json` was given; the content has passed its schema."""
-    field, proposal, values = content["background"], content["proposal"], content["values"]
+def statistics_from_json(content: Mapping[str, Any]) -> ChannelStatistics:
+    """Return what `statistics_to_json` was given; the content has passed its schema."""
+    field, suggested, values = content["background"], content["proposal"], content["values"]
     low, high = content["window"]
-    return Display(
+    return ChannelStatistics(
         (low, high),
         tuple(content["histogram"]),
         None if field is None else LatticeField.from_json(field),
-        Proposal(shapes_from(proposal["shapes"]), proposal["gradient_max"], proposal["reason"]),
+        SuggestedShapes(
+            shapes_from(suggested["shapes"]), suggested["gradient_max"], suggested["reason"]
+        ),
         Histogram(tuple(values["counts"]), values["low"], values["high"]),
     )
 
@@ -108,7 +110,7 @@ def make_appearance(
     name: str,
     color: tuple[float, float, float],
     *,
-    display: Display,
+    statistics: ChannelStatistics,
     iso_values: Mapping[str, float | None],
     confidence: float,
     surface: SurfaceConfidence,
@@ -116,24 +118,24 @@ def make_appearance(
     """Return how a channel is drawn; iso-values by tile id, both confidences for all."""
     known = [value for value in iso_values.values() if value is not None]
     iso_value = float(np.mean(known)) if known else None
-    found = display.threshold
+    found = statistics.threshold
     appearance = replace(
-        Appearance(name, color, display.window, iso_value, confidence, surface, {}),
+        Appearance(name, color, statistics.window, iso_value, confidence, surface, {}),
         threshold=None if found is None else found.value,
     )
     # a level that nothing tells from noise is no place for opacity to begin
     level = appearance.iso_normalized if surface == "clear" else None
     functions = make_transfer_functions(
-        np.asarray(display.histogram), level, appearance.threshold_normalized
+        np.asarray(statistics.histogram), level, appearance.threshold_normalized
     )
-    shapes = display.proposal.shapes
+    shapes = statistics.suggested.shapes
     if shapes:
         functions[NAME_2D] = fall_back(shapes)
     return replace(
         appearance,
         transfer_functions=functions,
         shapes={NAME_2D: shapes} if shapes else {},
-        gradient_max=display.proposal.gradient_max,
+        gradient_max=statistics.suggested.gradient_max,
     )
 
 

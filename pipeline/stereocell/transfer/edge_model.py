@@ -26,8 +26,9 @@ Field = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Plane:
-    """A histogram's size (rows, columns), the gradient of its last row, its spacings by the finest.
+class HistogramGrid:
+    """The extent of a joint histogram: its size (rows, columns), the gradient of its last row, and
+    its spacings by the finest.
 
     Columns are already the coarser ones.
     """
@@ -46,28 +47,28 @@ def value_noise(noise: float, gradient_max: float) -> float:
     return noise * gradient_max / NOISE_FACTOR / 2
 
 
-def count_edge(low: float, high: float, *, blur: float, sigma: float, plane: Plane) -> Field:
+def count_edge(low: float, high: float, *, blur: float, sigma: float, grid: HistogramGrid) -> Field:
     """Return the voxels of an edge by gradient and value, (rows, columns), per voxel of its area.
 
     low, high  values of the materials; sigma: of the values' noise; blur: in finest voxels
     """
-    reach = BEYOND * blur + max(plane.ratios)
+    reach = BEYOND * blur + max(grid.ratios)
     at = (2 * (np.arange(PLACES) + 0.5) / PLACES - 1) * reach
     squares = np.zeros((PLACES, DIRECTIONS))
-    for axis, ratio in enumerate(plane.ratios):
+    for axis, ratio in enumerate(grid.ratios):
         aside = _NORMALS[:, axis] * ratio
         step = ndtr((at[:, np.newaxis] + aside) / blur) - ndtr((at[:, np.newaxis] - aside) / blur)
         squares += (((high - low) * step + np.sqrt(2) * sigma * _CHANCE[axis]) / ratio) ** 2
     values = low + (high - low) * ndtr(at / blur)[:, np.newaxis] + sigma * _CHANCE[3]
-    return 2 * reach * _share(values, np.sqrt(squares), plane)
+    return 2 * reach * _share(values, np.sqrt(squares), grid)
 
 
-def count_material(value: float, sigma: float, plane: Plane) -> Field:
+def count_material(value: float, sigma: float, grid: HistogramGrid) -> Field:
     """Return a material's voxels by gradient and value, (rows, columns), 1 in sum."""
     squares = sum(
-        (np.sqrt(2) * sigma * _CHANCE[axis] / ratio) ** 2 for axis, ratio in enumerate(plane.ratios)
+        (np.sqrt(2) * sigma * _CHANCE[axis] / ratio) ** 2 for axis, ratio in enumerate(grid.ratios)
     )
-    return _share(value + sigma * _CHANCE[3], np.sqrt(squares), plane)
+    return _share(value + sigma * _CHANCE[3], np.sqrt(squares), grid)
 
 
 def find_steepest(blur: float, ratios: Ratios) -> float:
@@ -78,12 +79,12 @@ def find_steepest(blur: float, ratios: Ratios) -> float:
     return float(np.sqrt(squares).max())
 
 
-def _share(values: Field, gradients: Field, plane: Plane) -> Field:
-    row = np.minimum(gradients / plane.gradient_max * (plane.rows - 1) + 0.5, plane.rows - 1)
-    column = np.clip(values, 0, 1 - 1e-9) * plane.columns
-    cell = row.astype(np.intp) * plane.columns + column.astype(np.intp)
-    counts = np.bincount(cell.ravel(), minlength=plane.rows * plane.columns)
-    return counts.reshape(plane.rows, plane.columns) / cell.size
+def _share(values: Field, gradients: Field, grid: HistogramGrid) -> Field:
+    row = np.minimum(gradients / grid.gradient_max * (grid.rows - 1) + 0.5, grid.rows - 1)
+    column = np.clip(values, 0, 1 - 1e-9) * grid.columns
+    cell = row.astype(np.intp) * grid.columns + column.astype(np.intp)
+    counts = np.bincount(cell.ravel(), minlength=grid.rows * grid.columns)
+    return counts.reshape(grid.rows, grid.columns) / cell.size
 
 
 def _directions() -> Field:

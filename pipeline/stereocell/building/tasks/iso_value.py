@@ -12,7 +12,7 @@ from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.isovalue import IsoValue, find_iso_value
 from stereocell.isosurface.options import ADAPTIVE, IsoValueOptions
-from stereocell.isosurface.repair_rules import sum_solids
+from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
@@ -86,7 +86,7 @@ def _find(task: IsoTask) -> dict[str, Any]:
         result |= {name: getattr(found, name) for name in ("sharpness", "raggedness", "strength")}
         level = found.value if task.given is None else task.given
         smallest = float(task.settings.surface.min_diagonal_um)
-        sums = sum_solids(field.values > level, field.volume.spacing_um, smallest)
+        sums = sum_components(field.values > level, field.volume.spacing_um, smallest)
         result["solids"] = asdict(sums)
         result["levels"] = [float(f"{v:.6g}") for v in found.levels]
         result["score"] = [round(float(v), 5) for v in found.score]

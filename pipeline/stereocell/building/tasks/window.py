@@ -13,8 +13,12 @@ from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.storage.json_files import write_json
 from stereocell.transfer.adaptive_threshold import Histogram, make_histogram
-from stereocell.transfer.boundaries import Proposal, propose
-from stereocell.transfer.channel_statistics import Display, display_to_json, find_display
+from stereocell.transfer.boundaries import SuggestedShapes, suggest
+from stereocell.transfer.channel_statistics import (
+    ChannelStatistics,
+    find_statistics,
+    statistics_to_json,
+)
 from stereocell.transfer.joint_histogram import (
     COLUMNS,
     FINE_ROWS,
@@ -33,7 +37,7 @@ JOINT_VOXELS = 8_000_000  # and its boundaries on so many at full resolution
 
 
 @dataclass(frozen=True, slots=True)
-class DisplayTask:
+class StatisticsTask:
     ref: SourceRef
     level: int
     channel: int
@@ -43,13 +47,13 @@ class DisplayTask:
     window: tuple[float, float] | None = None  # None: it is found
 
 
-def write_display(task_and_file: tuple[DisplayTask, Path]) -> None:
+def write_statistics(task_and_file: tuple[StatisticsTask, Path]) -> None:
     """Find a channel's window and write it down."""
     task, file = task_and_file
-    write_json(file, display_to_json(run_display(task)))
+    write_json(file, statistics_to_json(measure_statistics(task)))
 
 
-def run_display(task: DisplayTask) -> Display:
+def measure_statistics(task: StatisticsTask) -> ChannelStatistics:
     """Return a channel's window and histogram, from a coarse level or from some of the planes."""
     dataset = open_source(task.ref)
     level = task.level
@@ -80,13 +84,15 @@ def run_display(task: DisplayTask) -> Display:
             spacing_um=dataset.levels[task.level].spacing_um,
             block_um=float(surface.background_um),
         )
-    display = find_display(voxels, task.settings.window, background=background, window=task.window)
+    statistics = find_statistics(
+        voxels, task.settings.window, background=background, window=task.window
+    )
     if len(voxels) < task.region.shape[0] and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
-        display = replace(display, values=_count_values(task, dataset, display.window))
-    return replace(display, proposal=_propose(task, dataset, display.window))
+        statistics = replace(statistics, values=_count_values(task, dataset, statistics.window))
+    return replace(statistics, suggested=_suggest(task, dataset, statistics.window))
 
 
-def _count_values(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -> Histogram:
+def _count_values(task: StatisticsTask, dataset: Dataset, window: tuple[float, float]) -> Histogram:
     """Return the histogram of all voxels of the region within the window."""
     (z0, *start), (z1, *stop) = task.region.start, task.region.stop
     counts: list[NDArray[np.int64]] = []
@@ -97,7 +103,9 @@ def _count_values(task: DisplayTask, dataset: Dataset, window: tuple[float, floa
     return replace(part, counts=tuple(int(n) for n in np.sum(counts, axis=0)))
 
 
-def _propose(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -> Proposal:
+def _suggest(
+    task: StatisticsTask, dataset: Dataset, window: tuple[float, float]
+) -> SuggestedShapes:
     """Return a 2D function from blocks of the level that is built: coarse ones have no edges."""
     spacing = dataset.levels[task.level].spacing_um
     fine = np.zeros((FINE_ROWS, COLUMNS), np.int64)
@@ -107,14 +115,14 @@ def _propose(task: DisplayTask, dataset: Dataset, window: tuple[float, float]) -
         fine += count_joint(
             to_eight_bits(voxels, window), spacing, gradient_max=STEEPEST, rows=FINE_ROWS
         )
-    return propose(fine, spacing)
+    return suggest(fine, spacing)
 
 
-def _voxels(task: DisplayTask, dataset: Dataset, level: int) -> int:
+def _voxels(task: StatisticsTask, dataset: Dataset, level: int) -> int:
     return int(np.prod(_region_at(task, dataset, level).shape, dtype=np.int64))
 
 
-def _region_at(task: DisplayTask, dataset: Dataset, level: int) -> Box:
+def _region_at(task: StatisticsTask, dataset: Dataset, level: int) -> Box:
     """Return the region in voxels of a coarser level."""
     fine, coarse = dataset.levels[task.level].shape, dataset.levels[level].shape
     start = [a * n // m for a, n, m in zip(task.region.start, coarse, fine, strict=True)]
