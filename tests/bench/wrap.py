@@ -33,8 +33,8 @@ from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.simplify import compact
-from stereocell.meshes.simplify_valid import simplify_soundly
-from stereocell.meshes.validity import bodies, certify
+from stereocell.meshes.simplify_valid import simplify_without_defects
+from stereocell.meshes.validity import find_defects, label_components
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
@@ -120,7 +120,7 @@ def wrap(given: Input) -> Mesh:
     whole = Box((0, 0, 0), distance.shape)
     closed = repair(distance, spacing, options).distance
     surface = extract_surface(closed, Lattice.of_whole(whole, spacing))
-    return simplify_soundly(surface, (), max_error_um=given.error * alpha).mesh
+    return simplify_without_defects(surface, (), max_error_um=given.error * alpha).mesh
 
 
 def iso_surface(given: Input) -> Mesh:
@@ -143,7 +143,7 @@ def chain(binary: Path, surface: Mesh, alpha: float, folder: Path) -> tuple[Mesh
 
 def kept(mesh: Mesh) -> Mesh:
     """Return the components that the paper's rule keeps."""
-    number = bodies(mesh.triangles, len(mesh.positions))
+    number = label_components(mesh.triangles, len(mesh.positions))
     faces = np.bincount(number[mesh.triangles[:, 0]])
     low, high = np.full((len(faces), 3), np.inf), np.full((len(faces), 3), -np.inf)
     np.minimum.at(low, number, mesh.positions)
@@ -219,7 +219,7 @@ def compare(given: Input, binary: Path, rounds: int, folder: Path) -> None:
             f"{there.mean:.3f} / {there.p95:.3f} / {there.max:.2f}  mesh to iso "
             f"{back.mean:.3f} / {back.p95:.3f} / {back.max:.2f} um (mean / p95 / max)  "
             f"{measure_enclosure(reference, target):.0%} enclosed  "
-            f"{certify(mesh).total} faults",
+            f"{find_defects(mesh).total} faults",
             flush=True,
         )
 

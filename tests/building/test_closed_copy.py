@@ -13,8 +13,8 @@ from stereocell.building import closed_copy
 from stereocell.building.closed_copy import close_tile
 from stereocell.building.unit_files import find_closed, load_record, save_unit
 from stereocell.formats.stl import write_stl
-from stereocell.meshes.simplify_valid import Mended
-from stereocell.meshes.validity import certify
+from stereocell.meshes.simplify_valid import Simplified
+from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
@@ -55,7 +55,7 @@ def test_copies_are_manifolds_and_their_union_is_the_whole(distance: NDArray[np.
     for tile in tiles:
         copy = close(distance, tile.lattice(REGION))
         mesh = copy.mesh
-        assert (copy.faults, copy.fallbacks) == (certify(mesh).total, 0) == (0, 0)
+        assert (copy.faults, copy.fallbacks) == (find_defects(mesh).total, 0) == (0, 0)
         copies.append(as_manifold(mesh))
         assert copies[-1].status() == manifold3d.Error.NoError
         # no further than a voxel past the cuts
@@ -92,14 +92,14 @@ def test_nothing_inside_is_no_copy(distance: NDArray[np.float32]) -> None:
 def test_a_copy_that_simplification_spoilt_stays_unsimplified(
     distance: NDArray[np.float32], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Mended:
-        return Mended(Mesh(mesh.positions, mesh.triangles[1:], mesh.normals), 0, 0)
+    def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Simplified:
+        return Simplified(Mesh(mesh.positions, mesh.triangles[1:], mesh.normals), 0, 0)
 
     simple = close(distance, REGION)
-    monkeypatch.setattr(closed_copy, "simplify_soundly", spoil)
+    monkeypatch.setattr(closed_copy, "simplify_without_defects", spoil)
     copy = close(distance, REGION)
     assert len(copy.mesh.triangles) > len(simple.mesh.triangles)
-    assert copy.faults == certify(copy.mesh).total == 0
+    assert copy.faults == find_defects(copy.mesh).total == 0
     assert copy.fallbacks == 2  # both balls
 
 

@@ -19,7 +19,7 @@ from stereocell.building.plan import Plan
 from stereocell.building.unit_files import load_lods, load_record, load_volume
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.extract import extract_surface
-from stereocell.meshes.validity import certify
+from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box, Tile, cut
@@ -179,7 +179,7 @@ def test_tiles_make_one_sound_surface_at_any_two_levels(built: Built, even: int,
     Nothing is left open, and nothing crosses or doubles: no crack, and no wall in the planes.
     """
     whole = _chessboard(built, even, odd)
-    assert not certify(whole).total, certify(whole).counts
+    assert not find_defects(whole).total, find_defects(whole).counts
 
 
 @pytest.mark.slow
@@ -202,7 +202,7 @@ def test_tiles_of_other_brightness_make_one_sound_surface(
     stepped: Built, even: int, odd: int
 ) -> None:
     whole = _chessboard(stepped, even, odd)
-    assert not certify(whole).total, certify(whole).counts
+    assert not find_defects(whole).total, find_defects(whole).counts
 
 
 @pytest.mark.slow
@@ -216,7 +216,7 @@ def test_tiles_make_one_sound_surface_on_thinned_planes(
     meshes = [lods[0].mesh for lods in built.lods.values()]
     whole = _welded(meshes)
     assert len(np.unique(whole.triangles)) < sum(len(mesh.positions) for mesh in meshes)
-    assert not certify(whole).total, certify(whole).counts
+    assert not find_defects(whole).total, find_defects(whole).counts
 
 
 @pytest.mark.parametrize("level", range(LODS))

@@ -8,7 +8,7 @@ import pytest
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import alpha_wrap
-from stereocell.meshes.validity import certify
+from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from support.phantoms import blurred_ball, write_ome_tiff
@@ -58,7 +58,7 @@ def test_wrap_is_closed_and_lies_the_offset_away() -> None:
     whole = Box((0, 0, 0), shape)
     ball = extract_surface(distance, Lattice.of_whole(whole, (1, 1, 1)))
     wrapped = alpha_wrap.alpha_wrap(ball, 2.0, 0.5)
-    assert not certify(wrapped).total
+    assert not find_defects(wrapped).total
     outward = wrapped.positions - np.float32([14.6, -14.6, 14.6])
     away = np.linalg.norm(outward, axis=1) - 9
     assert 0.3 < np.median(away) < 0.6

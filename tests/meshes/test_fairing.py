@@ -8,7 +8,7 @@ import pytest
 from stereocell.isosurface.extract import RIM_SNAP, extract_surface
 from stereocell.meshes import fairing
 from stereocell.meshes.fairing import make_fair
-from stereocell.meshes.validity import border, certify
+from stereocell.meshes.validity import border, find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
@@ -35,7 +35,7 @@ def test_long_diagonal_becomes_the_short_one() -> None:
     fair = make_fair(_roof(), (), max_slide_um=0.0, max_turn_um=0.1)
     assert _edges(_roof()) - _edges(fair) == {(0, 1)}
     assert _edges(fair) - _edges(_roof()) == {(2, 3)}
-    assert kinds(certify(fair)) == set()
+    assert kinds(find_defects(fair)) == set()
     assert sharpest_angle(fair) > 1.4 * sharpest_angle(_roof())
 
 
@@ -65,10 +65,10 @@ def test_turn_that_would_make_a_fault_is_not_made() -> None:
     nested = Mesh(
         positions, np.concatenate([roof.triangles, inner[:, ::-1]]), np.zeros_like(positions)
     )
-    before = certify(nested)
+    before = find_defects(nested)
     assert "crossings" not in kinds(before)
     fair = make_fair(nested, (), max_slide_um=0.0, max_turn_um=0.3)
-    assert "crossings" not in kinds(certify(fair))
+    assert "crossings" not in kinds(find_defects(fair))
     assert (0, 1) in _edges(fair)
 
 
@@ -97,7 +97,7 @@ def test_slides_make_an_iso_surface_fair_and_keep_it_on_the_ball() -> None:
     fair = make_fair(mesh, (plane,), max_slide_um=0.5, max_turn_um=0.05)
     assert sharpest_angle(mesh) < 5
     assert sharpest_angle(fair) > 15
-    assert kinds(certify(fair, (plane,))) == set()
+    assert kinds(find_defects(fair, (plane,))) == set()
     rim = border(mesh.triangles)
     np.testing.assert_array_equal(border(fair.triangles), rim)
     np.testing.assert_array_equal(fair.positions[rim], mesh.positions[rim])
@@ -130,12 +130,14 @@ def _shell(thickness: float) -> Mesh:
 def test_slide_that_would_make_a_fault_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Walls so close that they cross where vertices slide as they like."""
     shell = _shell(0.02)
-    assert kinds(certify(shell)) == set()
-    assert kinds(certify(make_fair(shell, (), max_slide_um=0.5, max_turn_um=0.05))) == set()
+    assert kinds(find_defects(shell)) == set()
+    assert kinds(find_defects(make_fair(shell, (), max_slide_um=0.5, max_turn_um=0.05))) == set()
     with monkeypatch.context() as patch:
-        patch.setattr(fairing, "certify", lambda *_: certify(ball()))  # as if all were well
+        patch.setattr(
+            fairing, "find_defects", lambda *_: find_defects(ball())
+        )  # as if all were well
         assert "crossings" in kinds(
-            certify(make_fair(shell, (), max_slide_um=0.5, max_turn_um=0.05))
+            find_defects(make_fair(shell, (), max_slide_um=0.5, max_turn_um=0.05))
         )
 
 
@@ -170,13 +172,13 @@ def test_needles_of_a_thin_tube_are_split_and_its_surface_stays(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tube = _tube(2.0, 5)
-    assert kinds(certify(tube, ENDS)) == set()
+    assert kinds(find_defects(tube, ENDS)) == set()
     assert sharpest_angle(tube) < 8
     with monkeypatch.context() as patch:
         patch.setattr(fairing, "SPLITS", 0)
         assert sharpest_angle(make_fair(tube, ENDS, max_slide_um=0.5, max_turn_um=0.1)) < 8
     fair = make_fair(tube, ENDS, max_slide_um=0.5, max_turn_um=0.1)
-    assert kinds(certify(fair, ENDS)) == set()
+    assert kinds(find_defects(fair, ENDS)) == set()
     assert sharpest_angle(fair) > 12
     rim = border(tube.triangles)
     np.testing.assert_array_equal(border(fair.triangles), rim)
@@ -196,13 +198,15 @@ def test_split_that_would_make_a_fault_is_not_made(monkeypatch: pytest.MonkeyPat
     """New vertices on the inner tube would rise through the outer one's faces; a third is split."""
     inner, outer = _tube(2.0, 5), _tube(1.95, 31, apothem=True)
     nested = joined(outer, turned(inner), moved(inner, (0.0, 9.0, 0.0)))
-    assert kinds(certify(nested, ENDS)) == set()
+    assert kinds(find_defects(nested, ENDS)) == set()
     fair = make_fair(nested, ENDS, max_slide_um=0.5, max_turn_um=0.1)
-    assert kinds(certify(fair, ENDS)) == set()
+    assert kinds(find_defects(fair, ENDS)) == set()
     new = fair.positions[len(nested.positions) :]
     assert (new[:, 1] > 5).sum() > 3 * SIDES
     with monkeypatch.context() as patch:
-        patch.setattr(fairing, "certify", lambda *_: certify(ball()))  # as if all were well
+        patch.setattr(
+            fairing, "find_defects", lambda *_: find_defects(ball())
+        )  # as if all were well
         assert "crossings" in kinds(
-            certify(make_fair(nested, ENDS, max_slide_um=0.5, max_turn_um=0.1), ENDS)
+            find_defects(make_fair(nested, ENDS, max_slide_um=0.5, max_turn_um=0.1), ENDS)
         )

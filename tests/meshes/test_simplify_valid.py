@@ -8,8 +8,8 @@ from scipy import ndimage
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import simplify_valid
 from stereocell.meshes.simplify import compact, renumber
-from stereocell.meshes.simplify_valid import simplify_soundly
-from stereocell.meshes.validity import Faults, certify
+from stereocell.meshes.simplify_valid import simplify_without_defects
+from stereocell.meshes.validity import Defects, find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
@@ -26,39 +26,39 @@ def sponge(seed: int) -> Mesh:
     return extract_surface(distance, Lattice.of_whole(whole, (1.0,) * 3))
 
 
-def by_vertices(faults: Faults, triangles: NDArray, used: NDArray) -> dict[str, set]:
+def by_vertices(defects: Defects, triangles: NDArray, used: NDArray) -> dict[str, set]:
     """Return faults in terms that don't depend on how triangles and vertices are numbered."""
     corners = used[triangles]
     return {
-        "crossings": {frozenset(map(tuple, corners[pair].tolist())) for pair in faults.crossings},
-        "crowded": {tuple(ends) for ends in used[faults.crowded].tolist()},
-        "pinched": set(used[faults.pinched].tolist()),
-        "degenerate": set(map(tuple, corners[faults.degenerate].tolist())),
+        "crossings": {frozenset(map(tuple, corners[pair].tolist())) for pair in defects.crossings},
+        "non_manifold_edges": {tuple(ends) for ends in used[defects.non_manifold_edges].tolist()},
+        "non_manifold_vertices": set(used[defects.non_manifold_vertices].tolist()),
+        "degenerate": set(map(tuple, corners[defects.degenerate].tolist())),
     }
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("max_error_um", [0.5, 2.0, 4.0])
-def test_faults_of_every_round_are_those_of_a_full_check(
+def test_defects_of_every_round_are_those_of_a_full_check(
     monkeypatch: pytest.MonkeyPatch, seed: int, max_error_um: float
 ) -> None:
     totals = []
-    checked = simplify_valid._Draft.faults
+    checked = simplify_valid._Draft.defects
 
     def compared(
         self: simplify_valid._Draft, triangles: NDArray, changed: set[int] | None
-    ) -> Faults:
+    ) -> Defects:
         found = checked(self, triangles, changed)
         used, own = renumber(triangles, len(self.mesh.positions))
-        full = certify(compact(self.mesh, triangles))
+        full = find_defects(compact(self.mesh, triangles))
         everything = np.arange(len(self.mesh.positions))
         assert by_vertices(found, triangles, everything) == by_vertices(full, own, used)
         totals.append(full.total)
         return found
 
-    monkeypatch.setattr(simplify_valid._Draft, "faults", compared)
-    done = simplify_soundly(sponge(seed), (), max_error_um=max_error_um)
-    assert kinds(certify(done.mesh)) == set()
+    monkeypatch.setattr(simplify_valid._Draft, "defects", compared)
+    done = simplify_without_defects(sponge(seed), (), max_error_um=max_error_um)
+    assert kinds(find_defects(done.mesh)) == set()
     assert totals[-1] == 0
     assert max_error_um < 2 or len(totals) > 1  # else this would show nothing
 
@@ -78,6 +78,6 @@ def test_triangles_are_found_among_others() -> None:
 
 
 def test_simplified_ball_is_one_body_and_says_so() -> None:
-    done = simplify_soundly(ball(), (), max_error_um=0.5)
-    assert (done.mended, done.fallbacks) == (0, 0)
+    done = simplify_without_defects(ball(), (), max_error_um=0.5)
+    assert (done.simplified_again, done.fallbacks) == (0, 0)
     assert len(done.mesh.triangles) < 0.3 * len(ball().triangles)

@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 
 from stereocell.isosurface.extract import extract_surface
-from stereocell.meshes.validity import border, certify
+from stereocell.meshes.validity import border, find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
@@ -15,28 +15,28 @@ from support.meshes import SOUND, _with, ball, joined, kinds, moved, to_mesh, tu
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_sound_meshes_have_no_faults(name: str) -> None:
-    assert kinds(certify(SOUND[name])) == set()
+def test_sound_meshes_have_no_defects(name: str) -> None:
+    assert kinds(find_defects(SOUND[name])) == set()
 
 
 def test_missing_triangle_leaves_a_hole() -> None:
-    faults = certify(_with(ball(), ball().triangles[1:]))
-    assert kinds(faults) == {"open"}
-    assert len(faults.open) == 3
+    defects = find_defects(_with(ball(), ball().triangles[1:]))
+    assert kinds(defects) == {"open"}
+    assert len(defects.open) == 3
 
 
-def test_turned_triangle_is_crowded_along_its_edges() -> None:
+def test_turned_triangle_has_non_manifold_edges() -> None:
     triangles = ball().triangles.copy()
     triangles[100] = triangles[100, ::-1]
-    faults = certify(_with(ball(), triangles))
-    assert kinds(faults) >= {"crowded"}
-    assert len(faults.crowded) == 3
+    defects = find_defects(_with(ball(), triangles))
+    assert kinds(defects) >= {"non_manifold_edges"}
+    assert len(defects.non_manifold_edges) == 3
 
 
 def test_triangle_that_comes_twice() -> None:
     triangles = np.concatenate([ball().triangles, ball().triangles[50:51]])
-    faults = certify(_with(ball(), triangles))
-    assert kinds(faults) >= {"crowded", "crossings"}
+    defects = find_defects(_with(ball(), triangles))
+    assert kinds(defects) >= {"non_manifold_edges", "crossings"}
 
 
 def test_edge_of_four_triangles() -> None:
@@ -46,9 +46,9 @@ def test_edge_of_four_triangles() -> None:
     both = joined(a, b)
     places, number = np.unique(both.positions, axis=0, return_inverse=True)
     welded = Mesh(places, number[both.triangles].astype(np.uint32), np.zeros_like(places))
-    faults = certify(welded)
-    assert len(faults.crowded) == 1
-    assert (welded.positions[faults.crowded[0], :2] == [1, 2]).all()
+    defects = find_defects(welded)
+    assert len(defects.non_manifold_edges) == 1
+    assert (welded.positions[defects.non_manifold_edges[0], :2] == [1, 2]).all()
 
 
 def test_bow_tie_of_two_boxes_at_a_corner() -> None:
@@ -56,11 +56,11 @@ def test_bow_tie_of_two_boxes_at_a_corner() -> None:
     both = joined(a, moved(a, (1.0, 2.0, 3.0)))
     places, number = np.unique(both.positions, axis=0, return_inverse=True)
     welded = Mesh(places, number[both.triangles].astype(np.uint32), np.zeros_like(places))
-    faults = certify(welded)
-    assert kinds(faults) == {"pinched"}
-    np.testing.assert_array_equal(welded.positions[faults.pinched], [[1, 2, 3]])
+    defects = find_defects(welded)
+    assert kinds(defects) == {"non_manifold_vertices"}
+    np.testing.assert_array_equal(welded.positions[defects.non_manifold_vertices], [[1, 2, 3]])
     # with a vertex for each box they are sound by numbers, and touch all the same
-    assert kinds(certify(both)) == {"crossings"}
+    assert kinds(find_defects(both)) == {"crossings"}
 
 
 def test_wall_in_a_cut_plane() -> None:
@@ -71,34 +71,34 @@ def test_wall_in_a_cut_plane() -> None:
     mesh = replace(mesh, positions=np.column_stack([x, mesh.positions[:, 1:]]))
     half = _with(mesh, mesh.triangles[(x[mesh.triangles] >= 0).all(axis=1)])
     plane = (0, 0.0)
-    assert kinds(certify(half, (plane,))) == set()
+    assert kinds(find_defects(half, (plane,))) == set()
     rim = border(half.triangles)
     after = dict(rim.tolist())
     first = int(rim[0, 0])
     second = after[first]
     lid = [[after[second], second, first]]
-    faults = certify(_with(half, np.concatenate([half.triangles, lid])), (plane,))
-    assert kinds(faults) == {"walls"}
-    assert faults.walls.tolist() == [len(half.triangles)]
+    defects = find_defects(_with(half, np.concatenate([half.triangles, lid])), (plane,))
+    assert kinds(defects) == {"walls"}
+    assert defects.walls.tolist() == [len(half.triangles)]
 
 
 def test_vertex_pushed_through_the_other_side() -> None:
     positions = ball().positions.copy()
     top = int(positions[:, 2].argmax())
     positions[top, 2] = -6
-    faults = certify(replace(ball(), positions=positions))
-    assert kinds(faults) == {"crossings"}
+    defects = find_defects(replace(ball(), positions=positions))
+    assert kinds(defects) == {"crossings"}
 
 
 def test_coplanar_fold() -> None:
     """A vertex of a box's flat face drawn over the next edge, within the face."""
     grid = pv.Box((0, 4, 0, 4, 0, 1), level=3).triangulate().clean()
     mesh = to_mesh(grid)
-    assert kinds(certify(mesh)) == set()
+    assert kinds(find_defects(mesh)) == set()
     positions = mesh.positions.copy()
     inner = int(np.flatnonzero((positions == [1, 1, 1]).all(axis=1))[0])
     positions[inner] = [2.5, 1.25, 1]
-    assert kinds(certify(replace(mesh, positions=positions))) == {"crossings"}
+    assert kinds(find_defects(replace(mesh, positions=positions))) == {"crossings"}
 
 
 def test_sliver_without_area() -> None:
@@ -109,21 +109,21 @@ def test_sliver_without_area() -> None:
     positions[-1] = (positions[a] + positions[b]) / 2
     new = len(positions) - 1
     split = np.array([[new, b, c], [a, new, c], [a, b, new]])
-    faults = certify(Mesh(positions, np.concatenate([box.triangles[1:], split]), positions))
-    assert kinds(faults) >= {"degenerate"}
-    np.testing.assert_array_equal(faults.degenerate, [len(box.triangles) + 1])
+    defects = find_defects(Mesh(positions, np.concatenate([box.triangles[1:], split]), positions))
+    assert kinds(defects) >= {"degenerate"}
+    np.testing.assert_array_equal(defects.degenerate, [len(box.triangles) + 1])
 
 
 def test_body_inside_out_and_a_cavity_without_a_solid() -> None:
-    assert kinds(certify(turned(ball()))) == {"inside_out"}
+    assert kinds(find_defects(turned(ball()))) == {"inside_out"}
     aside = joined(ball(), moved(turned(ball(2.0)), (20.0, 0.0, 0.0)))
-    assert kinds(certify(aside)) == {"inside_out"}
+    assert kinds(find_defects(aside)) == {"inside_out"}
 
 
-def test_vertices_of_faults_are_where_they_are() -> None:
+def test_vertices_of_defects_are_where_they_are() -> None:
     mesh = _with(ball(), ball().triangles[1:])
     np.testing.assert_array_equal(
-        certify(mesh).vertices(mesh.triangles), np.sort(ball().triangles[0])
+        find_defects(mesh).vertices(mesh.triangles), np.sort(ball().triangles[0])
     )
 
 
@@ -144,17 +144,17 @@ def _half(at: int) -> tuple[Mesh, Box, Box]:
 @pytest.mark.parametrize("at", [5, 10, 14])
 def test_mesh_may_be_open_on_its_cut_planes_only(at: int) -> None:
     mesh, _, _ = _half(at)
-    assert kinds(certify(mesh, ((0, float(at)),))) == set()
-    assert kinds(certify(mesh)) >= {"open"}
-    assert kinds(certify(mesh, ((0, float(at) + 1e-5),))) >= {"open"}
-    assert len(border(mesh.triangles)) == len(certify(mesh).open)
+    assert kinds(find_defects(mesh, ((0, float(at)),))) == set()
+    assert kinds(find_defects(mesh)) >= {"open"}
+    assert kinds(find_defects(mesh, ((0, float(at) + 1e-5),))) >= {"open"}
+    assert len(border(mesh.triangles)) == len(find_defects(mesh).open)
 
 
 @pytest.mark.parametrize("at", [5, 10, 14])
 def test_cut_body_inside_out_is_found(at: int) -> None:
     """Its volume is that between it and the plane: a small cap as well as all but a cap."""
     mesh, _, _ = _half(at)
-    assert kinds(certify(turned(mesh), ((0, float(at)),))) == {"inside_out"}
+    assert kinds(find_defects(turned(mesh), ((0, float(at)),))) == {"inside_out"}
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -165,4 +165,4 @@ def test_iso_surface_of_noise_is_sound(seed: int) -> None:
     box = Box((0, 0, 0), (24, 24, 24))
     mesh = extract_surface(distance, Lattice.of_whole(box, (1.0,) * 3))
     assert len(mesh.triangles) > 30_000
-    assert kinds(certify(mesh)) == set()
+    assert kinds(find_defects(mesh)) == set()

@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from stereocell.meshes.validity import Faults
+from stereocell.meshes.validity import Defects
 from stereocell.model.mesh import Mesh
 
 
@@ -39,8 +39,8 @@ def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
     return replace(mesh, positions=mesh.positions + np.float32(by))
 
 
-def kinds(faults: Faults) -> set[str]:
-    return {kind for kind, count in faults.counts.items() if count}
+def kinds(defects: Defects) -> set[str]:
+    return {kind for kind, count in defects.counts.items() if count}
 
 
 def _with(mesh: Mesh, triangles: NDArray[np.integer]) -> Mesh:

@@ -17,7 +17,7 @@ from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
 from stereocell.report.texture_similarity import sample
-from stereocell.textures.ambient_occlusion import find_openness
+from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.ambient_occlusion import sphere as directions
 from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.tangents import make_tangents
@@ -138,7 +138,7 @@ def test_openness_is_that_of_the_sky_above() -> None:
     floor = Mesh(points, np.zeros((0, 3), np.uint32), up)
     lattice = Lattice.of_whole(box, (1.0, 1.0, 1.0))
     radius = 8.0
-    found = find_openness(solid, lattice, floor, radius_um=radius)
+    found = find_ambient_visibility(solid, lattice, floor, radius_um=radius)
     sky = directions(20000)
     sky = sky[sky[:, 2] > 0]
     for value, distance in zip(found, along - 19.5, strict=True):
@@ -147,7 +147,7 @@ def test_openness_is_that_of_the_sky_above() -> None:
         expected = 1 - (hidden * sky[:, 2]).sum() / sky[:, 2].sum()
         assert value == pytest.approx(expected, abs=0.06)
     assert found[-1] == 1
-    none = find_openness(solid, lattice, floor, radius_um=0.0)
+    none = find_ambient_visibility(solid, lattice, floor, radius_um=0.0)
     assert (none == 1).all()
 
 

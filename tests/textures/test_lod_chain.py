@@ -13,8 +13,8 @@ from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import simplify_valid
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.simplify import simplify
-from stereocell.meshes.simplify_valid import Mended, simplify_soundly
-from stereocell.meshes.validity import border, certify
+from stereocell.meshes.simplify_valid import Simplified, simplify_without_defects
+from stereocell.meshes.validity import border, find_defects
 from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
@@ -40,11 +40,11 @@ def sponge() -> Mesh:
     return extract_surface(part, Lattice(LATTICE, LATTICE, REGION, SPACING, ORIGIN))
 
 
-def _chain(mesh: Mesh) -> Iterator[Mended]:
+def _chain(mesh: Mesh) -> Iterator[Simplified]:
     for error in (0.1, 0.5, 2.0, 4.0):
-        mended = simplify_soundly(mesh, PLANES, max_error_um=error)
-        yield mended
-        mesh = mended.mesh
+        simplified = simplify_without_defects(mesh, PLANES, max_error_um=error)
+        yield simplified
+        mesh = simplified.mesh
 
 
 def _settings(errors: tuple[float, ...]) -> Settings:
@@ -62,26 +62,26 @@ def _rim(mesh: Mesh) -> set[bytes]:
     return {ends.tobytes() for ends in mesh.positions[border(mesh.triangles)]}
 
 
-def test_simplification_alone_makes_faults_here(sponge: Mesh) -> None:
+def test_simplification_alone_makes_defects_here(sponge: Mesh) -> None:
     """Else the tests below would show nothing."""
-    assert kinds(certify(sponge, PLANES)) == set()
-    found = certify(simplify(sponge, 2.0), PLANES)
-    assert {"crowded", "pinched", "crossings"} <= kinds(found)
+    assert kinds(find_defects(sponge, PLANES)) == set()
+    found = find_defects(simplify(sponge, 2.0), PLANES)
+    assert {"non_manifold_edges", "non_manifold_vertices", "crossings"} <= kinds(found)
 
 
 def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
     lod_chain = list(_chain(sponge))
     for level in lod_chain:
-        assert kinds(certify(level.mesh, PLANES)) == set()
+        assert kinds(find_defects(level.mesh, PLANES)) == set()
         assert _rim(level.mesh) == _rim(sponge)
         assert level.fallbacks == 0
-    assert lod_chain[1].mended > 0
+    assert lod_chain[1].simplified_again > 0
     counts = [len(sponge.triangles), *(len(level.mesh.triangles) for level in lod_chain)]
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] < 0.1 * counts[0]
 
 
-def test_body_that_cannot_be_mended_keeps_its_surface_and_is_counted(
+def test_body_that_cannot_be_simplified_keeps_its_surface_and_is_counted(
     sponge: Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = moved(ball(1.0), (15.0, -20.0, -9.0))
@@ -92,20 +92,20 @@ def test_body_that_cannot_be_mended_keeps_its_surface_and_is_counted(
         np.concatenate([sponge.normals, alone.normals]),
     )
     monkeypatch.setattr(simplify_valid, "ROUNDS", 0)
-    kept = simplify_soundly(both, PLANES, max_error_um=2.0)
+    kept = simplify_without_defects(both, PLANES, max_error_um=2.0)
     assert kept.fallbacks > 0
-    assert kinds(certify(kept.mesh, PLANES)) == set()
+    assert kinds(find_defects(kept.mesh, PLANES)) == set()
     assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # the sponge is one body, mostly
     assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)  # the ball isn't
 
 
-def test_mesh_with_faults_of_its_own_keeps_the_body_that_has_them() -> None:
+def test_mesh_with_defects_of_its_own_keeps_the_body_that_has_them() -> None:
     """Nothing hides: what is at fault stays, and is found by whoever checks."""
     holed = replace(ball(), triangles=ball().triangles[1:])
-    done = simplify_soundly(holed, (), max_error_um=0.5)
+    done = simplify_without_defects(holed, (), max_error_um=0.5)
     assert done.fallbacks == 1
     np.testing.assert_array_equal(done.mesh.triangles, holed.triangles)
-    assert kinds(certify(done.mesh)) == {"open"}
+    assert kinds(find_defects(done.mesh)) == {"open"}
 
 
 @pytest.fixture(scope="module")
@@ -128,10 +128,13 @@ def _farthest(mesh: Mesh, simplified: Mesh) -> float:
 
 def test_thin_process_is_cut_off_and_with_a_bound_it_stays(with_process: Mesh) -> None:
     """The simplifier's error, a mean over planes, hardly feels it."""
-    assert _farthest(with_process, simplify_soundly(with_process, (), max_error_um=2.0).mesh) > 10
-    bound = simplify_soundly(with_process, (), max_error_um=2.0, max_away_um=3.0)
+    assert (
+        _farthest(with_process, simplify_without_defects(with_process, (), max_error_um=2.0).mesh)
+        > 10
+    )
+    bound = simplify_without_defects(with_process, (), max_error_um=2.0, max_away_um=3.0)
     assert _farthest(with_process, bound.mesh) <= 3.0
-    assert kinds(certify(bound.mesh)) == set()
+    assert kinds(find_defects(bound.mesh)) == set()
     assert bound.fallbacks == 0
     assert len(bound.mesh.triangles) < 0.25 * len(with_process.triangles)
 
@@ -153,7 +156,7 @@ def test_level_outside_the_surface_encloses_it_and_one_inside_does_not(
 ) -> None:
     fine = ball(4.0, 60)
     scaled = replace(fine, positions=fine.positions * np.float32(1 + outward_um / 4))
-    monkeypatch.setattr(lod_chain, "simplify_soundly", lambda *_: Mended(scaled, 0, 0))
+    monkeypatch.setattr(lod_chain, "simplify_without_defects", lambda *_: Simplified(scaled, 0, 0))
     *_, last = _levels(fine, (), _settings((0.1, 0.5)))
     assert last.quality is not None
     assert low <= last.quality.enclosed <= high

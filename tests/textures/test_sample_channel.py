@@ -18,7 +18,7 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
-from stereocell.textures.sample_channel import find_paint
+from stereocell.textures.sample_channel import sample_channel
 from stereocell.usd.validate import validate_stage
 from support import phantoms
 from support.glbs import read
@@ -38,7 +38,7 @@ def test_paint_is_the_largest_value_down_to_the_stated_depth() -> None:
 
     def painted(depth: float, intensity_window: tuple[float, float]) -> float:
         volume = Volume(voxels, (1.0, 1.0, 1.0))
-        found = find_paint(
+        found = sample_channel(
             volume, lattice, floor, intensity_window=intensity_window, depth_um=depth
         )
         return float(found[0])

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.isosurface.extract import extract_surface
-from stereocell.meshes.simplify_valid import simplify_soundly
-from stereocell.meshes.validity import bodies, certify
+from stereocell.meshes.simplify_valid import simplify_without_defects
+from stereocell.meshes.validity import find_defects, label_components
 from stereocell.model.lattice import Lattice
 from stereocell.model.unit import Closed
 
@@ -29,9 +29,9 @@ def close_tile(
     fine = extract_surface(own, lattice.alone())
     if not len(fine.triangles):
         return None
-    simplified = simplify_soundly(fine, (), max_error_um=max_error_um)
-    faults = certify(simplified.mesh).total
-    if not faults:
+    simplified = simplify_without_defects(fine, (), max_error_um=max_error_um)
+    defects = find_defects(simplified.mesh).total
+    if not defects:
         return Closed(simplified.mesh, 0, simplified.fallbacks)
-    every = int(bodies(fine.triangles, len(fine.positions)).max()) + 1
-    return Closed(fine, certify(fine).total, every)
+    every = int(label_components(fine.triangles, len(fine.positions)).max()) + 1
+    return Closed(fine, find_defects(fine).total, every)

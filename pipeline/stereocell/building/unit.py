@@ -20,11 +20,11 @@ from stereocell.model.tile_content import APRON
 from stereocell.model.timing import Clock
 from stereocell.model.unit import Closed, Unit
 from stereocell.model.volume import Volume
-from stereocell.textures.ambient_occlusion import find_openness
+from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels
 from stereocell.textures.options import UnwrapOptions
-from stereocell.textures.sample_channel import find_paint
+from stereocell.textures.sample_channel import sample_channel
 from stereocell.transfer.joint_histogram import to_eight_bits
 
 PAST = 3  # voxels past a cut that maps are baked from: the halo is larger, and texels smaller
@@ -174,10 +174,10 @@ def _with_surroundings(
     # a little smaller: rays start outside of it
     solid = distance > 0.25 * max(lattice.spacing_um)
     radius, depth = float(options.occlusion_um), float(options.paint_um)
-    openness = find_openness(solid, lattice, mesh, radius_um=radius)
+    openness = find_ambient_visibility(solid, lattice, mesh, radius_um=radius)
     paint = None
     if painted is not None and given.painted is not None:
-        paint = find_paint(
+        paint = sample_channel(
             painted, given.lattice, mesh, intensity_window=given.painted, depth_um=depth
         )
     return FineSurface(mesh, openness, paint)

@@ -26,7 +26,7 @@ from pydantic import TypeAdapter, ValidationError
 from stereocell.meshes.distance import Nearest, measure_distance
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
-from stereocell.meshes.validity import Faults, border, certify
+from stereocell.meshes.validity import Defects, border, find_defects
 from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.lattice import Plane
@@ -57,11 +57,11 @@ class _Options(NamedTuple):
     unwrap: UnwrapOptions
 
 
-_FAULTS = {
+_DEFECTS = {
     "degenerate": "triangles without area",
     "open": "open edges",
-    "crowded": "edges of more than two triangles",
-    "pinched": "pinched vertices",
+    "non_manifold_edges": "edges of more than two triangles",
+    "non_manifold_vertices": "pinched vertices",
     "inside_out": "bodies inside out",
     "crossings": "crossings",
     "walls": "triangles in the cut",
@@ -115,9 +115,9 @@ def _follow(
         return measure_distance(to_fine, Nearest(lod.mesh, options.lod.samples))
 
     def verdict(lod: ComposedLod) -> str:
-        _, faults = _certified(read_local(tile, channel_id, lod.level), planes)
+        _, defects = _certified(read_local(tile, channel_id, lod.level), planes)
         lost = f", without {' and '.join(lod.lost)}, which fit other faces" if lod.lost else ""
-        return f"lod{lod.level} ({_describe(faults)}{lost})"
+        return f"lod{lod.level} ({_describe(defects)}{lost})"
 
     if fine.level not in edited:
         told = [f"{verdict(lod)} {away(lod):.3g} um from lod{fine.level}, which is as it was built"
@@ -137,8 +137,8 @@ def _follow(
             lod = replace(lod, distance_um=away(lod))
             told.append(f"{verdict(lod)} stays, {lod.distance_um:.3g} um from lod{fine.level}")
         else:
-            lod, faults = made[lod.level]
-            found = "" if not faults else f" with {faults} faults"
+            lod, defects = made[lod.level]
+            found = "" if not defects else f" with {defects} faults"
             anew.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
         result.append(lod)
     if anew:
@@ -153,7 +153,7 @@ def _make(
     options: _Options,
     planes: tuple[Plane, ...],
 ) -> dict[int, tuple[ComposedLod, int]]:
-    """Return the coarser levels made of the finest one, by level, and how many faults they have."""
+    """Return the coarser levels made of the finest one, by level, and their numbers of defects."""
     fine, first = lods[0], lods[0].level + 1
     spacing = _spacing(tile, channel_id, fine)
     mesh, _ = _certified(_with_values(read_local(tile, channel_id, fine.level), fine), planes)
@@ -252,19 +252,19 @@ def _with_values(mesh: Mesh, fine: ComposedLod) -> Mesh:
     return mesh
 
 
-def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Faults]:
-    """Return the mesh and its faults; welded, where seams of UVs or of normals cut it open."""
-    faults = certify(mesh, planes)
-    if not faults.total:
-        return mesh, faults
+def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
+    """Return the mesh and its defects; welded, where seams of UVs or of normals cut it open."""
+    defects = find_defects(mesh, planes)
+    if not defects.total:
+        return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
     triangles = first[twin.ravel()][mesh.triangles].astype(np.uint32)
     has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # as not at a pole's seam
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)
-    found = certify(welded, planes)
-    if found.total >= faults.total:
-        return mesh, faults
+    found = find_defects(welded, planes)
+    if found.total >= defects.total:
+        return mesh, defects
     used = np.unique(triangles)
     return replace(
         welded,
@@ -273,8 +273,8 @@ def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Faults]:
     ), found
 
 
-def _describe(faults: Faults) -> str:
-    found = [f"{count} {_FAULTS[kind]}" for kind, count in faults.counts.items() if count]
+def _describe(defects: Defects) -> str:
+    found = [f"{count} {_DEFECTS[kind]}" for kind, count in defects.counts.items() if count]
     return ", ".join(found) or "sound"
 
 

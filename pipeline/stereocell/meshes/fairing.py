@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.meshes.split_edges import split_edges
-from stereocell.meshes.validity import border, certify, match_edges
+from stereocell.meshes.validity import border, find_defects, match_edges
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -36,7 +36,7 @@ Triangles = NDArray[np.int64]
 def make_fair(
     mesh: Mesh, planes: tuple[Plane, ...], *, max_slide_um: float, max_turn_um: float
 ) -> Mesh:
-    """Return the mesh with fairer triangles; where that made a fault, it is done again without.
+    """Return the mesh with fairer triangles; where that made a defect, it is done again without.
 
     `planes` are where the mesh may be open. Vertices slide by `max_slide_um` at most, and edges
     turn and split where the surface moves by less than `max_turn_um`. New vertices come last, and
@@ -46,16 +46,16 @@ def make_fair(
     held = np.zeros(count, bool)
     for _ in range(TRIES):
         fair, ends = _fair(mesh, planes, held, max_slide_um, max_turn_um)
-        faults = certify(fair, planes)
-        if not faults.total:
+        defects = find_defects(fair, planes)
+        if not defects.total:
             return fair
-        at_fault = np.zeros(len(fair.positions), bool)
-        at_fault[faults.vertices(fair.triangles)] = True
+        defective = np.zeros(len(fair.positions), bool)
+        defective[defects.vertices(fair.triangles)] = True
         # their neighbours too: a vertex that stays may be crossed by one that slides
-        at_fault[fair.triangles[_any(at_fault[fair.triangles])]] = True
+        defective[fair.triangles[_any(defective[fair.triangles])]] = True
         for _ in range(SPLITS):  # instead of new vertices the ends of their edges, maybe new too
-            at_fault[ends[at_fault[count:]]] = True
-        held |= at_fault[:count]
+            defective[ends[defective[count:]]] = True
+        held |= defective[:count]
     return mesh
 
 

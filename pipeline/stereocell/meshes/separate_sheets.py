@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from stereocell.meshes.validity import find_pinched, match_edges
+from stereocell.meshes.validity import find_non_manifold_vertices, match_edges
 from stereocell.model.mesh import Mesh
 
 APART = 0.2  # of the way to its neighbours, how far the vertex of a fan is drawn from the other's
@@ -23,18 +23,18 @@ Indices = NDArray[np.int64]
 Triangles = NDArray[np.uint32]
 
 
-def part_sheets(mesh: Mesh, triangles: Triangles) -> tuple[Mesh, Triangles, Indices]:
+def separate_sheets(mesh: Mesh, triangles: Triangles) -> tuple[Mesh, Triangles, Indices]:
     """Return the mesh with vertices added at its end, the triangles parted by them, their sources.
 
     `triangles` are any by the mesh's vertices; the mesh's own stay. Vertices of a border stay too.
     """
     corners = triangles.astype(np.int64)
-    edges, twins, crowded = match_edges(corners)
-    quads = _find_quads(mesh.positions, edges, crowded)
+    edges, twins, is_non_manifold = match_edges(corners)
+    quads = _find_quads(mesh.positions, edges, is_non_manifold)
     _pair(twins, quads)
     suspect = np.zeros(len(mesh.positions), bool)
-    suspect[edges[crowded]] = True
-    suspect[find_pinched(corners, twins, len(mesh.positions))] = True
+    suspect[edges[is_non_manifold]] = True
+    suspect[find_non_manifold_vertices(corners, twins, len(mesh.positions))] = True
     suspect[edges[twins < 0]] = False
     at = np.flatnonzero(suspect[corners].ravel())
     if not len(at):
@@ -55,14 +55,14 @@ def _onward(corner: Indices) -> Indices:
 
 
 def _find_quads(
-    positions: NDArray[np.float32], edges: Indices, crowded: NDArray[np.bool_]
+    positions: NDArray[np.float32], edges: Indices, is_non_manifold: NDArray[np.bool_]
 ) -> Indices:
-    """Return crowded edges, four (n, 4) at a time that lie on each other and are wound in turns.
+    """Return non-manifold edges, four (n, 4) at a time that lie on each other, wound in turns.
 
     In their order round the edge, so that no sheets cross if neighbours are paired, and from one on
     with which the wider of the two wedges is the narrower: two sheets, bent away from each other.
     """
-    at = np.flatnonzero(crowded)
+    at = np.flatnonzero(is_non_manifold)
     low, high = edges[at].min(axis=1), edges[at].max(axis=1)
     order = np.lexsort((high, low))
     at, low, high = at[order], low[order], high[order]
@@ -111,7 +111,7 @@ def _label_fans(at: Indices, twins: Indices) -> Indices:
 def _draw_apart(
     mesh: Mesh, corners: Indices, at: Indices, fan: Indices
 ) -> tuple[Mesh, Triangles, Indices]:
-    """Give each fan of a vertex that has several one of its own; the rest as `part_sheets`."""
+    """Give each fan of a vertex that has several one of its own; the rest as `separate_sheets`."""
     vertex = corners.ravel()[at]
     source = np.zeros(fan.max() + 1, np.int64)
     source[fan] = vertex

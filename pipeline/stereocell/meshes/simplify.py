@@ -12,7 +12,7 @@ import numpy as np
 from meshoptimizer._loader import lib
 from numpy.typing import NDArray
 
-from stereocell.meshes.validity import bodies
+from stereocell.meshes.validity import label_components
 from stereocell.model.mesh import Mesh
 
 # meshoptimizer 0.2.30a0 declares no argument types for the only call that takes locked vertices;
@@ -61,7 +61,7 @@ def simplify_part(
     vanishes, or lies flat. Such a body is simplified by itself, down to FEWEST triangles.
     """
     kept = drop_doubles(_simplify(mesh.positions, triangles, max_error_um, 0, locked))
-    numbers = bodies(triangles, len(mesh.positions))
+    numbers = label_components(triangles, len(mesh.positions))
     body = numbers[triangles[:, 0]]
     vanished = np.flatnonzero(~np.isin(body, numbers[kept[:, 0]]))
     vanished = vanished[np.argsort(body[vanished], kind="stable")]

@@ -18,9 +18,9 @@ from scipy.spatial import cKDTree
 
 from stereocell.meshes.distance import Nearest
 from stereocell.meshes.self_intersections import MARGIN
-from stereocell.meshes.separate_sheets import part_sheets
+from stereocell.meshes.separate_sheets import separate_sheets
 from stereocell.meshes.simplify import compact, renumber, simplify_part
-from stereocell.meshes.validity import Faults, bodies, border, certify
+from stereocell.meshes.validity import Defects, border, find_defects, label_components
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -35,18 +35,18 @@ Triangles = NDArray[np.uint32]
 
 
 @dataclass(frozen=True, slots=True)
-class Mended:
-    """`mended`: bodies simplified again; `fallbacks`: bodies that stayed as they were."""
+class Simplified:
+    """`simplified_again`: bodies; `fallbacks`: bodies that stayed as they were."""
 
     mesh: Mesh
-    mended: int
+    simplified_again: int
     fallbacks: int
 
 
-def simplify_soundly(
+def simplify_without_defects(
     mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float, max_away_um: float = np.inf
-) -> Mended:
-    """Return the mesh simplified and without faults, its borders as they are.
+) -> Simplified:
+    """Return the mesh simplified and without defects, its borders as they are.
 
     `planes` are where it may be open. A mesh that has faults itself keeps bodies with faults.
     Vertices that would lie further than `max_away_um` from what is returned stay, but for a few in
@@ -56,22 +56,22 @@ def simplify_soundly(
     body = draft.body  # of the mesh's own vertices
     tries = np.zeros(len(mesh.positions), np.int64)
     tree: cKDTree | None = None
-    triangles = draft.part(
+    triangles = draft.separate(
         simplify_part(mesh, mesh.triangles, max_error_um=max_error_um, locked=tries > 0)
     )
     chosen = np.ones(int(body.max(initial=0)) + 1, bool)
     redone: set[int] = set()
-    mended: set[int] = set()
+    defective: set[int] = set()
     kept: set[int] = set()
     for number in count():
-        faults = draft.faults(triangles, redone if number else None)
-        worst = np.unique(draft.body[faults.vertices(triangles)])
+        defects = draft.defects(triangles, redone if number else None)
+        worst = np.unique(draft.body[defects.vertices(triangles)])
         far = _strays(
             draft, triangles, body, chosen, max_away_um if number < FAR_ROUNDS else np.inf
         )
-        if kept.issuperset(worst.tolist()) and not len(far):  # no faults but the given mesh's own
+        if kept.issuperset(worst.tolist()) and not len(far):  # no defects but the given mesh's own
             break
-        mended.update(worst.tolist())
+        defective.update(worst.tolist())
         tries[far] += 1
         chosen[:] = False
         chosen[worst] = chosen[body[far]] = True
@@ -80,58 +80,60 @@ def simplify_soundly(
         if number < ROUNDS:
             if tree is None:
                 tree = cKDTree(mesh.positions)
-            if faults.total:
-                tries[_around(tree, draft.mesh, triangles, faults, tries)] += 1
-            again = draft.part(
+            if defects.total:
+                tries[_around(tree, draft.mesh, triangles, defects, tries)] += 1
+            again = draft.separate(
                 simplify_part(mesh, again, max_error_um=max_error_um, locked=tries > 0)
             )
         else:
             kept.update(worst.tolist())
         triangles = np.concatenate([triangles[~chosen[draft.body[triangles[:, 0]]]], again])
-    return Mended(compact(draft.mesh, triangles), len(mended - kept), len(kept))
+    return Simplified(compact(draft.mesh, triangles), len(defective - kept), len(kept))
 
 
 class _Draft:
-    """One simplification of a mesh after another, and their faults.
+    """One simplification of a mesh after another, and their defects.
 
     mesh       the mesh, and after its own the vertices by which sheets were parted
     body       which body of the mesh each of the vertices belongs to
-    rim        the mesh's border
+    border_edges  of the mesh
     triangles  what was checked last, and `crossings` the pairs of these that meet
 
     Vertices never move, so that two triangles of before meet now if they met then: crossings are
-    looked for among pairs with a fresh triangle only, and what is found is what `certify` finds.
+    looked for among pairs with a fresh triangle only; `find_defects` finds the same ones.
     """
 
     def __init__(self, mesh: Mesh, planes: tuple[Plane, ...]) -> None:
         self.mesh, self.planes = mesh, planes
-        self.body = bodies(mesh.triangles, len(mesh.positions))
-        self.rim = border(mesh.triangles)
+        self.body = label_components(mesh.triangles, len(mesh.positions))
+        self.border_edges = border(mesh.triangles)
         self.triangles = np.zeros((0, 3), np.uint32)
         self.crossings = np.zeros((0, 2), np.int64)
 
-    def part(self, triangles: Triangles) -> Triangles:
+    def separate(self, triangles: Triangles) -> Triangles:
         """Return the triangles with sheets parted, by vertices that the mesh gets for it."""
-        self.mesh, parted, source = part_sheets(self.mesh, triangles)
+        self.mesh, parted, source = separate_sheets(self.mesh, triangles)
         self.body = np.concatenate([self.body, self.body[source]])
         return parted
 
-    def faults(self, triangles: Triangles, changed: set[int] | None) -> Faults:
-        """Return the faults by numbers of these triangles; a border that changed counts as open.
+    def defects(self, triangles: Triangles, changed: set[int] | None) -> Defects:
+        """Return the defects by numbers of these triangles; a border that changed counts as open.
 
         With `changed`, bodies whose boxes lie clear of these bodies' are as sound as they were.
         """
-        mesh, body, rim = self.mesh, self.body, self.rim
+        mesh, body, border_edges = self.mesh, self.body, self.border_edges
         part, past = np.arange(len(triangles)), np.arange(len(self.triangles))
         if changed is not None:
             near = _near(mesh, triangles, body, changed)
             part, past = (
                 np.flatnonzero(near[body[of[:, 0]]]) for of in (triangles, self.triangles)
             )
-            rim = rim[np.isin(body[rim[:, 0]], np.unique(body[triangles[part, 0]]))]
+            border_edges = border_edges[
+                np.isin(body[border_edges[:, 0]], np.unique(body[triangles[part, 0]]))
+            ]
         before = _find(triangles[part], self.triangles[past])
         used, own = renumber(triangles[part], len(mesh.positions))
-        found = certify(
+        found = find_defects(
             Mesh(mesh.positions[used], own, mesh.normals[used]), self.planes, before < 0
         )
         now = np.full(len(self.triangles), -1, np.int64)
@@ -143,13 +145,15 @@ class _Draft:
         self.triangles, self.crossings = triangles, np.unique(np.sort(both, axis=1), axis=0)
         open_now = border(triangles[part])
         key = len(mesh.positions)
-        differs = np.setxor1d(open_now[:, 0] * key + open_now[:, 1], rim[:, 0] * key + rim[:, 1])
+        differs = np.setxor1d(
+            open_now[:, 0] * key + open_now[:, 1], border_edges[:, 0] * key + border_edges[:, 1]
+        )
         return replace(
             found,
             degenerate=part[found.degenerate],
             open=np.concatenate([used[found.open], np.stack(np.divmod(differs, key), axis=1)]),
-            crowded=used[found.crowded],
-            pinched=used[found.pinched],
+            non_manifold_edges=used[found.non_manifold_edges],
+            non_manifold_vertices=used[found.non_manifold_vertices],
             inside_out=part[found.inside_out],
             crossings=self.crossings,
             walls=part[found.walls],
@@ -208,18 +212,20 @@ def _near(
 
 
 def _around(
-    tree: cKDTree, mesh: Mesh, triangles: Triangles, faults: Faults, tries: NDArray[np.int64]
+    tree: cKDTree, mesh: Mesh, triangles: Triangles, defects: Defects, tries: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the vertices in balls round the faults, larger by GROWTH for each of the tries."""
+    """Return the vertices in balls round the defects, larger by GROWTH for each of the tries."""
     corners = mesh.positions[triangles].astype(np.float64)
     low, high = corners.min(axis=1), corners.max(axis=1)
-    first, second = faults.crossings.T
-    edges = mesh.positions[np.concatenate([faults.open, faults.crowded])].astype(np.float64)
-    pinched = mesh.positions[faults.pinched].astype(np.float64)
-    whole = np.concatenate([faults.degenerate, faults.inside_out, faults.walls])
+    first, second = defects.crossings.T
+    edges = mesh.positions[np.concatenate([defects.open, defects.non_manifold_edges])].astype(
+        np.float64
+    )
+    vertices = mesh.positions[defects.non_manifold_vertices].astype(np.float64)
+    whole = np.concatenate([defects.degenerate, defects.inside_out, defects.walls])
     # two triangles can meet only where their boxes do
-    lows = [np.maximum(low[first], low[second]), edges.min(axis=1), pinched, low[whole]]
-    highs = [np.minimum(high[first], high[second]), edges.max(axis=1), pinched, high[whole]]
+    lows = [np.maximum(low[first], low[second]), edges.min(axis=1), vertices, low[whole]]
+    highs = [np.minimum(high[first], high[second]), edges.max(axis=1), vertices, high[whole]]
     start, end = np.concatenate(lows), np.concatenate(highs)
     sides = corners - np.roll(corners, 1, axis=1)
     least = float(np.median(np.linalg.norm(sides, axis=2))) / 4

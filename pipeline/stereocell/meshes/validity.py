@@ -21,22 +21,22 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Faults:
+class Defects:
     """What keeps a mesh from being sound; all arrays empty if nothing does.
 
-    degenerate  triangles (n,) with two equal corners, or all three on a line
-    open        edges (n, 2), by vertices, of one triangle only, that lie on no cut plane
-    crowded     edges (n, 2) of more than two triangles, or of two that are wound alike
-    pinched     vertices (n,) whose triangles make more than one fan
-    inside_out  one triangle (n,) of each body that is wound inwards
-    crossings   pairs (n, 2) of triangles that meet beside their common corners
-    walls       triangles (n,) that lie in a cut plane, where the neighbour's may lie as well
+    degenerate             triangles (n,) with two equal corners, or all three on a line
+    open                   edges (n, 2), by vertices, of one triangle only, that lie on no cut plane
+    non_manifold_edges     edges (n, 2) of more than two triangles, or of two that are wound alike
+    non_manifold_vertices  vertices (n,) whose triangles make more than one fan
+    inside_out             one triangle (n,) of each body that is wound inwards
+    crossings              pairs (n, 2) of triangles that meet beside their common corners
+    walls                  triangles (n,) in a cut plane, where the neighbour's may lie as well
     """
 
     degenerate: Indices
     open: Indices
-    crowded: Indices
-    pinched: Indices
+    non_manifold_edges: Indices
+    non_manifold_vertices: Indices
     inside_out: Indices
     crossings: Indices
     walls: Indices
@@ -55,14 +55,19 @@ class Faults:
         whole = (self.degenerate, self.inside_out, self.walls, self.crossings.ravel())
         at = np.concatenate(whole)
         corners = triangles[at].astype(np.int64).ravel()
-        parts = [corners, self.open.ravel(), self.crowded.ravel(), self.pinched]
+        parts = [
+            corners,
+            self.open.ravel(),
+            self.non_manifold_edges.ravel(),
+            self.non_manifold_vertices,
+        ]
         return np.unique(np.concatenate(parts))
 
 
-def certify(
+def find_defects(
     mesh: Mesh, planes: tuple[Plane, ...] = (), fresh: NDArray[np.bool_] | None = None
-) -> Faults:
-    """Return the mesh's faults; it may be open on the planes and nowhere else.
+) -> Defects:
+    """Return the mesh's defects; it may be open on the planes and nowhere else.
 
     A body's winding is the sign of the volume inside it and the planes that cut it; a negative one
     is a cavity, if it lies in the box of a solid. `fresh`: triangles of which one at least is in
@@ -73,12 +78,12 @@ def certify(
     corners = mesh.positions.astype(np.float64)[triangles]
     degenerate = repeated | are_collinear(*corners.transpose(1, 0, 2))
     used = np.flatnonzero(~degenerate)
-    edges, twins, crowded = match_edges(triangles)
-    border_edges = np.flatnonzero((twins < 0) & ~crowded)
+    edges, twins, is_non_manifold = match_edges(triangles)
+    border_edges = np.flatnonzero((twins < 0) & ~is_non_manifold)
     lone = border_edges[~_on_planes(mesh.positions, edges[border_edges], planes)]
-    pinched = find_pinched(triangles, twins, len(mesh.positions))
+    non_manifold_vertices = find_non_manifold_vertices(triangles, twins, len(mesh.positions))
     one_fan = np.ones(len(mesh.positions), bool)
-    one_fan[pinched] = False
+    one_fan[non_manifold_vertices] = False
     one_fan[edges[twins < 0]] = False
     one_fan[triangles[degenerate]] = False
     crossings = find_crossings(
@@ -87,18 +92,18 @@ def certify(
         one_fan=one_fan,
         fresh=None if fresh is None else fresh[used],
     )
-    return Faults(
+    return Defects(
         degenerate=np.flatnonzero(degenerate),
         open=edges[lone],
-        crowded=np.unique(np.sort(edges[crowded], axis=1), axis=0),
-        pinched=pinched,
+        non_manifold_edges=np.unique(np.sort(edges[is_non_manifold], axis=1), axis=0),
+        non_manifold_vertices=non_manifold_vertices,
         inside_out=_inside_out(mesh, corners, edges, border_edges, planes),
         crossings=used[crossings],
         walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
 
 
-def bodies(triangles: NDArray[np.integer], vertices: int) -> NDArray[np.int32]:
+def label_components(triangles: NDArray[np.integer], vertices: int) -> NDArray[np.int32]:
     """Return the number of the connected body that each of the vertices belongs to."""
     a, b, c = triangles.astype(np.int64).T
     rows, columns = np.concatenate([a, b]), np.concatenate([b, c])
@@ -127,7 +132,7 @@ def border(triangles: NDArray[np.integer]) -> Indices:
 
 
 def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
-    """Return the directed edges (3 m, 2), the twin of each or -1, and which are crowded.
+    """Return the directed edges (3 m, 2), the twin of each or -1, and which are non-manifold.
 
     Edge 3 t + k goes from corner k of triangle t to the next one.
     """
@@ -144,9 +149,9 @@ def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]
     opposite = edges[first, 0] == edges[second, 1]
     opposite &= edges[first, 0] != edges[first, 1]
     twins[first[opposite]], twins[second[opposite]] = second[opposite], first[opposite]
-    crowded = np.empty(len(edges), bool)
-    crowded[order] = np.repeat(sizes >= 2, sizes)
-    return edges, twins, crowded & (twins < 0)
+    is_non_manifold = np.empty(len(edges), bool)
+    is_non_manifold[order] = np.repeat(sizes >= 2, sizes)
+    return edges, twins, is_non_manifold & (twins < 0)
 
 
 def _on_planes(
@@ -159,7 +164,7 @@ def _on_planes(
     return on
 
 
-def find_pinched(triangles: Indices, twins: Indices, vertices: int) -> Indices:
+def find_non_manifold_vertices(triangles: Indices, twins: Indices, vertices: int) -> Indices:
     """Return the vertices whose triangles don't make one fan: walk round each, and count."""
     corners = triangles.ravel()
     valence = np.bincount(corners, minlength=vertices)
@@ -194,7 +199,7 @@ def _inside_out(
     """Return one triangle of each body that is wound inwards. `lone`: edges of its border."""
     if not len(mesh.triangles):
         return np.zeros(0, np.int64)
-    labels = bodies(mesh.triangles, len(mesh.positions))[mesh.triangles[:, 0]]
+    labels = label_components(mesh.triangles, len(mesh.positions))[mesh.triangles[:, 0]]
     names, first, body = np.unique(labels, return_index=True, return_inverse=True)
     a, b, c = corners.transpose(1, 0, 2)
     area = np.cross(b - a, c - a)

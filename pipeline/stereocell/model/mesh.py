@@ -44,7 +44,7 @@ class Quality:
     away, back  distances from the iso-surface to this mesh, and from this mesh to it
     mended      bodies that had to be simplified again, as the first attempt had faults
     fallbacks   bodies that kept the level before's surface, as every attempt had faults
-    faults      left over, by the exact check: see `certify`
+    faults      left over, by the exact check: see `find_defects`
     angle_deg   1st percentile of the triangles' smallest angles
     enclosed    share of the iso-surface's area that lies inside this mesh or on it
     """

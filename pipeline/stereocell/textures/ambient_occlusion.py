@@ -21,10 +21,12 @@ STEP = 0.75  # of a ray, in coarsest voxel spacings
 NEIGHBOURS = 4  # points with a value of their own that others take the mean of
 
 
-def find_openness(
+def find_ambient_visibility(
     solid: NDArray[np.bool_], lattice: Lattice, mesh: Mesh, *, radius_um: float
 ) -> NDArray[np.float32]:
-    """Return for each vertex the share of open sky, float32 (n,), 0..1; 1 for a radius of 0.
+    """Return the ambient visibility of each vertex, float32 (n,), 0..1; 1 for a radius of 0.
+
+    It is 1 - ambient occlusion: 1 is open, as in glTF's occlusion texture.
 
     solid  bool (z, y, x), covers `lattice.window`
     mesh   positions and unit normals in world um (x, y, z); its triangles are not looked at

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from stereocell.model.mesh import Mesh
 from stereocell.textures.rasterize import find_texels
-from stereocell.textures.seam_padding import find_rims, fit_rims
+from stereocell.textures.seam_padding import find_chart_edges, fit_seam_texels
 
 NEIGHBOURS = 8  # fine vertices looked at where the nearest point is on another wall
 REACH = 1.5  # texels beyond a chart's edge whose values are found, not copied: bilinear lookups'
@@ -120,16 +120,16 @@ def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
     """Return the maps of a mesh with UVs and tangents, `size` (height, width) texels."""
     assert coarse.uvs is not None
     texel, triangle, weights, outside = find_texels(coarse.uvs, coarse.triangles, size, REACH)
-    values = _tell(coarse, triangle, weights, baker)
+    values = _compute_texels(coarse, triangle, weights, baker)
     image = fill(values, texel, size)
     inside = np.zeros(size[0] * size[1], bool)
     inside[texel[outside == 0]] = True
-    triangle, weights = find_rims(coarse.uvs, coarse.triangles, size)
+    triangle, weights = find_chart_edges(coarse.uvs, coarse.triangles, size)
     uvs = np.einsum(
         "nk,nkd->nd", weights, coarse.uvs[coarse.triangles[triangle]].astype(np.float64)
     )
-    wanted = _tell(coarse, triangle, weights, baker)
-    image = fit_rims(image, ~inside.reshape(size), uvs=uvs, wanted=wanted)
+    wanted = _compute_texels(coarse, triangle, weights, baker)
+    image = fit_seam_texels(image, ~inside.reshape(size), uvs=uvs, wanted=wanted)
     bytes_ = np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
     return Maps(
         np.ascontiguousarray(bytes_[..., :3]),
@@ -138,7 +138,7 @@ def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
     )
 
 
-def _tell(
+def _compute_texels(
     coarse: Mesh, triangle: NDArray[np.int64], weights: NDArray[np.float64], baker: Baker
 ) -> NDArray[np.float64]:
     """Return what maps hold at places of triangles: normal (3), openness and, if any, paint; 0..1.

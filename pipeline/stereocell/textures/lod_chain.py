@@ -5,8 +5,8 @@ import numpy as np
 from stereocell.meshes.distance import Nearest, measure_distance, measure_enclosure, measure_spread
 from stereocell.meshes.fairing import make_fair
 from stereocell.meshes.options import LodOptions
-from stereocell.meshes.simplify_valid import simplify_soundly
-from stereocell.meshes.validity import certify
+from stereocell.meshes.simplify_valid import simplify_without_defects
+from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
@@ -49,8 +49,10 @@ def make_levels(
     for level, error in list(enumerate(lod.errors))[first:]:
         with clock("simplify"):
             length = error * min(spacing_um)
-            mended = simplify_soundly(mesh, planes, max_error_um=length, max_away_um=STRAY * length)
-            mesh = mended.mesh
+            simplified = simplify_without_defects(
+                mesh, planes, max_error_um=length, max_away_um=STRAY * length
+            )
+            mesh = simplified.mesh
         if level == 0:
             with clock("fair"):
                 mesh = make_fair(
@@ -60,7 +62,7 @@ def make_levels(
                     max_turn_um=error * min(spacing_um),
                 )
         with clock("certify"):
-            left = certify(mesh, planes).total
+            left = find_defects(mesh, planes).total
         with clock("measure"):
             to_mesh = Nearest(mesh, lod.samples)
             distance = measure_distance(to_fine, to_mesh)
@@ -69,8 +71,8 @@ def make_levels(
             quality = Quality(
                 away=measure_spread(to_fine, to_mesh),
                 back=measure_spread(to_mesh, to_fine),
-                mended=mended.mended,
-                fallbacks=mended.fallbacks,
+                mended=simplified.simplified_again,
+                fallbacks=simplified.fallbacks,
                 faults=left,
                 angle_deg=sharpest_angle(mesh),
                 enclosed=measure_enclosure(to_fine, to_mesh),

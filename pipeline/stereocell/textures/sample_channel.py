@@ -14,7 +14,7 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.volume import Volume, xyz_to_zyx
 
 
-def find_paint(
+def sample_channel(
     painted: Volume,
     lattice: Lattice,
     mesh: Mesh,

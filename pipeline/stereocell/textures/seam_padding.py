@@ -13,7 +13,7 @@ MOST = 0.35  # that a texel is changed by, of the range 0..1
 PER_TEXEL = 2.0  # places on an edge
 
 
-def find_rims(
+def find_chart_edges(
     uvs: NDArray[np.float32], triangles: NDArray[np.uint32], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return places on the edges that have one triangle: triangle (n,), barycentric weights."""
@@ -36,7 +36,7 @@ def find_rims(
     return triangle, weights
 
 
-def fit_rims(
+def fit_seam_texels(
     image: NDArray[np.float64],
     is_free: NDArray[np.bool_],
     *,
