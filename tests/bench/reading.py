@@ -22,7 +22,7 @@ import zarr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import iso_task, statistics_task
 from stereocell.building.tasks.iso_value import read_iso_field
 from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, measure_statistics
@@ -100,7 +100,7 @@ def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
             take(sent)
             call("units", str(out), "--workers", "0", "--only", unit)
         read = take(sent) - check
-    settled = Store(out).plan()
+    settled = OutFolder(out).plan()
     middle = settled.tile("r1_c1")  # it has neighbours all round
     window = middle.lattice(settled.region).grown(settled.halo, settled.region)
     size = stored(source, window)
@@ -114,7 +114,7 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
     out = folder / "survey"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
-        settled = Store(out).plan()
+        settled = OutFolder(out).plan()
         (channel,) = settled.channels
         statistics = measure_statistics(statistics_task(settled, channel))
         take(sent)
@@ -134,7 +134,7 @@ def measure_windows(folder: Path, source: Path) -> float:
     out = folder / "windows"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (1, 1), REAL, "0")
-        settled = Store(out).plan()
+        settled = OutFolder(out).plan()
         take(sent)
         measure_statistics(statistics_task(settled, settled.channels[0]))
         coarse = {Path(file) for file in sent if not file.startswith(f"{source / '0'}/")}

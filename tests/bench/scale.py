@@ -40,7 +40,7 @@ from reading import (
     stored,
 )
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.model.tiling import cut
 from support.phantoms import write_ome_zarr
 
@@ -128,7 +128,7 @@ def run_units(out: Path, workers: int) -> Run:
         time.sleep(0.2)
     if command.returncode:
         raise SystemExit(f"units {out}: ended with {command.returncode}")
-    units = len(Store(out).index())
+    units = len(OutFolder(out).index())
     return Run(units, workers, time.perf_counter() - start, dict(peaks))
 
 
@@ -223,7 +223,7 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     print(f"{WHOLE} units of that size, without stage, bundle and report: {hours:.0f} core-hours, "
           f"{WHOLE * size / 1e12:.2f} TB of units written, "
           f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
-    settled = Store(out).plan()
+    settled = OutFolder(out).plan()
     voxel = stored(source, settled.region) / math.prod(settled.region.shape)
     print_whole(reading, survey, windows, voxel, settled.halo)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stereocell.building import phases
 from stereocell.building import settings as settings_module
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import load_lods
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
@@ -20,17 +20,17 @@ from support.meshes import enclosed_volume, open_edges
 VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
 
 
-def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[Store, list[Mesh]]:
+def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[OutFolder, list[Mesh]]:
     phases.make(str(source), out, settings_module.load("cycif", None, flags={"plan": plan}))
     engine = Engine(0)
     phases.run_units(out, engine)
-    store = Store(out)
+    out_folder = OutFolder(out)
     meshes = [
-        load_lods(store.unit_dir(*unit.split("/"), key))[0].mesh
-        for unit, key in store.index().items()
+        load_lods(out_folder.unit_dir(*unit.split("/"), key))[0].mesh
+        for unit, key in out_folder.index().items()
         if unit.endswith(f"/{channel}")
     ]
-    return store, meshes
+    return out_folder, meshes
 
 
 def _distance_to_ellipsoids(
@@ -52,7 +52,7 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
     source = tmp_path / "block.ome.zarr"
     write_cycif(source, grid=(2, 1), tile_size=(64, 160, 160), seed=5, brightness_spread=0.0)
     truth = json.loads((tmp_path / "block.truth.json").read_text())
-    store, meshes = _units(
+    out_folder, meshes = _units(
         source, tmp_path / "out", "Hoechst", channels=["Hoechst"], tile_size=[64, 160, 160]
     )
     positions = np.concatenate([mesh.positions for mesh in meshes]).astype(np.float64)
@@ -77,7 +77,7 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
         assert (distances[i] < 2 * VOXEL_UM).sum() > 100
 
     # the background is uneven: each tile's iso-value against the boundaries of its own nuclei
-    plan = store.plan()
+    plan = out_folder.plan()
     for tile in plan.tiles:
         first, last = plan.position_um(tile.box.start), plan.position_um(tile.box.stop)
         expected = np.mean(
@@ -88,7 +88,7 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
                 and (np.array(n["center_um"]) < last).all()
             ]
         )
-        found = store.survey()["Hoechst"]["iso"][tile.id]
+        found = out_folder.survey()["Hoechst"]["iso"][tile.id]
         assert found["value"] + found["background"] == pytest.approx(expected, rel=0.15)
 
 

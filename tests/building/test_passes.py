@@ -8,7 +8,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pxr import Usd
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
 from stereocell.model.mesh import Lod, Mesh
@@ -19,18 +19,18 @@ from support.meshes import enclosed_volume
 SPACING = (1.0, 1.0, 1.0)
 
 
-def _units(source: Path, out: Path, *flags: str) -> Store:
+def _units(source: Path, out: Path, *flags: str) -> OutFolder:
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    return Store(out)
+    return OutFolder(out)
 
 
-def _lods(store: Store) -> dict[str, tuple[Lod, ...]]:
+def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
     """Return what was built of each unit, by `<tile>/<channel>`."""
     built = {}
-    for unit, key in store.index().items():
+    for unit, key in out_folder.index().items():
         tile, channel = unit.split("/")
-        built[unit] = load_lods(store.unit_dir(tile, channel, key))
+        built[unit] = load_lods(out_folder.unit_dir(tile, channel, key))
     return built
 
 
@@ -44,8 +44,8 @@ def test_each_tile_s_body_is_cut_at_its_own_brightness(tmp_path: Path) -> None:
     bright = phantoms.blurred_ball(shape, SPACING, (15.5, 15.5, 47.5), radius, 1.0)
     counts = phantoms.as_counts(dim + 2 * bright, 100, 1100, noise=5.0)
     source = phantoms.write_ome_tiff(tmp_path / "two.ome.tif", counts, spacing=SPACING)
-    store = _units(source, tmp_path / "out", "--tile-size", "32,32,32")
-    for lods in _lods(store).values():
+    out_folder = _units(source, tmp_path / "out", "--tile-size", "32,32,32")
+    for lods in _lods(out_folder).values():
         assert enclosed_volume(lods[0].mesh) == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.1)
 
 
@@ -67,8 +67,8 @@ def test_few_bright_bodies_do_not_hide_the_many_dim_ones(tmp_path: Path) -> None
     (tmp_path / "mean.toml").write_text('[isovalue]\ncriterion = "pekar-mean"\n')
     found = []
     for name, flags in (("default", []), ("mean", ["--config", str(tmp_path / "mean.toml")])):
-        store = _units(source, tmp_path / name, "--tile-size", "36,96,96", *flags)
-        (channel,) = store.survey().values()
+        out_folder = _units(source, tmp_path / name, "--tile-size", "36,96,96", *flags)
+        (channel,) = out_folder.survey().values()
         iso = channel["iso"]["r0_c0"]
         found.append(iso["value"] + iso["background"])
     default, mean = found
@@ -122,18 +122,18 @@ def test_a_body_lies_at_its_place_at_any_level_and_in_any_region(
     second = {axis: value + skip + 0.5 for axis, value in first.items()}
     translations = (first, second) if stated else (None, None)
     source = _pyramid(tmp_path / "ball.ome.zarr", skip, translations)
-    store = _units(source, tmp_path / "out", *flags)
-    ((unit, lods),) = _lods(store).items()
+    out_folder = _units(source, tmp_path / "out", *flags)
+    ((unit, lods),) = _lods(out_folder).items()
     spacing = 2.0**level
     np.testing.assert_allclose(_center_of(lods[0].mesh), zyx_to_xyz(CENTER), atol=0.05 * spacing)
 
     # the voxels as well: the stage says where the volume's first and last lattice points are
-    assert main(["stage", str(store.out), "--workers", "0"]) == 0
+    assert main(["stage", str(out_folder.out), "--workers", "0"]) == 0
     n = (48 - 2 * skip) // 2 if level else 48
     box = np.reshape(region if region is not None else (0, 0, 0, n, n, n), (2, 3))
     origin = skip + 0.5 if level else 0.0
     ends = zyx_to_xyz(origin + spacing * (box - [[0], [1]]))
-    stage = Usd.Stage.Open(str(store.stage_file))
+    stage = Usd.Stage.Open(str(out_folder.stage_file))
     tile, channel = unit.split("/")
     prim = stage.GetPrimAtPath(f"/Specimen/Tiles/{tile}/{channel}/{channel}_{tile}_volume")
     low, high = (prim.GetAttribute(f"stereocell:bounds{end}").Get() for end in ("Min", "Max"))

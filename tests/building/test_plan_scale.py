@@ -5,7 +5,7 @@ from pathlib import Path
 
 import zarr
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import main
 from support import phantoms
 
@@ -38,5 +38,5 @@ def test_the_plan_of_16940_units_takes_seconds(tmp_path: Path) -> None:
     told = ["--preset", "cycif", "--level", "0", "--tile-size", size]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *told]) == 0
     assert time.process_time() - start < PLANS_S
-    plan = Store(tmp_path / "out").plan()
+    plan = OutFolder(tmp_path / "out").plan()
     assert (len(plan.tiles), len(plan.channels)) == (242, 70)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import load_lods, load_record, load_volume
 from stereocell.cli.__main__ import main
@@ -92,9 +92,9 @@ def _build(folder: Path, scene: NDArray[np.uint16], settings: str) -> Built:
     flags = ["--tile-size", f"{TILE},{TILE},{TILE}", "--config", str(folder / "settings.toml")]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    store = Store(out)
-    plan, index, survey = store.plan(), store.index(), store.survey()["cells"]
-    folders = {t.id: store.unit_dir(t.id, "cells", index[f"{t.id}/cells"]) for t in plan.tiles}
+    out_folder = OutFolder(out)
+    plan, index, survey = out_folder.plan(), out_folder.index(), out_folder.survey()["cells"]
+    folders = {t.id: out_folder.unit_dir(t.id, "cells", index[f"{t.id}/cells"]) for t in plan.tiles}
     records = {tile: load_record(unit) for tile, unit in folders.items()}
     return Built(
         plan,

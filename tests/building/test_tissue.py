@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import zarr
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.cli.__main__ import main
 from stereocell.samples.head import make_head
@@ -41,7 +41,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def add(out: Path, *flags: str) -> Store:
+def add(out: Path, *flags: str) -> OutFolder:
     """Add the classes to the plan; nothing is built."""
     from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
 
@@ -52,7 +52,7 @@ def add(out: Path, *flags: str) -> Store:
         Path(values["--model"]) if "--model" in values else None,
     )
     add_tissue(out, request)
-    return Store(out)
+    return OutFolder(out)
 
 
 def test_each_class_is_a_channel_of_eight_bits_that_sum_to_one(planned: Path) -> None:
@@ -96,7 +96,7 @@ def test_the_plan_with_classes_survives_its_file_and_passes_its_schema(planned: 
 
 def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: Path) -> None:
     here = add(planned, "--classes", "3").plan()
-    copy = Store(shutil.copytree(planned, tmp_path / "moved"))
+    copy = OutFolder(shutil.copytree(planned, tmp_path / "moved"))
     there = copy.plan()
     for before, after in zip(here.channels[1:], there.channels[1:], strict=True):
         voxels = tmp_path.resolve() / "moved" / "tissue" / "classes.ome.zarr"

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from stereocell.building import input_unchanged, phases
 from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
 from stereocell.report import phase as report
@@ -121,8 +121,8 @@ def copy(out: Path, to: Path, source: Path | None = None) -> Path:
         shutil.copy(out.parent / "f.ome.tif", source)
         text = text.replace(f'"{out.parent / "f.ome.tif"}"', f'"{source}"')
     (to / "plan.json").write_text(text)
-    store = Store(to)
-    store.save_units(store.plan(), store.index())
+    out_folder = OutFolder(to)
+    out_folder.save_units(out_folder.plan(), out_folder.index())
     open_source.cache_clear()
     return to
 

@@ -1,4 +1,4 @@
-"""A channel without a clear surface: built all the same, calmly, and flagged wherever it shows."""
+"""A channel without a clear surface: built all the same, smoothed, flagged wherever it shows."""
 
 import json
 from collections.abc import Iterator
@@ -9,8 +9,8 @@ import pytest
 from pxr import Usd
 from scipy import ndimage
 
-from stereocell.building.out_folder import Store
-from stereocell.building.plan import plan_for
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import smoothed_plan
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.report.facts import gather
@@ -50,13 +50,13 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _looks(out: Path) -> Iterator[tuple[str, str, float]]:
-    for entry in Store(out).survey().values():
+    for entry in OutFolder(out).survey().values():
         appearance = entry["look"]
         yield appearance["name"], appearance["surface"], appearance["iso_confidence"]
 
 
 def test_clearness_follows_the_confidence(out: Path) -> None:
-    least = Store(out).plan().settings.isovalue.min_confidence
+    least = OutFolder(out).plan().settings.isovalue.min_confidence
     found = {name: (surface, confidence) for name, surface, confidence in _looks(out)}
     assert {name: surface for name, (surface, _) in found.items()} == VERDICTS
     assert found["ball"][1] > 2 * least
@@ -116,7 +116,7 @@ def test_a_surface_confidence_that_is_none_is_named(
 
 
 def test_the_report_tells_it_of_the_channel_and_not_of_every_tile(out: Path) -> None:
-    remarks = {remark.title: remark.lines for remark in find_remarks(gather(Store(out)))}
+    remarks = {remark.title: remark.lines for remark in find_remarks(gather(OutFolder(out)))}
     (line,) = remarks["1 channel with no clear surface"]
     assert line.startswith("noise: confidence 0.0")
     assert line.endswith(
@@ -127,11 +127,11 @@ def test_the_report_tells_it_of_the_channel_and_not_of_every_tile(out: Path) -> 
     assert "no clear surface</b>: built all the same" in (out / "report/index.html").read_text()
 
 
-def test_calm_surface_reads_no_more_voxels_and_the_halo_holds(out: Path) -> None:
-    plan = Store(out).plan()
-    assert plan_for(plan, "clear") is plan
-    calm = plan_for(plan, "unclear")
-    before, after = plan.settings.surface, calm.settings.surface
+def test_smoothed_surface_reads_no_more_voxels_and_the_halo_holds(out: Path) -> None:
+    plan = OutFolder(out).plan()
+    assert smoothed_plan(plan, "clear") is plan
+    smoothed = smoothed_plan(plan, "unclear")
+    before, after = plan.settings.surface, smoothed.settings.surface
     assert float(after.smoothing_um) > 2 * float(before.smoothing_um)
     assert choose(plan, "unclear", []).alpha_um == 0
     reaches = [
@@ -140,4 +140,4 @@ def test_calm_surface_reads_no_more_voxels_and_the_halo_holds(out: Path) -> None
         for surface_confidence, surface in (("clear", before), ("unclear", after))
     ]
     assert reaches[1] == pytest.approx(reaches[0])
-    assert calm.halo == plan.halo
+    assert smoothed.halo == plan.halo

@@ -48,7 +48,9 @@ def edit(stage, tmp_path):
         layer.Save()
         del over
         export.told = []
-        write_bundle(path, tmp_path / "bundle", None, run=Engine(0).run, tell=export.told.append)
+        write_bundle(
+            path, tmp_path / "bundle", None, run=Engine(0).run, report_line=export.told.append
+        )
         return tmp_path / "bundle"
 
     return export
@@ -407,7 +409,7 @@ def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, ed
         tmp_path / "from_old",
         None,
         run=Engine(0).run,
-        tell=told.append,
+        report_line=told.append,
     )
     assert told == []
     assert files(tmp_path / "from_old") == files(bundle)
@@ -584,7 +586,11 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     own.GetRootLayer().Save()
     told: list[str] = []
     write_bundle(
-        tmp_path / "own/stage.usda", tmp_path / "a", None, run=Engine(0).run, tell=told.append
+        tmp_path / "own/stage.usda",
+        tmp_path / "a",
+        None,
+        run=Engine(0).run,
+        report_line=told.append,
     )
     (line,) = told
     assert "lod0 (sound); made anew from lod0: lod1" in line
@@ -597,7 +603,7 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     whole.Export(str(tmp_path / "flat.usda"))
     told: list[str] = []
     write_bundle(
-        tmp_path / "flat.usda", tmp_path / "flat", None, run=Engine(0).run, tell=told.append
+        tmp_path / "flat.usda", tmp_path / "flat", None, run=Engine(0).run, report_line=told.append
     )
     (line,) = told
     assert line == "r0_c0/CD31: edited by hand: lod0 (sound)"
@@ -615,7 +621,11 @@ def test_points_in_other_units_are_told(stage, tmp_path):
     root.Save()
     told: list[str] = []
     write_bundle(
-        tmp_path / "root.usda", tmp_path / "bundle", None, run=Engine(0).run, tell=told.append
+        tmp_path / "root.usda",
+        tmp_path / "bundle",
+        None,
+        run=Engine(0).run,
+        report_line=told.append,
     )
     (line,) = told
     assert "points of an artist's.usda, whose metersPerUnit is 0.01, are taken as um" in line
@@ -660,7 +670,11 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
     layer.Save()
     told: list[str] = []
     write_bundle(
-        tmp_path / "edit.usda", tmp_path / "bundle", None, run=Engine(0).run, tell=told.append
+        tmp_path / "edit.usda",
+        tmp_path / "bundle",
+        None,
+        run=Engine(0).run,
+        report_line=told.append,
     )
     (line,) = told
     assert "made anew from lod0: lod1" in line

@@ -11,7 +11,7 @@ from stereocell.formats import tiles3d
 from stereocell.formats.tiles3d import content_hash
 from stereocell.formats.tiles3d_walk import walk
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
-from stereocell.verify.bundle_against_stage import BundleTask, hold_tile
+from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
 from stereocell.verify.formats import check
 from support import spheres
 
@@ -75,7 +75,7 @@ def test_other_tiles_are_not_opened(bundle):
 
 
 def test_surfaces_behind_an_external_tileset_are_held_against_the_stage(made):
-    finding = hold_tile(BundleTask(made / "stage" / "stage.usda", made / "bundle", "r0_c0"))
+    finding = compare_tile(BundleTask(made / "stage" / "stage.usda", made / "bundle", "r0_c0"))
     assert (finding.surfaces, finding.problems) == (3, ())
 
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel
 from stereocell.building.unit_files import is_whole
 from stereocell.cli.__main__ import main
@@ -294,7 +294,7 @@ class _Page(HTMLParser):
 
 def _write(out: Path) -> tuple[str, _Page]:
     write_report(out)
-    html = Store(out).report_file.read_text()
+    html = OutFolder(out).report_file.read_text()
     return html, _Page(html)
 
 
@@ -333,7 +333,7 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     out = tmp_path / "out"
     shutil.copytree(built, out)
 
-    survey = json.loads(Store(out).survey_file.read_text())
+    survey = json.loads(OutFolder(out).survey_file.read_text())
     proposals = [entry["display"]["proposal"] for entry in survey.values()]
     triangle = {
         "kind": "triangle",
@@ -346,7 +346,7 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     }
     proposals[0].update(shapes=[], reason="too <dim>")
     proposals[1].update(shapes=[triangle] * 2, reason="")
-    Store(out).survey_file.write_text(json.dumps(survey))
+    OutFolder(out).survey_file.write_text(json.dumps(survey))
     _, parsed = _write(out)
     assert [b for a, b in pairwise(parsed.texts) if a == "2D function"] == [
         "none: too <dim>",
@@ -363,13 +363,13 @@ def test_value_is_said_to_be_drawn_if_that_shows(
 ) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
-    survey = json.loads(Store(out).survey_file.read_text())
+    survey = json.loads(OutFolder(out).survey_file.read_text())
     iso = survey["twin"]["iso"]["r0_c0"]
     found = json.loads((out / iso["file"]).read_text())["found"]
     for tile in survey["twin"]["iso"].values():
         other = json.loads((out / tile["file"]).read_text())["found"]
         tile["value"] = other * (factor if tile is iso else 1)
-    Store(out).survey_file.write_text(json.dumps(survey))
+    OutFolder(out).survey_file.write_text(json.dumps(survey))
     texts = _write(out)[1].texts
     said = [text for text in texts if "drawn to its neighbours" in text]
     assert len(said) == is_drawn
@@ -425,7 +425,7 @@ def test_report_before_units_names_the_command(tmp_path: Path) -> None:
 
 
 def test_doubtful_units_are_remarked(built: Path) -> None:
-    facts = gather(Store(built))
+    facts = gather(OutFolder(built))
     assert [step.name for step in facts.steps][:2] == ["read", "volume"]
     assert all(isinstance(step, StepFacts) for step in facts.steps)
     units = (
@@ -462,11 +462,11 @@ def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
         )
         for i, angle in enumerate(angles)
     )
-    (remark,) = find_remarks(replace(gather(Store(built)), units=units))
+    (remark,) = find_remarks(replace(gather(OutFolder(built)), units=units))
     assert remark.is_note
     assert remark.title.startswith("1 channel with thin triangles in lod0")
     assert remark.lines == ("CD31: 9.5° in r0_c2, 2 tiles below",)
-    assert not find_remarks(replace(gather(Store(built)), units=units[:1]))
+    assert not find_remarks(replace(gather(OutFolder(built)), units=units[:1]))
 
 
 @pytest.mark.usefixtures("no_drawing")
@@ -476,7 +476,7 @@ def test_report_goes_without_seconds_that_were_lost(built: Path, tmp_path: Path)
     for file in (out / "units").rglob("seconds.json"):
         file.unlink()
     _write(out)
-    facts = gather(Store(out))
+    facts = gather(OutFolder(out))
     assert facts.steps == ()
     assert all(is_whole(unit.directory) for unit in facts.units)
 

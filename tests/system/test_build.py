@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 from threadpoolctl import threadpool_limits
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import load_record
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
@@ -50,12 +50,12 @@ def test_build_leaves_everything(built: Path) -> None:
 
 
 def test_empty_channel_has_no_surface_and_says_why(built: Path) -> None:
-    store = Store(built)
-    for name, key in store.index().items():
+    out_folder = OutFolder(built)
+    for name, key in out_folder.index().items():
         tile, channel = name.split("/")
-        record = load_record(store.unit_dir(tile, channel, key))
+        record = load_record(out_folder.unit_dir(tile, channel, key))
         assert bool(record["reason"]) == (channel == "empty")
-    survey = store.survey()
+    survey = out_folder.survey()
     assert survey["empty"]["iso"]["r0_c0"]["reason"] == "every voxel is 300"
 
 
@@ -153,10 +153,10 @@ def test_same_build_again_does_nothing(
 def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
-    store = Store(out)
-    key = store.index()["r0_c1/F_x20_body"]
-    lost, kept = (store.unit_dir(tile, "F_x20_body", key_) for tile, key_ in
-                  (("r0_c1", key), ("r0_c0", store.index()["r0_c0/F_x20_body"])))  # fmt: skip
+    out_folder = OutFolder(out)
+    key = out_folder.index()["r0_c1/F_x20_body"]
+    lost, kept = (out_folder.unit_dir(tile, "F_x20_body", key_) for tile, key_ in
+                  (("r0_c1", key), ("r0_c0", out_folder.index()["r0_c0/F_x20_body"])))  # fmt: skip
     shutil.rmtree(lost)
     stamp = (kept / "unit.json").stat().st_mtime_ns
     plan = json.loads((out / "plan.json").read_text())
@@ -172,7 +172,7 @@ def test_given_iso_value_is_used_and_the_found_one_kept(tmp_path: Path) -> None:
     flags = ["--grid", "1x1", "--iso-value", "F body=400"]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    iso = Store(out).survey()["F_x20_body"]["iso"]["r0_c0"]
+    iso = OutFolder(out).survey()["F_x20_body"]["iso"]["r0_c0"]
     assert iso["value"] == 400
     assert iso["background"] == 0
     assert json.loads((out / iso["file"]).read_text())["found"] == pytest.approx(550, abs=250)
@@ -331,7 +331,7 @@ def test_one_unit_alone_does_not_pass_for_all(
     assert main(["plan", str(source), "-o", str(out), "--grid", "2x1"]) == 0
     assert main(["units", str(out), "--workers", "0", "--only", "r0_c1/F body"]) == 0
     assert len(list(out.rglob("unit.json"))) == 1
-    assert not Store(out).index_file.exists()
+    assert not OutFolder(out).index_file.exists()
     capsys.readouterr()
     assert main(["stage", str(out)]) == 1
     assert "run `stereocell units OUT`" in _one_line(capsys)

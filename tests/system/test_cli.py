@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import COMMANDS, main
 from support import phantoms
 
@@ -78,7 +78,7 @@ def test_an_iso_value_by_index_is_kept_by_name(source: Path, tmp_path: Path) -> 
     out = tmp_path / "out"
     flags = ["--grid", "2x1", "--iso-value", "1=400"]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
-    assert Store(out).plan().settings.iso_values == {"F again": 400.0}
+    assert OutFolder(out).plan().settings.iso_values == {"F again": 400.0}
 
 
 def test_the_settings_that_a_build_leaves_make_the_same_plan(source: Path, tmp_path: Path) -> None:
@@ -86,10 +86,10 @@ def test_the_settings_that_a_build_leaves_make_the_same_plan(source: Path, tmp_p
     assert main(["plan", str(source), "-o", str(first), "--grid", "5x3", "--region", ":,:,1:"]) == 0
     used = ["--config", str(first / "stereocell.toml")]
     assert main(["plan", str(source), "-o", str(second), *used]) == 0
-    assert Store(second).plan().tiles == Store(first).plan().tiles
-    assert Store(second).plan().settings == Store(first).plan().settings
+    assert OutFolder(second).plan().tiles == OutFolder(first).plan().tiles
+    assert OutFolder(second).plan().settings == OutFolder(first).plan().settings
     assert main(["plan", str(source), "-o", str(third), *used, "--tile-size", "16,48,36"]) == 0
-    assert len(Store(third).plan().tiles) == 1
+    assert len(OutFolder(third).plan().tiles) == 1
 
 
 def test_printed_settings_are_to_be_edited_and_left_ones_to_be_copied(

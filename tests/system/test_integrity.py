@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import find_damage, is_whole
 from stereocell.cli.__main__ import main
 from stereocell.storage import file_list
@@ -60,7 +60,7 @@ def _go_on(out: Path) -> None:
 
 
 def _unit(out: Path) -> Path:
-    return Store(out).unit_dir("r0_c0", F, Store(out).index()[f"r0_c0/{F}"])
+    return OutFolder(out).unit_dir("r0_c0", F, OutFolder(out).index()[f"r0_c0/{F}"])
 
 
 def _flip(file: Path, *, silent: bool = False) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import main
 from support import ctrl_c, phantoms
 from support.digests import digests_of
@@ -49,8 +49,8 @@ def source(built: Path) -> Path:
 
 
 def _unit(out: Path) -> Path:
-    store = Store(out)
-    return store.unit_dir(*UNIT, store.index()["/".join(UNIT)])
+    out_folder = OutFolder(out)
+    return out_folder.unit_dir(*UNIT, out_folder.index()["/".join(UNIT)])
 
 
 def _cut(file: Path) -> None:

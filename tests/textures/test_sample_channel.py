@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import PaintColors
@@ -80,9 +80,9 @@ def _sides(positions: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[n
 
 
 def test_unit_knows_the_paint_at_vertices_and_texels(built: Path) -> None:
-    store = Store(built)
-    assert store.plan().settings.paint == {"body": "marker"}
-    directory = store.unit_dir("r0_c0", "body", store.index()["r0_c0/body"])
+    out_folder = OutFolder(built)
+    assert out_folder.plan().settings.paint == {"body": "marker"}
+    directory = out_folder.unit_dir("r0_c0", "body", out_folder.index()["r0_c0/body"])
     lods = load_lods(directory)
     assert [lod["maps"]["painted"] for lod in load_record(directory)["lods"]] == [True] * 4
     first = lods[0].baked

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.tasks import window as window_task
 from stereocell.cli.__main__ import main
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
@@ -58,7 +58,7 @@ def test_window_is_that_of_the_region_alone(
     flags = ["--level", "0", "--region", "2:14,4:32,8:32"]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    (channel,) = Store(out).survey().values()
+    (channel,) = OutFolder(out).survey().values()
     level, part = seen
     options = WindowOptions()
     expected = np.percentile(
@@ -83,7 +83,7 @@ def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
     out = tmp_path / "out"
     assert main(["plan", str(source), "-o", str(out)]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    (channel,) = Store(out).survey().values()
+    (channel,) = OutFolder(out).survey().values()
     low, high = channel["display"]["window"]
     seen = voxels[::2]
     inside = (seen >= low) & (seen <= high)

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, Vt
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
@@ -389,7 +389,7 @@ def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Pa
     assert main(["plan", str(source), "-o", str(out)]) == 0
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0
-    ball_entry, flat_entry = Store(out).survey().values()
+    ball_entry, flat_entry = OutFolder(out).survey().values()
     appearance = appearance_from(ball_entry["look"])
     (triangle,) = appearance.shapes[NAME]
     low, high = appearance.window

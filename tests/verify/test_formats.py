@@ -5,7 +5,7 @@ import subprocess
 import pytest
 
 from stereocell.building import settings as settings_module
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, make_plan
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
@@ -238,7 +238,7 @@ def with_copies(out):
         level=(0, "asked for"),
         settings=settings,
     )
-    Store(out).save_plan(plan)
+    OutFolder(out).save_plan(plan)
     copy = out / "stage" / "tiles" / "r0_c0" / "CD31_closed.stl"
     write_stl(copy, spheres.tile(0).channels[0].lods[0].mesh)
     return copy

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from stereocell import read
 from stereocell.building.plan import Channel, Plan
-from stereocell.storage.workspace import bring
+from stereocell.storage.workspace import fetch
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class SourceRef:
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
-    bring(Path(ref.source))  # an added channel's lies in OUT
+    fetch(Path(ref.source))  # an added channel's lies in OUT
     if not ref.spacing_um:
         return read.open(ref.source, time=ref.time, series=ref.series)
     z, y, x = ref.spacing_um

@@ -24,7 +24,7 @@ _PHASES = "units.schema.json#Phases"
 _RUN_UNITS = "run `stereocell units OUT` first"
 
 
-class Store:
+class OutFolder:
     """One OUT folder."""
 
     def __init__(self, out: Path) -> None:
@@ -93,7 +93,7 @@ class Store:
         root = self.out.resolve()
         return _with_sources(plan, lambda source: str(root / source) if source else source)
 
-    # --- results of the units' two rounds
+    # --- results of the units' two passes
 
     def statistics_file(self, channel_id: str, key: str) -> Path:
         return self.out / "units" / f"window-{channel_id}-{key}.json"

@@ -1,7 +1,7 @@
-"""The two rounds over the units: first what neighbours must agree on, then the units themselves.
+"""The two passes over the units: first what neighbours must agree on, then the units themselves.
 
-Round one finds each channel's window, dataset-wide, and an iso-value for each (tile, channel).
-Round two builds meshes and volumes. Every result lies under a name that says what it depends on.
+Pass one finds each channel's window, dataset-wide, and an iso-value for each (tile, channel).
+Pass two builds meshes and volumes. Every result lies under a name that says what it depends on.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from stereocell.building.input_unchanged import require_added, require_input
 from stereocell.building.open_source import source_of
-from stereocell.building.out_folder import Store
-from stereocell.building.plan import Channel, Plan, plan_for
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import Channel, Plan, smoothed_plan
 from stereocell.building.tasks import iso_value as iso_maker
 from stereocell.building.tasks import unit as unit_maker
 from stereocell.building.tasks import window as window_maker
@@ -51,7 +51,9 @@ _STATISTICS, _ISO_VALUE = "units.schema.json#Display", "units.schema.json#IsoVal
 _AGAIN = "run `stereocell units OUT` again"
 
 
-def run_rounds(store: Store, plan: Plan, *, engine: Engine, only: str | None) -> tuple[int, int]:
+def run_passes(
+    out_folder: OutFolder, plan: Plan, *, engine: Engine, only: str | None
+) -> tuple[int, int]:
     """Build the units (or `only` one, `<tile>/<channel>`).
 
     Returns how many were not done already, and how many others are still to be built.
@@ -60,9 +62,9 @@ def run_rounds(store: Store, plan: Plan, *, engine: Engine, only: str | None) ->
     others are finished.
     """
     wanted = {(tile_id, channel.id) for tile_id, channel in _select(plan, only)}
-    content = _survey(store, plan, engine)
+    content = _survey(out_folder, plan, engine)
     tasks, keys, others = [], {}, 0
-    for name, task, key in unit_tasks(store, plan, content):
+    for name, task, key in unit_tasks(out_folder, plan, content):
         keys[name] = key
         if is_whole(task.directory):
             continue
@@ -74,12 +76,12 @@ def run_rounds(store: Store, plan: Plan, *, engine: Engine, only: str | None) ->
             others += 1
     _run(plan, engine, "units", run_unit, tasks)
     if not others:  # all there: the stage may be made of them
-        store.save_units(plan, keys)
+        out_folder.save_units(plan, keys)
     return len(tasks), others
 
 
 def unit_tasks(
-    store: Store, plan: Plan, content: Mapping[str, Any]
+    out_folder: OutFolder, plan: Plan, content: Mapping[str, Any]
 ) -> Iterator[tuple[str, UnitTask, str]]:
     """Yield `<tile>/<channel>`, task and key of every unit; `content` is what survey.json holds."""
     all_statistics = {id_: statistics_from_json(entry["display"]) for id_, entry in content.items()}
@@ -87,7 +89,7 @@ def unit_tasks(
         channel_id: make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
         for channel_id, entry in content.items()
     }
-    plans = {id_: plan_for(plan, entry["look"]["surface"]) for id_, entry in content.items()}
+    plans = {id_: smoothed_plan(plan, entry["look"]["surface"]) for id_, entry in content.items()}
     for tile_id, channel in _select(plan, None):
         statistics = all_statistics[channel.id]
         painter = plan.painter(channel)
@@ -96,7 +98,7 @@ def unit_tasks(
         field = fields[channel.id]
         repair = RepairOptions(**content[channel.id]["repair"])
         task, key = _unit_task(
-            store, as_built, tile_id, channel, field, repair, statistics, painted
+            out_folder, as_built, tile_id, channel, field, repair, statistics, painted
         )
         yield f"{tile_id}/{channel.id}", task, key
 
@@ -134,10 +136,10 @@ def _names(channel: Channel) -> tuple[str | int, ...]:
     return (channel.name, channel.id) + (() if channel.source else (channel.index,))
 
 
-def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
+def _survey(out_folder: OutFolder, plan: Plan, engine: Engine) -> dict[str, Any]:
     """Return (and write) each channel's statistics, iso-values and transfer functions."""
-    all_statistics = _all_statistics(store, plan, engine)
-    isos = _isos(store, plan, engine, all_statistics)
+    all_statistics = _all_statistics(out_folder, plan, engine)
+    isos = _isos(out_folder, plan, engine, all_statistics)
     neighbours = find_neighbours(plan.tiles)
     content = {}
     for channel in plan.channels:
@@ -166,7 +168,7 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
                     "value": reconciled.values[tile],
                     "background": f["background"],
                     "confidence": reconciled.confidences[tile],
-                    "reason": f["reason"] or _doubt(f, reconciled.confidences[tile], plan),
+                    "reason": f["reason"] or _reason(f, reconciled.confidences[tile], plan),
                     "file": f["file"],
                 }
                 for tile, f in found.items()
@@ -182,7 +184,7 @@ def _survey(store: Store, plan: Plan, engine: Engine) -> dict[str, Any]:
             ),
             "look": asdict(replace(appearance, painted_by=painter.id if painter else "")),
         }
-    write_json(store.survey_file, content)
+    write_json(out_folder.survey_file, content)
     return content
 
 
@@ -194,7 +196,7 @@ def _as_given(found: Mapping[str, Mapping[str, Any]]) -> Reconciled:
     return Reconciled(values, confidences, float(is_known), "clear" if is_known else "none")
 
 
-def _doubt(found: Mapping[str, Any], confidence: float, plan: Plan) -> str:
+def _reason(found: Mapping[str, Any], confidence: float, plan: Plan) -> str:
     """Return why a tile's surface is not clear; empty if it is."""
     least = plan.settings.isovalue.min_confidence
     if confidence >= least:
@@ -242,7 +244,9 @@ def _given(plan: Plan, channel: Channel, statistics: ChannelStatistics) -> float
     return given
 
 
-def _all_statistics(store: Store, plan: Plan, engine: Engine) -> dict[str, ChannelStatistics]:
+def _all_statistics(
+    out_folder: OutFolder, plan: Plan, engine: Engine
+) -> dict[str, ChannelStatistics]:
     files, tasks = {}, []
     for channel in plan.channels:
         task = statistics_task(plan, channel)
@@ -253,7 +257,7 @@ def _all_statistics(store: Store, plan: Plan, engine: Engine) -> dict[str, Chann
             asdict(plan.settings.window),
             plan.settings.surface.background_um if task.subtracts else 0,
         ]
-        file = store.statistics_file(
+        file = out_folder.statistics_file(
             channel.id, key_of(depends, window_maker, _reader(plan, channel))
         )
         files[channel.id] = file
@@ -268,7 +272,10 @@ def _all_statistics(store: Store, plan: Plan, engine: Engine) -> dict[str, Chann
 
 
 def _isos(
-    store: Store, plan: Plan, engine: Engine, all_statistics: Mapping[str, ChannelStatistics]
+    out_folder: OutFolder,
+    plan: Plan,
+    engine: Engine,
+    all_statistics: Mapping[str, ChannelStatistics],
 ) -> dict[tuple[str, str], dict[str, Any]]:
     files, tasks = {}, []
     settings = plan.settings
@@ -279,13 +286,13 @@ def _isos(
                 _input_key(plan, channel),
                 channel.index,
                 _box(tile.box),
-                asdict(settings.isovalue) | {"min_confidence": None},  # nothing to this round
+                asdict(settings.isovalue) | {"min_confidence": None},  # nothing to this pass
                 settings.surface.smoothing_um,
                 settings.surface.min_diagonal_um,
                 task.given,
                 None if task.background is None else task.background.to_json(),
             ]
-            file = store.iso_file(
+            file = out_folder.iso_file(
                 tile.id, channel.id, key_of(depends, iso_maker, _reader(plan, channel))
             )
             files[tile.id, channel.id] = file
@@ -293,13 +300,14 @@ def _isos(
                 tasks.append((f"{tile.id}/{channel.name}", (task, file)))
     _run(plan, engine, "iso-values", write_iso, tasks)
     return {
-        unit: read_json(file, _ISO_VALUE, _AGAIN) | {"file": file.relative_to(store.out).as_posix()}
+        unit: read_json(file, _ISO_VALUE, _AGAIN)
+        | {"file": file.relative_to(out_folder.out).as_posix()}
         for unit, file in files.items()
     }
 
 
 def _unit_task(
-    store: Store,
+    out_folder: OutFolder,
     plan: Plan,
     tile_id: str,
     channel: Channel,
@@ -336,7 +344,7 @@ def _unit_task(
         painted,
     ]
     key = key_of(depends, unit_maker, _reader(plan, channel))
-    directory = store.unit_dir(tile_id, channel.id, key)
+    directory = out_folder.unit_dir(tile_id, channel.id, key)
     ref, index = source_of(plan, channel), painted and painted[0]
     return UnitTask(ref, plan.level_of(channel), channel.index, given, directory, index), key
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.open_source import SourceRef, open_source
-from stereocell.building.out_folder import Store
-from stereocell.building.passes import run_rounds
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.passes import run_passes
 from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.building.settings import Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
@@ -47,12 +47,12 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     Raises StereoCellError; OUT is left as it was.
     """
     require_apart(source, out)
-    store = Store(out)
-    with phase_of(store, "plan") as phase:
+    out_folder = OutFolder(out)
+    with phase_of(out_folder, "plan") as phase:
         plan = settle(source, settings)
-        store.require_writable()
-        phase.is_up_to_date = not store.save_plan(plan)
-        write_bytes(store.settings_file, to_toml(plan.settings).encode())
+        out_folder.require_writable()
+        phase.is_up_to_date = not out_folder.save_plan(plan)
+        write_bytes(out_folder.settings_file, to_toml(plan.settings).encode())
         write_json(out / "provenance.json", provenance(plan))
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
@@ -124,10 +124,10 @@ def _added(plan: Plan) -> dict[str, Any]:
 
 def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     """Find windows and iso-values for all units, then build the units (or `only` one of them)."""
-    store = Store(out)
-    plan = store.plan()
-    with phase_of(store, "units") as phase:
-        built, missing = run_rounds(store, plan, engine=engine, only=only)
+    out_folder = OutFolder(out)
+    plan = out_folder.plan()
+    with phase_of(out_folder, "units") as phase:
+        built, missing = run_passes(out_folder, plan, engine=engine, only=only)
         phase.is_up_to_date = not built
         units = len(plan.tiles) * len(plan.channels)
         phase.about = "" if built == units else f"{built} of {units} units"
@@ -139,13 +139,15 @@ def run_stage(out: Path, engine: Engine) -> None:
     """Write OUT/stage from the units: stage.usda, looks/, tiles/ and, where there is a surface,
     specimen.usdz; last the list of all these, files.json. Other files are left alone.
     """
-    store = Store(out)
-    plan = store.plan()
-    with phase_of(store, "stage") as phase:
-        store.require_units_of(plan)
-        index, content = store.index(), store.survey()
+    out_folder = OutFolder(out)
+    plan = out_folder.plan()
+    with phase_of(out_folder, "stage") as phase:
+        out_folder.require_units_of(plan)
+        index, content = out_folder.index(), out_folder.survey()
         appearances = [appearance_from(content[channel.id]["look"]) for channel in plan.channels]
-        tiles = [(tile.id, tile_task(store, plan, index=index, tile=tile)) for tile in plan.tiles]
+        tiles = [
+            (tile.id, tile_task(out_folder, plan, index=index, tile=tile)) for tile in plan.tiles
+        ]
         about = provenance(plan)
         names = [plan.name, plan.modality]
         depends = [
@@ -156,9 +158,9 @@ def run_stage(out: Path, engine: Engine) -> None:
             list(plan.placement),
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
-        if phase.is_done(key, partial(_digest_of_stage, store)):
+        if phase.is_done(key, partial(_digest_of_stage, out_folder)):
             return
-        remove(store.stage_list)  # of what was
+        remove(out_folder.stage_list)  # of what was
         engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
         extents = [
             stage_writer.TileExtent(
@@ -167,7 +169,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             for _, t in tiles
         ]
         stage_writer.write_stage(
-            store.stage_dir,
+            out_folder.stage_dir,
             plan.name,
             appearances=appearances,
             tiles=extents,
@@ -175,50 +177,59 @@ def run_stage(out: Path, engine: Engine) -> None:
             modality=plan.modality,
             placement=plan.placement,
         )
-        store.remove_other_folders(store.stage_dir / "tiles", {tile.id for tile in plan.tiles})
-        files = {path: entry for _, tile in tiles for path, entry in tile.listed().items()}
-        small = store.stage_dir / usdz_writer.USDZ_NAME
-        usdz_writer.write_usdz(
-            store.stage_file, small, AsWritten({store.stage_dir.resolve(): files})
+        out_folder.remove_other_folders(
+            out_folder.stage_dir / "tiles", {tile.id for tile in plan.tiles}
         )
-        looks_dir = store.stage_dir / "looks"
-        written_files.write_list(store.stage_dir, files, looks_dir, store.stage_file, small)
+        files = {path: entry for _, tile in tiles for path, entry in tile.listed().items()}
+        small = out_folder.stage_dir / usdz_writer.USDZ_NAME
+        usdz_writer.write_usdz(
+            out_folder.stage_file, small, AsWritten({out_folder.stage_dir.resolve(): files})
+        )
+        looks_dir = out_folder.stage_dir / "looks"
+        written_files.write_list(
+            out_folder.stage_dir, files, looks_dir, out_folder.stage_file, small
+        )
 
 
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
     """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it."""
-    store = Store(out)
-    with phase_of(store, "bundle") as phase:
-        store.require_finished("stage")
-        path = stage if stage is not None else store.stage_file
+    out_folder = OutFolder(out)
+    with phase_of(out_folder, "bundle") as phase:
+        out_folder.require_finished("stage")
+        path = stage if stage is not None else out_folder.stage_file
         if not is_file(path):
             remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
             raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
         kept = objects_below(path.parent)
-        files = dependencies(path, store.stage_dir)  # first: it refuses those of others
+        files = dependencies(path, out_folder.stage_dir)  # first: it refuses those of others
         made_of = [str(path.absolute()), _states(files)] if kept is None else kept
         page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
         key = key_of([made_of, page], bundle_writer)
-        if kept is not None and store.is_begun("bundle"):
-            bundle_writer.remove_half(store.bundle_dir)
+        if kept is not None and out_folder.is_begun("bundle"):
+            bundle_writer.remove_half(out_folder.bundle_dir)
         bundle_writer.require_bundle(
-            store.bundle_dir
+            out_folder.bundle_dir
         )  # before it is written down that it was begun
-        if not phase.is_done(key, partial(_digest_of_bundle, store)):
-            store.remove_other_folders(store.parts_dir, {key})
-            parts = store.parts_dir / key
+        if not phase.is_done(key, partial(_digest_of_bundle, out_folder)):
+            out_folder.remove_other_folders(out_folder.parts_dir, {key})
+            parts = out_folder.parts_dir / key
             bundle_writer.write_bundle(
-                path, store.bundle_dir, viewer, run=engine.run, parts=parts, tell=_tell
+                path,
+                out_folder.bundle_dir,
+                viewer,
+                run=engine.run,
+                parts=parts,
+                report_line=_print_line,
             )
-    remove(store.parts_dir)
+    remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     console.print(f"bundle: {line}", markup=False, soft_wrap=True)
 
 
@@ -237,24 +248,24 @@ def digest_of(results: Iterable[Path]) -> str:
     return digest.hexdigest()[:20]
 
 
-def _digest_of_bundle(store: Store) -> str:
+def _digest_of_bundle(out_folder: OutFolder) -> str:
     """Return a digest of the bundle, whose files stand whole; empty: one does not."""
-    path = store.bundle_dir / bundle_writer.FILES
+    path = out_folder.bundle_dir / bundle_writer.FILES
     try:
         listed = read_list(path, "")
     except OutputError:
         return ""
-    faults = find_faults(store.bundle_dir, listed, since=path)
-    return "" if faults else digest_of([store.bundle_dir])
+    faults = find_faults(out_folder.bundle_dir, listed, since=path)
+    return "" if faults else digest_of([out_folder.bundle_dir])
 
 
-def _digest_of_stage(store: Store) -> str:
+def _digest_of_stage(out_folder: OutFolder) -> str:
     """Return a digest of the stage's list, whose files stand whole; empty: one does not."""
     try:
-        listed = written_files.read_stage_list(store.stage_dir)
+        listed = written_files.read_stage_list(out_folder.stage_dir)
     except OutputError:
         return ""
-    if not written_files.is_kept(store.stage_dir, listed, since=store.stage_list):
+    if not written_files.is_kept(out_folder.stage_dir, listed, since=out_folder.stage_list):
         return ""
     return written_files.digest_of(listed)
 
@@ -262,8 +273,8 @@ def _digest_of_stage(store: Store) -> str:
 class Phase:
     """One phase at work: does it have anything to do, and how long does it take."""
 
-    def __init__(self, store: Store, name: str) -> None:
-        self.store, self.name = store, name
+    def __init__(self, out_folder: OutFolder, name: str) -> None:
+        self.out_folder, self.name = out_folder, name
         self.key, self.about = "done", ""
         self.results: Callable[[], str] = str
         self.is_up_to_date = False
@@ -274,22 +285,23 @@ class Phase:
         results  returns a digest of it
         """
         self.key, self.results = key, results
-        entry = self.store.phases().get(self.name, {})
+        entry = self.out_folder.phases().get(self.name, {})
         self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
         if not self.is_up_to_date:
-            self.store.save_phase(self.name, "", "", 0.0, "")  # killed half-way, it is not done
+            # killed half-way, it is not done
+            self.out_folder.save_phase(self.name, "", "", 0.0, "")
         return self.is_up_to_date
 
 
 @contextmanager
-def phase_of(store: Store, name: str) -> Iterator[Phase]:
+def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
     """Tell how long a phase took and keep it for the report; one with nothing to do says so."""
     start = time.perf_counter()
-    phase = Phase(store, name)
+    phase = Phase(out_folder, name)
     yield phase
     seconds = time.perf_counter() - start
     if phase.is_up_to_date:
         console.print(f"{name}: up to date")
     else:
-        store.save_phase(name, phase.key, phase.results(), seconds, phase.about)
+        out_folder.save_phase(name, phase.key, phase.results(), seconds, phase.about)
         console.print(f"{name}: {seconds:.1f} s")

@@ -382,7 +382,7 @@ def _by(numbers: Sequence[float]) -> str:
     return " x ".join(f"{n:.15g}" for n in numbers)
 
 
-def plan_for(plan: Plan, surface_confidence: SurfaceConfidence) -> Plan:
+def smoothed_plan(plan: Plan, surface_confidence: SurfaceConfidence) -> Plan:
     """Return the plan by which a channel is built; one whose surface is unclear is smoothed more.
 
     At the level of a surface that nothing tells from noise the field is frayed, in solids that join
@@ -398,5 +398,5 @@ def plan_for(plan: Plan, surface_confidence: SurfaceConfidence) -> Plan:
     repair, step = plan.repair, plan.spacing_um
     closing = repair.reach_um(step) - replace(repair, alpha_um=0.0).reach_um(step)
     sigma = float(surface.smoothing_um) + closing / SMOOTHING_REACH
-    calm = replace(surface, smoothing_um=sigma)
-    return replace(plan, settings=replace(plan.settings, surface=calm))
+    smoothed = replace(surface, smoothing_um=sigma)
+    return replace(plan, settings=replace(plan.settings, surface=smoothed))

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import find_closed, is_whole, load_lods, load_volume
 from stereocell.model.channel import PaintColors
@@ -18,7 +18,7 @@ from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import find_json, read_json, write_json
-from stereocell.storage.workspace import at_hand, remove
+from stereocell.storage.workspace import cached, remove
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import written_files
 
@@ -59,12 +59,14 @@ class TileTask:
         return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
 
 
-def tile_task(store: Store, plan: Plan, *, index: Mapping[str, str], tile: Tile) -> TileTask:
+def tile_task(
+    out_folder: OutFolder, plan: Plan, *, index: Mapping[str, str], tile: Tile
+) -> TileTask:
     """Return the task of one tile; `index` holds the units' keys, by `<tile>/<channel>`."""
     units = tuple(
         (
             channel.id,
-            store.unit_dir(tile.id, channel.id, index[f"{tile.id}/{channel.id}"]),
+            out_folder.unit_dir(tile.id, channel.id, index[f"{tile.id}/{channel.id}"]),
             None if painter is None else PaintColors(channel.color, painter.color),
         )
         for channel in plan.channels
@@ -82,13 +84,13 @@ def tile_task(store: Store, plan: Plan, *, index: Mapping[str, str], tile: Tile)
     made_of = [(channel_id, folder.name, paint) for channel_id, folder, paint in units]
     depends = [asdict(content), [(*one, paint and asdict(paint)) for *one, paint in made_of]]
     key = key_of(depends, sys.modules[__name__])
-    return TileTask(store.stage_dir, content, units, store.tile_file(tile.id), key)
+    return TileTask(out_folder.stage_dir, content, units, out_folder.tile_file(tile.id), key)
 
 
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units. Raises OutputError."""
     remove(task.record)
-    with at_hand(*(folder for _, folder, _ in task.units)):
+    with cached(*(folder for _, folder, _ in task.units)):
         channels = tuple(
             ChannelContent(
                 channel_id, load_lods(folder), load_volume(folder), paint, find_closed(folder)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stereocell.building.input_unchanged import require_input
 from stereocell.building.open_source import SourceRef, open_source, source_of
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.phases import provenance
 from stereocell.building.plan import PALETTE, Channel, Plan
 from stereocell.building.tissue_files import (
@@ -88,8 +88,8 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     Nothing is learned anew where OUT/tissue comes from the same voxels, options and code and is
     whole. Raises StereoCellError; plan and OUT/tissue are then as they were.
     """
-    store = Store(out)
-    plan = without_tissue(store.plan())
+    out_folder = OutFolder(out)
+    plan = without_tissue(out_folder.plan())
     channel = _find_channel(plan, request.channel)
     voxels = math.prod(plan.region.shape)
     if voxels > MOST_VOXELS:
@@ -112,9 +112,9 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     key = key_of(depends, tissue_module, network_module, reader_of(plan.source))
     record = _find_learned(out / FOLDER, key)
     if record is None:
-        record = _learn(store, plan, channel, options, network, settings, key)
+        record = _learn(out_folder, plan, channel, options, network, settings, key)
     plan = with_tissue(plan, out, record)
-    store.save_plan(plan)
+    out_folder.save_plan(plan)
     write_json(out / "provenance.json", provenance(plan))
     return plan
 
@@ -157,7 +157,7 @@ def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
 
 
 def _learn(
-    store: Store,
+    out_folder: OutFolder,
     plan: Plan,
     channel: Channel,
     options: TissueOptions,
@@ -208,7 +208,7 @@ def _learn(
         "libraries": libraries_of(tissue_module, network_module),
     }
     shape = dataset.levels[plan.level].shape
-    with replacing_folder(store.out / FOLDER) as folder:
+    with replacing_folder(out_folder.out / FOLDER) as folder:
         write_probabilities(
             folder / VOXELS,
             [one.probabilities for one in classes],

@@ -10,7 +10,7 @@ from typing import Any
 from stereocell.model.errors import OutputError
 from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json
-from stereocell.storage.workspace import bring
+from stereocell.storage.workspace import fetch
 
 FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
 _SCHEMA = "tissue.schema.json"
@@ -37,7 +37,7 @@ def read_whole(folder: Path) -> dict[str, Any]:
     Raises OutputError, which names the first file that is not, and the remedy.
     """
     record = read_record(folder)
-    bring(folder)
+    fetch(folder)
     found, written = digests_of(folder), record["files"]
     for name in sorted(written.keys() | found.keys()):
         if found.get(name) != written.get(name):

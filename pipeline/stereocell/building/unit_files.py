@@ -24,7 +24,7 @@ from stereocell.model.unit import Closed, Unit
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
 from stereocell.storage.json_files import find_json, read_json, write_json
-from stereocell.storage.workspace import bring, is_file
+from stereocell.storage.workspace import fetch, is_file
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
@@ -107,7 +107,7 @@ def _is_own(record: Mapping[str, Any]) -> bool:
 
 def _as_written(directory: Path, file: Path) -> Path:
     """Return a file of a unit, which is what the record says. Raises OutputError."""
-    bring(file)
+    fetch(file)
     entry = load_record(directory)["files"].get(file.name)
     fault = "not in unit.json" if entry is None else ""
     if entry is not None and not file.is_file():

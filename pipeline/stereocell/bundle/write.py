@@ -53,7 +53,7 @@ MANIFEST = "manifest.json"
 FILES = "files.json"
 T = TypeVar("T")
 R = TypeVar("R")
-_Told = Callable[[str], None]
+_ReportLine = Callable[[str], None]
 
 
 class Run(Protocol):
@@ -71,7 +71,7 @@ def write_bundle(
     *,
     run: Run,
     parts: Path | None = None,
-    tell: _Told = lambda _: None,
+    report_line: _ReportLine = lambda _: None,
 ) -> None:
     """Write the bundle of a stage, or of a layer over it, in place of an older one.
 
@@ -79,7 +79,7 @@ def write_bundle(
     run          how the tiles are shared among workers; the bytes don't depend on their number
     parts        a folder for the tiles that are finished, of this very stage: those that are in it
                  are taken, and all are left there; None: none are kept if this does not end well
-    tell         is given a line on each layer that is not as it was written, and on each surface
+    report_line  is given a line on each layer that is not as it was written, and on each surface
                  that was edited by hand
 
     Raises StageError where the stage lacks something or a file of it is damaged, naming prim and
@@ -90,7 +90,7 @@ def write_bundle(
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
     with replacing_folder(bundle_dir) as folder:
-        _fill(stage_path, folder, viewer_dist, run, parts or folder / ".parts", tell)
+        _fill(stage_path, folder, viewer_dist, run, parts or folder / ".parts", report_line)
         shutil.rmtree(folder / ".parts", ignore_errors=True)
 
 
@@ -112,7 +112,7 @@ def _fill(
     viewer_dist: Path | None,
     run: Run,
     parts: Path,
-    tell: _Told,
+    report_line: _ReportLine,
 ) -> None:
     as_written = AsWritten()
     as_written.require_layers(stage_path.parent)
@@ -139,7 +139,7 @@ def _fill(
     exported = run("bundle", export, [(name, name) for name in missing])
     found |= dict(zip(missing, [tile for tile, _ in exported], strict=True))
     for layer_path in sorted(as_written.changed.union(*(changed for _, changed in exported))):
-        tell(
+        report_line(
             f"{layer_path}: {CHANGED}: taken as it is; if nobody edited it, remove it and {REMEDY}"
         )
     tiles = [tile for tile in found.values() if tile is not None]
@@ -163,7 +163,7 @@ def _fill(
     for tile in tiles:
         for channel in tile.channels:
             if channel.edit:
-                tell(f"{tile.id}/{channel.channel_id}: {channel.edit}")
+                report_line(f"{tile.id}/{channel.channel_id}: {channel.edit}")
 
 
 def describe_bundle(

@@ -71,7 +71,7 @@ def _reason(error: Exception) -> str:
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
     print(f"stereocell: {_shortened(line)}", file=sys.stderr)
     if options.json:
-        commands.tell(commands.to_json({"error": line, "exit_code": code}))
+        commands.print_line(commands.to_json({"error": line, "exit_code": code}))
     return code
 
 

@@ -38,7 +38,7 @@ class StdoutLost(Exception):
         self.error = error
 
 
-def tell(text: str) -> None:
+def print_line(text: str) -> None:
     """Print a line on stdout, now. Raises StdoutLost."""
     try:
         print(text, flush=True)
@@ -46,10 +46,10 @@ def tell(text: str) -> None:
         raise StdoutLost(error) from error
 
 
-def say(options: argparse.Namespace, text: str) -> None:
-    """Tell a person something."""
+def print_unless_json(options: argparse.Namespace, text: str) -> None:
+    """Print a text for a person."""
     if not options.json:
-        tell(plain(_as_given(options, text)))
+        print_line(plain(_as_given(options, text)))
 
 
 def plain(text: str) -> str:
@@ -60,19 +60,19 @@ def plain(text: str) -> str:
 
 
 def answer(options: argparse.Namespace, found: Answer) -> int:
-    """Tell a machine what was found, if one asked; return the exit code."""
+    """Print the answer for a machine, if one asked; return the exit code."""
     if options.json and found.data:
-        tell(_as_given(options, to_json(found.data)))
+        print_line(_as_given(options, to_json(found.data)))
     return found.code
 
 
 def to_json(data: Mapping[str, Any]) -> str:
     """Return one line of JSON in the words of its names, which a lone surrogate is none of."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False)
-    return text if _can_be_told(text) else json.dumps(data, allow_nan=False)
+    return text if _can_be_printed(text) else json.dumps(data, allow_nan=False)
 
 
-def _can_be_told(text: str) -> bool:
+def _can_be_printed(text: str) -> bool:
     """Return whether stdout has all of its letters, and a terminal no trouble with them."""
     try:
         text.encode(sys.stdout.encoding or "utf-8")
@@ -91,7 +91,9 @@ def settings(options: argparse.Namespace) -> Answer:
     from stereocell.building import settings as settings_module
 
     found = settings_module.load(options.preset, options.config, flags={})
-    say(options, settings_module.to_toml(found, settings_module.TEMPLATE).removesuffix("\n"))
+    print_unless_json(
+        options, settings_module.to_toml(found, settings_module.TEMPLATE).removesuffix("\n")
+    )
     return Answer(settings_module.to_dict(found))
 
 
@@ -102,7 +104,7 @@ def _series(options: argparse.Namespace) -> Answer | None:
     from stereocell import read
 
     lines = read.list_series(options.input)
-    say(options, "\n".join(lines))
+    print_unless_json(options, "\n".join(lines))
     return Answer({"series": list(lines)})
 
 
@@ -137,14 +139,14 @@ def iso(options: argparse.Namespace) -> Answer:
     candidates, path = iso_preview.preview(
         options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
-    say(options, "\n".join(iso_preview.table(candidates)))
-    say(options, f"wrote {path}")
+    print_unless_json(options, "\n".join(iso_preview.table(candidates)))
+    print_unless_json(options, f"wrote {path}")
     return Answer({"picture": str(path), "candidates": [asdict(one) for one in candidates]})
 
 
 def run_phases(options: argparse.Namespace, *names: str) -> Answer:
     from stereocell.building import phases
-    from stereocell.building.out_folder import Store
+    from stereocell.building.out_folder import OutFolder
     from stereocell.engine.run import Engine
     from stereocell.model.errors import UsageError
     from stereocell.storage.claim import LOCK
@@ -172,7 +174,7 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
                 phase.run_report(out)
     finally:
         engine.close()
-    seconds = {name: phase["seconds"] for name, phase in Store(out).phases().items()}
+    seconds = {name: phase["seconds"] for name, phase in OutFolder(out).phases().items()}
     results = {
         "stage": "stage/stage.usda",
         "bundle": "bundle/index.html",
@@ -193,8 +195,8 @@ def build(options: argparse.Namespace) -> Answer:
     planned = plan(options)
     made = run_phases(options, "units", "stage", "bundle", "report")
     for name in ("stage", "bundle", "report"):
-        say(options, f"{name:<8} {made.data[name]}")
-    say(options, f"look at it: stereocell view {options.shown}")
+        print_unless_json(options, f"{name:<8} {made.data[name]}")
+    print_unless_json(options, f"look at it: stereocell view {options.shown}")
     return Answer({**planned.data, **made.data})
 
 
@@ -209,7 +211,7 @@ def slices(options: argparse.Namespace) -> Answer:
     wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
     require_apart(options.input, options.out)
     count = write_slices(phases.settle(options.input, without_surface(wanted)), options.out)
-    say(options, f"wrote {count} slices to {options.out}")
+    print_unless_json(options, f"wrote {count} slices to {options.out}")
     return Answer({"out": str(options.out), "slices": count})
 
 
@@ -234,7 +236,7 @@ def sample(options: argparse.Namespace) -> Answer:
         samples.write_head(options.out, options.seed)
     else:
         samples.write_brain_cells(options.out)
-    say(options, f"wrote {options.out}")
+    print_unless_json(options, f"wrote {options.out}")
     return Answer({"out": str(options.out)})
 
 
@@ -253,7 +255,7 @@ def check(options: argparse.Namespace) -> Answer:
     lines = []
     for line in chain(run(options.out), _deep(options) if options.deep else ()):
         lines.append(asdict(line))
-        say(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
+        print_unless_json(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
     is_sound = all(line["ok"] for line in lines)
     return Answer({"ok": is_sound, "checks": lines}, 0 if is_sound else 1)
 
@@ -278,7 +280,9 @@ def doctor(options: argparse.Namespace) -> Answer:
     for one in examine():
         found.append(one)
         mark = "ok     " if one.ok else "missing" if one.is_needed else "without"
-        say(options, f"{mark} {one.name}: {one.found}" + (f": {one.cost}" if one.cost else ""))
+        print_unless_json(
+            options, f"{mark} {one.name}: {one.found}" + (f": {one.cost}" if one.cost else "")
+        )
     can_work = all(one.ok for one in found if one.is_needed)
     return Answer({"ok": can_work, "found": [asdict(one) for one in found]}, 0 if can_work else 1)
 

@@ -81,7 +81,7 @@ def choose_repair(
     spacing_um  (z, y, x)
 
     No gaps are closed in a surface that is not clear, by either wrap: none is known to be one
-    (building.plan.plan_for).
+    (building.plan.smoothed_plan).
     """
     sums = list(tiles)
     count, kept = (sum(tile[key] for tile in sums) for key in ("count", "kept"))

@@ -94,10 +94,10 @@ def simplify_without_defects(
 class _Draft:
     """One simplification of a mesh after another, and their defects.
 
-    mesh       the mesh, and after its own the vertices by which sheets were parted
-    body       which body of the mesh each of the vertices belongs to
+    mesh          the mesh, and after its own the vertices by which sheets were parted
+    body          which body of the mesh each of the vertices belongs to
     border_edges  of the mesh
-    triangles  what was checked last, and `crossings` the pairs of these that meet
+    triangles     what was checked last, and `crossings` the pairs of these that meet
 
     Vertices never move, so that two triangles of before meet now if they met then: crossings are
     looked for among pairs with a fresh triangle only; `find_defects` finds the same ones.

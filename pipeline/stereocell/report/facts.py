@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.unit_files import find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile
@@ -123,14 +123,14 @@ class Total:
     cavities_filled: int
 
 
-def gather(store: Store) -> Facts:
+def gather(out_folder: OutFolder) -> Facts:
     """Return the facts of OUT. Raises OutputError where plan or a unit is missing."""
-    plan = store.plan()
-    store.require_units_of(plan)
-    content, index = store.survey(), store.index()
+    plan = out_folder.plan()
+    out_folder.require_units_of(plan)
+    content, index = out_folder.survey(), out_folder.index()
     units = [
         _unit(
-            store,
+            out_folder,
             tile,
             channel,
             index[f"{tile.id}/{channel.id}"],
@@ -139,7 +139,7 @@ def gather(store: Store) -> Facts:
         for tile in plan.tiles
         for channel in plan.channels
     ]
-    phases = store.phases()
+    phases = out_folder.phases()
     return Facts(
         plan=plan,
         survey=content,
@@ -150,14 +150,16 @@ def gather(store: Store) -> Facts:
             if name in phases and phases[name]["key"]
         },
         steps=_steps(units),
-        files=_files(store),
+        files=_files(out_folder),
     )
 
 
-def _unit(store: Store, tile: Tile, channel: Channel, key: str, found: dict[str, Any]) -> UnitFacts:
-    directory = store.unit_dir(tile.id, channel.id, key)
+def _unit(
+    out_folder: OutFolder, tile: Tile, channel: Channel, key: str, found: dict[str, Any]
+) -> UnitFacts:
+    directory = out_folder.unit_dir(tile.id, channel.id, key)
     record = load_record(directory)
-    bundle = store.bundle_dir
+    bundle = out_folder.bundle_dir
     lods = []
     for level, lod in enumerate(record["lods"]):
         glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
@@ -271,10 +273,10 @@ def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
     )
 
 
-def _files(store: Store) -> tuple[FileFacts, ...]:
+def _files(out_folder: OutFolder) -> tuple[FileFacts, ...]:
     """Return count and bytes of the files in units, stage and bundle, by suffix, largest first."""
     rows = []
-    for part in (store.out / "units", store.stage_dir, store.bundle_dir):
+    for part in (out_folder.out / "units", out_folder.stage_dir, out_folder.bundle_dir):
         sizes: dict[str, list[int]] = defaultdict(list)
         for file, size in sizes_below(part).items():
             if not file.name.startswith("."):

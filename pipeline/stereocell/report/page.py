@@ -15,8 +15,8 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from stereocell.building.out_folder import Store
-from stereocell.building.plan import plan_for
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import smoothed_plan
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
 from stereocell.model.identifiers import from_identifier
 from stereocell.model.lattice_field import LatticeField, make_iso_field
@@ -51,15 +51,15 @@ def write_report(out: Path) -> None:
 
     Stage and bundle may be missing: the page says so. Raises OutputError where plan or units are.
     """
-    store = Store(out)
-    facts = gather(store)
-    write_bytes(store.report_file, render(store, facts).encode())
+    out_folder = OutFolder(out)
+    facts = gather(out_folder)
+    write_bytes(out_folder.report_file, render(out_folder, facts).encode())
 
 
-def render(store: Store, facts: Facts) -> str:
+def render(out_folder: OutFolder, facts: Facts) -> str:
     """Return the page as HTML."""
     plan = facts.plan
-    tissue = find_tissue(store.out, plan)  # first: what is damaged ends it before all is drawn
+    tissue = find_tissue(out_folder.out, plan)  # first: what is damaged ends it before all is drawn
     chosen = choose_units(len(plan.tiles), len(plan.channels), MOST_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
@@ -69,7 +69,7 @@ def render(store: Store, facts: Facts) -> str:
         iso_fields = _iso_fields(facts)
         cards = [
             [
-                _card(store, facts, units[key], iso_fields[key[1]])
+                _card(out_folder, facts, units[key], iso_fields[key[1]])
                 for channel in channels
                 if (key := (plan.tiles[tile].id, plan.channels[channel].id)) in units
             ]
@@ -120,7 +120,7 @@ def render(store: Store, facts: Facts) -> str:
             part: [file for file in facts.files if file.part == part]
             for part in dict.fromkeys(file.part for file in facts.files)
         },
-        settings=store.settings_file.read_text() if store.settings_file.is_file() else "",
+        settings=out_folder.settings_file.read_text() if out_folder.settings_file.is_file() else "",
     )
 
 
@@ -196,7 +196,9 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
     return rows
 
 
-def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None) -> dict[str, Any]:
+def _card(
+    out_folder: OutFolder, facts: Facts, unit: UnitFacts, iso: LatticeField | None
+) -> dict[str, Any]:
     """Return what the page shows of one unit: its slices and its curve."""
     plan = facts.plan
     lattice = unit.tile.lattice(plan.region)
@@ -211,12 +213,12 @@ def _card(store: Store, facts: Facts, unit: UnitFacts, iso: LatticeField | None)
         first_um=plan.position_um(lattice.start),
         spacing_um=plan.spacing_um,
         mesh=load_lods(unit.directory)[0].mesh if unit.lods else None,
-        sigma_um=float(plan_for(plan, surface_confidence).settings.surface.smoothing_um),
+        sigma_um=float(smoothed_plan(plan, surface_confidence).settings.surface.smoothing_um),
         iso_at=None
         if iso is None
         else partial(_in_eight_bits, iso, statistics.background, low, high),
     )
-    curve = read_curve(store.out, unit)
+    curve = read_curve(out_folder.out, unit)
     levels, found = curve.get("levels"), curve.get("found")
     return {
         "unit": unit,

@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.phases import digest_of, phase_of, provenance
 from stereocell.report import page
 from stereocell.storage.cache_key import key_of
@@ -11,12 +11,12 @@ from stereocell.storage.cache_key import key_of
 
 def run_report(out: Path) -> None:
     """Write OUT/report/index.html: pictures, sizes, times."""
-    store = Store(out)
-    with phase_of(store, "report") as phase:
-        plan = store.plan()
-        store.require_units_of(plan)
-        others = {name: entry for name, entry in store.phases().items() if name != "report"}
-        content = [store.index(), store.survey(), provenance(plan), others]
+    out_folder = OutFolder(out)
+    with phase_of(out_folder, "report") as phase:
+        plan = out_folder.plan()
+        out_folder.require_units_of(plan)
+        others = {name: entry for name, entry in out_folder.phases().items() if name != "report"}
+        content = [out_folder.index(), out_folder.survey(), provenance(plan), others]
         key = key_of([content, page.TEMPLATE.read_text()], page)
-        if not phase.is_done(key, partial(digest_of, [store.report_file])):
+        if not phase.is_done(key, partial(digest_of, [out_folder.report_file])):
             page.write_report(out)

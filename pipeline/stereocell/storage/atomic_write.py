@@ -17,7 +17,7 @@ from pathlib import Path
 from stereocell.model.errors import OutputError
 from stereocell.storage.claim import require_asked
 from stereocell.storage.temporary_names import clear_beside
-from stereocell.storage.workspace import keep, making
+from stereocell.storage.workspace import making, upload
 
 
 @contextmanager
@@ -39,7 +39,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             require_asked()
             os.replace(temporary, path)
-            keep(path)
+            upload(path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:

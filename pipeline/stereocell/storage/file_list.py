@@ -15,7 +15,7 @@ from typing import Any
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.json_files import read_json
-from stereocell.storage.workspace import at_hand, is_mirrored, sizes_below
+from stereocell.storage.workspace import cached, is_mirrored, sizes_below
 
 # by path from the list's folder, with forward slashes: {"bytes": ..., "sha256": ...}
 FileList = Mapping[str, Mapping[str, Any]]
@@ -33,7 +33,7 @@ def list_files(*paths: Path, root: Path) -> dict[str, dict[str, Any]]:
     """Return the list of files, and of all below folders, by their paths from `root`."""
     listed = {}
     for path in paths:
-        with at_hand(path):
+        with cached(path):
             for file in sizes_below(path):
                 listed[file.relative_to(root).as_posix()] = measure(file)
     return listed
@@ -91,7 +91,7 @@ def _faults(root: Path, listed: FileList, since: Path | None) -> Iterator[tuple[
             continue
         else:
             hashed += 1
-            with at_hand(file):
+            with cached(file):
                 if is_same(file, entry):
                     continue
             fault = DAMAGED

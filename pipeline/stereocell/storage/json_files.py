@@ -12,7 +12,7 @@ from jsonschema.exceptions import best_match
 from stereocell.model.errors import OutputError
 from stereocell.storage.assets import schema_path
 from stereocell.storage.atomic_write import write_bytes
-from stereocell.storage.workspace import bring
+from stereocell.storage.workspace import fetch
 
 
 def read_json(path: Path, schema: str | None, remedy: str) -> Any:
@@ -23,7 +23,7 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
 
     Raises OutputError, which names file, field and remedy.
     """
-    bring(path)
+    fetch(path)
     try:
         content = json.loads(path.read_bytes(), parse_constant=_refuse, parse_float=_finite)
     except FileNotFoundError:

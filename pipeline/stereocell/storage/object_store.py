@@ -169,7 +169,7 @@ class Mirror:
 
     # --- to here
 
-    def bring(self, keys: Iterable[str]) -> list[Path]:
+    def fetch(self, keys: Iterable[str]) -> list[Path]:
         """Fetch the objects that aren't here; return their files."""
         fs, base = self._storage
         files = {key: self.place.root / key for key in keys}
@@ -188,7 +188,7 @@ class Mirror:
 
     # --- to there
 
-    def keep(self, path: Path, there: Mapping[str, str] | None = None) -> None:
+    def upload(self, path: Path, there: Mapping[str, str] | None = None) -> None:
         """Put a file, or all of a folder in place of what was there.
 
         there  what is to be moved into the folder: from where, by what it is called there

@@ -4,9 +4,9 @@ pxr, numpy and PIL want files. So where OUT is an address (`s3://...`), a comman
 of this machine that lasts as long as it does, and each of a cluster's workers in one of the same
 name on its own machine:
 
-- `keep` puts what was written under its final name, whole, what tells of the others last. A large
+- `upload` puts what was written under its final name, whole, what tells of the others last. A large
   file is then taken away here: the disk holds what is at work, never the build.
-- `bring` fetches what is about to be read; the small files that steer a build come at the start.
+- `fetch` gets what is about to be read; the small files that steer a build come at the start.
 
 In any other folder these do nothing, so that readers and writers just call them.
 """
@@ -36,40 +36,40 @@ def _of(path: Path) -> Mirror | None:
     return next((mirror for mirror in _open if path.is_relative_to(mirror.place.root)), None)
 
 
-def bring(*paths: Path) -> None:
-    """Have files, or all of folders, at hand. Raises OutputError."""
+def fetch(*paths: Path) -> None:
+    """Fetch files, or all of folders. Raises OutputError."""
     for path in paths:
         mirror = _of(path)
         if mirror is not None and not path.is_file():
-            mirror.bring(mirror.keys_of(path))
+            mirror.fetch(mirror.keys_of(path))
 
 
 @contextmanager
-def at_hand(*paths: Path) -> Iterator[None]:
-    """Have files, or all of folders, at hand within the block; what it fetched is gone afterwards.
+def cached(*paths: Path) -> Iterator[None]:
+    """Have files, or all of folders, here within the block; what it fetched is gone afterwards.
 
     Raises OutputError.
     """
-    brought: list[Path] = []
+    fetched: list[Path] = []
     try:
         for path in paths:
             mirror = _of(path)
             if mirror is not None:
-                brought += mirror.bring(mirror.keys_of(path))
+                fetched += mirror.fetch(mirror.keys_of(path))
         yield
     finally:
-        for file in brought:
+        for file in fetched:
             file.unlink(missing_ok=True)
 
 
-def keep(path: Path) -> None:
+def upload(path: Path) -> None:
     """Put a file that was written under its final name. Raises OutputError.
 
     One of a folder that this process is making is put with the folder.
     """
     mirror = _of(path)
     if mirror is not None and not any(path.is_relative_to(folder) for folder in mirror.making):
-        mirror.keep(path)
+        mirror.upload(path)
 
 
 @contextmanager
@@ -84,7 +84,7 @@ def making(folder: Path, final: Path) -> Iterator[None]:
     try:
         yield
         old, new = mirror._key(folder), mirror._key(final)
-        mirror.keep(final, {new + key[len(old) :]: kept for key, kept in mirror.moves.items()})
+        mirror.upload(final, {new + key[len(old) :]: kept for key, kept in mirror.moves.items()})
     finally:
         mirror.making.discard(folder)
         mirror.moves = {}
@@ -166,7 +166,7 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
         with mirror.alone(command) if command else nullcontext():
             mirror.list_all()
             keys = mirror.keys_of(root / only)
-            mirror.bring(key for key in keys if not command or STEERING.fullmatch(key))
+            mirror.fetch(key for key in keys if not command or STEERING.fullmatch(key))
             yield root
     except StereoCellError as error:
         error.args = tuple(str(part).replace(str(root), mirror.place.shown) for part in error.args)

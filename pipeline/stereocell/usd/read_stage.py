@@ -19,7 +19,7 @@ from stereocell.formats.gltf import Material
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.location import Location, require_own
-from stereocell.storage.workspace import at_hand
+from stereocell.storage.workspace import cached
 from stereocell.usd.layer import (
     CHANNELS,
     METERS_PER_UNIT,
@@ -205,7 +205,7 @@ def loaded(
     that is damaged, too, where the stage is held against its list.
     """
     path = TILES.AppendChild(tile_id)
-    with at_hand(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
+    with cached(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
         if as_written is not None:
             for folder in _stage_folders(stage):
                 as_written.require_layers(folder / "tiles" / tile_id)

@@ -27,7 +27,7 @@ from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tile_content import Provenance, TileContent
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.workspace import at_hand
+from stereocell.storage.workspace import cached
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
     LAYER_SUFFIXES,
@@ -115,7 +115,7 @@ def write_stage(
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
         prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
         file = stage_dir / "tiles" / tile.id / LAYER_NAME
-        with at_hand(file):
+        with cached(file):
             selections, extents = _read_layer(file)
         for variant_set, variant in selections:
             prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)

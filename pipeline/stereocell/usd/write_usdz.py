@@ -25,7 +25,7 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
-from stereocell.storage.workspace import bring, remove
+from stereocell.storage.workspace import fetch, remove
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_stage import (
@@ -228,7 +228,7 @@ def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path, as_written: AsWritte
         export(layer, Path(folder) / _LAYER)
         files = [(_LAYER, Path(folder) / _LAYER)]
         for part in parts:
-            bring(*_images(part).values())
+            fetch(*_images(part).values())
             files += [
                 (_texture_name(part, kind), as_written.require(file))
                 for kind, file in _images(part).items()

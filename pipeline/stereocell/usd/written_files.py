@@ -25,7 +25,7 @@ from stereocell.storage.file_list import (
     list_files,
     read_list,
 )
-from stereocell.storage.workspace import at_hand, bring, is_file
+from stereocell.storage.workspace import cached, fetch, is_file
 from stereocell.usd.layer import LAYER_SUFFIXES, is_layer
 
 FILES, STAGE_NAME = "files.json", "stage.usda"
@@ -65,7 +65,7 @@ def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
     """Return what is to be said of a file that is not the one of the list."""
     if file.suffix not in LAYER_SUFFIXES:
         return DAMAGED
-    with at_hand(file):
+    with cached(file):
         if not is_layer(file):
             return DAMAGED
         is_as_long = file.stat().st_size == entry["bytes"]
@@ -104,7 +104,7 @@ class AsWritten:
         for path, entry in listed.items():
             file = root / path
             if file.parent == folder and file.suffix in LAYER_SUFFIXES:
-                bring(file)
+                fetch(file)
                 self._require(file, entry)
 
     def _list_over(self, folder: Path) -> tuple[Path, FileList]:

@@ -1,4 +1,4 @@
-"""Hold a bundle against the stage that it was exported from: what each file decodes to.
+"""Compare a bundle with the stage that it was exported from: what each file decodes to.
 
 Surfaces: every vertex of a decoded .glb lies within the lattice's half diagonal of a vertex of the
 composed mesh, and the other way round, triangle by triangle too, which face the same way and have
@@ -94,7 +94,7 @@ class TileFinding:
     edits: tuple[str, ...] = ()
 
 
-def hold_manifest(stage_file: Path, bundle: Path) -> list[str]:
+def compare_manifest(stage_file: Path, bundle: Path) -> list[str]:
     """Return what the manifest says otherwise than the composed stage. Raises StereoCellError."""
     stage = open_stage(stage_file)
     manifest = read_json(bundle / MANIFEST, "bundle.schema.json", _REMEDY)
@@ -116,11 +116,11 @@ def hold_manifest(stage_file: Path, bundle: Path) -> list[str]:
     ]:
         return [*problems, "the channels are not the stage's"]
     for appearance, channel in zip(appearances, manifest["channels"], strict=True):
-        problems += _hold_channel(appearance, channel, bundle)
+        problems += _compare_channel(appearance, channel, bundle)
     return problems
 
 
-def _hold_channel(
+def _compare_channel(
     appearance: ComposedAppearance, channel: dict[str, Any], bundle: Path
 ) -> Iterator[str]:
     away = max(abs(a - b) for a, b in zip(appearance.color, channel["color"], strict=True))
@@ -162,7 +162,7 @@ def _hold_channel(
             yield f"{appearance.id}: the lookup table of {name!r} is not the stage's"
 
 
-def hold_histograms(bundle: Path, tiles: Sequence[TileFinding]) -> Iterator[str]:
+def compare_histograms(bundle: Path, tiles: Sequence[TileFinding]) -> Iterator[str]:
     """Yield which channel's histogram of value and gradient its volumes do not give."""
     manifest = read_json(bundle / MANIFEST, "bundle.schema.json", _REMEDY)
     for channel in manifest["channels"]:
@@ -189,7 +189,7 @@ def _unlike(
             yield f"{name}: {key} is {found[key]!r}, {whose} {value!r}"
 
 
-def hold_tile(task: BundleTask) -> TileFinding:
+def compare_tile(task: BundleTask) -> TileFinding:
     """Return how one tile's files agree with the composed stage. Raises StereoCellError."""
     manifest = read_json(task.bundle / MANIFEST, "bundle.schema.json", _REMEDY)
     channels = {channel["id"]: channel for channel in manifest["channels"]}
@@ -218,7 +218,7 @@ def hold_tile(task: BundleTask) -> TileFinding:
             edits += [f"{name}: {shown.edit}"] if shown.edit else []
             contents = dict(_contents(task.bundle, channel, task.tile_id))
             surfaces += len(contents)
-            apart, faults = _hold_surfaces(contents, lods)
+            apart, faults = _compare_surfaces(contents, lods)
             worst = max(worst, apart)
             problems += [f"{name}: {fault}" for fault in faults]
             entry = _volume_entry(task.bundle, channel, task.tile_id)
@@ -228,7 +228,7 @@ def hold_tile(task: BundleTask) -> TileFinding:
             elif composed is not None and entry is not None:
                 problems += _unlike(name, entry, _placed(composed))
                 voxels = appearance.window_voxels(read_atlas(composed.atlas))
-                problems += [f"{name}: {fault}" for fault in _hold_volume(task, entry, voxels)]
+                problems += [f"{name}: {fault}" for fault in _compare_volume(task, entry, voxels)]
                 joints[appearance.id] = count_tile(voxels, composed, appearance.gradient_max)
     return TileFinding(
         task.tile_id, surfaces, len(joints), worst, joints, tuple(problems), tuple(edits)
@@ -276,7 +276,7 @@ def _contents(bundle: Path, channel: dict[str, Any], tile_id: str) -> Iterator[t
             yield int(content.path.stem.removeprefix("lod")), content
 
 
-def _hold_surfaces(
+def _compare_surfaces(
     contents: dict[int, Content], lods: dict[int, ComposedLod]
 ) -> tuple[float, list[str]]:
     """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
@@ -287,7 +287,7 @@ def _hold_surfaces(
         content, lod = contents[level], lods[level]
         is_last = level == max(contents) and len(contents) > 1
         drawn = read_glb(content.path)
-        apart, faults = _hold_surface(drawn, lod, is_last)
+        apart, faults = _compare_surface(drawn, lod, is_last)
         worst = max(worst, apart)
         problems += [f"lod{level}: {fault}" for fault in faults]
         # a coarser one states no less than a finer one; the finest, which all are held to, nothing
@@ -300,11 +300,11 @@ def _hold_surfaces(
                 f"expected {error_m * _UM_PER_METRE:.4g}"
             )
         corners.append((drawn.positions_m.min(axis=0), drawn.positions_m.max(axis=0)))
-    problems += _hold_boxes(contents, corners)
+    problems += _compare_boxes(contents, corners)
     return worst, problems
 
 
-def _hold_boxes(
+def _compare_boxes(
     contents: dict[int, Content], corners: Sequence[tuple[NDArray[Any], NDArray[Any]]]
 ) -> Iterator[str]:
     """Yield which box of a tileset isn't that of the surfaces in it; `corners`: theirs, metres."""
@@ -326,7 +326,7 @@ def _hold_boxes(
                 break
 
 
-def _hold_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
+def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
     """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
     problems = []
     triangles = lod.mesh.triangles
@@ -344,16 +344,16 @@ def _hold_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float,
             f"{limit_m * _UM_PER_METRE:.4g}"
         )
     else:
-        problems += _hold_faces(there, here, triangles, drawn, lod.mesh)
+        problems += _compare_faces(there, here, triangles, drawn, lod.mesh)
     away = max(abs(a - b) for a, b in zip(drawn.color, lod.material.color, strict=True))
     if away > _COLOR:
         problems.append(f"drawn in {drawn.color}, the stage's colour is {lod.material.color}")
-    problems += _hold_vertex_colors(drawn, lod.mesh, places, decoded)
-    problems += _hold_maps(drawn, lod, is_last)
+    problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
+    problems += _compare_maps(drawn, lod, is_last)
     return apart / drawn.step_m, problems
 
 
-def _hold_faces(
+def _compare_faces(
     there: NDArray[np.float64],
     here: NDArray[np.float64],
     triangles: NDArray[np.uint32],
@@ -426,7 +426,7 @@ def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(max(there.max(), back.max()))
 
 
-def _hold_vertex_colors(
+def _compare_vertex_colors(
     drawn: Drawn, mesh: Mesh, places: NDArray[np.float64], decoded: NDArray[np.float64]
 ) -> Iterator[str]:
     if mesh.colors is None:
@@ -440,7 +440,7 @@ def _hold_vertex_colors(
         yield "the mesh's own colours are others"
 
 
-def _hold_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str]:
+def _compare_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str]:
     for name, (kind, encode) in _ENCODERS.items():
         path: Path | NDArray[np.uint8] | None = getattr(lod.images or lod.maps, kind)
         named = path.name if isinstance(path, Path) else f"lod{lod.level}_{kind}"
@@ -470,7 +470,7 @@ def _volume_entry(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[s
     return next((one for one in content["volumes"] if one["tile"] == tile_id), None)
 
 
-def _hold_volume(
+def _compare_volume(
     task: BundleTask, entry: dict[str, Any], voxels: NDArray[np.uint8]
 ) -> Iterator[str]:
     """Yield what is wrong with a volume's levels and with its bricks; uint8 (z, y, x)."""

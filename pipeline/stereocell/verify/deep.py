@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from stereocell.building.input_unchanged import require_added, require_input
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import unit_tasks
 from stereocell.building.plan import Channel, Plan
 from stereocell.bundle.write import MANIFEST
@@ -16,12 +16,12 @@ from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
 from stereocell.verify.bundle_against_stage import (
     BundleTask,
-    hold_histograms,
-    hold_manifest,
-    hold_tile,
+    compare_histograms,
+    compare_manifest,
+    compare_tile,
 )
 from stereocell.verify.formats import CheckLine, raise_on
-from stereocell.verify.stage_against_source import SourceTask, UnitFinding, hold_unit
+from stereocell.verify.stage_against_source import SourceTask, UnitFinding, compare_unit
 
 
 def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
@@ -32,34 +32,34 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
     A source that is gone is one failed line: the bundle is held against the stage all the same.
     Raises StereoCellError where there is no plan.
     """
-    store = Store(out)
-    if not store.plan_file.exists() and (out / MANIFEST).is_file():
+    out_folder = OutFolder(out)
+    if not out_folder.plan_file.exists() and (out / MANIFEST).is_file():
         raise OutputError(
             f"{out}: a bundle by itself, expected OUT, with its plan.json: there is the stage that "
             "the bundle is held against"
         )
-    plan = store.plan()
-    exported, bundle = stage or store.stage_file, store.bundle_dir
+    plan = out_folder.plan()
+    exported, bundle = stage or out_folder.stage_file, out_folder.bundle_dir
     try:
-        for path in (store.stage_file, exported):
-            dependencies(path, store.stage_dir)
+        for path in (out_folder.stage_file, exported):
+            dependencies(path, out_folder.stage_dir)
     except StageError as error:
         yield CheckLine("files of the stage", False, _one_line(error))
         return
-    yield _line("tiles of the stage", lambda: _hold_tiles(store, plan))
+    yield _line("tiles of the stage", lambda: _compare_tiles(out_folder, plan))
     try:
-        store.require_units_of(plan)
+        out_folder.require_units_of(plan)
         require_input(plan)
         require_added(plan)
-        odd = list(_odd_values(store, plan))
-        findings = engine.run("source", hold_unit, list(_source_tasks(store, plan)))
+        odd = list(_odd_values(out_folder, plan))
+        findings = engine.run("source", compare_unit, list(_source_tasks(out_folder, plan)))
     except StereoCellError as error:
         yield CheckLine("stage against source", False, _one_line(error))
     else:
         for channel in plan.channels if findings else ():
             yield from _channel_lines(channel, findings, odd)
-    yield _line("manifest against stage", lambda: _hold_manifest(exported, bundle))
-    yield _line("bundle against stage", lambda: _hold_bundle(exported, bundle, engine))
+    yield _line("manifest against stage", lambda: _compare_manifest(exported, bundle))
+    yield _line("bundle against stage", lambda: _compare_bundle(exported, bundle, engine))
 
 
 def _line(name: str, run: Callable[[], str]) -> CheckLine:
@@ -78,8 +78,8 @@ def _tiles_in(path: Path) -> list[str]:
     return [str(prim.GetName()) for prim in tile_prims(stage)]
 
 
-def _hold_tiles(store: Store, plan: Plan) -> str:
-    there = set(_tiles_in(store.stage_file))
+def _compare_tiles(out_folder: OutFolder, plan: Plan) -> str:
+    there = set(_tiles_in(out_folder.stage_file))
     planned = {tile.id for tile in plan.tiles}
     raise_on(
         [f"{name} is missing" for name in sorted(planned - there)]
@@ -88,13 +88,13 @@ def _hold_tiles(store: Store, plan: Plan) -> str:
     return f"{len(there)}, as planned"
 
 
-def _odd_values(store: Store, plan: Plan) -> Iterator[str]:
+def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
     """Yield which channel of the stage has other values than were found in the source.
 
     Its window is not among them: it may be set to taste. That of its volumes is.
     """
-    stage = open_stage(store.stage_file)
-    survey = store.survey()
+    stage = open_stage(out_folder.stage_file)
+    survey = out_folder.survey()
     appearances = {appearance.id: appearance for appearance in read_appearances(stage)}
     for channel in plan.channels:
         built, appearance = survey[channel.id]["look"], appearances.get(channel.id)
@@ -111,21 +111,21 @@ def _odd_values(store: Store, plan: Plan) -> Iterator[str]:
                 yield f"{channel.id}: {name} is {told}; {here} was found"
 
 
-def _source_tasks(store: Store, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
-    there = set(_tiles_in(store.stage_file))
-    index = store.index()
-    for name, task, _ in unit_tasks(store, plan, store.survey()):
+def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
+    there = set(_tiles_in(out_folder.stage_file))
+    index = out_folder.index()
+    for name, task, _ in unit_tasks(out_folder, plan, out_folder.survey()):
         tile_id, channel_id = name.split("/")
         if tile_id not in there:
             continue  # told already
         # as it was built, maybe by an earlier version
-        unit = replace(task, directory=store.unit_dir(tile_id, channel_id, index[name]))
+        unit = replace(task, directory=out_folder.unit_dir(tile_id, channel_id, index[name]))
         tile = plan.tile(tile_id)
         yield (
             name,
             SourceTask(
                 unit,
-                store.stage_file,
+                out_folder.stage_file,
                 tile_id,
                 channel_id,
                 plan.position_um(tile.lattice(plan.region).start),
@@ -161,16 +161,16 @@ def _channel_lines(
     yield _line(f"{channel.name} against source", sum_up)
 
 
-def _hold_manifest(stage: Path, bundle: Path) -> str:
-    raise_on(hold_manifest(stage, bundle))
+def _compare_manifest(stage: Path, bundle: Path) -> str:
+    raise_on(compare_manifest(stage, bundle))
     return "names, colours, windows, transfer functions, tiles"
 
 
-def _hold_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
+def _compare_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
     tasks = [(name, BundleTask(stage, bundle, name)) for name in _tiles_in(stage)]
-    tiles = engine.run("bundle", hold_tile, tasks)
+    tiles = engine.run("bundle", compare_tile, tasks)
     raise_on([problem for tile in tiles for problem in tile.problems])
-    raise_on(list(hold_histograms(bundle, tiles)))
+    raise_on(list(compare_histograms(bundle, tiles)))
     surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
     edits = "; ".join(line for tile in tiles for line in tile.edits)
     worst = max((tile.worst for tile in tiles), default=0.0)

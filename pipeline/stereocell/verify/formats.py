@@ -17,7 +17,7 @@ from typing import Any
 
 from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
-from stereocell.building.out_folder import Store
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST
 from stereocell.formats.exr import check_exr
@@ -79,12 +79,12 @@ def check(out: Path) -> Iterator[CheckLine]:
 
 
 def _checks_of_build(out: Path) -> list[_Check]:
-    store = Store(out)
+    out_folder = OutFolder(out)
     return [
         ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
         *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
-        *([("units", lambda: _check_units(store))] if store.index_file.exists() else []),
-        ("stage hashes", lambda: _check_stage_hashes(store)),
+        *([("units", lambda: _check_units(out_folder))] if out_folder.index_file.exists() else []),
+        ("stage hashes", lambda: _check_stage_hashes(out_folder)),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
@@ -112,34 +112,34 @@ def _check_json(path: Path, schema: str, remedy: str) -> str:
 def _check_tissue(out: Path) -> str:
     """Check what `stereocell tissue` left; the bundle needs none of it."""
     files = read_whole(out / FOLDER)["files"]
-    require_added(Store(out).plan())
+    require_added(OutFolder(out).plan())
     return f"{RECORD} and {len(files)} files that it lists"
 
 
-def _check_units(store: Store) -> str:
+def _check_units(out_folder: OutFolder) -> str:
     """Check every file of the units against the hash in its unit.json."""
     problems, files = [], 0
-    for name, key in store.index().items():
+    for name, key in out_folder.index().items():
         tile_id, channel_id = name.split("/")
-        folder = store.unit_dir(tile_id, channel_id, key)
+        folder = out_folder.unit_dir(tile_id, channel_id, key)
         files += len(sizes_below(folder))
         problems += [
-            f"{(folder / file).relative_to(store.out).as_posix()}: {fault}"
+            f"{(folder / file).relative_to(out_folder.out).as_posix()}: {fault}"
             for file, fault in unit_files.find_damage(folder).items()
         ]
     _raise_on_all(problems, "remove what is damaged and run `stereocell units OUT`")
-    return f"{files} files of {len(store.index())} units"
+    return f"{files} files of {len(out_folder.index())} units"
 
 
-def _check_stage_hashes(store: Store) -> str:
+def _check_stage_hashes(out_folder: OutFolder) -> str:
     """Check every file that the build wrote against the stage's list; others are an artist's."""
-    listed = read_json(store.stage_list, "units.schema.json#FileList", written_files.REMEDY)
-    wrote = store.phases().get("stage", {"key": ""})
+    listed = read_json(out_folder.stage_list, "units.schema.json#FileList", written_files.REMEDY)
+    wrote = out_folder.phases().get("stage", {"key": ""})
     is_other = wrote["key"] and wrote["results"] != written_files.digest_of(listed)
     if is_other or written_files.STAGE_NAME not in listed:
-        path = store.stage_list
+        path = out_folder.stage_list
         raise CheckError(f"{path}: damaged, not the list that was written: {written_files.REMEDY}")
-    problems = written_files.find_damage(store.stage_dir, listed)
+    problems = written_files.find_damage(out_folder.stage_dir, listed)
     told = [f"stage/{path}: {fault}" for path, fault in problems.items()]
     remedy = f"remove what is damaged and {written_files.REMEDY}"
     if {written_files.CHANGED, written_files.DOUBTFUL} & set(problems.values()):
@@ -149,9 +149,9 @@ def _check_stage_hashes(store: Store) -> str:
 
 
 def _check_stage(out: Path) -> str:
-    store = Store(out)
-    store.require_finished("stage")
-    path = store.stage_file
+    out_folder = OutFolder(out)
+    out_folder.require_finished("stage")
+    path = out_folder.stage_file
     dependencies(path, path.parent)  # refuses what is not the stage's own
     findings = validate_stage(path)
     raise_on([str(finding) for finding in findings])
@@ -190,18 +190,18 @@ def _check_stage_files(out: Path) -> str:
 
 def _lost_copies(out: Path) -> list[str]:
     """Return what is wrong where the plan asks for closed copies, and surfaces have none."""
-    store = Store(out)
-    if not store.plan_file.is_file():  # the line `plan` says so
+    out_folder = OutFolder(out)
+    if not out_folder.plan_file.is_file():  # the line `plan` says so
         return []
-    plan = store.plan()
+    plan = out_folder.plan()
     if not plan.settings.surface.closed_tiles:
         return []
     return [
         f"{path}: missing, expected as surface.closed_tiles is on: run `stereocell stage OUT`"
         for tile in plan.tiles
         for channel in plan.channels
-        for path in [closed_file(store.stage_dir, tile.id, channel.id)]
-        if has_mesh(store.stage_dir, tile.id, channel.id) and not path.is_file()
+        for path in [closed_file(out_folder.stage_dir, tile.id, channel.id)]
+        if has_mesh(out_folder.stage_dir, tile.id, channel.id) and not path.is_file()
     ]
 
 

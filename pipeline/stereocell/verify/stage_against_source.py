@@ -1,4 +1,4 @@
-"""Hold a stage against its source: the surfaces and volumes of each unit, made anew from voxels.
+"""Compare a stage with its source: the surfaces and volumes of each unit, made anew from voxels.
 
 Surfaces: the iso-surface of the unit's own voxels, before any level of detail is made of it, and
 from it, and to it, the distance of each level: by the same measure as a level's stated distance
@@ -28,7 +28,7 @@ from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
-from stereocell.storage.workspace import at_hand
+from stereocell.storage.workspace import cached
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,
@@ -73,7 +73,7 @@ class UnitFinding:
     problems: tuple[str, ...]
 
 
-def hold_unit(task: SourceTask) -> UnitFinding:
+def compare_unit(task: SourceTask) -> UnitFinding:
     """Return how a unit's part of the stage agrees with its voxels. Raises StereoCellError."""
     given = task.unit.given
     dataset = open_source(task.unit.ref)
@@ -81,18 +81,18 @@ def hold_unit(task: SourceTask) -> UnitFinding:
     fine = find_surface(volume, given)
     problems = []
     stage = open_stage(task.stage_file)
-    with at_hand(task.unit.directory), loaded(stage, task.tile_id) as (tile, _):
+    with cached(task.unit.directory), loaded(stage, task.tile_id) as (tile, _):
         lods = list(read_lods(tile, task.channel_id))
         composed = read_volume(tile, task.channel_id)
         record = load_record(task.unit.directory)
-        levels, faults = _hold_lods(_placed(fine, task.placement), lods, record, task.samples)
+        levels, faults = _compare_lods(_placed(fine, task.placement), lods, record, task.samples)
         problems += faults
-        problems += _hold_shading(lods, load_lods(task.unit.directory), task.placement)
+        problems += _compare_shading(lods, load_lods(task.unit.directory), task.placement)
         if composed is None:
             problems.append("no volume in the stage")
         else:
             eight_bit = to_eight_bit(volume.voxels, given)
-            problems += _hold_volume(eight_bit, composed, task)
+            problems += _compare_volume(eight_bit, composed, task)
     return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
 
 
@@ -102,7 +102,7 @@ def _placed(mesh: Mesh, placement: Matrix) -> Mesh:
     return Mesh(positions.astype(np.float32), mesh.triangles, mesh.normals)
 
 
-def _hold_lods(
+def _compare_lods(
     fine: Mesh, lods: list[ComposedLod], record: dict[str, Any], samples: int
 ) -> tuple[tuple[tuple[float, float, float], ...], list[str]]:
     if not len(fine.triangles) or not lods:
@@ -161,7 +161,9 @@ def _facing(mesh: Mesh, fine: Nearest) -> float:
     return float(((own * other).sum(axis=1) / lengths).sum()) / area
 
 
-def _hold_shading(lods: list[ComposedLod], built: tuple[Lod, ...], placement: Matrix) -> list[str]:
+def _compare_shading(
+    lods: list[ComposedLod], built: tuple[Lod, ...], placement: Matrix
+) -> list[str]:
     """Return what of a level's normals, occlusion and maps is not as the unit has it."""
     odd = []
     for lod in lods:
@@ -219,7 +221,7 @@ def _slack(um: float) -> float:
     return um * (1 + _SHARE) + _HAIR_UM
 
 
-def _hold_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) -> list[str]:
+def _compare_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) -> list[str]:
     problems = []
     atlas, vdb = composed.atlas, composed.field
     stored = read_atlas(atlas)
