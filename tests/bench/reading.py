@@ -22,8 +22,8 @@ import zarr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
+from stereocell.building.channel_survey import iso_task, statistics_task
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.passes import iso_task, statistics_task
 from stereocell.building.tasks.iso_value import read_iso_field
 from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, measure_statistics
 from stereocell.model.tiling import Box, cut

@@ -68,14 +68,14 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     away, out = volume.with_name("away"), tmp_path / "out"
-    survey = passes._survey
+    survey = passes.survey_channels
 
     def vanish(*arguments: Any) -> Any:
         found = survey(*arguments)
         volume.rename(away)
         return found
 
-    monkeypatch.setattr(passes, "_survey", vanish)
+    monkeypatch.setattr(passes, "survey_channels", vanish)
     assert make_assets(volume, out, GRID, "--workers", "0") == 1
     assert "f.ome.zarr: " in only_line(capsys)
     assert not list(out.rglob("unit.json"))

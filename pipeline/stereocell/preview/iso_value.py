@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from stereocell.building.passes import iso_task, statistics_task
+from stereocell.building.channel_survey import iso_task, statistics_task
 from stereocell.building.phases import settle
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.settings import Settings

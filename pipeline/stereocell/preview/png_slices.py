@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from stereocell.building.channel_survey import statistics_task
 from stereocell.building.open_source import open_source, source_of
-from stereocell.building.passes import statistics_task
 from stereocell.building.plan import Plan
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.window import measure_statistics

@@ -1,0 +1,48 @@
+"""Tasks that read a plan's source: how they are run, and what their results' keys hold of it."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from stereocell.building.input_unchanged import require_added, require_input
+from stereocell.building.plan import Channel, Plan
+from stereocell.engine.run import Engine
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tiling import Box
+from stereocell.read.open_dataset import reader_of
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def run_on_input(
+    plan: Plan,
+    engine: Engine,
+    label: str,
+    function: Callable[[T], R],
+    tasks: Sequence[tuple[str, T]],
+) -> list[R]:
+    """Run tasks that read the source; it must be the one that was planned."""
+    if not tasks:
+        return []
+    require_input(plan)
+    require_added(plan)
+    return engine.run(label, function, tasks)
+
+
+def around(field: LatticeField | None, box: Box) -> LatticeField | None:
+    return None if field is None else field.around(box)
+
+
+def input_key(plan: Plan, channel: Channel) -> list[Any]:
+    if channel.source:
+        return [channel.fingerprint, 0, plan.spacing_um, plan.origin_um, 0]
+    return [plan.fingerprint, plan.level, plan.spacing_um, plan.origin_um, plan.settings.plan.time]
+
+
+def reader_module(plan: Plan, channel: Channel) -> str:
+    """Return the module that reads a channel: other formats' readers change nothing of it."""
+    return reader_of(channel.source or plan.source)
+
+
+def box_to_json(box: Box) -> list[list[int]]:
+    return [list(box.start), list(box.stop)]
