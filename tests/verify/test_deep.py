@@ -19,7 +19,7 @@ from stereocell.formats.ktx2 import encode_2d, encode_3d
 from stereocell.model.errors import SourceError
 from stereocell.usd.written_files import write_list
 from stereocell.verify import deep
-from stereocell.verify.bundle_against_stage import _texels
+from stereocell.verify.bundle_files import read_texels
 from stereocell.verify.deep import check_deep
 from stereocell.verify.formats import CheckLine
 from support import phantoms
@@ -183,25 +183,25 @@ def move_the_bounds(out: Path) -> None:
 
 def empty_the_bricks(out: Path) -> None:
     file = out / "bundle" / "volumes" / "r0_c0" / "F_bricks.ktx2"
-    (bricks,) = _texels(file)
+    (bricks,) = read_texels(file)
     file.write_bytes(encode_3d([np.zeros_like(bricks)]).data)
 
 
 def empty_the_histogram(out: Path) -> None:
     file = out / "bundle" / "channels" / "F" / "histogram2d.ktx2"
-    file.write_bytes(encode_2d(np.zeros_like(_texels(file)[0][0])).data)
+    file.write_bytes(encode_2d(np.zeros_like(read_texels(file)[0][0])).data)
 
 
 def invert_the_lookup_table(out: Path) -> None:
     file = out / "bundle" / "luts" / "F.ktx2"
-    rows = _texels(file)[0][0].copy()
+    rows = read_texels(file)[0][0].copy()
     rows[..., 0] = 255 - rows[..., 0]
     file.write_bytes(encode_2d(rows).data)
 
 
 def narrow_the_lookup_table(out: Path) -> None:
     file = out / "bundle" / "luts" / "F.ktx2"
-    file.write_bytes(encode_2d(np.ascontiguousarray(_texels(file)[0][0][:, :-1])).data)
+    file.write_bytes(encode_2d(np.ascontiguousarray(read_texels(file)[0][0][:, :-1])).data)
 
 
 def drop_a_tile(out: Path) -> None:

@@ -1,70 +1,20 @@
-"""Compare a bundle with the stage that it was exported from: what each file decodes to.
+"""Compare a bundle with the stage that it was exported from: what each file of a tile decodes to.
 
-Surfaces: every vertex of a decoded .glb lies within the lattice's half diagonal of a vertex of the
-composed mesh, and the other way round, triangle by triangle too, which face the same way and have
-the same place in the maps; colours within 1/255; maps as the stage's images would be encoded now.
-Boxes and errors of the tilesets: as the surfaces and the stage give them. Volumes: every voxel of
-every mip level, the bricks' least and most, the histograms of value and gradient. And what the
-manifest says of each channel and tile.
+See bundle_manifest, bundle_surfaces and bundle_volumes for what is compared.
 """
 
-import io
-import json
-import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import alktx2
-import numpy as np
-import zstandard
-from numpy.typing import NDArray
-from PIL import Image
-from scipy.spatial import cKDTree
 
 from stereocell.bundle.edited_meshes import shown_lods
-from stereocell.bundle.write import MANIFEST
 from stereocell.bundle.write_tile import find_bounds
-from stereocell.bundle.write_transfer2d import count_tile, sum_tiles
-from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
+from stereocell.bundle.write_transfer2d import count_tile
 from stereocell.formats.exr import read_atlas
-from stereocell.formats.gltf import AMBIENT_SHARE
-from stereocell.formats.gltf_decode import Drawn, read_glb
-from stereocell.formats.ktx2 import encode_color_map, encode_normal_map, encode_occlusion_map
-from stereocell.formats.tiles3d_walk import Content, walk
-from stereocell.model.errors import CheckError
-from stereocell.model.mesh import Mesh
-from stereocell.storage.json_files import read_json
-from stereocell.transfer.joint_histogram import log_scaled
-from stereocell.transfer.opacity import evaluate
-from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
-from stereocell.usd.read_stage import (
-    ComposedLod,
-    ComposedVolume,
-    loaded,
-    modality_of,
-    open_stage,
-    read_volume,
-    specimen_name,
-    tile_prims,
-)
-from stereocell.usd.read_textures import read_image
-
-_COLOR = 1 / 255 + 1e-6
-_UM_PER_METRE = 1e6
-_MAP_DIFFERENCE = 1.0  # of 255, in the mean: the same image by another version of the encoder
-_ODD_SHARE = 0.01  # of a surface's area: slivers that the lattice turns over
-_ALONG = math.cos(math.radians(3))  # a normal's 8 bits on an octahedron, and as much again
-_UV_STEP = 1e-4  # of a map's edge; 16 bits hold a sixth of it
-_ROUNDED = 1.001  # four digits, upwards
-_BOX_M = 2e-9  # whole nm, outwards
-_ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
-    "normalTexture": ("normal", encode_normal_map),
-    "occlusionTexture": ("occlusion", encode_occlusion_map),
-    "baseColorTexture": ("color", encode_color_map),
-}
-_REMEDY = "run `stereocell bundle OUT`"
+from stereocell.usd.read_appearances import read_appearances
+from stereocell.usd.read_stage import loaded, open_stage, read_volume
+from stereocell.verify.bundle_files import find_differences, read_manifest
+from stereocell.verify.bundle_surfaces import compare_surfaces, surfaces_of, without_repeats
+from stereocell.verify.bundle_volumes import compare_volume, find_volume, placement_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,104 +44,9 @@ class TileFinding:
     edits: tuple[str, ...] = ()
 
 
-def compare_manifest(stage_file: Path, bundle: Path) -> list[str]:
-    """Return what the manifest says otherwise than the composed stage. Raises StereoCellError."""
-    stage = open_stage(stage_file)
-    manifest = read_json(bundle / MANIFEST, "bundle.schema.json", _REMEDY)
-    specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
-    problems = list(_unlike("specimen", manifest["specimen"], specimen))
-    tiles = [str(prim.GetName()) for prim in tile_prims(stage)]
-    listed = [tile["id"] for tile in manifest["tiles"]]
-    if tiles != listed:
-        problems.append(f"tiles are {', '.join(listed)}, the stage's {', '.join(tiles)}")
-    ends = [
-        [pick(tile["bounds_um"][end][axis] for tile in manifest["tiles"]) for axis in range(3)]
-        for end, pick in (("min", min), ("max", max))
-    ]
-    whole = {"bounds_um": dict(zip(("min", "max"), ends, strict=True))}
-    problems += _unlike("specimen", manifest["specimen"], whole, "its tiles'")
-    appearances = read_appearances(stage)
-    if [appearance.id for appearance in appearances] != [
-        channel["id"] for channel in manifest["channels"]
-    ]:
-        return [*problems, "the channels are not the stage's"]
-    for appearance, channel in zip(appearances, manifest["channels"], strict=True):
-        problems += _compare_channel(appearance, channel, bundle)
-    return problems
-
-
-def _compare_channel(
-    appearance: ComposedAppearance, channel: dict[str, Any], bundle: Path
-) -> Iterator[str]:
-    away = max(abs(a - b) for a, b in zip(appearance.color, channel["color"], strict=True))
-    if away > _COLOR:
-        yield f"{appearance.id}: color is {channel['color']}, the stage's {list(appearance.color)}"
-    expected = {
-        "name": appearance.name,
-        "window": list(appearance.window),
-        "iso_value": appearance.iso_value,
-        "iso_normalized": appearance.iso_normalized,
-        "threshold_normalized": appearance.threshold_normalized,
-        "surface": "none" if channel["tileset"] is None else appearance.surface,
-        "transfer_function": appearance.chosen,
-        "transfer_functions": list(appearance.transfer_functions),
-    }
-    yield from _unlike(appearance.id, channel, expected)
-    yield from _unlike(
-        appearance.id, channel["transfer_functions_2d"], {"names": list(appearance.shapes)}
-    )
-    shapes = _transfer2d(bundle, channel)
-    drawn = {
-        "gradient_max": appearance.gradient_max,
-        "functions": {
-            name: [asdict(one) for one in all_] for name, all_ in appearance.shapes.items()
-        },
-    }
-    yield from _unlike(appearance.id, shapes, json.loads(json.dumps(drawn)))
-    rows = _texels(bundle / channel["lut"]["path"])[0][0]
-    if rows.shape != (len(appearance.transfer_functions), 256, 4):
-        shape = " x ".join(map(str, rows.shape))
-        yield (
-            f"{appearance.id}: its lookup table has {shape} values, expected "
-            f"{len(appearance.transfer_functions)} x 256 x 4"
-        )
-        return
-    for row, (name, points) in zip(rows, appearance.transfer_functions.items(), strict=True):
-        off = np.abs(row[:, 3] / 255 - evaluate(points)).max()
-        if (row[:, :3] != 255).any() or off > _COLOR:
-            yield f"{appearance.id}: the lookup table of {name!r} is not the stage's"
-
-
-def compare_histograms(bundle: Path, tiles: Sequence[TileFinding]) -> Iterator[str]:
-    """Yield which channel's histogram of value and gradient its volumes do not give."""
-    manifest = read_json(bundle / MANIFEST, "bundle.schema.json", _REMEDY)
-    for channel in manifest["channels"]:
-        name = channel["id"]
-        counts = sum_tiles(tile.joints[name] for tile in tiles if name in tile.joints)
-        shapes = _transfer2d(bundle, channel)
-        expected = log_scaled(counts)
-        found = _texels(bundle / shapes["histogram"]["path"])[0][0, ..., 0]
-        if found.shape != expected.shape or (found != expected).any():
-            yield f"{name}: its histogram of value and gradient is not its volumes'"
-        yield from _unlike(name, shapes, {"most": int(counts.max())}, "its volumes'")
-
-
-def _transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
-    path = bundle / channel["transfer_functions_2d"]["file"]["path"]
-    return dict(read_json(path, "transfer2d.schema.json", _REMEDY))
-
-
-def _unlike(
-    name: str, found: dict[str, Any], expected: dict[str, Any], whose: str = "the stage's"
-) -> Iterator[str]:
-    for key, value in expected.items():
-        if found[key] != value:
-            yield f"{name}: {key} is {found[key]!r}, {whose} {value!r}"
-
-
 def compare_tile(task: BundleTask) -> TileFinding:
     """Return how one tile's files agree with the composed stage. Raises StereoCellError."""
-    manifest = read_json(task.bundle / MANIFEST, "bundle.schema.json", _REMEDY)
+    manifest = read_manifest(task.bundle)
     channels = {channel["id"]: channel for channel in manifest["channels"]}
     problems: list[str] = []
     edits: list[str] = []
@@ -210,300 +65,28 @@ def compare_tile(task: BundleTask) -> TileFinding:
             low, high = find_bounds(tile, volumes)
             bounds = {"min": list(low), "max": list(high)}
             told = {"representation": choice.representation, "bounds_um": bounds}
-            problems += _unlike(task.tile_id, listed, told)
+            problems += find_differences(task.tile_id, listed, told)
         for appearance, composed in zip(appearances, volumes, strict=True):
             channel, name = channels[appearance.id], f"{task.tile_id}/{appearance.id}"
             shown = shown_lods(tile, appearance.id, choice.finest_lod)
-            lods = dict(_without_repeats(shown.lods))
+            lods = dict(without_repeats(shown.lods))
             edits += [f"{name}: {shown.edit}"] if shown.edit else []
-            contents = dict(_contents(task.bundle, channel, task.tile_id))
+            contents = dict(surfaces_of(task.bundle, channel, task.tile_id))
             surfaces += len(contents)
-            apart, faults = _compare_surfaces(contents, lods)
+            apart, faults = compare_surfaces(contents, lods)
             worst = max(worst, apart)
             problems += [f"{name}: {fault}" for fault in faults]
-            entry = _volume_entry(task.bundle, channel, task.tile_id)
+            entry = find_volume(task.bundle, channel, task.tile_id)
             if (composed is None) != (entry is None):
                 which = ("stage", "bundle") if composed is None else ("bundle", "stage")
                 problems.append(f"{name}: the {which[0]} has no volume, the {which[1]} has one")
             elif composed is not None and entry is not None:
-                problems += _unlike(name, entry, _placed(composed))
+                problems += find_differences(name, entry, placement_of(composed))
                 voxels = appearance.window_voxels(read_atlas(composed.atlas))
-                problems += [f"{name}: {fault}" for fault in _compare_volume(task, entry, voxels)]
+                problems += [
+                    f"{name}: {fault}" for fault in compare_volume(task.bundle, entry, voxels)
+                ]
                 joints[appearance.id] = count_tile(voxels, composed, appearance.gradient_max)
     return TileFinding(
         task.tile_id, surfaces, len(joints), worst, joints, tuple(problems), tuple(edits)
     )
-
-
-def _without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
-    """Yield the levels that a bundle has: of those that are alike, the finest."""
-    last: ComposedLod | None = None
-    for lod in lods:
-        if last is None or not _are_alike(last, lod):
-            yield lod.level, lod
-        last = lod
-
-
-def _are_alike(one: ComposedLod, other: ComposedLod) -> bool:
-    def arrays(lod: ComposedLod) -> list[NDArray[Any] | None]:
-        mesh, maps = lod.mesh, lod.images or lod.maps
-        images = [None if m is None else read_image(m) for m in (maps.normal, maps.occlusion,
-                                                                 maps.color)]  # fmt: skip
-        return [mesh.positions, mesh.triangles, mesh.normals, mesh.colors, mesh.openness, *images]
-
-    if one.material != other.material or len(one.mesh.triangles) != len(other.mesh.triangles):
-        return False
-    pairs = zip(arrays(one), arrays(other), strict=True)
-    return all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs)
-
-
-def _placed(volume: ComposedVolume) -> dict[str, Any]:
-    """Return where a volume is, as the bundle says it."""
-    return {
-        "size": list(volume.size),
-        "apron": volume.apron,
-        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
-        "matrix": [float(number) for number in volume.matrix.ravel()],
-    }
-
-
-def _contents(bundle: Path, channel: dict[str, Any], tile_id: str) -> Iterator[tuple[int, Content]]:
-    """Yield a tile's surfaces in a channel's tileset, by level."""
-    if channel["tileset"] is None:
-        return
-    for content in walk(bundle, bundle / channel["tileset"]["path"], tile_id):
-        if not content.is_tileset:
-            yield int(content.path.stem.removeprefix("lod")), content
-
-
-def _compare_surfaces(
-    contents: dict[int, Content], lods: dict[int, ComposedLod]
-) -> tuple[float, list[str]]:
-    """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
-    problems = [f"lod{level} is not in the stage" for level in contents if level not in lods]
-    problems += [f"the bundle lacks lod{level}" for level in sorted(lods.keys() - contents.keys())]
-    worst, error_m, corners = 0.0, 0.0, []
-    for level in sorted(contents.keys() & lods.keys()):
-        content, lod = contents[level], lods[level]
-        is_last = level == max(contents) and len(contents) > 1
-        drawn = read_glb(content.path)
-        apart, faults = _compare_surface(drawn, lod, is_last)
-        worst = max(worst, apart)
-        problems += [f"lod{level}: {fault}" for fault in faults]
-        # a coarser one states no less than a finer one; the finest, which all are held to, nothing
-        if level > min(contents):
-            moved_m = math.sqrt(3) / 2 * drawn.step_m if is_last else 0.0
-            error_m = max(error_m, lod.distance_um / _UM_PER_METRE + moved_m)
-        if not error_m * (1 - 1e-6) <= content.error_m <= error_m * _ROUNDED:
-            problems.append(
-                f"lod{level}: the tileset states {content.error_m * _UM_PER_METRE:.4g} um, "
-                f"expected {error_m * _UM_PER_METRE:.4g}"
-            )
-        corners.append((drawn.positions_m.min(axis=0), drawn.positions_m.max(axis=0)))
-    problems += _compare_boxes(contents, corners)
-    return worst, problems
-
-
-def _compare_boxes(
-    contents: dict[int, Content], corners: Sequence[tuple[NDArray[Any], NDArray[Any]]]
-) -> Iterator[str]:
-    """Yield which box of a tileset isn't that of the surfaces in it; `corners`: theirs, metres."""
-    if not corners:
-        return
-    low = np.min([low for low, _ in corners], axis=0).astype(np.float64)
-    high = np.max([high for _, high in corners], axis=0).astype(np.float64)
-    # y up, which boxes are not
-    low, high = np.array([low[0], -high[2], low[1]]), np.array([high[0], -low[2], high[1]])
-    slack = _BOX_M + 4e-7 * max(float(np.abs(low).max()), float(np.abs(high).max()))
-    for level, content in contents.items():
-        for k, box in enumerate(content.boxes):
-            centre, half = np.array(box[:3]), np.array(box[3:]).reshape(3, 3)
-            reach = np.abs(half).sum(axis=0)
-            lacks = max((centre - reach - low).max(), (high - centre - reach).max())
-            exceeds = max((low - centre + reach).max(), (centre + reach - high).max())
-            if lacks > slack or (k == 0 and exceeds > slack):
-                yield f"lod{level}: a box of the tileset is not round the surfaces: {list(box)}"
-                break
-
-
-def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
-    """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
-    problems = []
-    triangles = lod.mesh.triangles
-    if len(drawn.triangles) != len(triangles):
-        return 0.0, [f"{len(drawn.triangles)} triangles, the stage has {len(triangles)}"]
-    places = lod.mesh.positions.astype(np.float64) / _UM_PER_METRE
-    decoded = drawn.positions_m.astype(np.float64)
-    # float32 metres of a viewer, beside half the diagonal of a lattice cell
-    limit_m = math.sqrt(3) / 2 * drawn.step_m + 4e-7 * float(np.abs(places).max())
-    there, here = places[triangles], decoded[drawn.triangles]
-    apart = max(_farthest(places, decoded), _farthest(there.mean(axis=1), here.mean(axis=1)))
-    if apart > limit_m:
-        problems.append(
-            f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place, the lattice allows "
-            f"{limit_m * _UM_PER_METRE:.4g}"
-        )
-    else:
-        problems += _compare_faces(there, here, triangles, drawn, lod.mesh)
-    away = max(abs(a - b) for a, b in zip(drawn.color, lod.material.color, strict=True))
-    if away > _COLOR:
-        problems.append(f"drawn in {drawn.color}, the stage's colour is {lod.material.color}")
-    problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
-    problems += _compare_maps(drawn, lod, is_last)
-    return apart / drawn.step_m, problems
-
-
-def _compare_faces(
-    there: NDArray[np.float64],
-    here: NDArray[np.float64],
-    triangles: NDArray[np.uint32],
-    drawn: Drawn,
-    mesh: Mesh,
-) -> Iterator[str]:
-    """Yield what is wrong with the way that triangles face, and with their place in the maps.
-
-    there, here  corners (n, 3, 3) of the stage's and of the bundle's
-    """
-    _, twins = cKDTree(here.mean(axis=1)).query(there.mean(axis=1))
-    normals, turned = (
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        for corners in (there, here[np.asarray(twins)])
-    )
-    areas = np.linalg.norm(normals, axis=1)
-    whole = float(areas.sum())
-    odd = float(areas[(normals * turned).sum(axis=1) < 0].sum())
-    if odd > _ODD_SHARE * whole:
-        yield f"{odd / whole:.0%} of its area faces the other way"
-    here_of = drawn.triangles[np.asarray(twins)]
-    along = (_means(mesh.normals, triangles) * _means(drawn.normals, here_of)).sum(axis=1)
-    odd = float(areas[along < _ALONG].sum())
-    if odd > _ODD_SHARE * whole:
-        yield f"{odd / whole:.0%} of its area is shaded by other normals"
-    dimmed = _dimmed(mesh)
-    if (dimmed is None) != (drawn.colors is None):
-        yield (
-            "its vertices have colours, the stage's none"
-            if dimmed is None
-            else ("the occlusion at its vertices is lost")
-        )
-    elif dimmed is not None and drawn.colors is not None:
-        off = np.abs(dimmed[triangles].mean(axis=1) - drawn.colors[here_of].mean(axis=1))
-        odd = float(areas[off.max(axis=1) > _COLOR].sum())
-        if odd > _ODD_SHARE * whole:
-            yield f"{odd / whole:.0%} of its area has other colours or occlusion at its vertices"
-    if drawn.uvs is None or mesh.uvs is None:
-        return  # a map without them is told of the map
-    wanted = mesh.uvs.astype(np.float64)[triangles].mean(axis=1)
-    found = drawn.uvs[drawn.triangles].mean(axis=1)[np.asarray(twins)]
-    off = np.abs(found - np.stack([wanted[:, 0], 1 - wanted[:, 1]], axis=1)).max(axis=1)
-    odd = float(areas[off > _UV_STEP].sum())
-    if odd > _ODD_SHARE * whole:
-        yield f"{odd / whole:.0%} of its area lies elsewhere in the maps"
-
-
-def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the direction (m, 3) of each triangle's three normals."""
-    means = normals.astype(np.float64)[triangles].sum(axis=1)
-    return np.asarray(means / np.maximum(np.linalg.norm(means, axis=1, keepdims=True), 1e-12))
-
-
-def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
-    """Return what the colour of each vertex is multiplied by (n, 3), or None: see gltf.py."""
-    if mesh.colors is None and mesh.openness is None:
-        return None
-    colors = np.ones((len(mesh.positions), 3))
-    if mesh.colors is not None:
-        colors = np.clip(mesh.colors.astype(np.float64), 0, 1)
-    if mesh.openness is None:
-        return colors
-    openness = np.clip(mesh.openness.astype(np.float64), 0, 1)[:, np.newaxis]
-    return np.asarray(colors * (1 - AMBIENT_SHARE * (1 - openness)))
-
-
-def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the largest distance from a point of either set to the nearest of the other."""
-    there, back = (np.asarray(cKDTree(c).query(d)[0]) for c, d in ((a, b), (b, a)))
-    return float(max(there.max(), back.max()))
-
-
-def _compare_vertex_colors(
-    drawn: Drawn, mesh: Mesh, places: NDArray[np.float64], decoded: NDArray[np.float64]
-) -> Iterator[str]:
-    if mesh.colors is None:
-        return
-    if drawn.colors is None:
-        yield "the mesh's own colours are lost"
-        return
-    _, nearest = cKDTree(decoded).query(places)
-    dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # by occlusion, or not at all
-    if float((dimmed - np.clip(mesh.colors, 0, 1)).max()) > 2 * _COLOR:
-        yield "the mesh's own colours are others"
-
-
-def _compare_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str]:
-    for name, (kind, encode) in _ENCODERS.items():
-        path: Path | NDArray[np.uint8] | None = getattr(lod.images or lod.maps, kind)
-        named = path.name if isinstance(path, Path) else f"lod{lod.level}_{kind}"
-        if path is None or (is_last and kind != "color" and name not in drawn.maps):
-            if path is None and name in drawn.maps:
-                yield f"a map ({kind}) that the stage has not"
-            continue  # the coarsest level goes without
-        if name not in drawn.maps:
-            yield f"the map {named} is missing"
-            continue
-        anew = encode(read_image(path))
-        if anew == drawn.maps[name]:
-            continue
-        found, wanted = _pixels(drawn.maps[name]), _pixels(anew)
-        if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
-            yield f"the map {named} is another image in the stage"
-
-
-def _pixels(ktx2: bytes) -> NDArray[np.float64]:
-    png, _ = alktx2.decode_ktx2_to_bytes(ktx2)
-    with Image.open(io.BytesIO(png)) as image:
-        return np.asarray(image.convert("RGB"), dtype=np.float64)
-
-
-def _volume_entry(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[str, Any] | None:
-    content = read_json(bundle / channel["volumes"]["path"], "volumes.schema.json", _REMEDY)
-    return next((one for one in content["volumes"] if one["tile"] == tile_id), None)
-
-
-def _compare_volume(
-    task: BundleTask, entry: dict[str, Any], voxels: NDArray[np.uint8]
-) -> Iterator[str]:
-    """Yield what is wrong with a volume's levels and with its bricks; uint8 (z, y, x)."""
-    file = task.bundle / entry["file"]["path"]
-    found, expected = _texels(file), mip_levels(voxels)
-    if [level.shape[:3] for level in found] != [level.shape for level in expected]:
-        yield f"{file.name}: its levels have other sizes than the stage's volume gives"
-        return
-    for k, (level, wanted) in enumerate(zip(found, expected, strict=True)):
-        wrong = int((level[..., 0] != wanted).sum())
-        if wrong:
-            yield f"{file.name}: level {k}: {wrong} of {wanted.size} voxels are not the stage's"
-    file = task.bundle / entry["bricks"]["path"]
-    (bricks,), ends = _texels(file), min_max_bricks(voxels)
-    if bricks.shape != ends.shape or (bricks != ends).any():
-        yield f"{file.name}: not the least and most of the stage's bricks"
-
-
-def _texels(file: Path) -> list[NDArray[np.uint8]]:
-    """Return the levels of a KTX2 file of ours, finest first, each (z, y, x, components)."""
-    try:
-        data = file.read_bytes()
-        width, height, depth, _, _, count = np.frombuffer(data, "<u4", 6, 20).tolist()
-        components = {9: 1, 16: 2, 37: 4}[int(np.frombuffer(data, "<u4", 1, 12)[0])]
-        levels = []
-        for k in range(count):
-            offset, length, size = np.frombuffer(data, "<u8", 3, 80 + 24 * k).tolist()
-            frame = data[offset : offset + length]
-            texels = zstandard.ZstdDecompressor().decompress(frame, max_output_size=size)
-            shape = [max(1, n >> k) for n in (max(1, depth), height, width)]
-            levels.append(np.frombuffer(texels, np.uint8).reshape(*shape, components))
-    except OSError as error:
-        raise CheckError(f"{file}: {error.strerror or error}") from error
-    except (ValueError, LookupError, zstandard.ZstdError) as error:
-        raise CheckError(f"{file}: can't be decoded: {error!r}") from error
-    return levels

@@ -14,12 +14,8 @@ from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
-from stereocell.verify.bundle_against_stage import (
-    BundleTask,
-    compare_histograms,
-    compare_manifest,
-    compare_tile,
-)
+from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
+from stereocell.verify.bundle_manifest import compare_histograms, compare_manifest
 from stereocell.verify.formats import CheckLine, raise_on
 from stereocell.verify.stage_against_source import SourceTask, UnitFinding, compare_unit
 
@@ -170,7 +166,7 @@ def _compare_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
     tasks = [(name, BundleTask(stage, bundle, name)) for name in _tiles_in(stage)]
     tiles = engine.run("bundle", compare_tile, tasks)
     raise_on([problem for tile in tiles for problem in tile.problems])
-    raise_on(list(compare_histograms(bundle, tiles)))
+    raise_on(list(compare_histograms(bundle, [tile.joints for tile in tiles])))
     surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
     edits = "; ".join(line for tile in tiles for line in tile.edits)
     worst = max((tile.worst for tile in tiles), default=0.0)

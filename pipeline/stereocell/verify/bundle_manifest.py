@@ -1,0 +1,109 @@
+"""Compare a bundle's manifest with the stage: what it says of specimen, tiles and channels.
+
+Of each channel also its transfer functions: lookup tables, shapes, histograms.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stereocell.bundle.write_transfer2d import sum_tiles
+from stereocell.transfer.joint_histogram import log_scaled
+from stereocell.transfer.opacity import evaluate
+from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_stage import modality_of, open_stage, specimen_name, tile_prims
+from stereocell.verify.bundle_files import (
+    COLOR_STEP,
+    find_differences,
+    read_manifest,
+    read_texels,
+    read_transfer2d,
+)
+
+
+def compare_manifest(stage_file: Path, bundle: Path) -> list[str]:
+    """Return what the manifest says otherwise than the composed stage. Raises StereoCellError."""
+    stage = open_stage(stage_file)
+    manifest = read_manifest(bundle)
+    specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    problems = list(find_differences("specimen", manifest["specimen"], specimen))
+    tiles = [str(prim.GetName()) for prim in tile_prims(stage)]
+    listed = [tile["id"] for tile in manifest["tiles"]]
+    if tiles != listed:
+        problems.append(f"tiles are {', '.join(listed)}, the stage's {', '.join(tiles)}")
+    ends = [
+        [pick(tile["bounds_um"][end][axis] for tile in manifest["tiles"]) for axis in range(3)]
+        for end, pick in (("min", min), ("max", max))
+    ]
+    whole = {"bounds_um": dict(zip(("min", "max"), ends, strict=True))}
+    problems += find_differences("specimen", manifest["specimen"], whole, "its tiles'")
+    appearances = read_appearances(stage)
+    ids = [appearance.id for appearance in appearances]
+    if ids != [channel["id"] for channel in manifest["channels"]]:
+        return [*problems, "the channels are not the stage's"]
+    for appearance, channel in zip(appearances, manifest["channels"], strict=True):
+        problems += _compare_channel(appearance, channel, bundle)
+    return problems
+
+
+def _compare_channel(
+    appearance: ComposedAppearance, channel: dict[str, Any], bundle: Path
+) -> Iterator[str]:
+    away = max(abs(a - b) for a, b in zip(appearance.color, channel["color"], strict=True))
+    if away > COLOR_STEP:
+        yield f"{appearance.id}: color is {channel['color']}, the stage's {list(appearance.color)}"
+    expected = {
+        "name": appearance.name,
+        "window": list(appearance.window),
+        "iso_value": appearance.iso_value,
+        "iso_normalized": appearance.iso_normalized,
+        "threshold_normalized": appearance.threshold_normalized,
+        "surface": "none" if channel["tileset"] is None else appearance.surface,
+        "transfer_function": appearance.chosen,
+        "transfer_functions": list(appearance.transfer_functions),
+    }
+    yield from find_differences(appearance.id, channel, expected)
+    yield from find_differences(
+        appearance.id, channel["transfer_functions_2d"], {"names": list(appearance.shapes)}
+    )
+    shapes = read_transfer2d(bundle, channel)
+    drawn = {
+        "gradient_max": appearance.gradient_max,
+        "functions": {
+            name: [asdict(one) for one in all_] for name, all_ in appearance.shapes.items()
+        },
+    }
+    yield from find_differences(appearance.id, shapes, json.loads(json.dumps(drawn)))
+    rows = read_texels(bundle / channel["lut"]["path"])[0][0]
+    if rows.shape != (len(appearance.transfer_functions), 256, 4):
+        shape = " x ".join(map(str, rows.shape))
+        yield (
+            f"{appearance.id}: its lookup table has {shape} values, expected "
+            f"{len(appearance.transfer_functions)} x 256 x 4"
+        )
+        return
+    for row, (name, points) in zip(rows, appearance.transfer_functions.items(), strict=True):
+        off = np.abs(row[:, 3] / 255 - evaluate(points)).max()
+        if (row[:, :3] != 255).any() or off > COLOR_STEP:
+            yield f"{appearance.id}: the lookup table of {name!r} is not the stage's"
+
+
+def compare_histograms(bundle: Path, joints: Sequence[Mapping[str, bytes]]) -> Iterator[str]:
+    """Yield which channel's histogram of value and gradient its volumes do not give.
+
+    joints  each tile's, packed, by channel
+    """
+    manifest = read_manifest(bundle)
+    for channel in manifest["channels"]:
+        name = channel["id"]
+        counts = sum_tiles(tile[name] for tile in joints if name in tile)
+        shapes = read_transfer2d(bundle, channel)
+        expected = log_scaled(counts)
+        found = read_texels(bundle / shapes["histogram"]["path"])[0][0, ..., 0]
+        if found.shape != expected.shape or (found != expected).any():
+            yield f"{name}: its histogram of value and gradient is not its volumes'"
+        yield from find_differences(name, shapes, {"most": int(counts.max())}, "its volumes'")

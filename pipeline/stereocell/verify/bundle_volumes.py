@@ -1,0 +1,45 @@
+"""Compare a tile's volumes in a bundle with the stage's: voxels of every mip level, bricks."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
+from stereocell.storage.json_files import read_json
+from stereocell.usd.read_stage import ComposedVolume
+from stereocell.verify.bundle_files import REMEDY, read_texels
+
+
+def placement_of(volume: ComposedVolume) -> dict[str, Any]:
+    """Return where a volume is, as the bundle says it."""
+    return {
+        "size": list(volume.size),
+        "apron": volume.apron,
+        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
+        "matrix": [float(number) for number in volume.matrix.ravel()],
+    }
+
+
+def find_volume(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[str, Any] | None:
+    content = read_json(bundle / channel["volumes"]["path"], "volumes.schema.json", REMEDY)
+    return next((one for one in content["volumes"] if one["tile"] == tile_id), None)
+
+
+def compare_volume(bundle: Path, entry: dict[str, Any], voxels: NDArray[np.uint8]) -> Iterator[str]:
+    """Yield what is wrong with a volume's levels and with its bricks; uint8 (z, y, x)."""
+    file = bundle / entry["file"]["path"]
+    found, expected = read_texels(file), mip_levels(voxels)
+    if [level.shape[:3] for level in found] != [level.shape for level in expected]:
+        yield f"{file.name}: its levels have other sizes than the stage's volume gives"
+        return
+    for k, (level, wanted) in enumerate(zip(found, expected, strict=True)):
+        wrong = int((level[..., 0] != wanted).sum())
+        if wrong:
+            yield f"{file.name}: level {k}: {wrong} of {wanted.size} voxels are not the stage's"
+    file = bundle / entry["bricks"]["path"]
+    (bricks,), ends = read_texels(file), min_max_bricks(voxels)
+    if bricks.shape != ends.shape or (bricks != ends).any():
+        yield f"{file.name}: not the least and most of the stage's bricks"
