@@ -156,7 +156,9 @@ def test_level_outside_the_surface_encloses_it_and_one_inside_does_not(
 ) -> None:
     fine = ball(4.0, 60)
     scaled = replace(fine, positions=fine.positions * np.float32(1 + outward_um / 4))
-    monkeypatch.setattr(lod_chain, "simplify_without_defects", lambda *_: Simplified(scaled, 0, 0))
+    monkeypatch.setattr(
+        lod_chain, "simplify_without_defects", lambda *_, **__: Simplified(scaled, 0, 0)
+    )
     *_, last = _levels(fine, (), _settings((0.1, 0.5)))
     assert last.quality is not None
     assert low <= last.quality.enclosed <= high

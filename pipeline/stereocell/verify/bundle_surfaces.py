@@ -25,9 +25,7 @@ from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.model.mesh import Mesh
 from stereocell.usd.read_stage import ComposedLod
 from stereocell.usd.read_textures import read_image
-from stereocell.verify.bundle_files import (
-    COLOR_STEP,
-)
+from stereocell.verify.bundle_files import COLOR_STEP
 
 _UM_PER_METRE = 1e6
 _MAP_DIFFERENCE = 1.0  # of 255, in the mean: the same image by another version of the encoder
