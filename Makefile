@@ -4,7 +4,7 @@ SHELL := /bin/bash
 
 # What a person sets is data: taken as it stands, no dollar expanded, and given to commands by the
 # environment, where no shell reads it: "$$OUT" in a recipe, never $(OUT)
-SET := INPUT OUT SAMPLE WORKERS ARGS PYTHON CHROMIUM BLENDER_BASE STEREOCELL_DATA CI
+SET := INPUT OUT SAMPLE WORKERS ARGS T PYTHON CHROMIUM BLENDER_BASE STEREOCELL_DATA CI
 $(foreach name,$(SET),$(if $(filter-out undefined,$(origin $(name))),$(eval override export $(name) := $$(value $(name)))))
 
 export PYTHON ?= python3
@@ -46,7 +46,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-fast test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -149,9 +149,19 @@ lint: setup ## ruff, mypy, layers of imports, biome, tsc
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
-test-fast: setup ## Unit tests only
-	$(BIN)/pytest -m "not slow"
-	cd $(VIEWER) && npm run --silent test
+# a process for each core, and of each one thread: others would wait for one another, busily
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
+VITEST := cd $(VIEWER) && npm run --silent types && npm exec --silent -- vitest run
+
+test-here: setup ## The tests of one package:  T=meshes, or of a folder of the viewer: T=panel
+	@found=; \
+	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; $(PYTEST) "tests/$$T" || exit; fi; \
+	if [ -n "$$T" ] && [ -e "$(VIEWER)/src/$$T" ]; then found=1; $(VITEST) --project unit "src/$$T" || exit; fi; \
+	[ -n "$$found" ] || { printf 'T is %s, expected a folder of tests or of %s, as T=meshes\n' "$$T" $(VIEWER)/src >&2; exit 2; }
+
+test-fast: setup ## What takes no while: no whole builds, no malformed inputs, no browser
+	$(PYTEST) -m "not slow" --ignore tests/system --ignore tests/malformed
+	$(VITEST) --project unit
 
 # Side by side: browsers often wait, and then Python has the cores
 test: setup browser ## All tests, in headless Chromium too
@@ -160,9 +170,12 @@ test: setup browser ## All tests, in headless Chromium too
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
-# a process for each core, and of each one thread: others would wait for one another, busily
 test-python: setup
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n "$$WORKERS" --durations 25
+
+test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
+	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
+	$(MAKE) --no-print-directory torture
 
 test-viewer: setup browser
 	cd $(VIEWER) && npm run --silent test

@@ -16,9 +16,20 @@ import pytest
 from numpy.typing import NDArray
 
 from support import phantoms
+from support.exhaustive import IS_EXHAUSTIVE
 from support.object_store import VERSITYGW
 
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave sweeps to `make test-exhaustive`."""
+    if IS_EXHAUSTIVE:
+        return
+    of_sweeps = {item: item.get_closest_marker("exhaustive") is not None for item in items}
+    config.hook.pytest_deselected(items=[item for item in items if of_sweeps[item]])
+    items[:] = [item for item in items if not of_sweeps[item]]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

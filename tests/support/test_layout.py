@@ -1,0 +1,94 @@
+"""Where tests lie: tests/ and the viewer's test/ mirror the code, and no test imports another."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parents[1]
+ROOT = TESTS.parent
+PACKAGE = ROOT / "pipeline" / "stereocell"
+VIEWER = ROOT / "viewer_gltf"
+# what mirrors no package: of the whole, of other languages and programs, or what tests share
+OF_THE_WHOLE = {"bench", "blender", "docs", "malformed", "support", "system"}
+OF_THE_PAGE = {"interop", "page", "shaders", "support"}
+
+
+def folders(of: Path) -> set[str]:
+    """Return the folders in which there are files that are kept, by their path."""
+    generated = {"__pycache__", "node_modules"}
+    files = (file.relative_to(of) for file in of.rglob("*") if file.suffix in (".py", ".ts"))
+    return {
+        place.parent.as_posix()
+        for place in files
+        if len(place.parts) > 1 and not generated.intersection(place.parts)
+    }
+
+
+def imported(module: str) -> Iterator[str]:
+    """Yield the names that a Python module imports, those below a package with it."""
+    for node in ast.walk(ast.parse(module)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module or ''}.{alias.name}" for alias in node.names)
+
+
+def names_a_test(module: str) -> bool:
+    """Whether a dotted name leads to a test module, or to a folder of tests but the shared one."""
+    first, *_ = parts = module.strip(".").split(".")
+    return any(re.fullmatch(r"test_\w+", part) for part in parts) or first == "tests"
+
+
+@pytest.mark.parametrize(
+    ("module", "expected"),
+    [
+        ("from test_seams import scene", True),
+        ("from building.test_seams import scene", True),
+        ("from tests.building import scene", True),
+        ("def late():\n    import building.test_seams as seams", True),
+        ("from . import test_seams", True),
+        ("from support import phantoms", False),
+        ("import latest_thing", False),
+    ],
+)
+def test_an_import_of_a_test_is_seen(module: str, expected: bool) -> None:
+    assert any(names_a_test(name) for name in imported(module)) == expected
+
+
+def test_no_test_imports_another_and_nothing_shared_imports_a_test() -> None:
+    modules = {file: file.read_text() for file in TESTS.rglob("*.py") if ".venv" not in file.parts}
+    assert len(modules) > 100
+    found = [
+        f"{file.relative_to(ROOT)} imports {name}"
+        for file, module in modules.items()
+        for name in imported(module)
+        if names_a_test(name)
+    ]
+    assert found == []
+
+
+def test_no_browser_test_imports_another() -> None:
+    modules = sorted((VIEWER / "test").rglob("*.ts"))
+    assert modules
+    address = re.compile(r"""\b(?:from|import)\s*\(?\s*["']([^"']+\.test(?:\.ts)?)["']""")
+    found = [
+        f"{file.relative_to(ROOT)} imports {name}"
+        for file in modules
+        for name in address.findall(file.read_text())
+    ]
+    assert found == []
+
+
+def test_folders_of_tests_are_those_of_the_package() -> None:
+    mirrored = {name for name in folders(TESTS) if name.split("/")[0] not in OF_THE_WHOLE}
+    assert mirrored - folders(PACKAGE) == set()
+    assert {name.split("/")[0] for name in folders(TESTS)} >= OF_THE_WHOLE
+
+
+def test_folders_of_browser_tests_are_those_of_the_viewer() -> None:
+    mirrored = {name for name in folders(VIEWER / "test") if name.split("/")[0] not in OF_THE_PAGE}
+    assert mirrored - folders(VIEWER / "src") == set()
+    assert {name.split("/")[0] for name in folders(VIEWER / "test")} >= OF_THE_PAGE
