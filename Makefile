@@ -151,6 +151,7 @@ lint: setup ## ruff, mypy, layers of imports, biome, tsc
 
 # a process for each core, and of each one thread: others would wait for one another, busily
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
+SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
 VITEST := cd $(VIEWER) && npm run --silent types && npm exec --silent -- vitest run
 
 test-here: setup ## The tests of one package:  T=meshes, or of a folder of the viewer: T=panel
@@ -184,12 +185,12 @@ test-viewer: setup browser
 	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
 	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
-	rm -rf out/f && $(BIN)/python tests/support/phantoms.py out/f
-	$(BIN)/python tests/support/validators.py $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
-	rm -rf out/edit && $(BIN)/python tests/support/stage_edits.py volume out/edit
+	rm -rf out/f && $(SUPPORT).phantoms out/f
+	$(SUPPORT).validators $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
+	rm -rf out/edit && $(SUPPORT).stage_edits volume out/edit
 	$(MAKE) --no-print-directory bundle INPUT=out/edit/balls.ome.tif OUT=out/edit/built ARGS="--grid 3x2" WORKERS=0
 	cp -r out/edit/built/bundle out/edit/before
-	$(BIN)/python tests/support/stage_edits.py layer out/edit
+	$(SUPPORT).stage_edits layer out/edit
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/demo/bundle" \
 	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
@@ -213,7 +214,7 @@ object-store: setup ## versitygw for the tests, by Go, which keep to moto's serv
 	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest
 
 torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs
-	$(BIN)/python tests/support/torture.py 50
+	$(SUPPORT).torture 50
 	$(BIN)/python tests/malformed
 
 bench: setup ## Ratios of two things in one run, medians

@@ -1,6 +1,6 @@
 """Builds that are killed in each of their phases, and what they leave once they have gone on.
 
-    python tests/support/torture.py [KILLS [SEED]]
+    PYTHONPATH=tests python -m support.torture [KILLS [SEED]]
 
 A build of two tiles and two channels is killed and started again, over and over, as often in each
 phase as in any other: a kill waits until its phase has begun, and then a random part of the time

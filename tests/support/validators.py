@@ -1,6 +1,6 @@
 """A build but for its report, which takes longest: for tests that look at no report.
 
-`python tests/support/validators.py INPUT OUT [INPUT OUT ...]` does it in one process.
+`python -m support.validators INPUT OUT [INPUT OUT ...]` does it in one process.
 """
 
 import sys

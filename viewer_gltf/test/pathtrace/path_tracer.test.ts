@@ -4,17 +4,13 @@
  * gathers the same. Whatever the bricks' size, and however the samples are spread. What comes after
  * the light is in denoise_and_tone.test.ts.
  */
-import { execFile } from "node:child_process";
-import { existsSync } from "node:fs";
-import { join } from "node:path";
 import { describe, expect, it } from "vitest";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
 import type { Gathered, Harness, Run } from "../support/pathtrace/harness";
 import { BASE, opacityRamp, SIZE } from "../support/pathtrace/phantom";
+import { askPython, hasPython } from "../support/python";
 
-const REPOSITORY = new URL("../../../", import.meta.url).pathname;
-const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/python");
 /** Texels of the tracer that rest or are sampled as one. */
 const NOISE_TILE = 16;
 
@@ -59,14 +55,9 @@ function expectAlike(a: Estimate, b: Estimate, what: string): void {
 
 const samplesOf = ({ moments }: Gathered) => moments.filter((_, i) => i % 4 === 1);
 
-function reference(run: Run, paths: number): Promise<{ mean: number[]; error: number[] }> {
-  return new Promise((resolve, reject) => {
-    const script = join(REPOSITORY, "tests/support/reference_path_tracer.py");
-    const child = execFile(PYTHON, [script], (error, stdout, stderr) =>
-      error ? reject(new Error(stderr)) : resolve(JSON.parse(stdout)),
-    );
-    child.stdin?.end(JSON.stringify({ ...run, paths, seed: 1 }));
-  });
+async function reference(run: Run, paths: number): Promise<{ mean: number[]; error: number[] }> {
+  const asked = JSON.stringify({ ...run, paths, seed: 1 });
+  return JSON.parse(await askPython("reference_path_tracer", [], asked));
 }
 
 describeInChromium("the path tracer", () => {
@@ -377,7 +368,7 @@ describeInChromium("the path tracer", () => {
     expect(ground).toBeLessThan(0.85 * face);
   });
 
-  describe.skipIf(!existsSync(PYTHON))("beside another path tracer", () => {
+  describe.skipIf(!hasPython)("beside another path tracer", () => {
     const lit: Run = {
       ...BASE,
       color: [0.9, 0.75, 0.6],

@@ -3,8 +3,6 @@
  * fixture, and of a real stack where STEREOCELL_REAL_BUNDLE names its bundle. Skipped where the
  * repository has no .venv (`make setup`).
  */
-import { execFile } from "node:child_process";
-import { existsSync } from "node:fs";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -13,22 +11,12 @@ import { framingDistance, place } from "../../src/render/placement";
 import { withoutMarks } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand, type Stand } from "../support/browser/stand";
+import { askPython, hasPython } from "../support/python";
 
-const REPOSITORY = new URL("../../../", import.meta.url).pathname;
-const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/python");
 const REAL = process.env.STEREOCELL_REAL_BUNDLE;
 const FIELD_OF_VIEW_DEG = 40;
 const VIEWPORT = { width: 360, height: 240 };
 const LEAST_DB = 40;
-
-function run(script: string, given: readonly string[], input: string): Promise<string> {
-  return new Promise((resolve, reject) => {
-    const child = execFile(PYTHON, [script, ...given], (error, stdout, stderr) =>
-      error ? reject(new Error(stderr)) : resolve(stdout),
-    );
-    child.stdin?.end(input);
-  });
-}
 
 /** Show these channels alone, as volumes everywhere, from the front; how near that comes, in dB. */
 async function hold(stand: Stand, channels: readonly string[]) {
@@ -52,13 +40,12 @@ async function hold(stand: Stand, channels: readonly string[]) {
     target_um: center,
     fov_deg: FIELD_OF_VIEW_DEG,
   };
-  const script = join(REPOSITORY, "tests/support/bundle_picture.py");
-  const said = await run(script, [stand.bundle, picture], JSON.stringify(asked));
+  const said = await askPython("bundle_picture", [stand.bundle, picture], JSON.stringify(asked));
   await rm(folder, { recursive: true });
   return JSON.parse(said) as { psnr: number; drawn: number };
 }
 
-describe.skipIf(!existsSync(PYTHON))("against the float64 reference", () => {
+describe.skipIf(!hasPython)("against the float64 reference", () => {
   describeInChromium("the picture of the fixture", () => {
     const stand = prepareStand({ viewport: VIEWPORT });
     for (const channels of [["Balls"], ["Block"], ["F_x20_body", "Balls", "Block"]]) {
