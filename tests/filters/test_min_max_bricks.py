@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 
-from stereocell.filters.min_max_bricks import BRICK, min_max_bricks, mip_levels
+from stereocell.filters.min_max_bricks import SKIP_BRICK, min_max_bricks, mip_levels
 
 shapes = st.tuples(*[st.integers(1, 21)] * 3)
 volumes = shapes.flatmap(lambda shape: arrays(np.uint8, shape))
@@ -13,13 +13,13 @@ volumes = shapes.flatmap(lambda shape: arrays(np.uint8, shape))
 @given(volumes, st.integers(0, 2**32 - 1))
 def test_bricks_hold_every_value_that_trilinear_interpolation_gives(volume, seed):
     bricks = min_max_bricks(volume)
-    assert bricks.shape == (*(-(-n // BRICK) for n in volume.shape), 2)
+    assert bricks.shape == (*(-(-n // SKIP_BRICK) for n in volume.shape), 2)
     # Texture coordinates anywhere in the texture, in voxels from its corner: centres are at + 0.5.
     points = np.random.default_rng(seed).uniform(0, 1, (64, 3)) * volume.shape
     samples = ndimage.map_coordinates(
         volume.astype(np.float64), (points - 0.5).T, order=1, mode="nearest"
     )
-    ranges = bricks[tuple((points // BRICK).astype(int).T)]
+    ranges = bricks[tuple((points // SKIP_BRICK).astype(int).T)]
     assert (samples >= ranges[:, 0] - 1e-6).all()
     assert (samples <= ranges[:, 1] + 1e-6).all()
 
@@ -28,7 +28,8 @@ def test_bricks_hold_every_value_that_trilinear_interpolation_gives(volume, seed
 def test_bricks_cover_their_voxels_and_one_more_on_each_side_and_nothing_else(volume):
     bricks = min_max_bricks(volume)
     for brick in np.ndindex(bricks.shape[:3]):
-        reach = tuple(slice(max(8 * b - 1, 0), 8 * b + 9) for b in brick)
+        first = [SKIP_BRICK * b for b in brick]
+        reach = tuple(slice(max(i - 1, 0), i + SKIP_BRICK + 1) for i in first)
         assert tuple(bricks[brick]) == (volume[reach].min(), volume[reach].max())
 
 

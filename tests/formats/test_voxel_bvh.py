@@ -10,9 +10,9 @@ from hypothesis.extra import numpy as npst
 from scipy import ndimage
 
 from stereocell.formats.voxel_bvh import (
-    BRICK,
     EMPTY,
     STORED,
+    STREAM_BRICK,
     build,
     first_children,
     reassemble,
@@ -38,7 +38,7 @@ def bricks_of(bvh):
 
 def box_of(node, reach=0):
     """Return the texels of a node's box, cut at the volume's ends, and `reach` more of them."""
-    edge = BRICK << int(node["level"])
+    edge = STREAM_BRICK << int(node["level"])
     return tuple(
         slice(max(0, int(node[a]) * edge - reach), min(n, (int(node[a]) + 1) * edge + reach))
         for a, n in zip("zyx", VOLUME.shape, strict=True)
@@ -59,7 +59,7 @@ def test_a_leaf_holds_its_texels_and_one_of_its_neighbours_all_round(bvh):
     leaves = [(n, b) for n, b in bricks_of(bvh) if n["level"] == 0 and b is not None]
     assert leaves
     for node, brick in leaves:
-        first = BRICK * np.array([node["z"], node["y"], node["x"]]).reshape(3, 1, 1, 1)
+        first = STREAM_BRICK * np.array([node["z"], node["y"], node["x"]]).reshape(3, 1, 1, 1)
         np.testing.assert_array_equal(brick, clamped(VOLUME, first + cells(STORED) - 1))
 
 
@@ -69,8 +69,8 @@ def test_a_trilinear_sample_inside_a_leaf_needs_no_other_brick(bvh):
     for node, brick in bricks_of(bvh):
         if brick is None or node["level"] > 0:
             continue
-        inside = rng.uniform(0, BRICK, (3, 40))
-        first = BRICK * np.array([[node["z"]], [node["y"]], [node["x"]]])
+        inside = rng.uniform(0, STREAM_BRICK, (3, 40))
+        first = STREAM_BRICK * np.array([[node["z"]], [node["y"]], [node["x"]]])
         inside = np.minimum(inside, np.array(VOLUME.shape)[:, None] - first)
         alone = ndimage.map_coordinates(brick.astype(float), inside + 0.5, order=1)
         place = first + inside - 0.5
@@ -86,8 +86,9 @@ def test_a_coarse_texel_is_the_mean_of_its_cell(bvh):
         if brick is None or level == 0:
             continue
         edge = 1 << level
-        for place in itertools.product(range(0, BRICK, 5), repeat=3):
-            low = [(int(node[a]) * BRICK + p) * edge for a, p in zip("zyx", place, strict=True)]
+        for place in itertools.product(range(0, STREAM_BRICK, 5), repeat=3):
+            first = [int(node[axis]) * STREAM_BRICK for axis in "zyx"]
+            low = [(i + p) * edge for i, p in zip(first, place, strict=True)]
             if any(at + edge > n for at, n in zip(low, VOLUME.shape, strict=True)):
                 continue
             cell = VOLUME[tuple(slice(at, at + edge) for at in low)]
@@ -207,7 +208,7 @@ def test_a_constant_volume_has_no_error():
 def test_weights_interpolate_a_ramp_exactly():
     """Coarse texel k's centre lies at (k - 1/2) 2^level finest texels from the box's low side."""
     for level in range(1, 5):
-        count = BRICK << level
+        count = STREAM_BRICK << level
         centres = (np.arange(STORED) - 0.5) * 2**level
         np.testing.assert_allclose(upsampling(level, count) @ centres, np.arange(count) + 0.5)
 

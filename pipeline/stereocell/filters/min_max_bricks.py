@@ -10,7 +10,7 @@ Creation", NVIDIA 2005). Bricks follow the min-max blocks of Parker et al., IEEE
 import numpy as np
 from numpy.typing import NDArray
 
-BRICK = 8  # voxels along a brick's edge
+SKIP_BRICK = 8  # voxels along a brick's edge, a power of two; the viewer's build reads it here
 SMALLEST_LEVEL = 4  # no further mip level once no axis is longer
 
 
@@ -31,9 +31,9 @@ def mip_levels(volume: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
 def min_max_bricks(volume: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return the smallest and largest voxel of each brick: uint8 (bz, by, bx, 2).
 
-    Along an axis of n voxels there are ceil(n / 8) bricks; brick b covers the voxels
-    [8b - 1, 8b + 8], clipped to the volume: all that a trilinear sample between the outer faces
-    of its voxels 8b to 8b + 7 can touch.
+    Along an axis of n voxels there are ceil(n / SKIP_BRICK) bricks; brick b begins at voxel
+    i = SKIP_BRICK * b and covers [i - 1, i + SKIP_BRICK], clipped to the volume: all that a
+    trilinear sample between the outer faces of its own voxels can touch.
     """
     low, high = volume, volume
     for axis in range(3):
@@ -68,10 +68,10 @@ def _halve(
 
 def _reduce(ufunc: np.ufunc, values: NDArray[np.uint8], axis: int) -> NDArray[np.uint8]:
     n = values.shape[axis]
-    reduced: NDArray[np.uint8] = ufunc.reduceat(values, np.arange(0, n, BRICK), axis=axis)
+    reduced: NDArray[np.uint8] = ufunc.reduceat(values, np.arange(0, n, SKIP_BRICK), axis=axis)
     moved, source = np.moveaxis(reduced, axis, 0), np.moveaxis(values, axis, 0)
-    after = source[BRICK::BRICK]  # the first voxel of the next brick
+    after = source[SKIP_BRICK::SKIP_BRICK]  # the first voxel of the next brick
     ufunc(moved[: len(after)], after, out=moved[: len(after)])
-    before = source[BRICK - 1 : n - 1 : BRICK]  # the last voxel of the brick before
+    before = source[SKIP_BRICK - 1 : n - 1 : SKIP_BRICK]  # the last voxel of the brick before
     ufunc(moved[1:], before, out=moved[1:])
     return reduced

@@ -21,7 +21,7 @@ import zstandard
 from jsonschema import Draft202012Validator
 from numpy.typing import NDArray
 
-from stereocell.formats.voxel_bvh import BRICK, EMPTY, STORED, Bvh, Bytes3
+from stereocell.formats.voxel_bvh import EMPTY, STORED, STREAM_BRICK, Bvh, Bytes3
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.assets import schema_path
 
@@ -119,8 +119,8 @@ def encode_tree(bvh: Bvh, source: bytes) -> bytes:
         MAGIC,
         VERSION,
         HEADER.size,
-        BRICK,
-        (STORED - BRICK) // 2,
+        STREAM_BRICK,
+        (STORED - STREAM_BRICK) // 2,
         int(nodes["level"][0]) + 1,
         _ZSTD,
         x,
@@ -147,7 +147,7 @@ def parse_table(data: bytes) -> Table:
     if magic != MAGIC:
         raise BrickFormatError(f"magic is {magic!r}, expected {MAGIC!r}")
     layout = (version, header_bytes, brick, apron, codec)
-    expected = (VERSION, HEADER.size, BRICK, 1, _ZSTD)
+    expected = (VERSION, HEADER.size, STREAM_BRICK, 1, _ZSTD)
     if layout != expected:
         raise BrickFormatError(
             f"version, header, brick, apron, codec are {layout}, expected {expected}"
@@ -155,7 +155,7 @@ def parse_table(data: bytes) -> Table:
     end = HEADER.size + count * RECORD.itemsize
     if count == 0 or end > min(len(data), _MAX_TABLE_BYTES):
         raise BrickFormatError(f"{count} nodes in {len(data)} bytes")
-    if not 0 < levels <= 16 or not all(0 < n <= BRICK << levels - 1 for n in (x, y, z)):
+    if not 0 < levels <= 16 or not all(0 < n <= STREAM_BRICK << levels - 1 for n in (x, y, z)):
         raise BrickFormatError(f"{x} x {y} x {z} texels in {levels} levels")
     nodes = np.frombuffer(data, dtype=RECORD, count=count, offset=HEADER.size)
     _check_nodes(nodes, levels, stored, brick_bytes)

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-BRICK = 16  # texels along a leaf's edge, without the apron
-STORED = BRICK + 2  # texels along the edge of what is stored
+STREAM_BRICK = 16  # texels along a leaf's edge, without the apron; the viewer's build reads it
+STORED = STREAM_BRICK + 2  # texels along the edge of what is stored
 EMPTY = 1  # flag: no brick; the node is `constant` throughout
 _SLAB = 1 << 18  # texels that are compared at once: they stay in the cache
 
@@ -80,7 +80,7 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
     for what lacks, in exact arithmetic, rounded once. Behind the volume's faces bricks repeat the
     nearest texel, as GL_CLAMP_TO_EDGE does. Raises ValueError for an empty or oversized volume.
     """
-    if volume.ndim != 3 or not volume.size or max(volume.shape) > BRICK << 15:
+    if volume.ndim != 3 or not volume.size or max(volume.shape) > STREAM_BRICK << 15:
         raise ValueError(f"a volume of {volume.shape} texels")
     pyramid = _make_pyramid(volume)
     means = _cell_means(volume, len(pyramid))
@@ -140,7 +140,7 @@ def reassemble(bvh: Bvh) -> Bytes3:
         stored = None if is_empty else next(brick)
         if not is_empty and node["level"] > 0:
             continue
-        edge = BRICK << int(node["level"])
+        edge = STREAM_BRICK << int(node["level"])
         box = tuple(slice(int(node[axis]) * edge, (int(node[axis]) + 1) * edge) for axis in "zyx")
         part = volume[box]
         if stored is None:
@@ -165,7 +165,7 @@ def _make_pyramid(volume: Bytes3) -> list[Bytes3]:
     """Return the levels, each half as long as the one before, until one brick holds all."""
     levels = [volume]
     exact: NDArray[np.uint8] | Floats = volume
-    while max(levels[-1].shape) > BRICK:
+    while max(levels[-1].shape) > STREAM_BRICK:
         for axis in range(3):
             exact = _halve(exact, axis)
         levels.append((exact + np.float32(0.5)).astype(np.uint8))
@@ -194,7 +194,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
     sums: NDArray[Any] = volume
     counts = np.ones((1, 1, 1), dtype=np.int64)
     for axis, n in enumerate(volume.shape):
-        starts = np.arange(0, n, BRICK)
+        starts = np.arange(0, n, STREAM_BRICK)
         sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)  # 16^3 * 255 at most
         shape = [1, 1, 1]
         shape[axis] = len(starts)
@@ -210,7 +210,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
 
 def _pad(level: Bytes3, grid: tuple[int, ...]) -> Bytes3:
     """Return the texels that a level's bricks hold: an apron, and whole bricks at the end."""
-    widths = [(1, g * BRICK + 1 - n) for g, n in zip(grid, level.shape, strict=True)]
+    widths = [(1, g * STREAM_BRICK + 1 - n) for g, n in zip(grid, level.shape, strict=True)]
     return np.pad(level, widths, mode="edge")
 
 
@@ -219,10 +219,10 @@ def _ranges(padded: Bytes3, ufunc: np.ufunc) -> Bytes3:
     values = padded
     for axis in range(3):
         values = np.moveaxis(values, axis, 0)
-        core = values[1:-1].reshape(-1, BRICK, *values.shape[1:])
+        core = values[1:-1].reshape(-1, STREAM_BRICK, *values.shape[1:])
         reduced: Bytes3 = ufunc.reduce(core, axis=1)
-        ufunc(reduced, values[:-2:BRICK], out=reduced)
-        ufunc(reduced, values[BRICK + 1 :: BRICK], out=reduced)
+        ufunc(reduced, values[:-2:STREAM_BRICK], out=reduced)
+        ufunc(reduced, values[STREAM_BRICK + 1 :: STREAM_BRICK], out=reduced)
         values = np.moveaxis(reduced, 0, axis)
     return values
 
@@ -243,7 +243,7 @@ def _reduce_children(ufunc: np.ufunc, values: NDArray[Any], neutral: int) -> NDA
 def _cut(padded: Bytes3, places: NDArray[np.int64]) -> Bytes3:
     """Return the bricks (n, 18, 18, 18) at these places (z, y, x) of a padded level."""
     windows = np.lib.stride_tricks.sliding_window_view(padded, (STORED,) * 3)
-    bricks: Bytes3 = windows[::BRICK, ::BRICK, ::BRICK][tuple(places.T)]
+    bricks: Bytes3 = windows[::STREAM_BRICK, ::STREAM_BRICK, ::STREAM_BRICK][tuple(places.T)]
     return bricks
 
 
@@ -261,7 +261,7 @@ def _error(
     brick: Bytes3, level: int, place: NDArray[np.int64], volume: Bytes3
 ) -> tuple[int, float]:
     """Return the largest and the root mean square difference of a brick to what it averages."""
-    edge = BRICK << level
+    edge = STREAM_BRICK << level
     z0, y0, x0 = (int(n) * edge for n in place)
     box = volume[z0 : z0 + edge, y0 : y0 + edge, x0 : x0 + edge]
     weights = [upsampling(level, n) for n in box.shape]

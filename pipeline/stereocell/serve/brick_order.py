@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.formats.brick_stream import Table
-from stereocell.formats.voxel_bvh import BRICK, EMPTY
+from stereocell.formats.voxel_bvh import EMPTY, STREAM_BRICK
 from stereocell.model.errors import SourceError
 
 _FOVEA_RAD = math.radians(20)  # off the gaze by this much, a brick is worth half
@@ -79,7 +79,7 @@ def place(table: Table, entry: dict[str, Any]) -> PlacedTree:
     count = size - 2 * first
     spacing = np.where(count > 0, (high_um - low_um) / np.where(count > 0, count, 1), 1.0)
     at = np.stack([nodes[axis] for axis in "xyz"], axis=1).astype(np.float64)
-    edge = (BRICK * np.exp2(nodes["level"].astype(np.float64)))[:, np.newaxis]
+    edge = (STREAM_BRICK * np.exp2(nodes["level"].astype(np.float64)))[:, np.newaxis]
     low = np.maximum(at * edge, first) - first
     high = np.minimum((at + 1) * edge, size - first) - first
     low_box, high_box = low_um + low * spacing, low_um + high * spacing

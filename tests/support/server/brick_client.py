@@ -18,7 +18,7 @@ from stereocell.formats.brick_stream import (
     decode_frame,
     parse_table,
 )
-from stereocell.formats.voxel_bvh import BRICK, EMPTY, STORED, upsampling
+from stereocell.formats.voxel_bvh import EMPTY, STORED, STREAM_BRICK, upsampling
 
 
 @dataclass
@@ -99,7 +99,7 @@ def reconstruct(table: Table, frames: dict[int, bytes]) -> np.ndarray:
         if not is_empty and i not in frames:
             continue
         level = int(node["level"])
-        edge = BRICK << level
+        edge = STREAM_BRICK << level
         part = volume[tuple(slice(node[a] * edge, (node[a] + 1) * edge) for a in map(str, "zyx"))]
         if is_empty:
             part[:] = node["constant"]

@@ -1,8 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
+import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
-import { brickCounts } from "../volumes/bricks8";
+import { brickCounts } from "../volumes/skip_bricks";
 import { assemble, brickRanges, emptyBlock, paste } from "./assemble_tiles";
 import { frameOf } from "./texel_frame";
 
@@ -81,7 +82,8 @@ describe("the range of a brick", () => {
               Math.floor(i / size[0]) % size[1],
               Math.floor(i / (size[0] * size[1])),
             ];
-            if (p.some((v, k) => v < 8 * brick[k] - 1 || v > 8 * brick[k] + 8)) continue;
+            const inside = p.map((v, k) => v - SKIP_BRICK * brick[k]);
+            if (inside.some((v) => v < -1 || v > SKIP_BRICK)) continue;
             low = Math.min(low, texels[stride * i + channel]);
             high = Math.max(high, texels[stride * i + channel]);
           }

@@ -4,8 +4,9 @@
  * pasted over one another is the same.
  */
 
+import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { Size3 } from "../bundle/ktx2";
-import { brickCounts } from "../volumes/bricks8";
+import { brickCounts } from "../volumes/skip_bricks";
 
 /**
  * One mip level of a tile, channels interleaved, x fastest. `at` and `whole`: where the tile's
@@ -55,8 +56,8 @@ function axisOf(count: number, finest: number, { at, whole, size }: Part, k: num
 }
 
 /**
- * Smallest and largest value of every brick of 8^3 texels of one channel, interleaved, over the
- * texels [8b - 1, 8b + 8]: all that a trilinear sample inside the brick can touch.
+ * Smallest and largest value of every brick of SKIP_BRICK^3 texels of one channel, interleaved. A
+ * brick that begins at texel i covers [i - 1, i + SKIP_BRICK]: all that a trilinear sample inside the brick can touch.
  */
 export function brickRanges(
   { size, stride, texels }: Block,
@@ -83,8 +84,9 @@ function rowRanges(texels: Uint8Array, from: number, stride: number, n: number, 
   for (let b = 0; 2 * b < row.length; b++) {
     let low = 255;
     let high = 0;
-    const last = Math.min(n - 1, 8 * b + 8);
-    for (let x = Math.max(0, 8 * b - 1); x <= last; x++) {
+    const first = SKIP_BRICK * b;
+    const last = Math.min(n - 1, first + SKIP_BRICK);
+    for (let x = Math.max(0, first - 1); x <= last; x++) {
       const value = texels[from + x * stride];
       if (value < low) low = value;
       if (value > high) high = value;
@@ -103,10 +105,11 @@ function widen(ranges: Uint8Array, to: number, row: Uint8Array): void {
 
 /** The bricks along an axis that read a texel. */
 function readers(texel: number, count: number): readonly number[] {
-  const brick = texel >> 3;
+  const brick = Math.floor(texel / SKIP_BRICK);
+  const inside = texel % SKIP_BRICK;
   const found = [brick];
-  if (texel % 8 === 0 && brick > 0) found.push(brick - 1);
-  if (texel % 8 === 7 && brick + 1 < count) found.push(brick + 1);
+  if (inside === 0 && brick > 0) found.push(brick - 1);
+  if (inside === SKIP_BRICK - 1 && brick + 1 < count) found.push(brick + 1);
   return found;
 }
 

@@ -1,8 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
 import { randomShapes, sampled } from "../../test/support/transfer_2d";
+import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { Size3 } from "../bundle/ktx2";
-import { brickCounts } from "../volumes/bricks8";
+import { brickCounts } from "../volumes/skip_bricks";
 import { planeTable } from "../volumes/transfer_table_2d";
 import { brickRanges } from "./assemble_tiles";
 import { coarserMajorants, majorants, mediumTable } from "./extinction";
@@ -129,7 +130,7 @@ describe("majorants", () => {
     let largest = 0;
     for (let i = 0; i < 20_000; i++) {
       const p = size.map((n) => n * random());
-      const cell = p.map((v) => Math.floor(v / (8 * factor)));
+      const cell = p.map((v) => Math.floor(v / (SKIP_BRICK * factor)));
       const majorant = found[(cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]];
       const extinction = extinctionAt(p);
       expect(extinction).toBeLessThanOrEqual(majorant * (1 + 1e-5));

@@ -23,7 +23,7 @@ export type MediumTexels = Readonly<{
   texture: Data3DTexture;
   /** Where bricks are in the texture; null: it is the block itself. */
   index: Data3DTexture | null;
-  /** Smallest and largest intensity of every brick of 8^3 texels, of each channel, interleaved. */
+  /** Smallest and largest intensity of every brick of SKIP_BRICK^3 texels, of each channel, interleaved. */
   bricks: readonly Uint8Array[];
   /** Frees the texture. */
   release: () => void;

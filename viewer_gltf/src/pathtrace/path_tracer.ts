@@ -15,12 +15,13 @@ import {
   type WebGLRenderer,
   type WebGLRenderTarget,
 } from "three";
+import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
 import { drawWhole, float3D, floatTarget, floatTexture } from "../gpu/float_targets";
 import { drawEyes } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
-import { brickCounts, SKIP_BRICK } from "../volumes/bricks8";
+import { brickCounts } from "../volumes/skip_bricks";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { Developer } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
@@ -138,7 +139,7 @@ export class Tracer {
     if (texels === null) return;
     const { uniforms } = this.pathPass;
     texelsInto(uniforms, texels);
-    this.pathPass.define("BRICKS", texels.index === null ? null : 1);
+    this.pathPass.define("STREAM_BRICK", texels.index === null ? null : STREAM_BRICK);
     this.pathPass.define("CHANNELS", texels.channels.length);
     this.developer.expect(uniforms.uSize.value);
   }

@@ -1,10 +1,10 @@
 /** What the path tracer's shader is told: of the medium, the scene, its light and its paths. */
 import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
+import { SKIP_BRICK } from "../bundle/generated/constants";
 import { clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import { nothing } from "../gpu/float_targets";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
-import { SKIP_BRICK } from "../volumes/bricks8";
 import { turnOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";

@@ -1,5 +1,5 @@
 /**
- * Where a ray may leap: for every brick of 8^3 texels, how far the nearest brick lies in which the
+ * Where a ray may leap: for every brick of SKIP_BRICK^3 texels, how far the nearest brick lies in which the
  * transfer functions show anything. Pure arrays.
  *
  * The distance is Chebyshev's, in bricks, by the two-pass chamfer transform (Rosenfeld & Pfaltz

@@ -21,14 +21,15 @@ import {
   Vector3,
   Vector4,
 } from "three";
+import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { TileVolume } from "../bundle/generated/volumes";
 import { COLUMNS, ROWS } from "../bundle/transfer_2d";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import type { Rgb } from "../math/color";
 import { distanceInGrid } from "./blend_order";
-import { brickCounts, SKIP_BRICK } from "./bricks8";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
+import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
@@ -236,7 +237,7 @@ export class TileMarch {
     uniforms.uVolume.value = shown.texture;
     uniforms.uOldVolume.value = (old ?? shown).texture;
     uniforms.uIndex.value = shown.index;
-    this.define("BRICKS", shown.index !== null);
+    this.define("STREAM_BRICK", shown.index === null ? null : STREAM_BRICK);
     uniforms.uFresh.value = fresh;
     uniforms.uPresence.value = presence;
     const coarsest = Math.max(shown.level, old?.level ?? 0);
@@ -263,17 +264,14 @@ export class TileMarch {
     if (differs) this.lut.needsUpdate = true;
     this.dressPlanes(looks);
     uniforms.uAllInDisc.value = looks.every((look) => look.isInDisc);
-    this.define(
-      "DISC",
-      looks.some((look) => look.isInDisc),
-    );
+    this.define("DISC", looks.some((look) => look.isInDisc) ? 1 : null);
     return differs;
   }
 
   /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
   private dressPlanes(looks: readonly Look[]): void {
     const isTwoD = looks.some(({ plane }) => plane != null);
-    this.define("TWO_D", isTwoD);
+    this.define("TWO_D", isTwoD ? 1 : null);
     if (!isTwoD) return;
     const { uniforms } = this.mesh.material;
     this.planes ??= emptyPlanes(this.channelCount);
@@ -303,11 +301,11 @@ export class TileMarch {
     this.occupancy.needsUpdate = true;
   }
 
-  private define(name: string, isOn: boolean): void {
+  private define(name: string, value: number | null): void {
     const { material } = this.mesh;
-    if (name in material.defines === isOn) return;
-    if (isOn) material.defines[name] = 1;
-    else delete material.defines[name];
+    if ((material.defines[name] ?? null) === value) return;
+    if (value === null) delete material.defines[name];
+    else material.defines[name] = value;
     material.needsUpdate = true;
   }
 

@@ -7,7 +7,7 @@ import { checkFile, fetchFile, fileAddress, readBody, request } from "../bundle/
 import type { TileVolume } from "../bundle/generated/volumes";
 import { checkHash } from "../bundle/hash";
 import { compressedLevel, readLevel, readTexture } from "../bundle/ktx2";
-import { brickCounts } from "./bricks8";
+import { brickCounts } from "./skip_bricks";
 
 export class VolumeSource {
   private whole: Uint8Array<ArrayBuffer> | null = null;

@@ -1,12 +1,13 @@
-#ifdef BRICKS
-// Virtual texturing: uVolume is an atlas of bricks of 16^3 texels with an apron of one, uIndex says of
-// every cell of 16^3 texels (those of one channel behind those of the one before) where its brick is
-// (slot along x, y, z), and how coarse (a: level); a of 255: it is r / 255 throughout.
+#ifdef STREAM_BRICK
+// Virtual texturing: uVolume is an atlas of bricks of STREAM_BRICK^3 texels with an apron of one. uIndex
+// has an entry for every cell of STREAM_BRICK^3 texels, channel by channel: its brick's slot (x, y, z)
+// and level (a); a of 255: the cell is r / 255 throughout.
 vec4 sampleIntensities(vec3 p) {
+  const float EDGE = float(STREAM_BRICK);
   ivec3 size = textureSize(uIndex, 0);
   ivec3 cells = ivec3(size.xy, size.z / CHANNELS);
   vec3 texel = clamp(p, 0.0, 1.0) * uTexels;
-  ivec3 cell = min(ivec3(texel / 16.0), cells - 1);
+  ivec3 cell = min(ivec3(texel / EDGE), cells - 1);
   vec3 atlas = vec3(textureSize(uVolume, 0));
   vec4 v = vec4(0.0);
   for (int c = 0; c < CHANNELS; c++) {
@@ -16,8 +17,8 @@ vec4 sampleIntensities(vec3 p) {
       continue;
     }
     int level = int(entry.a);
-    vec3 inside = texel / float(1 << level) - 16.0 * vec3(cell >> level) + 1.0;
-    v[c] = texture(uVolume, (18.0 * vec3(entry.rgb) + clamp(inside, 1.0, 17.0)) / atlas).r;
+    vec3 inside = texel / float(1 << level) - EDGE * vec3(cell >> level) + 1.0;
+    v[c] = texture(uVolume, ((EDGE + 2.0) * vec3(entry.rgb) + clamp(inside, 1.0, EDGE + 1.0)) / atlas).r;
   }
   return v;
 }

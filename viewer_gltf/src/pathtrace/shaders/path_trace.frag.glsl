@@ -12,7 +12,7 @@ uniform vec3 uTexPerUm;  // y falls
 uniform float uVoxel;  // um, finest spacing
 uniform vec3 uTexels;  // of the block that is gone through
 uniform sampler3D uVolume;
-uniform usampler3D uIndex;  // with BRICKS
+uniform usampler3D uIndex;  // with STREAM_BRICK
 uniform sampler3D uOldVolume;  // the same volume: nothing fades here
 uniform float uFresh;
 uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um

@@ -1,5 +1,5 @@
 /**
- * The volumes of one tile as bricks that come by view: an atlas of bricks, and of every cell of 16^3
+ * The volumes of one tile as bricks that come by view: an atlas of bricks, and of every cell of STREAM_BRICK^3
  * texels where in the atlas it is to be found (virtual texturing). Stands in for `TileTexture`.
  */
 import {
@@ -11,7 +11,7 @@ import {
   RGBAIntegerFormat,
   UnsignedByteType,
 } from "three";
-import { brickCounts } from "../bricks8";
+import { brickCounts } from "../skip_bricks";
 import type { Packed } from "../tile_texture";
 import type { VolumeSource } from "../volume_source";
 import type { Brick, BrickLink, Taker } from "./client";

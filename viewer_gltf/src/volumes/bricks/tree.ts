@@ -5,9 +5,9 @@
  * that has come, or the constant of an empty one.
  */
 import { BundleError } from "../../bundle/errors";
+import { SKIP_BRICK, STREAM_BRICK } from "../../bundle/generated/constants";
 import type { Size3 } from "../../bundle/ktx2";
 
-export const STREAM_BRICK = 16;
 /** Texels along an edge of what a node stores: with its apron. */
 export const STORED = STREAM_BRICK + 2;
 export const STORED_BYTES = STORED ** 3;
@@ -133,7 +133,7 @@ export function drawnNodes({ cells, nodes }: Table, present: Uint8Array): Uint32
 }
 
 /**
- * Smallest and largest intensity of every brick of 8^3 texels, interleaved, as the march's and the
+ * Smallest and largest intensity of every brick of SKIP_BRICK^3 texels, interleaved, as the march's and the
  * path tracer's tables want them: of the node that is drawn there.
  */
 export function rangesOf(
@@ -142,12 +142,13 @@ export function rangesOf(
   counts: Size3,
 ): Uint8Array<ArrayBuffer> {
   const ranges = new Uint8Array(2 * counts[0] * counts[1] * counts[2]);
+  const cellOf = (brick: number) => Math.floor((brick * SKIP_BRICK) / STREAM_BRICK);
   let to = 0;
   for (let z = 0; z < counts[2]; z++) {
     for (let y = 0; y < counts[1]; y++) {
-      const row = ((z >> 1) * cells[1] + (y >> 1)) * cells[0];
+      const row = (cellOf(z) * cells[1] + cellOf(y)) * cells[0];
       for (let x = 0; x < counts[0]; x++, to += 2) {
-        const n = drawn[row + (x >> 1)];
+        const n = drawn[row + cellOf(x)];
         const [low, high] = n === NOTHING ? [0, 0] : nodes[n].range;
         ranges[to] = low;
         ranges[to + 1] = high;

@@ -33,7 +33,7 @@ uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;  // xyz unit normal, w um: nothing with dot(normal, p) > w is drawn
 uniform sampler3D uVolume;
-uniform usampler3D uIndex;  // with BRICKS
+uniform usampler3D uIndex;  // with STREAM_BRICK
 uniform sampler3D uOldVolume;  // what the volume takes the place of, at another mip level
 uniform float uFresh;  // 0..1: share of the new one
 uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255

@@ -12,6 +12,7 @@ import {
   Vector4,
   WebGLRenderer,
 } from "three";
+import { STREAM_BRICK } from "../../../src/bundle/generated/constants";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { Eyes } from "../../../src/gpu/eyes";
 import { floatTarget, floatTexture } from "../../../src/gpu/float_targets";
@@ -25,6 +26,7 @@ import { Tracer } from "../../../src/pathtrace/path_tracer";
 import { TRACE_WARP } from "../../../src/pathtrace/shaders/sources";
 import { DepthPass } from "../../../src/render/depth_pass";
 import { START_TRACE, type TraceSettings } from "../../../src/state/path_trace_settings";
+import { STORED } from "../../../src/volumes/bricks/tree";
 import { alikeRows } from "../../../src/volumes/transfer_table_2d";
 import { volumeTexture } from "../../../src/volumes/volume_texture";
 
@@ -100,23 +102,23 @@ function texelsOf(run: Run): MediumTexels {
   };
 }
 
-/** All of a volume's bricks of 16^3 texels with their aprons, and where each is, from the last on. */
+/** All of a volume's bricks of STREAM_BRICK^3 texels with their aprons, and where each is, from the last on. */
 function inBricks(size: Run["size"], texels: Uint8Array) {
-  const cells = size.map((n) => Math.ceil(n / 16));
+  const cells = size.map((n) => Math.ceil(n / STREAM_BRICK));
   const [cx, cy, cz] = cells;
-  const sides = cells.map((n) => 18 * n);
+  const sides = cells.map((n) => STORED * n);
   const atlas = new Uint8Array(sides[0] * sides[1] * sides[2]);
   const entries = new Uint8Array(4 * cx * cy * cz);
   for (let cell = 0; cell < cx * cy * cz; cell++) {
     const at = [cell % cx, Math.floor(cell / cx) % cy, Math.floor(cell / (cx * cy))];
     const slot = at.map((v, k) => cells[k] - 1 - v);
     entries.set(slot, 4 * cell);
-    for (let i = 0; i < 18 ** 3; i++) {
-      const inside = [i % 18, Math.floor(i / 18) % 18, Math.floor(i / 18 ** 2)];
+    for (let i = 0; i < STORED ** 3; i++) {
+      const inside = [i % STORED, Math.floor(i / STORED) % STORED, Math.floor(i / STORED ** 2)];
       const [x, y, z] = inside.map((v, k) =>
-        Math.min(size[k] - 1, Math.max(0, 16 * at[k] + v - 1)),
+        Math.min(size[k] - 1, Math.max(0, STREAM_BRICK * at[k] + v - 1)),
       );
-      const [ax, ay, az] = inside.map((v, k) => 18 * slot[k] + v);
+      const [ax, ay, az] = inside.map((v, k) => STORED * slot[k] + v);
       atlas[(az * sides[1] + ay) * sides[0] + ax] = texels[(z * size[1] + y) * size[0] + x];
     }
   }
