@@ -5,6 +5,7 @@
  * the light is in denoise_and_tone.test.ts.
  */
 import { describe, expect, it } from "vitest";
+import { SKIP_BRICK } from "../../src/bundle/generated/constants";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
 import type { Gathered, Harness, Run } from "../support/pathtrace/harness";
@@ -13,6 +14,9 @@ import { askPython, hasPython } from "../support/python";
 
 /** Texels of the tracer that rest or are sampled as one. */
 const NOISE_TILE = 16;
+
+/** Edges of the bricks of majorants, texels. */
+const BRICKS = [SKIP_BRICK, 2 * SKIP_BRICK, 4 * SKIP_BRICK];
 
 /** Of the reference: its standard errors are below 1 % then. */
 const PATHS = 600_000;
@@ -162,7 +166,7 @@ describeInChromium("the path tracer", () => {
       const extinctions = opacities.map((opacity) => -Math.log(1 - opacity / 255));
       depth += (between(extinctions, between(intensities, z)) * 32) / STEPS;
     }
-    for (const brick of [8, 16, 32]) {
+    for (const brick of BRICKS) {
       it(`that thickens inwards, bricks of ${brick}`, async () => {
         const texels = slab(intensities);
         const run = { ...far, texels, opacities, brick, passes: 128 };
@@ -173,10 +177,11 @@ describeInChromium("the path tracer", () => {
 
   it("covers as much whatever the bricks' size", async () => {
     const found: Estimate[] = [];
-    for (const brick of [8, 16, 32]) found.push(coverage(await gather({ ...BASE, brick })));
-    expectAlike(found[0], found[1], "bricks of 8 and of 16");
-    expectAlike(found[0], found[2], "bricks of 8 and of 32");
-    expectAlike(found[1], found[2], "bricks of 16 and of 32");
+    for (const brick of BRICKS) found.push(coverage(await gather({ ...BASE, brick })));
+    const [small, middle, large] = BRICKS;
+    expectAlike(found[0], found[1], `bricks of ${small} and of ${middle}`);
+    expectAlike(found[0], found[2], `bricks of ${small} and of ${large}`);
+    expectAlike(found[1], found[2], `bricks of ${middle} and of ${large}`);
   });
 
   it("takes turns with the tiles: after a whole turn each pixel has one sample", async () => {

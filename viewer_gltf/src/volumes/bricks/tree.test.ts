@@ -1,5 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { BundleError } from "../../bundle/errors";
+import { SKIP_BRICK, STREAM_BRICK } from "../../bundle/generated/constants";
+import { brickCounts } from "../skip_bricks";
 import { BRICKS_FRAME, parseFrame } from "./protocol";
 import { drawnNodes, haveBits, NOTHING, parseTable, rangesOf } from "./tree";
 
@@ -70,10 +72,13 @@ describe("a table of bricks", () => {
     expect(drawn(0, 0, 0)).toEqual([NOTHING, 2]); // what is empty is known from the table
     expect(drawn(1, 0, 0)).toEqual([0, 2]);
     expect(drawn(1, 1, 0)).toEqual([1, 2]);
-    const ranges = rangesOf(table, drawnNodes(table, Uint8Array.of(1, 0, 0)), [3, 1, 1]);
-    expect([...ranges]).toEqual([7, 200, 7, 200, 7, 7]); // bricks of 8: two in the first cell
-    const before = rangesOf(table, drawnNodes(table, new Uint8Array(3)), [3, 1, 1]);
-    expect([...before]).toEqual([0, 0, 0, 0, 7, 7]);
+    const counts = brickCounts(table.size);
+    const perBrick = (first: readonly number[], second: readonly number[]) =>
+      Array.from({ length: counts[0] }, (_, b) => (b * SKIP_BRICK < STREAM_BRICK ? first : second));
+    const ranges = rangesOf(table, drawnNodes(table, Uint8Array.of(1, 0, 0)), counts);
+    expect([...ranges]).toEqual(perBrick([7, 200], [7, 7]).flat());
+    const before = rangesOf(table, drawnNodes(table, new Uint8Array(3)), counts);
+    expect([...before]).toEqual(perBrick([0, 0], [7, 7]).flat());
   });
 
   it("tells which bricks are there by bits, the first one lowest", () => {
