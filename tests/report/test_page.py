@@ -333,7 +333,7 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     out = tmp_path / "out"
     shutil.copytree(built, out)
 
-    survey = json.loads(OutFolder(out).survey_file.read_text())
+    survey = OutFolder(out).survey()
     proposals = [entry["display"]["proposal"] for entry in survey.values()]
     triangle = {
         "kind": "triangle",
@@ -346,7 +346,7 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     }
     proposals[0].update(shapes=[], reason="too <dim>")
     proposals[1].update(shapes=[triangle] * 2, reason="")
-    OutFolder(out).survey_file.write_text(json.dumps(survey))
+    OutFolder(out).save_survey(survey)
     _, parsed = _write(out)
     assert [b for a, b in pairwise(parsed.texts) if a == "2D function"] == [
         "none: too <dim>",
@@ -363,13 +363,13 @@ def test_value_is_said_to_be_drawn_if_that_shows(
 ) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
-    survey = json.loads(OutFolder(out).survey_file.read_text())
+    survey = OutFolder(out).survey()
     iso = survey["twin"]["iso"]["r0_c0"]
     found = json.loads((out / iso["file"]).read_text())["found"]
     for tile in survey["twin"]["iso"].values():
         other = json.loads((out / tile["file"]).read_text())["found"]
         tile["value"] = other * (factor if tile is iso else 1)
-    OutFolder(out).survey_file.write_text(json.dumps(survey))
+    OutFolder(out).save_survey(survey)
     texts = _write(out)[1].texts
     said = [text for text in texts if "drawn to its neighbours" in text]
     assert len(said) == is_drawn

@@ -5,6 +5,7 @@ Each flip keeps the file's size; a `silent` one keeps its time, too, as a worn d
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -142,6 +143,33 @@ def test_each_damaged_file_is_named(out: Path) -> None:
     assert all(f"stage/tiles/r0_c0/{file.name}: damaged" in detail for file in files)
 
 
+def _change_a_digit(file: Path) -> None:
+    """Turn one digit of a JSON file's first broken number into another; size and time stay."""
+    status, text = file.stat(), file.read_text()
+    place = next(re.finditer(r"[1-9]\d*\.\d", text)).start()
+    digit = "2" if text[place] == "1" else "1"
+    file.write_text(text[:place] + digit + text[place + 1 :])
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+@pytest.mark.parametrize("name", [f"window-{F}-*.json", f"r0_c0/{F}/iso-*.json", "survey.json"])
+def test_what_the_units_rest_on_is_named_and_found_anew(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    (file,) = (out / "units").glob(name)
+    _change_a_digit(file)
+    line = _line(out, "units")
+    assert not line.ok
+    assert f"{file.relative_to(out).as_posix()}: damaged" in line.detail
+    shutil.rmtree(out / "stage")
+    capfd.readouterr()
+    if name == "survey.json":
+        assert main(["stage", str(out), *FLAGS]) == 1
+        assert f"{file}: damaged: run `stereocell units OUT`" in capfd.readouterr().err
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
 # --- the stage
 
 
@@ -201,6 +229,28 @@ def test_file_of_the_bundle_with_a_flipped_bit_is_made_anew(
     _go_on(out)  # of a copy, the bundle is of another stage
     _flip(out / "bundle" / name)
     assert f"{name}: not the bytes" in _line(out, "hashes").detail
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def test_damaged_manifest_is_named_and_made_anew(out: Path, built: Path) -> None:
+    _go_on(out)  # it is another OUT than it was
+    assert _line(out, "hashes").ok
+    _change_a_digit(out / "bundle" / "manifest.json")
+    line = _line(out, "hashes")
+    assert not line.ok
+    assert "manifest.json: not the bytes that were written" in line.detail
+    assert "run `stereocell bundle OUT`" in line.detail
+    _go_on(out)
+    assert _assets(out) == _assets(built)
+
+
+def test_remedy_that_check_names_mends_the_bundle(out: Path, built: Path) -> None:
+    _go_on(out)
+    file = out / "bundle" / "volumes" / "r0_c0" / f"{F}.ktx2"
+    _flip(file, silent=True)
+    assert "remove what is damaged and run `stereocell bundle OUT`" in _line(out, "hashes").detail
+    file.unlink()
     _go_on(out)
     assert _assets(out) == _assets(built)
 

@@ -5,6 +5,7 @@ It is the first pass over the units, and its result, survey.json, steers the sec
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 from stereocell.building.open_source import source_of
@@ -31,7 +32,7 @@ from stereocell.isosurface.options import ADAPTIVE
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
-from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import (
     ChannelStatistics,
     make_appearance,
@@ -39,13 +40,13 @@ from stereocell.transfer.channel_statistics import (
     statistics_to_json,
 )
 
-_STATISTICS, _ISO_VALUE = "units.schema.json#Display", "units.schema.json#IsoValue"
-_AGAIN = "run `stereocell units OUT` again"
+WINDOW, ISO_VALUE = "units.schema.json#Window", "units.schema.json#IsoValue"
+AGAIN = "run `stereocell units OUT` again"
 
 
 def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> dict[str, Any]:
     """Return (and write) each channel's statistics, iso-values and transfer functions."""
-    all_statistics = _all_statistics(out_folder, plan, engine)
+    all_statistics, windows = _all_statistics(out_folder, plan, engine)
     isos = _isos(out_folder, plan, engine, all_statistics)
     neighbours = find_neighbours(plan.tiles)
     content = {}
@@ -70,6 +71,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> dict[s
         )
         content[channel.id] = {
             "display": statistics_to_json(statistics),
+            "display_file": windows[channel.id].relative_to(out_folder.out).as_posix(),
             "iso": {
                 tile: {
                     "value": reconciled.values[tile],
@@ -91,7 +93,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> dict[s
             ),
             "look": asdict(replace(appearance, painted_by=painter.id if painter else "")),
         }
-    write_json(out_folder.survey_file, content)
+    out_folder.save_survey(content)
     return content
 
 
@@ -153,8 +155,10 @@ def _given(plan: Plan, channel: Channel, statistics: ChannelStatistics) -> float
 
 def _all_statistics(
     out_folder: OutFolder, plan: Plan, engine: Engine
-) -> dict[str, ChannelStatistics]:
-    files, tasks = {}, []
+) -> tuple[dict[str, ChannelStatistics], dict[str, Path]]:
+    """Return each channel's statistics, and the file that holds them, by channel id."""
+    files: dict[str, Path] = {}
+    tasks = []
     for channel in plan.channels:
         task = statistics_task(plan, channel)
         depends = [
@@ -168,14 +172,14 @@ def _all_statistics(
             channel.id, key_of(depends, window_maker, reader_module(plan, channel))
         )
         files[channel.id] = file
-        if find_json(file, _STATISTICS) is None:
+        if find_sealed(file, WINDOW) is None:
             tasks.append((channel.id, (task, file)))
     run_on_input(plan, engine, "windows", write_statistics, tasks)
     found = {}
     for channel_id, file in files.items():
-        content = read_json(file, _STATISTICS, _AGAIN)
-        found[channel_id] = statistics_from_json(content)
-    return found
+        content = read_sealed(file, WINDOW, AGAIN)
+        found[channel_id] = statistics_from_json(content["display"])
+    return found, files
 
 
 def _isos(
@@ -203,11 +207,11 @@ def _isos(
                 tile.id, channel.id, key_of(depends, iso_maker, reader_module(plan, channel))
             )
             files[tile.id, channel.id] = file
-            if find_json(file, _ISO_VALUE) is None:
+            if find_sealed(file, ISO_VALUE) is None:
                 tasks.append((f"{tile.id}/{channel.name}", (task, file)))
     run_on_input(plan, engine, "iso-values", write_iso, tasks)
     return {
-        unit: read_json(file, _ISO_VALUE, _AGAIN)
+        unit: read_sealed(file, ISO_VALUE, AGAIN)
         | {"file": file.relative_to(out_folder.out).as_posix()}
         for unit, file in files.items()
     }

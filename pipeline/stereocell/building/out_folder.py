@@ -16,9 +16,16 @@ from stereocell.building.plan_file import from_json, to_json
 from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of
-from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.json_files import (
+    find_json,
+    read_json,
+    read_sealed,
+    write_json,
+    write_sealed,
+)
 from stereocell.storage.workspace import remove, sizes_below
 
+SURVEY = "units.schema.json#Survey"
 _PLAN = "plan.schema.json"
 _PHASES = "units.schema.json#Phases"
 _RUN_UNITS = "run `stereocell units OUT` first"
@@ -109,7 +116,11 @@ class OutFolder:
 
     def survey(self) -> dict[str, Any]:
         """Return each channel's statistics, iso-values by tile, and appearance, by channel id."""
-        return dict(read_json(self.survey_file, "units.schema.json#Survey", _RUN_UNITS))
+        sealed = read_sealed(self.survey_file, SURVEY, _RUN_UNITS)
+        return dict(sealed["channels"])
+
+    def save_survey(self, content: Mapping[str, Any]) -> None:
+        write_sealed(self.survey_file, {"channels": dict(content)})
 
     def index(self) -> dict[str, str]:
         """Return the key of each finished unit, by `<tile>/<channel>`."""

@@ -29,10 +29,10 @@ from stereocell.read.open_dataset import READERS
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of, libraries_of
-from stereocell.storage.file_list import find_faults, read_list
+from stereocell.storage.file_list import find_faults, measure, read_list
 from stereocell.storage.json_files import write_json
 from stereocell.storage.location import Location, require_apart
-from stereocell.storage.workspace import is_file, objects_below, remove, sizes_below
+from stereocell.storage.workspace import cached, is_file, objects_below, remove, sizes_below
 from stereocell.transfer.channel_statistics import appearance_from
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
@@ -256,7 +256,14 @@ def _digest_of_bundle(out_folder: OutFolder) -> str:
     except OutputError:
         return ""
     faults = find_faults(out_folder.bundle_dir, listed, since=path)
-    return "" if faults else digest_of([out_folder.bundle_dir])
+    return "" if faults else digest_of([out_folder.bundle_dir]) + digest_of_manifest(out_folder)
+
+
+def digest_of_manifest(out_folder: OutFolder) -> str:
+    """Return a digest of the bundle's manifest, which no list holds; empty: there is none."""
+    manifest = out_folder.bundle_dir / bundle_writer.MANIFEST
+    with cached(manifest):
+        return str(measure(manifest)["sha256"])[:20] if manifest.is_file() else ""
 
 
 def _digest_of_stage(out_folder: OutFolder) -> str:

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
@@ -17,7 +16,7 @@ from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.file_list import FileList
-from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.storage.workspace import cached, remove
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import written_files
@@ -47,7 +46,7 @@ class TileTask:
 
     def is_done(self) -> bool:
         """Return whether the tile stands whole and comes from the same things, whole as well."""
-        found: dict[str, Any] | None = find_json(self.record, _RECORD)
+        found = find_sealed(self.record, _RECORD)
         if found is None or found["key"] != self.key:
             return False
         are_whole = all(is_whole(folder) for _, folder, _ in self.units)
@@ -55,7 +54,7 @@ class TileTask:
 
     def listed(self) -> FileList:
         """Return the files of the tile, which is done, by their paths from the stage's folder."""
-        found = read_json(self.record, _RECORD, written_files.REMEDY)
+        found = read_sealed(self.record, _RECORD, written_files.REMEDY)
         return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
 
 
@@ -98,4 +97,4 @@ def run_tile(task: TileTask) -> None:
             for channel_id, folder, paint in task.units
         )
         files = stage_writer.write_tile(task.stage_dir, replace(task.content, channels=channels))
-    write_json(task.record, {"key": task.key, "files": files})
+    write_sealed(task.record, {"key": task.key, "files": files})

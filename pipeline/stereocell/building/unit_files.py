@@ -5,9 +5,7 @@ unit.json lists the others with their hashes, and holds one of itself: each file
 own before it is read.
 """
 
-import hashlib
 import io
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -23,12 +21,17 @@ from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
 from stereocell.model.unit import Closed, Unit
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
-from stereocell.storage.json_files import find_json, read_json, write_json
+from stereocell.storage.json_files import (
+    find_json,
+    find_sealed,
+    read_sealed,
+    write_json,
+    write_sealed,
+)
 from stereocell.storage.workspace import fetch, is_file
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
-_OWN = "sha256"
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
@@ -61,7 +64,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "cavities_filled": unit.cavities_filled,
             "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
         }
-        write_json(folder / _RECORD, record | {_OWN: _digest_of(record)})
+        write_sealed(folder / _RECORD, record)
         # after the files were listed: a unit is whole without
         write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
 
@@ -71,8 +74,8 @@ def is_whole(directory: Path) -> bool:
 
     What has not changed since by its size and time is not read: see file_list.py.
     """
-    record = find_json(directory / _RECORD, SCHEMA)
-    if record is None or not _is_own(record):
+    record = find_sealed(directory / _RECORD, SCHEMA)
+    if record is None:
         return False
     return not find_faults(directory, record["files"], since=directory / _RECORD)
 
@@ -81,28 +84,15 @@ def find_damage(directory: Path) -> dict[str, str]:
     """Return what is wrong with each file of a unit, by name; all are hashed."""
     if not is_file(directory / _RECORD):
         return {_RECORD: MISSING}
-    record = find_json(directory / _RECORD, SCHEMA)
-    if record is None or not _is_own(record):
+    record = find_sealed(directory / _RECORD, SCHEMA)
+    if record is None:
         return {_RECORD: DAMAGED}
     return find_faults(directory, record["files"])
 
 
 def load_record(directory: Path) -> dict[str, Any]:
     """Return what unit.json holds: triangles, distances, reason. Raises OutputError."""
-    record = dict(read_json(directory / _RECORD, SCHEMA, _remedy(directory)))
-    if not _is_own(record):
-        raise OutputError(f"{directory / _RECORD}: damaged: {_remedy(directory)}")
-    return record
-
-
-def _digest_of(record: Mapping[str, Any]) -> str:
-    """Return what a record says of itself: a hash of all else that is in it."""
-    others = {name: value for name, value in record.items() if name != _OWN}
-    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
-
-
-def _is_own(record: Mapping[str, Any]) -> bool:
-    return bool(record[_OWN] == _digest_of(record))
+    return read_sealed(directory / _RECORD, SCHEMA, _remedy(directory))
 
 
 def _as_written(directory: Path, file: Path) -> Path:

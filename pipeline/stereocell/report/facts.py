@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.building.channel_survey import AGAIN, ISO_VALUE
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.unit_files import find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile
-from stereocell.storage.json_files import read_json
+from stereocell.storage.json_files import read_sealed
 from stereocell.storage.workspace import sizes_below
 
 PHASES = ("plan", "units", "stage", "bundle")
@@ -206,11 +207,7 @@ def _lod(record: dict[str, Any], size: int) -> LodFacts:
 
 def read_curve(out: Path, unit: UnitFacts) -> dict[str, Any]:
     """Return what the first round wrote of a unit: levels, score, found (none if constant)."""
-    return dict(
-        read_json(
-            out / unit.iso_file, "units.schema.json#IsoValue", "run `stereocell units OUT` again"
-        )
-    )
+    return read_sealed(out / unit.iso_file, ISO_VALUE, AGAIN)
 
 
 def sum_up(units: Iterable[UnitFacts]) -> Total:

@@ -1,6 +1,12 @@
-"""JSON files of ours: read against their schema, one line for what is wrong; written whole."""
+"""JSON files of ours: read against their schema, one line for what is wrong; written whole.
 
+A sealed one holds a hash of all else that is in it, as `sha256`: of numbers a schema says little,
+and one digit that changed would be built on.
+"""
+
+import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -13,6 +19,8 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.assets import schema_path
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.workspace import fetch
+
+_SEAL = "sha256"
 
 
 def read_json(path: Path, schema: str | None, remedy: str) -> Any:
@@ -63,6 +71,31 @@ def find_json(path: Path, schema: str) -> Any:
 def write_json(path: Path, content: Any) -> None:
     """Put `content` at `path` as JSON, whole or not at all. Raises OutputError."""
     write_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
+
+
+def write_sealed(path: Path, content: Mapping[str, Any]) -> None:
+    """Put `content` at `path` as sealed JSON, whole or not at all. Raises OutputError."""
+    write_json(path, {**content, _SEAL: _digest_of(content)})
+
+
+def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
+    """Return what sealed JSON holds, as `read_json` does. Raises OutputError, for damage too."""
+    content = dict(read_json(path, schema, remedy))
+    if content.pop(_SEAL) != _digest_of(content):
+        raise OutputError(f"{path}: damaged: {remedy}")
+    return content
+
+
+def find_sealed(path: Path, schema: str) -> dict[str, Any] | None:
+    """Return what sealed JSON holds, or None where there is none that is as it was written."""
+    try:
+        return read_sealed(path, schema, "")
+    except OutputError:
+        return None
+
+
+def _digest_of(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def compact_json(content: Any) -> bytes:

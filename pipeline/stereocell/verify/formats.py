@@ -16,8 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import unit_files
+from stereocell.building.channel_survey import ISO_VALUE, WINDOW
 from stereocell.building.input_unchanged import require_added
-from stereocell.building.out_folder import OutFolder
+from stereocell.building.out_folder import SURVEY, OutFolder
+from stereocell.building.phases import digest_of_manifest
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST
 from stereocell.formats.exr import check_exr
@@ -27,10 +29,10 @@ from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.formats.vdb import check_vdb
 from stereocell.model.errors import CheckError, OutputError, StereoCellError
 from stereocell.storage.assets import find_asset
-from stereocell.storage.file_list import measure
-from stereocell.storage.json_files import read_json
+from stereocell.storage.file_list import DAMAGED, MISSING, measure
+from stereocell.storage.json_files import find_sealed, read_json
 from stereocell.storage.location import Location, require_own
-from stereocell.storage.workspace import sizes_below
+from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.transfer.shapes2d import find_fault, shapes_from
 from stereocell.usd import written_files
 from stereocell.usd.read_stage import dependencies
@@ -63,9 +65,9 @@ def check(out: Path) -> Iterator[CheckLine]:
     Raises OutputError, before any line, where there is neither.
     """
     if any((out / part).exists() for part in ("plan.json", "stage", "bundle")):
-        checks = [*_checks_of_build(out), *_checks_of_bundle(out / "bundle")]
+        checks = [*_checks_of_build(out), *_checks_of_bundle(out / "bundle", OutFolder(out))]
     elif (out / MANIFEST).is_file():
-        checks = _checks_of_bundle(out)
+        checks = _checks_of_bundle(out, None)
     else:
         raise OutputError(
             f"{out}: holds no build, expected plan.json, stage/ and bundle/, "
@@ -91,14 +93,14 @@ def _checks_of_build(out: Path) -> list[_Check]:
     ]
 
 
-def _checks_of_bundle(bundle: Path) -> list[_Check]:
+def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check]:
     return [
         ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
         ("2D transfer functions", lambda: _check_transfer2d(bundle)),
         ("tilesets", lambda: _check_tilesets(bundle)),
-        ("hashes", lambda: _check_hashes(bundle)),
+        ("hashes", lambda: _check_hashes(bundle, out_folder)),
         ("glTF validator", lambda: _check_meshes(bundle)),
         ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
     ]
@@ -117,8 +119,8 @@ def _check_tissue(out: Path) -> str:
 
 
 def _check_units(out_folder: OutFolder) -> str:
-    """Check every file of the units against the hash in its unit.json."""
-    problems, files = [], 0
+    """Check every file of the units against the hash in its unit.json, and what they rest on."""
+    problems, files = _spoilt_survey(out_folder), 0
     for name, key in out_folder.index().items():
         tile_id, channel_id = name.split("/")
         folder = out_folder.unit_dir(tile_id, channel_id, key)
@@ -129,6 +131,23 @@ def _check_units(out_folder: OutFolder) -> str:
         ]
     _raise_on_all(problems, "remove what is damaged and run `stereocell units OUT`")
     return f"{files} files of {len(out_folder.index())} units"
+
+
+def _spoilt_survey(out_folder: OutFolder) -> list[str]:
+    """Return what is wrong with the survey and with the windows and iso-values it was made of."""
+    survey = find_sealed(out_folder.survey_file, SURVEY)
+    if survey is None:
+        return [_fault_of(out_folder, out_folder.survey_file)]
+    channels = survey["channels"].values()
+    files = {channel["display_file"]: WINDOW for channel in channels}
+    files |= {tile["file"]: ISO_VALUE for channel in channels for tile in channel["iso"].values()}
+    spoilt = [name for name in files if find_sealed(out_folder.out / name, files[name]) is None]
+    return [_fault_of(out_folder, out_folder.out / name) for name in spoilt]
+
+
+def _fault_of(out_folder: OutFolder, file: Path) -> str:
+    name = file.relative_to(out_folder.out).as_posix()
+    return f"{name}: {DAMAGED if is_file(file) else MISSING}"
 
 
 def _check_stage_hashes(out_folder: OutFolder) -> str:
@@ -326,8 +345,11 @@ def _spoilt_content(content: Content) -> list[str]:
     return problems
 
 
-def _check_hashes(bundle: Path) -> str:
-    """Check every file against files.json, every reference too, and that no file is unlisted."""
+def _check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
+    """Check every file against files.json, every reference too, and that no file is unlisted.
+
+    out_folder  the OUT that the bundle lies in, which knows the manifest; None: it lies by itself
+    """
     manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
     listed = read_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)
     problems = []
@@ -352,8 +374,15 @@ def _check_hashes(bundle: Path) -> str:
             expected = measure(bundle / FILES)
         if entry != expected:
             problems.append(f"{reference['path']}: a reference to it has another hash")
-    raise_on(sorted(problems))
+    if out_folder is not None and not problems and not _is_own_manifest(out_folder):
+        problems.append(f"{MANIFEST}: not the bytes that were written")
+    _raise_on_all(sorted(problems), f"remove what is damaged and {_RUN_BUNDLE}")
     return f"{len(listed)} files, {len(references)} references"
+
+
+def _is_own_manifest(out_folder: OutFolder) -> bool:
+    wrote = out_folder.phases().get("bundle", {"key": ""})
+    return not wrote["key"] or bool(wrote["results"].endswith(digest_of_manifest(out_folder)))
 
 
 def _references(content: Any) -> Iterator[dict[str, Any]]:

@@ -17,7 +17,7 @@ from stereocell.model.errors import NoSurfaceError
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
-from stereocell.storage.json_files import write_json
+from stereocell.storage.json_files import write_sealed
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def read_iso_field(task: IsoTask) -> IsoField:
 def write_iso(task_and_file: tuple[IsoTask, Path]) -> None:
     """Find one unit's iso-value and write it down with its curve."""
     task, file = task_and_file
-    write_json(file, _find(task))
+    write_sealed(file, _find(task))
 
 
 def _find(task: IsoTask) -> dict[str, Any]:

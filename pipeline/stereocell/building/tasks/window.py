@@ -11,7 +11,7 @@ from stereocell.building.settings import Settings
 from stereocell.filters.background import find_background
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
-from stereocell.storage.json_files import write_json
+from stereocell.storage.json_files import write_sealed
 from stereocell.transfer.adaptive_threshold import Histogram, make_histogram
 from stereocell.transfer.boundaries import SuggestedShapes, suggest
 from stereocell.transfer.channel_statistics import (
@@ -50,7 +50,7 @@ class StatisticsTask:
 def write_statistics(task_and_file: tuple[StatisticsTask, Path]) -> None:
     """Find a channel's window and write it down."""
     task, file = task_and_file
-    write_json(file, statistics_to_json(measure_statistics(task)))
+    write_sealed(file, {"display": statistics_to_json(measure_statistics(task))})
 
 
 def measure_statistics(task: StatisticsTask) -> ChannelStatistics:
