@@ -9,6 +9,7 @@ from jsonschema import Draft202012Validator
 from stereocell.bundle.write import describe_bundle, describe_channel
 from stereocell.bundle.write_tile import BundleTile, FileRef
 from stereocell.formats.tiles3d import TILESET, TileLod, make_tilesets
+from stereocell.model.channel import TransferFunctions2d
 from stereocell.storage.assets import schema_path
 from stereocell.usd.read_appearances import ComposedAppearance
 
@@ -75,8 +76,7 @@ def manifest(rng, tiles, files):
             "clear",
             "default",
             ramps,
-            {"arcs": ()},
-            1.0,
+            TransferFunctions2d(1.0, {"arcs": ()}),
             iso,
         )
         entry = describe_channel(

@@ -344,9 +344,12 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
         "opacity": 0.7,
         "softness": 0.5,
     }
-    proposals[0].update(shapes=[], reason="too <dim>")
-    proposals[1].update(shapes=[triangle] * 2, reason="")
-    OutFolder(out).save_survey(survey)
+    for suggested, shapes, reason in zip(
+        proposals, ([], [triangle] * 2), ("too <dim>", ""), strict=True
+    ):
+        suggested["reason"] = reason
+        suggested["transfer_2d"]["functions"] = {"arcs": shapes}
+    OutFolder(out).survey_file.write_text(json.dumps(survey))
     _, parsed = _write(out)
     assert [b for a, b in pairwise(parsed.texts) if a == "2D function"] == [
         "none: too <dim>",

@@ -111,7 +111,7 @@ def test_without_a_boundary_nothing_is_suggested_and_it_is_said(
 ) -> None:
     suggested = suggest(fine_counts(voxels) if voxels.size else np.zeros((FINE_ROWS, COLUMNS), int))
     assert (suggested.shapes, suggested.reason) == ((), reason)
-    assert suggested.gradient_max > 0
+    assert suggested.transfer_2d.gradient_max > 0
 
 
 def test_the_suggestion_takes_the_boundaries_and_leaves_the_materials() -> None:
@@ -129,11 +129,11 @@ def test_the_suggestion_takes_the_boundaries_and_leaves_the_materials() -> None:
     assert outer.opacity < inner.opacity
 
     opacity = evaluate2d(suggested.shapes)[..., 3] > 12
-    apex = 0.35 * erf(1 / (1.2 * np.sqrt(2))) / suggested.gradient_max
+    apex = 0.35 * erf(1 / (1.2 * np.sqrt(2))) / suggested.transfer_2d.gradient_max
     for middle in (0.325, 0.675):
         assert opacity[round(0.95 * apex * (ROWS - 1)), round(255 * middle)]
     # of the voxels far inside of a material all but the noisiest stay clear
-    counts = rebin(fine, suggested.gradient_max)
+    counts = rebin(fine, suggested.transfer_2d.gradient_max)
     for material in (0.15, 0.5, 0.85):
         near = np.abs(np.arange(COLUMNS) / 255 - material) < 0.03
         assert counts[opacity & near].sum() < 0.01 * counts[:, near].sum()

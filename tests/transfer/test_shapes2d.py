@@ -17,7 +17,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
-from stereocell.model.channel import Shape, Shapes
+from stereocell.model.channel import Shape, Shapes, TransferFunctions2d
 from stereocell.model.errors import StageError
 from stereocell.storage.assets import find_asset, schema_path
 from stereocell.transfer.channel_statistics import appearance_from
@@ -49,8 +49,7 @@ SHAPES: Shapes = (
 LOOK = replace(
     spheres.RED,
     transfer_functions={**spheres.RED.transfer_functions, NAME: fall_back(SHAPES)},
-    shapes={NAME: SHAPES},
-    gradient_max=0.37,
+    transfer_2d=TransferFunctions2d(0.37, {NAME: SHAPES}),
 )
 APPEARANCES = (LOOK, spheres.BLUE)
 TILES = tuple(spheres.tile(column, APPEARANCES) for column in (0, 1))
@@ -213,10 +212,9 @@ def edit(stage: Path, folder: Path, variant: str = NAME, **arrays: object) -> Pa
 
 def test_the_stage_gives_back_the_shapes_as_they_were(stage: Path) -> None:
     red, blue = read_appearances(open_stage(stage))
-    assert red.shapes == {NAME: SHAPES}
-    assert red.gradient_max == 0.37
+    assert red.transfer_2d == LOOK.transfer_2d
     assert list(red.transfer_functions) == ["default", NAME, "sharp"]
-    assert (blue.shapes, blue.gradient_max) == ({}, 0.5)
+    assert blue.transfer_2d == TransferFunctions2d(0.5, {})
 
 
 def test_what_an_artist_leaves_out_has_its_default(stage: Path, tmp_path: Path) -> None:
@@ -229,7 +227,7 @@ def test_what_an_artist_leaves_out_has_its_default(stage: Path, tmp_path: Path) 
     )
     red, _ = read_appearances(open_stage(path))
     expected = Shape("triangle", (0.25, 0.75), (0, 1), 0.5, (1, 1, 1), 1, 0.5)
-    assert red.shapes == {NAME: SHAPES, "sharp": (expected,)}
+    assert red.transfer_2d.functions == {NAME: SHAPES, "sharp": (expected,)}
     assert red.chosen == "sharp"
 
 
@@ -238,7 +236,7 @@ def test_emptied_shapes_leave_the_opacity_points(stage: Path, tmp_path: Path) ->
     empty |= {"shapeTips": Vt.FloatArray(), "shapeSoftness": Vt.FloatArray()}
     path = edit(stage, tmp_path, **empty, shapeColors=Vt.Vec4fArray())
     red, _ = read_appearances(open_stage(path))
-    assert red.shapes == {}
+    assert red.transfer_2d.functions == {}
     assert NAME in red.transfer_functions
 
 
@@ -391,11 +389,11 @@ def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Pa
         assert main([phase, str(out), "--workers", "0"]) == 0
     ball_entry, flat_entry = OutFolder(out).survey().values()
     appearance = appearance_from(ball_entry["look"])
-    (triangle,) = appearance.shapes[NAME]
+    (triangle,) = appearance.transfer_2d.functions[NAME]
     low, high = appearance.window
     # half-way between the ball's and the background's counts
     assert low + triangle.tip * (high - low) == pytest.approx(600, abs=20)
-    assert flat_entry["look"]["shapes"] == {}
+    assert flat_entry["look"]["transfer_2d"]["functions"] == {}
     assert flat_entry["display"]["proposal"]["reason"] == "materials found: 1, expected at least 2"
     red = functions(out / "bundle", "Ball")
     assert [s["kind"] for s in red["functions"][NAME]] == ["triangle"]  # type: ignore[index]

@@ -10,8 +10,10 @@ from jsonschema import Draft202012Validator
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdVol
 
 from stereocell.formats.exr import read_atlas
+from stereocell.model.channel import TransferFunctions2d
 from stereocell.model.errors import OutputError
 from stereocell.storage import assets
+from stereocell.usd.numbers2d import ATTRIBUTES
 from stereocell.usd.write_stage import write_tile
 from support.digests import digests_of
 from support.phantoms import f_phantom
@@ -327,6 +329,13 @@ def test_the_json_twin_of_the_schema_has_the_same_attributes() -> None:
         assert field["description"] == " ".join(attribute.documentation.split())
         default = None if attribute.default is None else np.array(attribute.default).tolist()
         assert default == pytest.approx(field.get("default"))
+
+
+def test_numbers_of_2d_functions_have_an_attribute_each_and_its_default() -> None:
+    twin = json.loads(assets.schema_path("channel.schema.json").read_text())
+    for field, attribute in ATTRIBUTES.items():
+        assert twin["properties"][attribute]["usdType"] == "float"
+        assert twin["properties"][attribute]["default"] == getattr(TransferFunctions2d(), field)
 
 
 def test_a_channel_as_json_fits_the_twin_of_its_schema(stage_path: Path) -> None:

@@ -243,7 +243,10 @@ def describe_channel(
         "surface": "none" if tileset is None else appearance.surface,
         "transfer_function": appearance.chosen,
         "transfer_functions": list(appearance.transfer_functions),
-        "transfer_functions_2d": {"names": list(appearance.shapes), "file": asdict(transfer2d)},
+        "transfer_functions_2d": {
+            "names": list(appearance.transfer_2d.functions),
+            "file": asdict(transfer2d),
+        },
         "lut": asdict(lut),
         "tileset": None if tileset is None else asdict(tileset),
         "triangles": _totals(triangles),

@@ -302,7 +302,7 @@ def _export_volume(
             for level in texture.levels
         ],
     }
-    return entry, files, count_tile(voxels, volume, appearance.gradient_max)
+    return entry, files, count_tile(voxels, volume, appearance.transfer_2d.gradient_max)
 
 
 def _point(values: Any) -> Point:

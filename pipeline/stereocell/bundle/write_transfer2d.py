@@ -1,6 +1,6 @@
 """Write a channel's 2D transfer functions, and the histogram that they are placed in.
 
-channels/<channel>/transfer2d.json    shapes by function, gradient_max: transfer2d.schema.json
+channels/<channel>/transfer2d.json    shapes by function, and their numbers: transfer2d.schema.json
 channels/<channel>/histogram2d.ktx2   voxels by value and gradient magnitude, on a logarithmic scale
 
 The counts are of the bundle's own 8-bit volumes, so that a panel shows what its shader draws, and
@@ -60,11 +60,4 @@ def describe(
     appearance: ComposedAppearance, counts: NDArray[np.int64], histogram: dict[str, Any]
 ) -> dict[str, Any]:
     """Return what transfer2d.json holds; `histogram`: the reference to its file."""
-    return {
-        "gradient_max": appearance.gradient_max,
-        "functions": {
-            name: [asdict(shape) for shape in shapes] for name, shapes in appearance.shapes.items()
-        },
-        "histogram": histogram,
-        "most": int(counts.max()),
-    }
+    return {**asdict(appearance.transfer_2d), "histogram": histogram, "most": int(counts.max())}

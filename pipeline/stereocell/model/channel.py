@@ -11,7 +11,6 @@ from stereocell.model.identifiers import to_identifier
 # `unclear`: a surface is built where a level was found, and nothing to rely on
 SurfaceConfidence = Literal["clear", "unclear", "none"]
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
-DEFAULT_GRADIENT_MAX = 0.5  # the fallback in schemas/usd: half of the window over two voxels
 ShapeKind = Literal["rectangle", "triangle"]
 
 
@@ -40,6 +39,21 @@ Shapes = tuple[Shape, ...]
 
 
 @dataclass(frozen=True, slots=True)
+class TransferFunctions2d:
+    """A channel's 2D transfer functions, and the numbers that they are read by.
+
+    gradient_max  the gradient magnitude that is 1 to shapes; see transfer/joint_histogram.py
+    functions     shapes by the function's name; empty: all functions of the channel are 1D
+
+    All fields but `functions` are numbers. survey.json, the stage (usd/numbers2d.py) and the
+    bundle's transfer2d.json take each over by its name; defaults are those of schemas/usd.
+    """
+
+    gradient_max: float = 0.5
+    functions: dict[str, Shapes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class Appearance:
     """How one channel is drawn in all tiles.
 
@@ -50,8 +64,7 @@ class Appearance:
     surface           how clear it is
     painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
-    shapes            of those functions that are two-dimensional, by name
-    gradient_max      the gradient magnitude that is 1 to shapes; see transfer/joint_histogram.py
+    transfer_2d       those functions that are two-dimensional
     threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
     """
 
@@ -63,8 +76,7 @@ class Appearance:
     surface: SurfaceConfidence
     transfer_functions: dict[str, OpacityPoints]
     painted_by: str = ""
-    shapes: dict[str, Shapes] = field(default_factory=dict)
-    gradient_max: float = DEFAULT_GRADIENT_MAX
+    transfer_2d: TransferFunctions2d = field(default_factory=TransferFunctions2d)
     threshold: float | None = None
 
     @property

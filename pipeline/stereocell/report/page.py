@@ -139,6 +139,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
     for channel in facts.plan.channels:
         entry = facts.survey[channel.id]
         appearance = appearance_from(entry["look"])
+        suggested = statistics_from_json(entry["display"]).suggested
         units = [unit for unit in facts.units if unit.channel == channel]
         values = [u.iso_value + u.background for u in units if u.iso_value is not None]
         rows.append(
@@ -151,8 +152,8 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "surface": appearance.surface,
                 "repair": entry["repair"],
                 "spread": (min(values), max(values)) if values else None,
-                "arcs": len(entry["display"]["proposal"]["shapes"]),
-                "no_arcs": entry["display"]["proposal"]["reason"],
+                "arcs": len(suggested.shapes),
+                "no_arcs": suggested.reason,
                 "given": channel.name in facts.plan.settings.iso_values,
                 "histogram": charts.histogram(
                     entry["display"]["histogram"],

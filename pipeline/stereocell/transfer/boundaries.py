@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 from scipy.special import erf
 
-from stereocell.model.channel import Shape, Shapes
+from stereocell.model.channel import Shape, Shapes, TransferFunctions2d
 from stereocell.transfer.edge_model import (
     COARSER,
     HistogramGrid,
@@ -33,6 +33,7 @@ from stereocell.transfer.edge_model import (
 )
 from stereocell.transfer.joint_histogram import choose_gradient_max, rebin
 from stereocell.transfer.material_peaks import find_materials, find_noise
+from stereocell.transfer.shapes2d import NAME
 
 BLURS = np.geomspace(0.3, 8.0, 14)  # sigma of an edge, in finest voxels
 NOISES = (1.0, 1.5)  # x a material's noise, which a bias field widens
@@ -85,21 +86,23 @@ class Boundaries:
 
 @dataclass(frozen=True, slots=True)
 class SuggestedShapes:
-    """A first 2D function for a channel; `reason` says why it has no shapes, empty if it has some.
+    """A first 2D function for a channel; `reason` says why it has no shapes."""
 
-    gradient_max  the gradient magnitude that is 1 to the shapes
-    """
-
-    shapes: Shapes
-    gradient_max: float
+    transfer_2d: TransferFunctions2d
     reason: str
+
+    @property
+    def shapes(self) -> Shapes:
+        return self.transfer_2d.functions.get(NAME, ())
 
 
 def suggest(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> SuggestedShapes:
     """Return shapes on the boundaries of a channel; `fine`: counts, see choose_gradient_max."""
     gradient_max = choose_gradient_max(fine)
     found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um)
-    return SuggestedShapes(suggest_shapes(found), gradient_max, found.reason)
+    shapes = suggest_shapes(found)
+    functions = {NAME: shapes} if shapes else {}
+    return SuggestedShapes(TransferFunctions2d(gradient_max, functions), found.reason)
 
 
 def find_boundaries(

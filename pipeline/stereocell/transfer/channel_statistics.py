@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Appearance, SurfaceConfidence
+from stereocell.model.channel import Appearance, SurfaceConfidence, TransferFunctions2d
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
@@ -22,12 +22,11 @@ from stereocell.transfer.adaptive_threshold import (
 from stereocell.transfer.boundaries import SuggestedShapes
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
-from stereocell.transfer.shapes2d import NAME as NAME_2D
-from stereocell.transfer.shapes2d import fall_back, shapes_from
+from stereocell.transfer.shapes2d import fall_back, transfer_2d_from
 
 BINS = 256
 _AT_ONCE = 1 << 20  # voxels
-NO_SUGGESTION = SuggestedShapes((), DEFAULT_GRADIENT_MAX, "not looked for")
+NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
 
@@ -99,9 +98,7 @@ def statistics_from_json(content: Mapping[str, Any]) -> ChannelStatistics:
         (low, high),
         tuple(content["histogram"]),
         None if field is None else LatticeField.from_json(field),
-        SuggestedShapes(
-            shapes_from(suggested["shapes"]), suggested["gradient_max"], suggested["reason"]
-        ),
+        SuggestedShapes(transfer_2d_from(suggested["transfer_2d"]), suggested["reason"]),
         Histogram(tuple(values["counts"]), values["low"], values["high"]),
     )
 
@@ -128,15 +125,10 @@ def make_appearance(
     functions = make_transfer_functions(
         np.asarray(statistics.histogram), level, appearance.threshold_normalized
     )
-    shapes = statistics.suggested.shapes
-    if shapes:
-        functions[NAME_2D] = fall_back(shapes)
-    return replace(
-        appearance,
-        transfer_functions=functions,
-        shapes={NAME_2D: shapes} if shapes else {},
-        gradient_max=statistics.suggested.gradient_max,
-    )
+    transfer_2d = statistics.suggested.transfer_2d
+    for name_2d, shapes in transfer_2d.functions.items():
+        functions[name_2d] = fall_back(shapes)
+    return replace(appearance, transfer_functions=functions, transfer_2d=transfer_2d)
 
 
 def appearance_from(content: Mapping[str, Any]) -> Appearance:
@@ -154,7 +146,6 @@ def appearance_from(content: Mapping[str, Any]) -> Appearance:
         content["surface"],
         functions,
         content["painted_by"],
-        {name: shapes_from(shapes) for name, shapes in content["shapes"].items()},
-        content["gradient_max"],
+        transfer_2d_from(content["transfer_2d"]),
         content["threshold"],
     )

@@ -9,9 +9,15 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdShade
 
 from stereocell.formats.gltf import Material
-from stereocell.model.channel import OpacityPoints, Shapes, SurfaceConfidence, normalized
+from stereocell.model.channel import (
+    OpacityPoints,
+    SurfaceConfidence,
+    TransferFunctions2d,
+    normalized,
+)
 from stereocell.model.errors import StageError
 from stereocell.usd.layer import CHANNELS
+from stereocell.usd.numbers2d import read_numbers
 from stereocell.usd.read_attributes import (
     color_of,
     numbers_of,
@@ -19,7 +25,7 @@ from stereocell.usd.read_attributes import (
     shortest,
     value_of,
 )
-from stereocell.usd.read_shapes2d import read_gradient_max, read_shapes
+from stereocell.usd.read_shapes2d import read_shapes
 from stereocell.usd.read_textures import feeder
 from stereocell.usd.write_appearances import DEFAULT_FUNCTION
 
@@ -35,8 +41,7 @@ class ComposedAppearance:
     volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
     surface        how clear it is
     chosen         a transfer function
-    shapes         of those functions that are two-dimensional, by name
-    gradient_max   the gradient magnitude that is 1 to shapes
+    transfer_2d    those functions that are two-dimensional
     threshold      where the body begins, in voxel values; None: it is not known
     """
 
@@ -49,8 +54,7 @@ class ComposedAppearance:
     surface: SurfaceConfidence
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
-    shapes: dict[str, Shapes]
-    gradient_max: float
+    transfer_2d: TransferFunctions2d
     threshold: float | None = None
 
     @property
@@ -131,8 +135,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         _surface_confidence(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
-        shapes,
-        read_gradient_max(prim),
+        TransferFunctions2d(functions=shapes, **read_numbers(prim)),
         _number(prim, "stereocell:threshold"),
     )
 

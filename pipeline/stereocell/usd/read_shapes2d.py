@@ -4,7 +4,7 @@ from typing import Any
 
 from pxr import Usd
 
-from stereocell.model.channel import DEFAULT_GRADIENT_MAX, Shape, Shapes
+from stereocell.model.channel import Shape, Shapes
 from stereocell.model.errors import StageError
 from stereocell.transfer.shapes2d import MAX_SHAPES, find_fault
 from stereocell.usd.read_attributes import shortest
@@ -12,7 +12,6 @@ from stereocell.usd.read_attributes import shortest
 _BOXES = "stereocell:shapes"
 _KINDS, _COLORS = "stereocell:shapeKinds", "stereocell:shapeColors"
 _TIPS, _SOFTNESS = "stereocell:shapeTips", "stereocell:shapeSoftness"
-_GRADIENT_MAX = "stereocell:gradientMax"
 
 
 def read_shapes(prim: Usd.Prim) -> Shapes:
@@ -41,16 +40,6 @@ def read_shapes(prim: Usd.Prim) -> Shapes:
             raise StageError(f"{prim.GetPath()}.{_BOXES}: shape {i}: {fault}")
         shapes.append(shape)
     return tuple(shapes)
-
-
-def read_gradient_max(prim: Usd.Prim) -> float:
-    """Return the gradient magnitude that is 1 to a channel's shapes. Raises StageError."""
-    value = prim.GetAttribute(_GRADIENT_MAX).Get()
-    if value is None:  # only stages of other programs lack it
-        return DEFAULT_GRADIENT_MAX
-    if not 0 < value < float("inf"):
-        raise StageError(f"{prim.GetPath()}.{_GRADIENT_MAX}: {value:g}, expected it above 0")
-    return shortest(value)
 
 
 def _values(prim: Usd.Prim, name: str) -> list[Any]:  # what USD holds there

@@ -28,6 +28,7 @@ from stereocell.usd.layer import (
     new_stage,
     set_attribute,
 )
+from stereocell.usd.numbers2d import write_numbers
 
 DEFAULT_FUNCTION = "default"
 
@@ -62,7 +63,7 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*appearance.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, appearance.iso_confidence)
     set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, appearance.surface)
-    set_attribute(prim, "stereocell:gradientMax", _Types.Float, appearance.gradient_max)
+    write_numbers(prim, appearance.transfer_2d)
     if appearance.painted_by:
         set_attribute(
             prim, "stereocell:paintedBy", _Types.String, appearance.painted_by, custom=True
@@ -96,8 +97,8 @@ def _author_functions(prim: Usd.Prim, appearance: Appearance) -> None:
             pairs = _pairs(points)
             set_attribute(prim, "stereocell:opacityPoints", _Types.Float2Array, pairs)
             set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(appearance, name)}")
-            if name in appearance.shapes:
-                _author_shapes(prim, appearance.shapes[name])
+            if name in appearance.transfer_2d.functions:
+                _author_shapes(prim, appearance.transfer_2d.functions[name])
     variants.SetVariantSelection(DEFAULT_FUNCTION)
 
 

@@ -86,7 +86,9 @@ def compare_tile(task: BundleTask) -> TileFinding:
                 problems += [
                     f"{name}: {fault}" for fault in compare_volume(task.bundle, entry, voxels)
                 ]
-                joints[appearance.id] = count_tile(voxels, composed, appearance.gradient_max)
+                joints[appearance.id] = count_tile(
+                    voxels, composed, appearance.transfer_2d.gradient_max
+                )
     return TileFinding(
         task.tile_id, surfaces, len(joints), worst, joints, tuple(problems), tuple(edits)
     )

@@ -68,16 +68,13 @@ def _compare_channel(
     }
     yield from find_differences(appearance.id, channel, expected)
     yield from find_differences(
-        appearance.id, channel["transfer_functions_2d"], {"names": list(appearance.shapes)}
+        appearance.id,
+        channel["transfer_functions_2d"],
+        {"names": list(appearance.transfer_2d.functions)},
     )
     shapes = read_transfer2d(bundle, channel)
-    drawn = {
-        "gradient_max": appearance.gradient_max,
-        "functions": {
-            name: [asdict(one) for one in all_] for name, all_ in appearance.shapes.items()
-        },
-    }
-    yield from find_differences(appearance.id, shapes, json.loads(json.dumps(drawn)))
+    drawn = json.loads(json.dumps(asdict(appearance.transfer_2d)))
+    yield from find_differences(appearance.id, shapes, drawn)
     rows = read_texels(bundle / channel["lut"]["path"])[0][0]
     if rows.shape != (len(appearance.transfer_functions), 256, 4):
         shape = " x ".join(map(str, rows.shape))

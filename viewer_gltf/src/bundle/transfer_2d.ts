@@ -1,4 +1,5 @@
 /** A two-dimensional transfer function as a bundle has it: shapes, and the size of its tables. Pure. */
+import type { ChannelTransfer2D } from "./generated/transfer2d";
 
 export const ROWS = 64;
 export const COLUMNS = 256;
@@ -18,6 +19,13 @@ export type Shape = Readonly<{
   softness: number;
 }>;
 export type Shapes = readonly Shape[];
+
+/**
+ * A channel's two-dimensional functions and the numbers that they are read by, as transfer2d.json has
+ * them; without its histogram.
+ */
+export type Transfer2d = Readonly<Omit<ChannelTransfer2D, "functions" | "histogram" | "most">> &
+  Readonly<{ functions: Readonly<Record<string, Shapes>> }>;
 
 /** What is wrong with a shape that came from outside; null: nothing. */
 export function faultOf(shape: Shape): string | null {

@@ -28,7 +28,7 @@ const CONTEXT: KeyContext = {
     {
       type: "learn-plane",
       channel: "c0",
-      plane: { gradientMax: 0.5, functions: {} },
+      plane: { gradient_max: 0.5, functions: {} },
     } as const,
     { type: "set", id: "mode", value: "traced" } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),

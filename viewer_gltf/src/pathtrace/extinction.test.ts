@@ -32,7 +32,12 @@ describe("a medium's table", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
-      const plane = planeTable(randomShapes(random), 0.5, window, random());
+      const plane = planeTable(
+        randomShapes(random),
+        { gradient_max: 0.5, functions: {} },
+        window,
+        random(),
+      );
       const medium = mediumTable([{ color: WHITE, table: plane.envelope, plane }], 0.5, 0, 2);
       const low = Math.floor(256 * random());
       const high = low + Math.floor((256 - low) * random());

@@ -23,6 +23,7 @@ import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
 import { brickCounts } from "../volumes/skip_bricks";
 import { ENTRIES } from "../volumes/transfer_luts";
+import { tablesInto } from "../volumes/transfer_table_2d";
 import { Developer } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import { coarserMajorants, type MediumLook, majorants, mediumTable, rowsOf } from "./extinction";
@@ -160,9 +161,10 @@ export class Tracer {
     this.majorantTexture = float3D(coarse.majorants, coarse.counts);
     const { uniforms } = this.pathPass;
     this.pathPass.define("TWO_D", rows === 1 ? null : 1);
-    looks.forEach(({ plane }, c) => {
-      uniforms.uGradientMax.value.setComponent(c, plane?.gradientMax ?? 1);
-    });
+    tablesInto(
+      uniforms,
+      looks.map(({ plane }) => plane),
+    );
     uniforms.uMedium.value = this.medium;
     uniforms.uMajorants.value = this.majorantTexture;
     uniforms.uBrick.value.setScalar(this.brick);

@@ -5,6 +5,7 @@ import { SKIP_BRICK } from "../bundle/generated/constants";
 import { clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import { nothing } from "../gpu/float_targets";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
+import { tableUniforms } from "../volumes/transfer_table_2d";
 import { turnOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";
@@ -54,7 +55,7 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     uOldVolume: nothing(),
     uFresh: { value: 1 },
     uMedium: nothing(),
-    uGradientMax: { value: new Vector4(1, 1, 1, 1) },
+    ...tableUniforms(),
     uMajorants: nothing(),
     uBrick: { value: new Vector3(SKIP_BRICK, SKIP_BRICK, SKIP_BRICK) },
     uClipLow: { value: new Vector3() },

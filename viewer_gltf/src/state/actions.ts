@@ -1,10 +1,9 @@
 /** All that can be asked of the state. */
 
-import type { Shapes } from "../bundle/transfer_2d";
+import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import type { SetAction } from "./parameters/kinds";
-import type { Plane } from "./transfer_functions_2d";
 
 export type Action =
   /** What a user sets by a number, a switch, a choice or a colour: see parameters/. */
@@ -15,7 +14,7 @@ export type Action =
   /** Other shapes for a transfer function, which is chosen by that; `own` may be a new one. */
   | Readonly<{ type: "set-shapes"; channel: string; name: string; shapes: Shapes }>
   /** What the bundle has of a channel's two-dimensional functions has come. */
-  | Readonly<{ type: "learn-plane"; channel: string; plane: Plane }>
+  | Readonly<{ type: "learn-plane"; channel: string; plane: Transfer2d }>
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "set-clip"; clip: Clip }>

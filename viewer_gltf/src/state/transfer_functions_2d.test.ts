@@ -33,7 +33,7 @@ const set = (name: string, shapes: readonly Shape[]): Action => ({
 const LEARN: Action = {
   type: "learn-plane",
   channel: "c0",
-  plane: { gradientMax: 0.4, functions: { soft: [SHAPE] } },
+  plane: { gradient_max: 0.4, functions: { soft: [SHAPE] } },
 };
 
 describe("the two-dimensional functions of a channel", () => {

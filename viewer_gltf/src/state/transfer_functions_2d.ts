@@ -3,7 +3,14 @@
  * what a user has made of it. Plain data and pure functions; see docs/transfer-functions.md.
  */
 
-import { faultOf, MAX_SHAPES, type Range, type Shape, type Shapes } from "../bundle/transfer_2d";
+import {
+  faultOf,
+  MAX_SHAPES,
+  type Range,
+  type Shape,
+  type Shapes,
+  type Transfer2d,
+} from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
 import { LEAST_HEIGHT, LEAST_WIDTH } from "./transfer_shapes";
 
@@ -15,20 +22,13 @@ export const OWN = "own";
  */
 export const STEPS = 1020;
 
-/** What `transfer2d.json` says of a channel. */
-export type Plane = Readonly<{
-  /** The step of intensity over two finest voxel spacings that is 1 to shapes. */
-  gradientMax: number;
-  functions: Readonly<Record<string, Shapes>>;
-}>;
-
 export type Functions = Readonly<{
   transferFunction: string;
   transferFunctions: readonly string[];
   /** Of these, the bundle's two-dimensional ones. */
   transferFunctions2d: readonly string[];
   /** null: it has not come, as it is asked for only when something needs it. */
-  plane: Plane | null;
+  plane: Transfer2d | null;
   /** What the user has made of functions, by name. */
   shapes: Readonly<Record<string, Shapes>>;
 }>;

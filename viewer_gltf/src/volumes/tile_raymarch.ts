@@ -33,7 +33,7 @@ import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
-import { alikeRows, type PlaneTable } from "./transfer_table_2d";
+import { alikeRows, type PlaneTable, tablesInto, tableUniforms } from "./transfer_table_2d";
 
 /** Hard limit of a ray, whatever the volume's size and through however many tiles it goes. */
 export const MAX_STEPS = 100;
@@ -183,7 +183,7 @@ export class TileMarch {
         uOccupancy: { value: this.occupancy },
         uLut: { value: this.lut },
         uPlanes: { value: null },
-        uGradientMax: { value: new Vector4(1, 1, 1, 1) },
+        ...tableUniforms(),
       },
     });
     const matrix = new Matrix4().fromArray(volume.matrix);
@@ -278,8 +278,11 @@ export class TileMarch {
     uniforms.uPlanes.value = this.planes;
     const cells = this.planes.image.data as Uint8Array;
     const { length } = looks[0].table;
+    tablesInto(
+      uniforms as ReturnType<typeof tableUniforms>,
+      looks.map(({ plane }) => plane),
+    );
     looks.forEach(({ table, plane }, c) => {
-      uniforms.uGradientMax.value.setComponent(c, plane?.gradientMax ?? 1);
       const at = c * ROWS * length;
       const isThere =
         plane != null

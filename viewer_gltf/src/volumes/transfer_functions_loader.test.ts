@@ -3,7 +3,7 @@ import { writeKtx2 } from "../../test/support/fixture/ktx2";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import { BASE, WorkerStub } from "../../test/support/fixture/unit";
 import type { FileRef } from "../bundle/generated/bundle";
-import type { Plane } from "../state/transfer_functions_2d";
+import type { Transfer2d } from "../bundle/transfer_2d";
 import { makeShape } from "../state/transfer_shapes";
 import { TransferPlanes } from "./transfer_functions_loader";
 
@@ -22,7 +22,7 @@ function textOf(functions: object): string {
 describe("what a bundle has of two-dimensional transfer functions", () => {
   const asked: string[] = [];
   const faults: unknown[] = [];
-  const learned: Plane[] = [];
+  const learned: Transfer2d[] = [];
   let text = "";
 
   beforeEach(() => {
@@ -40,7 +40,7 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
     text = textOf(functions);
     const manifest = sampleManifest(1);
     manifest.channels[0].transfer_functions_2d.file = refOf("transfer2d.json", text);
-    const onPlane = (_: string, plane: Plane) => learned.push(plane);
+    const onPlane = (_: string, plane: Transfer2d) => learned.push(plane);
     const onError = (error: unknown) => faults.push(error);
     return new TransferPlanes({ base: BASE, manifest }, onPlane, () => undefined, onError);
   }
@@ -54,7 +54,7 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
     await come(set);
     set.want("c0");
     expect(asked).toEqual(["transfer2d.json"]);
-    expect(learned).toEqual([{ gradientMax: 0.4, functions: { soft: [SHAPE] } }]);
+    expect(learned).toEqual([{ gradient_max: 0.4, functions: { soft: [SHAPE] } }]);
     for (let i = 0; i < 3; i++) expect(set.histogram("c0")).toBeNull();
     await come(set);
     expect(set.histogram("c0")?.cells).toHaveLength(256 * 64);

@@ -6,7 +6,7 @@
 import type { FileRef } from "../bundle/generated/bundle";
 import type { Bundle } from "../bundle/load";
 import { loadHistogram, loadTransfer2d } from "../bundle/load";
-import type { Plane } from "../state/transfer_functions_2d";
+import type { Transfer2d } from "../bundle/transfer_2d";
 
 export type Histogram = Readonly<{
   /** 256 x 64 bytes, row 0 is gradient 0: the logarithm of the number of voxels. */
@@ -24,7 +24,7 @@ export class TransferPlanes {
 
   constructor(
     private readonly bundle: Bundle,
-    private readonly onPlane: (channel: string, plane: Plane) => void,
+    private readonly onPlane: (channel: string, plane: Transfer2d) => void,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {}
@@ -38,9 +38,9 @@ export class TransferPlanes {
     if (this.refs.has(channel)) return;
     void this.once(channel, async () => {
       const { file } = this.channel(channel).transfer_functions_2d;
-      const { gradient_max, functions, histogram } = await loadTransfer2d(this.bundle.base, file);
+      const { histogram, most: _, ...transfer2d } = await loadTransfer2d(this.bundle.base, file);
       this.refs.set(channel, histogram);
-      this.onPlane(channel, { gradientMax: gradient_max, functions });
+      this.onPlane(channel, transfer2d);
     });
   }
 

@@ -1,9 +1,11 @@
 /**
  * What a march looks up for a two-dimensional transfer function: a table of value and gradient
- * magnitude, and what stands for it where gradients are not asked for. Pure arrays.
+ * magnitude, and what stands for it where gradients are not asked for. Pure arrays, and the uniforms
+ * that hand their numbers to gpu/chunks/transfer_table_2d.glsl.
  */
+import { Vector4 } from "three";
 
-import { ROWS, type Shapes } from "../bundle/transfer_2d";
+import { ROWS, type Shapes, type Transfer2d } from "../bundle/transfer_2d";
 import { rasterise } from "../state/transfer_shapes";
 import { ENTRIES, lookUpTable } from "./transfer_luts";
 
@@ -20,6 +22,19 @@ export type PlaneTable = Readonly<{
 
 export const NO_ENTRIES = new Uint8Array(ROW);
 
+/** An entry for each channel. */
+export function tableUniforms() {
+  return { uGradientMax: { value: new Vector4(1, 1, 1, 1) } };
+}
+
+/** Set what `tableUniforms` made by the channels' tables; null: a channel has none. */
+export function tablesInto(
+  { uGradientMax }: ReturnType<typeof tableUniforms>,
+  tables: readonly (PlaneTable | null | undefined)[],
+): void {
+  tables.forEach((table, c) => void uGradientMax.value.setComponent(c, table?.gradientMax ?? 1));
+}
+
 /**
  * The table of shapes in a window of the intensities, which divides the steps of intensity too.
  *
@@ -27,7 +42,7 @@ export const NO_ENTRIES = new Uint8Array(ROW);
  */
 export function planeTable(
   shapes: Shapes,
-  gradientMax: number,
+  { gradient_max }: Transfer2d,
   window: readonly [number, number],
   opacity: number,
 ): PlaneTable {
@@ -40,7 +55,7 @@ export function planeTable(
       cells.set(lookUpTable(whole.subarray(at, at + ROW), window, opacity), at);
     }
   }
-  const gradient = gradientMax * (window[1] - window[0]);
+  const gradient = gradient_max * (window[1] - window[0]);
   return { cells, gradientMax: gradient, envelope: envelopeOf(cells) };
 }
 

@@ -2,7 +2,7 @@
 import { Group, Matrix4, Scene, Vector3 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
-import type { Shapes } from "../bundle/transfer_2d";
+import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
 import type { ShownVolume } from "../state/on_screen";
 import { isInDisc, type WantedTile } from "../state/representation";
@@ -26,7 +26,7 @@ import { stride } from "./volume_texture";
 const PARALLEL_LOADS = 4;
 type MadePlane = Readonly<{
   shapes: Shapes;
-  gradientMax: number;
+  plane: Transfer2d;
   window: readonly [number, number];
   opacity: number;
   table: PlaneTable;
@@ -331,16 +331,15 @@ export class VolumeSet {
     const { id, plane, window, opacity } = channel;
     const shapes = shapesOf(channel);
     if (plane === null || shapes.length === 0) return null;
-    const { gradientMax } = plane;
     const made = this.planes.get(id);
     const isSame =
       made?.shapes === shapes &&
-      made.gradientMax === gradientMax &&
+      made.plane === plane &&
       made.window === window &&
       made.opacity === opacity;
     if (isSame) return made.table;
-    const table = planeTable(shapes, gradientMax, window, opacity);
-    this.planes.set(id, { shapes, gradientMax, window, opacity, table });
+    const table = planeTable(shapes, plane, window, opacity);
+    this.planes.set(id, { shapes, plane, window, opacity, table });
     return table;
   }
 

@@ -1,6 +1,8 @@
 // Two-dimensional transfer functions: value and gradient magnitude (Kniss, Kindlmann & Hansen 2002);
 // docs/transfer-functions.md says what the numbers are.
 
+uniform vec4 uGradientMax;  // of each channel: the step of intensity over two voxels that is 1 to its table
+
 // How the intensities change over two voxels, along the axes of the texture.
 struct Steps {
   vec4 x;

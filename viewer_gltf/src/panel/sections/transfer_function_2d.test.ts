@@ -138,7 +138,7 @@ describe("the editor of value and gradient", () => {
     };
     const items = (channel: ChannelState) => planeItems(channel, desk.view, null, String);
     expect(items(unknown)[1].refusal).toBe("Its shapes have not come.");
-    const known = { ...unknown, plane: { gradientMax: 0.5, functions: { soft: [TRIANGLE] } } };
+    const known = { ...unknown, plane: { gradient_max: 0.5, functions: { soft: [TRIANGLE] } } };
     expect(items(known)[1]).toMatchObject({ refusal: "", shapes: [TRIANGLE] });
   });
 

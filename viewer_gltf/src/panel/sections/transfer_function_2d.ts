@@ -60,7 +60,7 @@ export function planeItems(
   const full = shapes.length >= MAX_SHAPES ? `There are ${MAX_SHAPES} shapes: no more.` : "";
   const count = shapes.length;
   const set = (changed: Shapes) => setShapes(channel, changed);
-  const most = plane === null ? "" : percent(plane.gradientMax * (window[1] - window[0]));
+  const most = plane === null ? "" : percent(plane.gradient_max * (window[1] - window[0]));
   const steepest = most === "" ? "" : `gradient ${most}`;
   const add = (kind: Shape["kind"]): Control => ({
     kind: "button",

@@ -15,10 +15,7 @@ uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // with STREAM_BRICK
 uniform sampler3D uOldVolume;  // the same volume: nothing fades here
 uniform float uFresh;
-uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um
-#ifdef TWO_D  // ... then 64 rows each, by gradient
-uniform vec4 uGradientMax;  // steps of intensity over two voxels that are 1 to the rows
-#endif
+uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um; TWO_D: 64 rows each, by gradient
 uniform sampler3D uMajorants;  // largest extinction per um in each brick
 uniform vec3 uBrick;  // texels along a brick's edges
 uniform vec3 uClipLow;

@@ -40,7 +40,6 @@ uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
 uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
 #ifdef TWO_D
 uniform sampler2DArray uPlanes;  // 256 x 64 x CHANNELS: the same by value and steepness
-uniform vec4 uGradientMax;  // steps of intensity over two voxels that are 1 to the tables
 #endif
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;

@@ -25,18 +25,19 @@ export type Texture = Readonly<{
  *
  * @param head declarations, with `#include <chunks/...>` lines
  * @param body of main()
+ * @param uniforms textures, and vectors of four numbers
  */
 export async function runProgram(
   page: Page,
   chunks: Record<string, string>,
   head: string,
   body: string,
-  textures: Readonly<Record<string, Texture>> = {},
+  uniforms: Readonly<Record<string, Texture | readonly number[]>> = {},
 ): Promise<readonly number[]> {
   const precision = "precision highp float;\nprecision highp sampler3D;\n";
   const source = `#version 300 es\n${precision}out vec4 oColor;\n${head}\nvoid main() {\n${body}\n}`;
   return page.evaluate(
-    ({ fragment, textures }) => {
+    ({ fragment, uniforms }) => {
       const gl = document.createElement("canvas").getContext("webgl2");
       if (gl === null) throw new Error("no WebGL 2");
       if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("no float target");
@@ -68,7 +69,11 @@ export async function runProgram(
         }
       };
       gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-      Object.entries(textures).forEach(([name, given], unit) => {
+      Object.entries(uniforms).forEach(([name, given], unit) => {
+        if (!("size" in given)) {
+          gl.uniform4fv(gl.getUniformLocation(program, name), given);
+          return;
+        }
         const { size, channels, texels, isLinear, isFloat } = given;
         const format = channels === 1 ? gl.RED : gl.RGBA;
         const floats = channels === 1 ? gl.R32F : gl.RGBA32F;
@@ -96,6 +101,6 @@ export async function runProgram(
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.FLOAT, numbers);
       return [...numbers];
     },
-    { fragment: includeChunks(source, chunks), textures },
+    { fragment: includeChunks(source, chunks), uniforms },
   );
 }

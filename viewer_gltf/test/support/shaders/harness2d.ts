@@ -17,7 +17,12 @@ const SLOPE = { from: 20, length: 8 };
 /** A plane of one shape with hard edges. */
 function onePlane(values: Range, gradients: Range, opacity: number): PlaneTable {
   const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), values, gradients };
-  return planeTable([{ ...shape, softness: 0, opacity }], 0.5, [0, 1], 1);
+  return planeTable(
+    [{ ...shape, softness: 0, opacity }],
+    { gradient_max: 0.5, functions: {} },
+    [0, 1],
+    1,
+  );
 }
 
 /**
@@ -82,7 +87,7 @@ function compareLeaps2d(seed: number): Apart {
     ...makeShape(i % 2 ? "rectangle" : "triangle", { value: random(), gradient: random() }),
     opacity: random(),
   }));
-  const plane = planeTable(shapes, 0.2, [0, 1], 1);
+  const plane = planeTable(shapes, { gradient_max: 0.2, functions: {} }, [0, 1], 1);
   const [leaping, plain] = [true, false].map((hasLeaps) =>
     draw(
       [marchOf(cube(SIDE), texels, bricks, plane.envelope, hasLeaps, depth, plane)],

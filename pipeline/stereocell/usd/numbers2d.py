@@ -1,0 +1,73 @@
+"""The numbers of a channel's 2D transfer functions as attributes: `gradient_max` is `gradientMax`.
+
+Writer and reader go by the fields of TransferFunctions2d, and by the limits that
+schemas/channel.schema.json has for their attributes.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import cache
+from math import inf
+from typing import Any
+
+from pxr import Sdf, Usd
+
+from stereocell.model.channel import TransferFunctions2d
+from stereocell.model.errors import StageError
+from stereocell.storage.assets import find_asset
+from stereocell.usd.layer import set_attribute
+from stereocell.usd.read_attributes import shortest
+
+
+def attribute_of(field: str) -> str:
+    """Return the name of a field's attribute: stereocell:gradientMax for `gradient_max`."""
+    first, *others = field.split("_")
+    return f"stereocell:{first}{''.join(word.capitalize() for word in others)}"
+
+
+ATTRIBUTES = {
+    field.name: attribute_of(field.name)
+    for field in fields(TransferFunctions2d)
+    if field.name != "functions"
+}
+
+
+def write_numbers(prim: Usd.Prim, transfer_2d: TransferFunctions2d) -> None:
+    """Write each number as a float attribute of a channel's material."""
+    for field, attribute in ATTRIBUTES.items():
+        set_attribute(prim, attribute, Sdf.ValueTypeNames.Float, getattr(transfer_2d, field))
+
+
+def read_numbers(prim: Usd.Prim) -> dict[str, float]:
+    """Return the numbers by field. One without a value is left out: only stages of other programs
+    lack any. Raises StageError for one outside its limits.
+    """
+    found = {}
+    for field, attribute in ATTRIBUTES.items():
+        value = prim.GetAttribute(attribute).Get()
+        if value is None:
+            continue
+        expected = _outside(value, _limits()[attribute])
+        if expected:
+            raise StageError(f"{prim.GetPath()}.{attribute}: {value:g}, expected it {expected}")
+        found[field] = shortest(value)
+    return found
+
+
+def _outside(value: float, limits: Mapping[str, Any]) -> str:
+    """Return the limits that a number breaks; empty: it is within them. NaN breaks all."""
+    above, least = limits.get("exclusiveMinimum", -inf), limits.get("minimum", -inf)
+    if not value > above:
+        return f"above {above:g}"
+    if not value >= least:
+        return f"at least {least:g}"
+    most = limits.get("maximum", inf)
+    return "" if value < inf and value <= most else f"at most {most:g}"
+
+
+@cache
+def _limits() -> dict[str, dict[str, Any]]:
+    """Return the schemas of a channel's attributes."""
+    content = json.loads(find_asset("schemas/channel.schema.json").read_bytes())
+    return dict(content["properties"])
