@@ -102,7 +102,7 @@ def _build(folder: Path, scene: NDArray[np.uint16], settings: str) -> Built:
         {tile: load_lods(unit) for tile, unit in folders.items()},
         {tile: np.array(load_volume(unit)) for tile, unit in folders.items()},
         {t: (r["fragments_dropped"], r["cavities_filled"]) for t, r in records.items()},
-        tuple(survey["display"]["window"]),
+        tuple(survey["statistics"]["window"]),
     )
 
 

@@ -51,7 +51,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _looks(out: Path) -> Iterator[tuple[str, str, float]]:
     for entry in OutFolder(out).survey().values():
-        appearance = entry["look"]
+        appearance = entry["appearance"]
         yield appearance["name"], appearance["surface"], appearance["iso_confidence"]
 
 

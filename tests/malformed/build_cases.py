@@ -120,11 +120,11 @@ def _plans() -> Iterator[Case]:
 
 def _units() -> Iterator[Case]:
     for name, change in {
-        "window turned": put("channels", "F", "display", "window", [9, 1]), "window NaN": put("channels", "F", "display", "window", [float("nan")] * 2),
-        "histogram short": put("channels", "F", "display", "histogram", [1]), "iso of 1e999": put("channels", "F", "iso", {"r0_c0": float("inf")}), "look lost": put("channels", "F", "look", {}),
-        "look named odd": put("channels", "F", "look", "name", "\n"), "look's window turned": put("channels", "F", "look", "window", [5, 5]),
-        "look's functions": put("channels", "F", "look", "transfer_functions", {"../x": [[0, 0]]}), "look's functions empty": put("channels", "F", "look", "transfer_functions", {}),
-        "look's colour": put("channels", "F", "look", "color", [1e30, -1, 0]),
+        "window turned": put("channels", "F", "statistics", "window", [9, 1]), "window NaN": put("channels", "F", "statistics", "window", [float("nan")] * 2),
+        "histogram short": put("channels", "F", "statistics", "histogram", [1]), "iso of 1e999": put("channels", "F", "iso", {"r0_c0": float("inf")}), "look lost": put("channels", "F", "appearance", {}),
+        "look named odd": put("channels", "F", "appearance", "name", "\n"), "look's window turned": put("channels", "F", "appearance", "window", [5, 5]),
+        "look's functions": put("channels", "F", "appearance", "transfer_functions", {"../x": [[0, 0]]}), "look's functions empty": put("channels", "F", "appearance", "transfer_functions", {}),
+        "look's colour": put("channels", "F", "appearance", "color", [1e30, -1, 0]),
     }.items():  # fmt: skip
         yield _edited(f"survey's {name}", "stage", SURVEY, _sealed(change))
     for name, key in {"escapes": "../../../bait", "empty": "", "of another": "0" * 20}.items():

@@ -334,7 +334,7 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     shutil.copytree(built, out)
 
     survey = OutFolder(out).survey()
-    proposals = [entry["display"]["proposal"] for entry in survey.values()]
+    proposals = [entry["statistics"]["suggested"] for entry in survey.values()]
     triangle = {
         "kind": "triangle",
         "values": [0.0, 1.0],

@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 from skimage import filters
 
+from stereocell.building.tasks.window import statistics_from_json, statistics_to_json
 from stereocell.cli.__main__ import main
 from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
 from stereocell.transfer.adaptive_threshold import (
@@ -24,8 +25,6 @@ from stereocell.transfer.adaptive_threshold import (
 from stereocell.transfer.channel_statistics import (
     find_statistics,
     make_appearance,
-    statistics_from_json,
-    statistics_to_json,
 )
 from stereocell.transfer.opacity import THRESHOLD, evaluate
 from stereocell.transfer.options import WindowOptions
@@ -337,19 +336,19 @@ def manifest(bundle: Path) -> dict[str, object]:
 
 def test_the_adaptive_criterion_takes_it_in_every_tile(built: Path) -> None:
     (entry,) = json.loads((built / "units" / "survey.json").read_text()).values()
-    threshold = entry["look"]["threshold"]
+    threshold = entry["appearance"]["threshold"]
     assert {iso["value"] for iso in entry["iso"].values()} == {threshold}
     assert {iso["background"] for iso in entry["iso"].values()} == {0.0}
     assert len(entry["iso"]) == 2
-    assert entry["look"]["iso_value"] == pytest.approx(threshold)
+    assert entry["appearance"]["iso_value"] == pytest.approx(threshold)
     assert 250 < threshold < 850
 
 
 def test_the_threshold_reaches_the_bundle_and_check_finds_nothing(built: Path) -> None:
     (entry,) = json.loads((built / "units" / "survey.json").read_text()).values()
-    low, high = entry["look"]["window"]
+    low, high = entry["appearance"]["window"]
     channel = manifest(built / "bundle")
-    share = (entry["look"]["threshold"] - low) / (high - low)
+    share = (entry["appearance"]["threshold"] - low) / (high - low)
     assert channel["threshold_normalized"] == pytest.approx(share, abs=1e-6)
     assert THRESHOLD in channel["transfer_functions"]
     assert [line for line in check(built) if not line.ok] == []
@@ -382,7 +381,7 @@ def test_an_edited_threshold_reaches_the_bundle(
         """
     )
     assert main(["bundle", str(built), "--stage", str(layer), "--workers", "0"]) == 0
-    low, high = entry["look"]["window"]
+    low, high = entry["appearance"]["window"]
     found = manifest(built / "bundle")["threshold_normalized"]
     if expected is None:
         assert found is None

@@ -64,13 +64,13 @@ def test_window_is_that_of_the_region_alone(
     expected = np.percentile(
         pyramid[level][part], (options.low_percentile, options.high_percentile)
     )
-    assert channel["display"]["window"] == pytest.approx(expected)
-    assert sum(channel["display"]["histogram"]) == pyramid[level][part].size
+    assert channel["statistics"]["window"] == pytest.approx(expected)
+    assert sum(channel["statistics"]["histogram"]) == pyramid[level][part].size
     # the threshold is read from every voxel, however few tell the window
-    low, high = channel["display"]["window"]
+    low, high = channel["statistics"]["window"]
     whole = fine[2:14, 4:32, 8:32]
     inside = (whole >= low) & (whole <= high)
-    assert sum(channel["display"]["values"]["counts"]) == np.count_nonzero(inside)
+    assert sum(channel["statistics"]["values"]["counts"]) == np.count_nonzero(inside)
 
 
 def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
@@ -84,10 +84,10 @@ def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
     assert main(["plan", str(source), "-o", str(out)]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
     (channel,) = OutFolder(out).survey().values()
-    low, high = channel["display"]["window"]
+    low, high = channel["statistics"]["window"]
     seen = voxels[::2]
     inside = (seen >= low) & (seen <= high)
-    assert sum(channel["display"]["values"]["counts"]) == np.count_nonzero(inside)
+    assert sum(channel["statistics"]["values"]["counts"]) == np.count_nonzero(inside)
 
 
 @pytest.mark.parametrize("iso", [None, 0.0, 0.02, 0.3, 0.97, 1.0, 1.7])

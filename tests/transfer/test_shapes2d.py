@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, Vt
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.survey_file import read_survey
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.model.channel import Shape, Shapes, TransferFunctions2d
 from stereocell.model.errors import StageError
 from stereocell.storage.assets import find_asset, schema_path
-from stereocell.transfer.channel_statistics import appearance_from
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.transfer.opacity import evaluate
 from stereocell.transfer.shapes2d import (
@@ -387,14 +387,14 @@ def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Pa
     assert main(["plan", str(source), "-o", str(out)]) == 0
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0
-    ball_entry, flat_entry = OutFolder(out).survey().values()
-    appearance = appearance_from(ball_entry["look"])
+    ball, flat = read_survey(OutFolder(out)).values()
+    appearance = ball.appearance
     (triangle,) = appearance.transfer_2d.functions[NAME]
     low, high = appearance.window
     # half-way between the ball's and the background's counts
     assert low + triangle.tip * (high - low) == pytest.approx(600, abs=20)
-    assert flat_entry["look"]["transfer_2d"]["functions"] == {}
-    assert flat_entry["display"]["proposal"]["reason"] == "materials found: 1, expected at least 2"
+    assert flat.appearance.transfer_2d.functions == {}
+    assert flat.statistics.suggested.reason == "materials found: 1, expected at least 2"
     red = functions(out / "bundle", "Ball")
     assert [s["kind"] for s in red["functions"][NAME]] == ["triangle"]  # type: ignore[index]
     assert functions(out / "bundle", "Flat")["functions"] == {}

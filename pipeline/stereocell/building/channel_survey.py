@@ -18,10 +18,20 @@ from stereocell.building.source_tasks import (
     reader_module,
     run_on_input,
 )
+from stereocell.building.survey_file import (
+    ChannelSurvey,
+    Survey,
+    TileIso,
+    save_survey,
+)
 from stereocell.building.tasks import iso_value as iso_maker
 from stereocell.building.tasks import window as window_maker
 from stereocell.building.tasks.iso_value import IsoTask, write_iso
-from stereocell.building.tasks.window import StatisticsTask, write_statistics
+from stereocell.building.tasks.window import (
+    StatisticsTask,
+    statistics_from_json,
+    write_statistics,
+)
 from stereocell.engine.run import Engine
 from stereocell.isosurface.neighbour_consensus import (
     Reconciled,
@@ -33,23 +43,18 @@ from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
-from stereocell.transfer.channel_statistics import (
-    ChannelStatistics,
-    make_appearance,
-    statistics_from_json,
-    statistics_to_json,
-)
+from stereocell.transfer.channel_statistics import ChannelStatistics, make_appearance
 
 WINDOW, ISO_VALUE = "units.schema.json#Window", "units.schema.json#IsoValue"
 AGAIN = "run `stereocell units OUT` again"
 
 
-def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> dict[str, Any]:
+def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey:
     """Return (and write) each channel's statistics, iso-values and transfer functions."""
     all_statistics, windows = _all_statistics(out_folder, plan, engine)
     isos = _isos(out_folder, plan, engine, all_statistics)
     neighbours = find_neighbours(plan.tiles)
-    content = {}
+    survey = {}
     for channel in plan.channels:
         found = {tile.id: isos[tile.id, channel.id] for tile in plan.tiles}
         reconciled = (
@@ -69,32 +74,30 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> dict[s
             confidence=reconciled.confidence,
             surface=reconciled.surface_confidence,
         )
-        content[channel.id] = {
-            "display": statistics_to_json(statistics),
-            "display_file": windows[channel.id].relative_to(out_folder.out).as_posix(),
-            "iso": {
-                tile: {
-                    "value": reconciled.values[tile],
-                    "background": f["background"],
-                    "confidence": reconciled.confidences[tile],
-                    "reason": f["reason"] or _reason(f, reconciled.confidences[tile], plan),
-                    "file": f["file"],
-                }
+        survey[channel.id] = ChannelSurvey(
+            statistics,
+            windows[channel.id].relative_to(out_folder.out).as_posix(),
+            {
+                tile: TileIso(
+                    reconciled.values[tile],
+                    f["background"],
+                    reconciled.confidences[tile],
+                    f["reason"] or _reason(f, reconciled.confidences[tile], plan),
+                    f["file"],
+                )
                 for tile, f in found.items()
             },
-            "repair": asdict(
-                choose_repair(
-                    [f["solids"] for f in found.values() if "solids" in f],
-                    plan.repair,
-                    surface=plan.settings.surface,
-                    spacing_um=plan.spacing_um,
-                    surface_confidence=reconciled.surface_confidence,
-                )
+            choose_repair(
+                [f["solids"] for f in found.values() if "solids" in f],
+                plan.repair,
+                surface=plan.settings.surface,
+                spacing_um=plan.spacing_um,
+                surface_confidence=reconciled.surface_confidence,
             ),
-            "look": asdict(replace(appearance, painted_by=painter.id if painter else "")),
-        }
-    out_folder.save_survey(content)
-    return content
+            replace(appearance, painted_by=painter.id if painter else ""),
+        )
+    save_survey(out_folder, survey)
+    return survey
 
 
 def _as_given(found: Mapping[str, Mapping[str, Any]]) -> Reconciled:
@@ -178,7 +181,7 @@ def _all_statistics(
     found = {}
     for channel_id, file in files.items():
         content = read_sealed(file, WINDOW, AGAIN)
-        found[channel_id] = statistics_from_json(content["display"])
+        found[channel_id] = statistics_from_json(content["statistics"])
     return found, files
 
 

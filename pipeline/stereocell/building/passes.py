@@ -4,9 +4,8 @@ Pass one finds each channel's window, dataset-wide, and an iso-value for each (t
 Pass two builds meshes and volumes. Every result lies under a name that says what it depends on.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any
 
 from stereocell.building.channel_survey import survey_channels
 from stereocell.building.open_source import source_of
@@ -19,6 +18,7 @@ from stereocell.building.source_tasks import (
     reader_module,
     run_on_input,
 )
+from stereocell.building.survey_file import Survey
 from stereocell.building.tasks import unit as unit_maker
 from stereocell.building.tasks.unit import UnitTask, run_unit
 from stereocell.building.unit import UnitInput
@@ -32,7 +32,6 @@ from stereocell.model.lattice_field import LatticeField, make_iso_field
 from stereocell.storage.cache_key import key_of
 from stereocell.transfer.channel_statistics import (
     ChannelStatistics,
-    statistics_from_json,
 )
 
 
@@ -47,9 +46,9 @@ def run_passes(
     others are finished.
     """
     wanted = {(tile_id, channel.id) for tile_id, channel in _select(plan, only)}
-    content = survey_channels(out_folder, plan, engine)
+    survey = survey_channels(out_folder, plan, engine)
     tasks, keys, others = [], {}, 0
-    for name, task, key in unit_tasks(out_folder, plan, content):
+    for name, task, key in unit_tasks(out_folder, plan, survey):
         keys[name] = key
         if is_whole(task.directory):
             continue
@@ -66,22 +65,21 @@ def run_passes(
 
 
 def unit_tasks(
-    out_folder: OutFolder, plan: Plan, content: Mapping[str, Any]
+    out_folder: OutFolder, plan: Plan, survey: Survey
 ) -> Iterator[tuple[str, UnitTask, str]]:
-    """Yield `<tile>/<channel>`, task and key of every unit; `content` is what survey.json holds."""
-    all_statistics = {id_: statistics_from_json(entry["display"]) for id_, entry in content.items()}
+    """Yield `<tile>/<channel>`, task and key of every unit."""
     fields = {
-        channel_id: make_iso_field(plan.tiles, {t: f["value"] for t, f in entry["iso"].items()})
-        for channel_id, entry in content.items()
+        channel_id: make_iso_field(plan.tiles, {t: f.value for t, f in found.iso.items()})
+        for channel_id, found in survey.items()
     }
-    plans = {id_: smoothed_plan(plan, entry["look"]["surface"]) for id_, entry in content.items()}
+    plans = {id_: smoothed_plan(plan, found.appearance.surface) for id_, found in survey.items()}
     for tile_id, channel in _select(plan, None):
-        statistics = all_statistics[channel.id]
+        statistics = survey[channel.id].statistics
         painter = plan.painter(channel)
-        painted = None if painter is None else (painter.index, all_statistics[painter.id].window)
+        painted = None if painter is None else (painter.index, survey[painter.id].statistics.window)
         as_built = plans[channel.id]
         field = fields[channel.id]
-        repair = RepairOptions(**content[channel.id]["repair"])
+        repair = survey[channel.id].repair
         task, key = _unit_task(
             out_folder, as_built, tile_id, channel, field, repair, statistics, painted
         )

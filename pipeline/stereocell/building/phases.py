@@ -19,6 +19,7 @@ from stereocell.building.passes import run_passes
 from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
 from stereocell.building.settings import Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
+from stereocell.building.survey_file import read_survey
 from stereocell.building.tasks import iso_value, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
@@ -33,7 +34,6 @@ from stereocell.storage.file_list import find_faults, measure, read_list
 from stereocell.storage.json_files import write_json
 from stereocell.storage.location import Location, require_apart
 from stereocell.storage.workspace import cached, is_file, objects_below, remove, sizes_below
-from stereocell.transfer.channel_statistics import appearance_from
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd import written_files
@@ -143,8 +143,8 @@ def run_stage(out: Path, engine: Engine) -> None:
     plan = out_folder.plan()
     with phase_of(out_folder, "stage") as phase:
         out_folder.require_units_of(plan)
-        index, content = out_folder.index(), out_folder.survey()
-        appearances = [appearance_from(content[channel.id]["look"]) for channel in plan.channels]
+        index, survey = out_folder.index(), read_survey(out_folder)
+        appearances = [survey[channel.id].appearance for channel in plan.channels]
         tiles = [
             (tile.id, tile_task(out_folder, plan, index=index, tile=tile)) for tile in plan.tiles
         ]

@@ -59,6 +59,16 @@ class LatticeField:
         return {"centres": [list(axis) for axis in self.centres], "values": self.values.tolist()}
 
     @classmethod
+    def __get_pydantic_core_schema__(cls, *_: Any) -> Any:
+        """Let pydantic read and write a field as `from_json` and `to_json` do."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(
+            lambda value: value if isinstance(value, cls) else cls.from_json(value),
+            serialization=core_schema.plain_serializer_function_ser_schema(cls.to_json),
+        )
+
+    @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> "LatticeField":
         """Return the field that `to_json` was given."""
         z, y, x = (tuple(axis) for axis in content["centres"])

@@ -12,6 +12,7 @@ import numpy as np
 from stereocell.building.channel_survey import AGAIN, ISO_VALUE
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
+from stereocell.building.survey_file import Survey, TileIso, read_survey
 from stereocell.building.unit_files import find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile
 from stereocell.storage.json_files import read_sealed
@@ -104,7 +105,7 @@ class Facts:
     """All of a build. `phases`: seconds of each, and on what where not on all."""
 
     plan: Plan
-    survey: dict[str, Any]
+    survey: Survey
     units: tuple[UnitFacts, ...]
     phases: dict[str, tuple[float, str]]
     steps: tuple[StepFacts, ...]
@@ -128,14 +129,14 @@ def gather(out_folder: OutFolder) -> Facts:
     """Return the facts of OUT. Raises OutputError where plan or a unit is missing."""
     plan = out_folder.plan()
     out_folder.require_units_of(plan)
-    content, index = out_folder.survey(), out_folder.index()
+    survey, index = read_survey(out_folder), out_folder.index()
     units = [
         _unit(
             out_folder,
             tile,
             channel,
             index[f"{tile.id}/{channel.id}"],
-            content[channel.id]["iso"][tile.id],
+            survey[channel.id].iso[tile.id],
         )
         for tile in plan.tiles
         for channel in plan.channels
@@ -143,7 +144,7 @@ def gather(out_folder: OutFolder) -> Facts:
     phases = out_folder.phases()
     return Facts(
         plan=plan,
-        survey=content,
+        survey=survey,
         units=tuple(units),
         phases={
             name: (phases[name]["seconds"], phases[name]["about"])
@@ -156,7 +157,7 @@ def gather(out_folder: OutFolder) -> Facts:
 
 
 def _unit(
-    out_folder: OutFolder, tile: Tile, channel: Channel, key: str, found: dict[str, Any]
+    out_folder: OutFolder, tile: Tile, channel: Channel, key: str, found: TileIso
 ) -> UnitFacts:
     directory = out_folder.unit_dir(tile.id, channel.id, key)
     record = load_record(directory)
@@ -173,11 +174,11 @@ def _unit(
         tile=tile,
         channel=channel,
         directory=directory,
-        iso_file=found["file"],
-        iso_value=found["value"],
-        background=found["background"],
-        confidence=found["confidence"],
-        iso_reason=found["reason"],
+        iso_file=found.file,
+        iso_value=found.value,
+        background=found.background,
+        confidence=found.confidence,
+        iso_reason=found.reason,
         reason=record["reason"],
         lods=tuple(lods),
         voxels=(x, y, z),

@@ -36,7 +36,6 @@ from stereocell.report.thresholds import draw_cut, draw_threshold
 from stereocell.report.tissue import TissueFacts, find_tissue
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.textures.unwrap import mip_levels_apart
-from stereocell.transfer.channel_statistics import appearance_from, statistics_from_json
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 MOST_PICTURED = 60  # units
@@ -137,9 +136,8 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
     """Return what the page says of each channel."""
     rows = []
     for channel in facts.plan.channels:
-        entry = facts.survey[channel.id]
-        appearance = appearance_from(entry["look"])
-        suggested = statistics_from_json(entry["display"]).suggested
+        found = facts.survey[channel.id]
+        appearance, suggested = found.appearance, found.statistics.suggested
         units = [unit for unit in facts.units if unit.channel == channel]
         values = [u.iso_value + u.background for u in units if u.iso_value is not None]
         rows.append(
@@ -150,13 +148,13 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "iso_value": appearance.iso_value,
                 "confidence": appearance.iso_confidence,
                 "surface": appearance.surface,
-                "repair": entry["repair"],
+                "repair": found.repair,
                 "spread": (min(values), max(values)) if values else None,
                 "arcs": len(suggested.shapes),
                 "no_arcs": suggested.reason,
                 "given": channel.name in facts.plan.settings.iso_values,
                 "histogram": charts.histogram(
-                    entry["display"]["histogram"],
+                    found.statistics.histogram,
                     appearance.transfer_functions,
                     appearance.iso_normalized,
                 ),
@@ -176,9 +174,9 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
     rows = []
     # a tissue class has probabilities, not a histogram of bodies
     for unit in (u for u in facts.units if u.tile == middle and not u.channel.source):
-        entry = facts.survey[unit.channel.id]
-        figure = draw_threshold(statistics_from_json(entry["display"]))
-        share = appearance_from(entry["look"]).threshold_normalized
+        found = facts.survey[unit.channel.id]
+        figure = draw_threshold(found.statistics)
+        share = found.appearance.threshold_normalized
         if figure is None or share is None:
             continue
         volume = load_volume(unit.directory)[inner, inner, inner]
@@ -205,8 +203,8 @@ def _card(
     lattice = unit.tile.lattice(plan.region)
     inner = slice(APRON, -APRON)
     volume = load_volume(unit.directory)[inner, inner, inner]
-    statistics = statistics_from_json(facts.survey[unit.channel.id]["display"])
-    surface_confidence = facts.survey[unit.channel.id]["look"]["surface"]
+    statistics = facts.survey[unit.channel.id].statistics
+    surface_confidence = facts.survey[unit.channel.id].appearance.surface
     low, high = statistics.window
     slices = cut_unit(
         volume,
@@ -245,7 +243,7 @@ def _iso_fields(facts: Facts) -> dict[str, LatticeField | None]:
     return {
         channel.id: make_iso_field(
             facts.plan.tiles,
-            {tile: f["value"] for tile, f in facts.survey[channel.id]["iso"].items()},
+            {tile: f.value for tile, f in facts.survey[channel.id].iso.items()},
         )
         for channel in facts.plan.channels
     }

@@ -34,9 +34,9 @@ def find_remarks(facts: Facts) -> list[Remark]:
         if u.reason and u.channel.name in with_surface
     ]
     doubtful = {
-        channel.name: appearance["iso_confidence"]
+        channel.name: appearance.iso_confidence
         for channel in facts.plan.channels
-        if (appearance := facts.survey[channel.id]["look"])["surface"] == "unclear"
+        if (appearance := facts.survey[channel.id].appearance).surface == "unclear"
     }
     built = [
         f"{name}: confidence {confidence:.2f}, expected at least "

@@ -5,7 +5,7 @@ level, and so does its threshold. Iso-values are found per tile; transfer functi
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from stereocell.transfer.adaptive_threshold import (
 from stereocell.transfer.boundaries import SuggestedShapes
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
-from stereocell.transfer.shapes2d import fall_back, transfer_2d_from
+from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
 _AT_ONCE = 1 << 20  # voxels
@@ -78,31 +78,6 @@ def find_statistics(
     return ChannelStatistics((low, high), tuple(int(n) for n in counts), background, values=values)
 
 
-def statistics_to_json(statistics: ChannelStatistics) -> dict[str, Any]:
-    """Return statistics as plain values, as survey.json holds it."""
-    field = statistics.background
-    return {
-        "window": list(statistics.window),
-        "histogram": list(statistics.histogram),
-        "background": None if field is None else field.to_json(),
-        "proposal": asdict(statistics.suggested),
-        "values": asdict(statistics.values),
-    }
-
-
-def statistics_from_json(content: Mapping[str, Any]) -> ChannelStatistics:
-    """Return what `statistics_to_json` was given; the content has passed its schema."""
-    field, suggested, values = content["background"], content["proposal"], content["values"]
-    low, high = content["window"]
-    return ChannelStatistics(
-        (low, high),
-        tuple(content["histogram"]),
-        None if field is None else LatticeField.from_json(field),
-        SuggestedShapes(transfer_2d_from(suggested["transfer_2d"]), suggested["reason"]),
-        Histogram(tuple(values["counts"]), values["low"], values["high"]),
-    )
-
-
 def make_appearance(
     name: str,
     color: tuple[float, float, float],
@@ -129,23 +104,3 @@ def make_appearance(
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)
     return replace(appearance, transfer_functions=functions, transfer_2d=transfer_2d)
-
-
-def appearance_from(content: Mapping[str, Any]) -> Appearance:
-    """Return the appearance that survey.json holds."""
-    functions = {
-        name: tuple((float(x), float(opacity)) for x, opacity in points)
-        for name, points in content["transfer_functions"].items()
-    }
-    return Appearance(
-        content["name"],
-        tuple(content["color"]),
-        tuple(content["window"]),
-        content["iso_value"],
-        content["iso_confidence"],
-        content["surface"],
-        functions,
-        content["painted_by"],
-        transfer_2d_from(content["transfer_2d"]),
-        content["threshold"],
-    )

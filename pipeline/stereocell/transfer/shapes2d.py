@@ -17,7 +17,6 @@ from stereocell.model.channel import (
     Shape,
     ShapeKind,
     Shapes,
-    TransferFunctions2d,
 )
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS
 
@@ -126,12 +125,6 @@ def _soften(depth: NDArray[np.float64], softness: float) -> NDArray[np.float64]:
     if softness == 0:
         return (depth >= 0).astype(np.float64)
     return np.clip(depth / softness, 0.0, 1.0)
-
-
-def transfer_2d_from(content: Mapping[str, Any]) -> TransferFunctions2d:
-    """Return the 2D functions that JSON holds, as dataclasses.asdict made them."""
-    functions = {name: shapes_from(shapes) for name, shapes in content["functions"].items()}
-    return TransferFunctions2d(**{**content, "functions": functions})
 
 
 def shapes_from(content: Sequence[Mapping[str, Any]]) -> Shapes:

@@ -8,6 +8,7 @@ from stereocell.building.input_unchanged import require_added, require_input
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import unit_tasks
 from stereocell.building.plan import Channel, Plan
+from stereocell.building.survey_file import read_survey
 from stereocell.bundle.write import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError, StageError, StereoCellError
@@ -90,17 +91,17 @@ def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
     Its window is not among them: it may be set to taste. That of its volumes is.
     """
     stage = open_stage(out_folder.stage_file)
-    survey = out_folder.survey()
+    survey = read_survey(out_folder)
     appearances = {appearance.id: appearance for appearance in read_appearances(stage)}
     for channel in plan.channels:
-        built, appearance = survey[channel.id]["look"], appearances.get(channel.id)
+        built, appearance = survey[channel.id].appearance, appearances.get(channel.id)
         if appearance is None:
             yield f"{channel.id}: it is not in the stage"
             continue
         for name, found, wanted in (
-            ("isoValue", (appearance.iso_value,), (built["iso_value"],)),
-            ("threshold", (appearance.threshold,), (built["threshold"],)),
-            ("volumeWindow", appearance.volume_window, built["window"]),
+            ("isoValue", (appearance.iso_value,), (built.iso_value,)),
+            ("threshold", (appearance.threshold,), (built.threshold,)),
+            ("volumeWindow", appearance.volume_window, built.window),
         ):
             if found != tuple(None if value is None else shortest(value) for value in wanted):
                 told, here = (", ".join(map(str, one)) for one in (found, wanted))
@@ -110,7 +111,7 @@ def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
 def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
     there = set(_tiles_in(out_folder.stage_file))
     index = out_folder.index()
-    for name, task, _ in unit_tasks(out_folder, plan, out_folder.survey()):
+    for name, task, _ in unit_tasks(out_folder, plan, read_survey(out_folder)):
         tile_id, channel_id = name.split("/")
         if tile_id not in there:
             continue  # told already

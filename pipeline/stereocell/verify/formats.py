@@ -139,7 +139,7 @@ def _spoilt_survey(out_folder: OutFolder) -> list[str]:
     if survey is None:
         return [_fault_of(out_folder, out_folder.survey_file)]
     channels = survey["channels"].values()
-    files = {channel["display_file"]: WINDOW for channel in channels}
+    files = {channel["statistics_file"]: WINDOW for channel in channels}
     files |= {tile["file"]: ISO_VALUE for channel in channels for tile in channel["iso"].values()}
     spoilt = [name for name in files if find_sealed(out_folder.out / name, files[name]) is None]
     return [_fault_of(out_folder, out_folder.out / name) for name in spoilt]

@@ -1,10 +1,14 @@
 """Find a channel's window, histogram and suggested 2D function, on a worker. Picklable."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.settings import Settings
@@ -14,11 +18,7 @@ from stereocell.read import Dataset
 from stereocell.storage.json_files import write_sealed
 from stereocell.transfer.adaptive_threshold import Histogram, make_histogram
 from stereocell.transfer.boundaries import SuggestedShapes, suggest
-from stereocell.transfer.channel_statistics import (
-    ChannelStatistics,
-    find_statistics,
-    statistics_to_json,
-)
+from stereocell.transfer.channel_statistics import ChannelStatistics, find_statistics
 from stereocell.transfer.joint_histogram import (
     COLUMNS,
     FINE_ROWS,
@@ -47,10 +47,25 @@ class StatisticsTask:
     window: tuple[float, float] | None = None  # None: it is found
 
 
+@cache
+def _adapter() -> TypeAdapter[ChannelStatistics]:
+    return TypeAdapter(ChannelStatistics)
+
+
+def statistics_to_json(statistics: ChannelStatistics) -> dict[str, Any]:
+    """Return a channel's statistics as plain values."""
+    return dict(_adapter().dump_python(statistics, mode="json"))
+
+
+def statistics_from_json(content: Mapping[str, Any]) -> ChannelStatistics:
+    """Return what `statistics_to_json` was given; the content has passed its schema."""
+    return _adapter().validate_python(content)
+
+
 def write_statistics(task_and_file: tuple[StatisticsTask, Path]) -> None:
     """Find a channel's window and write it down."""
     task, file = task_and_file
-    write_sealed(file, {"display": statistics_to_json(measure_statistics(task))})
+    write_sealed(file, {"statistics": statistics_to_json(measure_statistics(task))})
 
 
 def measure_statistics(task: StatisticsTask) -> ChannelStatistics:
