@@ -1,1 +1,1 @@
-"""Voxels in, voxels out: noise, background, minima and maxima of bricks."""
+"""Filters from voxels to voxels: noise, background, minima and maxima of bricks."""

@@ -1,9 +1,9 @@
-"""The background under a channel: smooth, dataset-wide, subtracted before any iso-value is sought.
+"""The background of a channel: smooth, dataset-wide, subtracted before iso-values are found.
 
-Stains sit on light that comes from elsewhere and varies over a tile; one level can't serve both its
-bright and its dark side. In blocks as large as the largest bodies a low percentile of the voxels is
-background, as long as the bodies leave that share free; between the blocks' centres it runs
-linearly, so that neighbouring tiles see the same value at the same place.
+Stray light and autofluorescence lie under a stain and vary over a tile; one level can't serve both
+its bright and its dark side. Space is split into blocks as large as the largest bodies. A low
+percentile of a block's voxels is its background, as long as bodies leave that share free. The field
+is linear between the blocks' centres, so neighbouring tiles see the same value at the same place.
 """
 
 from itertools import pairwise, product
@@ -16,8 +16,8 @@ from scipy import ndimage
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 
-PERCENTILE = 15.0
-SMOOTHING = 0.7  # sigma, in blocks: a block that a body fills all the same is drawn down
+PERCENTILE = 15.0  # percent of a block's voxels that are at most the background
+SMOOTHING = 0.7  # sigma in blocks; lowers a block that a body fills completely
 
 
 def find_background(
@@ -27,10 +27,12 @@ def find_background(
     spacing_um: tuple[float, float, float],
     block_um: float,
 ) -> LatticeField:
-    """Return the background of `field`, (z, y, x), which covers `region` at any resolution.
+    """Return the background of a channel, in voxel values.
 
-    Knots lie at the centres of blocks of about `block_um`, in voxels of the region's level, whose
-    spacing is `spacing_um`.
+    field       (z, y, x), voxel values; covers `region` at any resolution
+    region      voxels of the level that is built
+    spacing_um  (z, y, x), of the region's level
+    block_um    aim for the edge of a block; knots lie at the blocks' centres
     """
     blocks = [
         max(1, min(n, round(size * step / block_um)))
@@ -43,7 +45,7 @@ def find_background(
     knots = np.empty(blocks)
     for place in product(*(range(count) for count in blocks)):
         block = tuple(slice(e[i], e[i + 1]) for e, i in zip(edges, place, strict=True))
-        # block by block: all of the field as float32 would be what a small build's memory peaks at
+        # block by block: the whole field as float32 would set the peak memory of a small build
         knots[place] = np.percentile(field[block].astype(np.float32), PERCENTILE)
     z, y, x = (
         tuple(float(start + (a + b) / 2 * size / n - 0.5) for a, b in pairwise(edge))

@@ -1,4 +1,4 @@
-"""What is done to voxels before any surface is sought: hot voxels out, noise smoothed."""
+"""Filters applied before a surface is extracted: hot voxels removed, noise smoothed."""
 
 from typing import Any
 
@@ -8,11 +8,12 @@ from scipy import ndimage
 
 from stereocell.model.volume import Volume
 
-MEDIAN_REACH = 1  # voxels, in plane
-SMOOTHING_REACH = 4.0  # sigmas of the Gaussian that are summed
+MEDIAN_REACH = 1  # voxels that the median reaches in plane
+SMOOTHING_REACH = 4.0  # radius of the Gaussian, in sigmas
 
-# exchanges that leave the median of nine in the middle: Paeth, "Median finding on a 3 x 3 grid",
-# Graphics Gems, 1990, as numbered by Devillard, "Fast median search", 1998
+# pairs (a, b) of nine values to put in order; then value 4 is their median.
+# References: A. W. Paeth, "Median finding on a 3 x 3 grid", Graphics Gems, 1990, 171-175; in the
+# numbering of N. Devillard, "Fast median search: an ANSI C implementation", 1998
 _EXCHANGES = (
     (1, 2), (4, 5), (7, 8), (0, 1), (3, 4), (6, 7), (1, 2), (4, 5), (7, 8), (0, 3),
     (5, 8), (4, 7), (3, 6), (1, 4), (2, 5), (4, 7), (4, 2), (6, 4), (4, 2),
@@ -20,13 +21,17 @@ _EXCHANGES = (
 
 
 def denoise(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
-    """Return the voxels (z, y, x) after a median of 3 x 3 in plane and a Gaussian, float32."""
+    """Return the voxels after a 3 x 3 median in plane and a Gaussian.
+
+    sigma_um  sigma of the Gaussian; 0 turns it off
+    result    float32 (z, y, x), voxel values
+    """
     plain = Volume(median_in_plane(volume.voxels), volume.spacing_um, volume.origin_um)
     return smooth(plain, sigma_um)
 
 
 def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
-    """Return the voxels (z, y, x) after a Gaussian of `sigma_um`, float32; 0 turns it off."""
+    """Return the voxels after a Gaussian of sigma `sigma_um` (0: none); float32 (z, y, x)."""
     field = volume.voxels.astype(np.float32)
     if sigma_um > 0:
         sigma = sigma_um / np.asarray(volume.spacing_um)
@@ -35,10 +40,12 @@ def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
 
 
 def median_in_plane(voxels: NDArray[Any]) -> NDArray[Any]:
-    """Return the median of the 3 x 3 voxels around each in its plane; ends repeat.
+    """Return the median of the 3 x 3 voxels around each voxel in its plane; edges repeat.
 
-    Against hot voxels, which a Gaussian would only spread. By exchanges of whole planes: ten times
-    as fast as scipy's, which sorts voxel by voxel.
+    voxels  (z, y, x), any number type; the result has the same shape and type
+
+    It removes hot voxels, which a Gaussian would spread. It exchanges whole planes, and is ten
+    times as fast as scipy's, which sorts voxel by voxel.
     """
     result = np.empty_like(voxels)
     for plane, out in zip(voxels, result, strict=True):

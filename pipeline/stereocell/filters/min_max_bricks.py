@@ -1,23 +1,31 @@
-"""What a ray-marcher wants beside the voxels: mip levels and the value range of each brick.
+"""Data that a ray-marcher needs beside the voxels: mip levels, and the value range of each brick.
 
-Mip levels are box-filtered so that every level covers the same box: level k has max(1, n >> k)
-voxels along an axis of n, and where n is odd the voxels are averaged by the share of them that
-the coarser voxel covers (polyphase box filter; Guthe & Heckbert, "Non-Power-of-Two Mipmap
-Creation", NVIDIA 2005). Bricks follow the min-max blocks of Parker et al., IEEE Visualization
-1998, grown by the voxel on each side that trilinear interpolation can reach.
+Every mip level covers the same box: level k has max(1, n >> k) voxels along an axis of n. Where n
+is odd, a coarser voxel is the mean of the voxels that it covers, weighted by the share that it
+covers (polyphase box filter). Bricks follow min-max blocks, grown by one voxel on each side, since
+trilinear interpolation reaches that far.
+
+References
+S. Guthe & P. Heckbert, "Non-power-of-two mipmap creation", NVIDIA, 2005.
+S. Parker, P. Shirley, Y. Livnat, C. Hansen & P.-P. Sloan, "Interactive ray tracing for isosurface
+rendering", IEEE Visualization 1998.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 SKIP_BRICK = 8  # voxels along a brick's edge, a power of two; the viewer's build reads it here
-SMALLEST_LEVEL = 4  # no further mip level once no axis is longer
+SMALLEST_LEVEL = 4  # voxels; the last mip level has no axis longer than this
 
 
 def mip_levels(volume: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """Return the volume (z, y, x) and its coarser levels, finest first, each uint8 (z, y, x).
+    """Return the volume and its coarser levels, finest first.
 
-    Averages are kept in float32 from level to level and rounded once a level.
+    volume  uint8 (z, y, x)
+    result  uint8 (z, y, x) each. Means are kept in float32 between levels, and rounded at each
+
+    >>> [level.shape for level in mip_levels(np.zeros((16, 12, 5), np.uint8))]
+    [(16, 12, 5), (8, 6, 2), (4, 3, 1)]
     """
     levels = [volume]
     average: NDArray[np.uint8] | NDArray[np.float32] = volume
@@ -31,9 +39,11 @@ def mip_levels(volume: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
 def min_max_bricks(volume: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return the smallest and largest voxel of each brick: uint8 (bz, by, bx, 2).
 
+    volume  uint8 (z, y, x)
+
     Along an axis of n voxels there are ceil(n / SKIP_BRICK) bricks; brick b begins at voxel
-    i = SKIP_BRICK * b and covers [i - 1, i + SKIP_BRICK], clipped to the volume: all that a
-    trilinear sample between the outer faces of its own voxels can touch.
+    i = SKIP_BRICK * b and covers [i - 1, i + SKIP_BRICK], clipped to the volume: a trilinear sample
+    between the outer faces of its own voxels reads no other.
     """
     low, high = volume, volume
     for axis in range(3):

@@ -5,7 +5,11 @@ from numpy.typing import NDArray
 
 
 def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return sRGB, uint8, of linear 0..1 (IEC 61966-2-1)."""
+    """Return 8-bit sRGB of linear colours (IEC 61966-2-1).
+
+    linear  float32, any shape, 0..1; values outside are clipped
+    result  uint8, same shape, 0..255
+    """
     clipped = np.clip(linear.astype(np.float64), 0, 1)
     bent = 1.055 * clipped ** (1 / 2.4) - 0.055
     return np.round(255 * np.where(clipped <= 0.0031308, 12.92 * clipped, bent)).astype(np.uint8)

@@ -1,11 +1,11 @@
-"""Every error that a user can cause or mend: one line, exit code 1 (2 for wrong usage).
+"""Errors that a user can cause or repair: one line, exit code 1 (2 for wrong usage).
 
 All other exceptions are bugs and keep their traceback.
 """
 
 
 class StereoCellError(Exception):
-    """The message names the file or tile, the field, what was found and what was expected."""
+    """The message names the file or tile and the field, the value found and the value expected."""
 
     exit_code = 1
 
@@ -21,16 +21,16 @@ class SourceError(StereoCellError):
 
 
 class OutputError(StereoCellError):
-    """OUT can't be written, or holds something else."""
+    """OUT can't be written, or holds something other than a build."""
 
 
 class NoSurfaceError(StereoCellError):
-    """The voxels have no iso-surface. The caller records the reason; the build goes on."""
+    """The voxels have no iso-surface. The caller records the reason, and the build goes on."""
 
 
 class StageError(StereoCellError):
-    """A USD stage does not hold what the bundle needs."""
+    """A USD stage lacks something that the bundle needs."""
 
 
 class CheckError(StereoCellError):
-    """An output breaks the rules of its own format."""
+    """An output breaks the rules of its format."""

@@ -1,11 +1,11 @@
 """Channel and tile names as identifiers: legal in USD paths, file names and URLs, and reversible.
 
-ASCII letters and digits stay; each other character becomes `_x<hex>_`, as do a leading digit and
-an underscore that stands before an `x` (so that no name can imitate an escape). `Hoechst 33342`
-becomes `Hoechst_x20_33342`, `CD3e` with a Greek epsilon `CD3_x3b5_`, `1st` becomes `_x31_st`.
+ASCII letters and digits stay. Each other character becomes `_x<hex>_`; so do a leading digit and
+an underscore before an `x`, so that no name can look like an escape. `Hoechst 33342` becomes
+`Hoechst_x20_33342`, `CD3e` with a Greek epsilon `CD3_x3b5_`, `1st` becomes `_x31_st`.
 
-File names are limited to 255 bytes. Where the identifier would be longer than `MAX_LENGTH`, its end
-gives way to a digest of the whole name, as `_xh<hex>_`, which no other name can imitate.
+File names are limited to 255 bytes. An identifier longer than `MAX_LENGTH` is cut, and ends in a
+digest of the whole name, `_xh<hex>_`. No other name can have that identifier.
 """
 
 import hashlib
@@ -13,7 +13,7 @@ import re
 from bisect import bisect_right
 from itertools import accumulate
 
-MAX_LENGTH = 180  # leaves room for tile ids, keys and suffixes round it in a file's name
+MAX_LENGTH = 180  # most characters; leaves room for tile id, key and suffix in a file name
 
 _ESCAPE = re.compile(r"_x([0-9a-f]+)_|_xh[0-9a-f]{20}_$")
 _KEPT = re.compile(r"[A-Za-z0-9]|_(?!x)")
@@ -37,5 +37,5 @@ def to_identifier(name: str) -> str:
 
 
 def from_identifier(identifier: str) -> str:
-    """Return the name that `to_identifier` was given; one cut short ends in `\u2026`."""
+    """Return the name that `to_identifier` was given; a shortened name ends in `\u2026`."""
     return _ESCAPE.sub(lambda match: chr(int(match[1], 16)) if match[1] else "\u2026", identifier)

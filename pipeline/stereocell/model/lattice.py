@@ -1,4 +1,4 @@
-"""Where a tile's samples lie: what was read, what is the tile's own, what is built."""
+"""Where a tile's samples lie: the voxels read, the tile's own points, the region that is built."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -8,20 +8,20 @@ import numpy as np
 from stereocell.model.tiling import Box
 from stereocell.model.volume import zyx_to_xyz
 
-Spacing = tuple[float, float, float]  # um between samples, (z, y, x)
-Point = tuple[float, float, float]  # um, (z, y, x)
-Step = tuple[int, int, int]  # planes of voxels, (z, y, x)
-Plane = tuple[int, float]  # a column of positions (0 x, 1 y, 2 z), and its value in um
+Spacing = tuple[float, float, float]  # distance between samples in um, (z, y, x)
+Point = tuple[float, float, float]  # position in um, (z, y, x)
+Step = tuple[int, int, int]  # every how many planes of voxels one is kept, (z, y, x)
+Plane = tuple[int, float]  # axis of a position (0 x, 1 y, 2 z), and its value in um
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
     """Where a tile's samples lie; boxes are half-open, (z, y, x), in voxels of the level.
 
-    window      what was read: the arrays that belong to the lattice cover it
-    own         the tile's lattice points: its cells lie between them
-    region      all that is built: a tile is cut where its own points end before it
-    spacing_um  between samples, (z, y, x)
+    window      voxels that were read: arrays of the lattice cover them
+    own         the tile's lattice points: the tile's cells lie between them
+    region      voxels of the whole build: a tile is cut where `own` ends before the region does
+    spacing_um  distance between samples, (z, y, x)
     origin_um   centre of voxel (0, 0, 0), (z, y, x); the same for all tiles of a build
     """
 
@@ -33,7 +33,7 @@ class Lattice:
 
     @classmethod
     def of_whole(cls, box: Box, spacing_um: Spacing, origin_um: Point = (0, 0, 0)) -> "Lattice":
-        """Return the lattice of a volume that is one tile, and all that is built."""
+        """Return the lattice of a volume that is a single tile, and the whole region."""
         return cls(box, box, box, spacing_um, origin_um)
 
     def alone(self) -> "Lattice":
@@ -41,11 +41,11 @@ class Lattice:
         return Lattice.of_whole(self.own, self.spacing_um, self.origin_um)
 
     def grown(self, voxels: int) -> "Lattice":
-        """Return the lattice with so many more points of its own each way, within the region."""
+        """Return the lattice with `voxels` more own points on each side, within the region."""
         return replace(self, own=self.own.grown((voxels, voxels, voxels), self.region))
 
     def thinned(self, step: Step) -> "Lattice":
-        """Return the lattice of every `step`-th plane, counted from the region's first one."""
+        """Return the lattice of every `step`-th plane (z, y, x), from the region's first on."""
         if step == (1, 1, 1):
             return self
         z, y, x = (h * k for h, k in zip(self.spacing_um, step, strict=True))
@@ -60,7 +60,7 @@ class Lattice:
         )
 
     def slices_of_thinned(self, step: Step) -> tuple[slice, slice, slice]:
-        """Return which planes of the window `thinned` keeps."""
+        """Return the planes of the window that `thinned` keeps, as slices (z, y, x)."""
         starts = zip(
             self.window.thinned(self.region, step).start,
             self.region.start,
@@ -72,7 +72,7 @@ class Lattice:
         return z, y, x
 
     def cuts(self) -> Iterator[tuple[int, int]]:
-        """Yield where another tile follows: the axis (0 z, 1 y, 2 x), and the plane's index."""
+        """Yield each cut, where another tile follows: axis (0 z, 1 y, 2 x), index of the plane."""
         for axis in range(3):
             if self.own.start[axis] != self.region.start[axis]:
                 yield axis, self.own.start[axis]
@@ -80,11 +80,14 @@ class Lattice:
                 yield axis, self.own.stop[axis] - 1
 
     def cut_planes(self) -> tuple[Plane, ...]:
-        """Return where an extracted mesh is open, as float32 has it: where another tile follows."""
+        """Return the planes in which an extracted mesh is open: another tile follows there.
+
+        Values are rounded to float32, as the mesh's positions are.
+        """
         planes = []
         for axis, place in self.cuts():
             zyx = np.zeros(3)
             zyx[axis] = place * self.spacing_um[axis] + self.origin_um[axis]
-            value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # as of the mesh's vertices
+            value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # rounded as vertices are
             planes.append((2 - axis, float(value)))
         return tuple(planes)

@@ -1,8 +1,8 @@
-"""Fields that run linearly between the knots of a lattice: iso-values and backgrounds.
+"""Fields that are linear between the knots of a lattice: iso-values and backgrounds.
 
-Each tile has its own iso-value, and neighbours must agree on their common plane; so the surface is
-taken where f(x) = iso(x), iso running linearly from tile centre to tile centre, constant beyond the
-last. The background that is subtracted from f is such a field too, on a lattice of its own.
+Each tile has its own iso-value, and neighbours must agree on their common plane. So the surface is
+extracted where f(x) = iso(x); iso is linear from tile centre to tile centre, and constant beyond
+the last one. The background that is subtracted from f is such a field too, on its own lattice.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,10 +17,10 @@ from stereocell.model.tiling import Box, Tile
 
 @dataclass(frozen=True, slots=True)
 class LatticeField:
-    """Values on a grid of places.
+    """Values at the knots of a grid.
 
     centres  three rising tuples, (z, y, x), in voxels of the level
-    values   float64 (z, y, x), one for each combination of centres
+    values   float64 (z, y, x), one for each combination of centres; in voxel values
     """
 
     centres: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
@@ -29,9 +29,9 @@ class LatticeField:
     def at(self, box: Box) -> NDArray[np.float32]:
         """Return the field at the voxels of the box, float32; it broadcasts over (z, y, x).
 
-        An axis along which only one centre reaches into the box is 1 long. A voxel's value depends
-        on nothing but its place, bit by bit: linear steps axis by axis, weights from the voxel's
-        index alone.
+        An axis has length 1 where only one centre reaches into the box. A value depends on its
+        voxel's position alone, bit by bit: interpolation runs axis by axis, and weights follow from
+        the voxel's index.
         """
         near = self.around(box)
         weights = [
@@ -40,12 +40,12 @@ class LatticeField:
         ]
         columns = _blend(_blend(near.values, 0, weights[0]), 1, weights[1])
         field = np.empty((*columns.shape[:2], len(weights[2].share)), np.float32)
-        for plane, column in zip(field, columns, strict=True):  # all in float64 would be GBs
+        for plane, column in zip(field, columns, strict=True):  # the whole in float64 takes GBs
             plane[...] = _blend(column, 1, weights[2])
         return field
 
     def around(self, window: Box) -> "LatticeField":
-        """Return the part that reaches into a unit's window: what its result depends on."""
+        """Return the part of the field that reaches into a unit's window: it decides the result."""
         keep = []
         for axis, centres in enumerate(self.centres):
             first = np.searchsorted(centres, window.start[axis], side="right") - 1
@@ -55,7 +55,7 @@ class LatticeField:
         return LatticeField((z, y, x), self.values[tuple(keep)])
 
     def to_json(self) -> dict[str, Any]:
-        """Return the field as plain values."""
+        """Return the field as lists of numbers."""
         return {"centres": [list(axis) for axis in self.centres], "values": self.values.tolist()}
 
     @classmethod
@@ -70,14 +70,14 @@ class LatticeField:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> "LatticeField":
-        """Return the field that `to_json` was given."""
+        """Return the field from the lists of `to_json`."""
         z, y, x = (tuple(axis) for axis in content["centres"])
         return cls((z, y, x), np.array(content["values"], np.float64))
 
 
 @dataclass(frozen=True, slots=True)
 class _Weights:
-    """Each voxel lies at `share` of the way from centre number `low` to `high`; arrays (n,)."""
+    """A voxel lies at `share` of the way from centre `low` to centre `high`; arrays (n,)."""
 
     low: NDArray[np.intp]
     high: NDArray[np.intp]
@@ -85,7 +85,7 @@ class _Weights:
 
 
 def _weights(centres: NDArray[np.float64], start: int, stop: int) -> _Weights:
-    """Return the weights of the voxels start..stop; of one that stands for all with one centre."""
+    """Return the weights of voxels start..stop; of the first one alone if there is one centre."""
     voxels = np.arange(start, stop if len(centres) > 1 else start + 1, dtype=np.float64)
     below = np.searchsorted(centres, voxels, side="right") - 1
     low = np.clip(below, 0, len(centres) - 1)
@@ -104,9 +104,9 @@ def _blend(values: NDArray[np.float64], axis: int, weights: _Weights) -> NDArray
 
 
 def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> LatticeField | None:
-    """Return the field of one channel's iso-values, by tile id; None if no tile has one.
+    """Return the field of one channel's iso-values; None if no tile has one.
 
-    A tile without a value takes the mean of the channel's others.
+    found  iso-value by tile id, in voxel values; None: the tile takes the mean of the others
     """
     known = [value for value in found.values() if value is not None]
     if not known:

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 class Mesh:
     """An indexed triangle mesh, counter-clockwise seen from outside.
 
-    positions  float32 (n, 3)  x, y, z in um, world
-    triangles  uint32  (m, 3)
+    positions  float32 (n, 3)  x, y, z in um, world space
+    triangles  uint32  (m, 3)  vertex numbers
     normals    float32 (n, 3)  unit length, pointing out
     uvs        float32 (n, 2)  origin at the lower left, v upwards (USD's convention), or None
     tangents   float32 (n, 4)  xyz and the bitangent's sign (glTF's convention), or None
-    colors     float32 (n, 3)  linear RGB 0..1, what a stage draws it in, or None: its look's colour
-    openness   float32 (n,)    0..1, what a stage says of ambient occlusion (1: none of it), or None
+    colors     float32 (n, 3)  linear RGB 0..1 as read from a stage, or None: the channel's colour
+    openness   float32 (n,)    1 - ambient occlusion as read from a stage, 0..1, or None
     """
 
     positions: NDArray[np.float32]
@@ -30,7 +30,7 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Distances in um from one surface to another: see `distance.measure_spread`."""
+    """Distances in um from one surface to another; see `meshes.distance.measure_spread`."""
 
     mean: float
     p95: float
@@ -39,14 +39,14 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What is known of a level of detail beside its distance.
+    """How a level of detail was made, and how true it is.
 
-    away, back  distances from the iso-surface to this mesh, and from this mesh to it
-    mended      bodies that had to be simplified again, as the first attempt had faults
-    fallbacks   bodies that kept the level before's surface, as every attempt had faults
-    faults      left over, by the exact check: see `find_defects`
-    angle_deg   1st percentile of the triangles' smallest angles
-    enclosed    share of the iso-surface's area that lies inside this mesh or on it
+    away, back  distances from the iso-surface to this mesh, and from this mesh to the iso-surface
+    mended      bodies that were simplified again, because the first attempt had defects
+    fallbacks   bodies that kept the previous level's surface, because every attempt had defects
+    faults      defects that are left, by the exact check: see `find_defects`
+    angle_deg   1st percentile of the triangles' smallest angles, in degrees
+    enclosed    share of the iso-surface's area that lies inside this mesh or on it, 0..1
     """
 
     away: Spread
@@ -60,12 +60,12 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class Baked:
-    """What the fine surface told a level: at texels (h, w) if it has UVs, else at vertices (n,).
+    """Values baked from the fine surface: at texels (h, w) if the level has UVs, else at vertices.
 
-    openness  uint8; 255: no ambient occlusion
-    paint     uint8; another channel's intensity, or None
-    texel_um  edge of a texel on the surface; 0: no maps
-    charts    of its UVs
+    openness  uint8, (h, w) or (n,); 255: no ambient occlusion
+    paint     uint8, (h, w) or (n,); intensity of the sampled channel, or None
+    texel_um  edge of a texel on the surface, in um; 0: no maps
+    charts    number of UV charts
     reason    why there are no maps; empty if there are
     """
 
@@ -80,10 +80,10 @@ class Baked:
 class Lod:
     """One level of detail. `lod0` is the finest.
 
-    distance_um  measured distance between this mesh and the iso-surface: see `distance`
+    distance_um  measured distance between this mesh and the iso-surface: see `measure_distance`
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
-    quality      how it was made and how true it is; None where the writer doesn't know
-    baked        ambient occlusion and paint; None: neither
+    quality      None where the writer doesn't know it
+    baked        ambient occlusion and sampled channel; None: neither
     """
 
     mesh: Mesh

@@ -1,4 +1,4 @@
-"""The content of a tile: what the units of work leave and the stage writer takes."""
+"""The content of a tile: units of work produce it, the stage writer takes it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 from stereocell.model.channel import PaintColors
 from stereocell.model.mesh import Lod
 
-APRON = 1  # voxels around the lattice's on every side of a volume: what trilinear filtering reads
+APRON = 1  # voxels added around a volume on every side; trilinear filtering reads them
 Provenance = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelContent:
-    """One (tile, channel): what a unit of work leaves.
+    """The result of one (tile, channel).
 
     lods    finest first; empty: no surface
     volume  uint8 (z, y, x), window applied, with an apron of APRON voxels on every side
-    paint   colours of the channel that is painted on the surface; None: none is
-    closed  the STL of a closed copy of the surface; None: there is none
+    paint   colours of the channel that is sampled on the surface; None: no channel
+    closed  STL file of a closed copy of the surface; None: no file
     """
 
     channel_id: str
@@ -35,10 +35,11 @@ class ChannelContent:
 class TileContent:
     """One tile with all its channels.
 
+    spacing_um         distance between voxels, (z, y, x)
     first_um, last_um  (z, y, x) centres of its first own voxel and of its last lattice point: the
                        box that its meshes fill and that its volume shows
-    own_shape          voxels (z, y, x) without the apron and without the neighbours' shared plane.
-                       The volumes' shape is the lattice's (own + shared planes) + 2
+    own_shape          voxels (z, y, x) without the apron and without the planes shared with
+                       neighbours. A volume has the lattice's shape (own + shared planes) + 2
     """
 
     id: str

@@ -1,8 +1,8 @@
 """Cut a lattice of voxels into tiles that share their border planes.
 
 Neighbours share ONE plane of lattice points: a tile's own points run from `start` to `stop`
-inclusive where another tile follows, so that each cell belongs to exactly one tile and surfaces
-meet without cracks and without clipping.
+inclusive where another tile follows. So each cell belongs to exactly one tile, and surfaces meet
+without cracks and without clipping.
 """
 
 from collections.abc import Sequence
@@ -42,10 +42,10 @@ class Box:
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def thinned(self, region: "Box", step: tuple[int, int, int], outward: bool = False) -> "Box":
-        """Return the box in planes of which every `step` one stays, from the region's first on.
+        """Return the box in thinned planes: every `step`-th is kept, from the region's first on.
 
-        It ends with the last of these inside, or `outward` the next one, if the region has it: so
-        that boxes that share a plane still share one.
+        It ends with the last kept plane inside it. With `outward` it ends with the next kept plane,
+        if the region has one, so that boxes that share a plane still share one.
         """
         start, stop = [], []
         ends = zip(self.start, self.stop, region.start, region.stop, step, strict=True)
@@ -60,7 +60,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """`id` is `r<row>_c<column>`, with `_z<k>` where the depth is split. `box`: its own voxels."""
+    """`id` is `r<row>_c<column>`, with `_z<k>` where the depth is split; `box`: its own voxels."""
 
     id: str
     box: Box
@@ -68,16 +68,16 @@ class Tile:
     def lattice(self, region: Box) -> Box:
         """Return the box of the lattice points between which the tile's cells lie.
 
-        It holds one plane more than `box` on each side where another tile follows.
+        It has one plane more than `box` on each side where another tile follows.
         """
         z, y, x = (min(b + 1, end) for b, end in zip(self.box.stop, region.stop, strict=True))
         return Box(self.box.start, (z, y, x))
 
 
 def cut(region: Box, tile_size: tuple[int, int, int]) -> tuple[Tile, ...]:
-    """Return the tiles of `region`, row by row; the last of an axis may be smaller.
+    """Return the tiles of `region`, row by row; the last tile of an axis may be smaller.
 
-    A last tile of a single plane would hold no cells: it joins its neighbour.
+    tile_size  voxels (z, y, x). A last tile of a single plane has no cells: it joins its neighbour
     """
     axes = []
     for low, high, size in zip(region.start, region.stop, tile_size, strict=True):
@@ -91,7 +91,7 @@ def cut(region: Box, tile_size: tuple[int, int, int]) -> tuple[Tile, ...]:
 def cut_evenly(region: Box, columns: int, rows: int) -> tuple[Tile, ...]:
     """Return columns x rows tiles, row by row; their sizes differ by one voxel at most.
 
-    The region needs at least two voxels a tile each way.
+    The region must have at least two voxels per tile along y and x.
     """
     axes = [
         [low + i * (high - low) // count for i in range(count + 1)]

@@ -1,4 +1,4 @@
-"""Seconds spent, by step."""
+"""A clock that adds up seconds by step."""
 
 import time
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 
 class Clock:
-    """Seconds spent, by step."""
+    """Adds up seconds by step: `with clock("extract"): ...`."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

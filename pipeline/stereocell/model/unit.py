@@ -1,4 +1,4 @@
-"""A unit as it was built: the surface and the volume of one (tile, channel)."""
+"""The result of a unit: the surface and the volume of one (tile, channel)."""
 
 from dataclasses import dataclass
 
@@ -10,10 +10,10 @@ from stereocell.model.mesh import Lod, Mesh
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """A closed copy of a tile.
+    """A closed copy of a tile's surface.
 
-    faults     that are left, by the exact check
-    fallbacks  bodies that simplification left as they were: all, where it left faults
+    faults     defects that are left, by the exact check
+    fallbacks  bodies that were not simplified: all of them, if simplification left defects
     """
 
     mesh: Mesh
@@ -23,12 +23,12 @@ class Closed:
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What a unit leaves.
+    """The result of one unit of work.
 
-    closed   a closed copy of lod0, if that is asked for and there are solids
-    volume   uint8 (z, y, x): the lattice's voxels, window applied, APRON voxels more on every side
+    closed   a closed copy of lod0, if one is asked for and the tile has connected components
+    volume   uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side
     reason   why there is no surface; empty if there is one
-    seconds  by step
+    seconds  time spent, by step
     """
 
     lods: tuple[Lod, ...]

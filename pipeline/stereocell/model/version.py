@@ -1,4 +1,4 @@
-"""The program's name and version, as files carry it."""
+"""The program's name and version, as output files carry it."""
 
 from importlib.metadata import version
 

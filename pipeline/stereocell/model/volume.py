@@ -1,4 +1,4 @@
-"""The noun that all stages share: voxels and their place, and the one axis swap."""
+"""The type that all stages share: voxels and their position, and the one axis swap."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 class Volume:
     """One channel's window.
 
-    `voxels` (z, y, x), integer or float32. `spacing_um` and `origin_um` are (z, y, x) in
-    micrometres; the CENTRE of voxel (0, 0, 0) lies at the origin.
+    voxels      (z, y, x), integer or float32
+    spacing_um  distance between voxels in um, (z, y, x)
+    origin_um   CENTRE of voxel (0, 0, 0) in um, (z, y, x)
     """
 
     voxels: NDArray[Any]
@@ -21,16 +22,22 @@ class Volume:
 
 
 def zyx_to_xyz(points_um: ArrayLike) -> NDArray[np.float64]:
-    """Return world positions (x, y, z) in um of image positions (z, y, x) in um; shape (..., 3).
+    """Return world positions (x, y, z) of image positions (z, y, x).
+
+    points_um  (..., 3), um
+    result     float64 (..., 3), um
 
     The world is right-handed, x right, y up, z towards the viewer (glTF, USD with Y up). Image
-    rows grow downwards, so y changes its sign here and nowhere else; whoever maps triangles by
-    it swaps their winding too.
+    rows grow downwards, so y changes its sign here and nowhere else. A caller that maps triangles
+    must swap their winding too.
+
+    >>> zyx_to_xyz((1.0, 2.0, 3.0))
+    array([ 3., -2.,  1.])
     """
     points = np.asarray(points_um, dtype=np.float64)
     return np.stack([points[..., 2], -points[..., 1], points[..., 0]], axis=-1)
 
 
 def xyz_to_zyx(points_um: ArrayLike) -> NDArray[np.float64]:
-    """Return image positions (z, y, x) of world positions (x, y, z); shape (..., 3)."""
-    return zyx_to_xyz(points_um)  # swapping the ends and turning y over is its own inverse
+    """Return image positions (z, y, x) of world positions (x, y, z); float64 (..., 3), um."""
+    return zyx_to_xyz(points_um)  # the swap is its own inverse
