@@ -1,11 +1,15 @@
-"""Turn a window of voxels into the triangles of its iso-surface, without cracks between tiles.
+"""Extract the triangles of the iso-surface from a window of voxels, without cracks between tiles.
 
-Neighbouring tiles share a plane of lattice points and each extracts only its own cells. Whatever
-the field depends on is dataset-wide or lies inside the halo, so both see the same values on the
-common plane, and the vertices there come out equal bit by bit: positions are found in lattice
-units and put into the world in float64, by the same arithmetic for every tile.
+Neighbouring tiles share a plane of lattice points, and each extracts its own cells only. The field
+depends on dataset-wide numbers and on voxels inside the halo alone, so both tiles see the same
+values on the common plane. The vertices there are equal bit by bit: positions are found in lattice
+units and moved into the world in float64, by the same arithmetic for every tile.
 
-Extraction is Flying Edges (Schroeder, Maynard & Geveci, LDAV 2015) as VTK has it.
+Triangles come from VTK's Flying Edges.
+
+References
+W. Schroeder, R. Maynard & B. Geveci, "Flying edges: A high-performance scalable isocontouring
+algorithm", IEEE LDAV 2015. doi:10.1109/LDAV.2015.7348069
 """
 
 import numpy as np
@@ -19,13 +23,14 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
 
-# Values nearer to zero than this share of the distance's clip are moved off it: a vertex on a
-# lattice point would make degenerate triangles.
+# Least absolute value, as a share of the distance's clip: values nearer to zero are moved to it,
+# since a vertex on a lattice point would make degenerate triangles.
 SNAP = 0.01
-# On a cut plane neither simplification nor fairing may move a vertex later: crossings stay clear of
-# the ends of their lattice edge by this share of it, or short edges would stay, and sharp triangles
-# on them: the 1st percentile of lod0's smallest angles, on tiles of nuclei and of membranes, is 13
-# and 15 degrees so, 9 and 11 at .05. At .25, 1 % of the cut's places were shaded 3 degrees apart.
+# Least distance of a crossing on a cut plane from the ends of its lattice edge, as a share of the
+# edge. Simplification and fairing may not move vertices there, so a nearer crossing would leave
+# short edges and sharp triangles. The 1st percentile of lod0's smallest angles, on tiles of nuclei
+# and of membranes, is 13 and 15 degrees; it is 9 and 11 at .05. At .25 the shading of 1 % of the
+# cut's points differed by 3 degrees between neighbours.
 RIM_SNAP = 0.2
 
 
@@ -35,22 +40,30 @@ def extract_surface(
     """Return the surface distance = 0 between the lattice's own points; empty if there is none.
 
     distance  float32 (z, y, x), um, positive inside; covers `lattice.window`
-    cut_as    the lattice at whose ends tiles are cut, if it isn't this one; there the surface is
-              as that one's
+    cut_as    the lattice at whose ends tiles are cut, if it differs from `lattice`; the surface
+              follows that lattice there
+    result    positions float32 (n, 3) in world um (x, y, z), triangles, normals
 
-    The mesh is in world um (x, y, z). It is open where another tile follows, and closed by a cap,
-    within one voxel, where the region ends. Normals come from the field's gradient, which halos
-    make continuous across tiles.
+    The mesh is open where another tile follows, and closed by a cap, within one voxel, where the
+    region ends. Normals come from the field's gradient; halos make them continuous across tiles.
+
+    >>> from stereocell.model.tiling import Box
+    >>> z, y, x = np.mgrid[:9, :9, :9]
+    >>> ball = (3 - np.sqrt((z - 4) ** 2 + (y - 4) ** 2 + (x - 4) ** 2)).astype(np.float32)
+    >>> box = Box((0, 0, 0), (9, 9, 9))
+    >>> mesh = extract_surface(np.clip(ball, -2, 2), Lattice.of_whole(box, (1.0, 1.0, 1.0)))
+    >>> mesh.positions.shape, mesh.triangles.shape
+    ((150, 3), (296, 3))
     """
     own, region = lattice.own, lattice.region
-    window = own.grown((2, 2, 2), lattice.window)  # what the slopes round each vertex are made of
+    window = own.grown((2, 2, 2), lattice.window)  # slopes around the vertices need two more voxels
     distance = distance[window.slices_in(lattice.window)]
     limit = np.float32(2 * max(lattice.spacing_um))
     cap = [
         (int(a == low), int(b == high))
         for a, b, low, high in zip(own.start, own.stop, region.start, region.stop, strict=True)
     ]
-    # where the lattice ends with the region, so does the window: both get the same margin
+    # where the lattice ends with the region, the window does too: both get the same margin
     margin = np.array([low for low, _ in cap])
     distance = np.pad(distance, cap, constant_values=-limit)
     box = [
@@ -74,7 +87,7 @@ def extract_surface(
     lattice_zyx = points[:, ::-1].astype(np.float64) + (np.asarray(own.start) - margin)
     positions = zyx_to_xyz(lattice_zyx * steps + origin).astype(np.float32)
     normals = _normals(distance, lattice_zyx - np.asarray(window.start) + margin, steps)
-    # VTK winds by the image's own axes; the world mirrors y, which turns every triangle over
+    # VTK winds by the image's axes; the world mirrors y, so every triangle is turned over
     return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
 
 
@@ -90,9 +103,9 @@ def _least_on_plane(
     at: int,
     snap: np.float32,
 ) -> NDArray[np.float32]:
-    """Return how far off zero the values of a plane of the box must be, for RIM_SNAP.
+    """Return the least absolute values on a plane of the box that RIM_SNAP asks for.
 
-    It looks one point past the box: all tiles that share a point of the plane see all its edges.
+    It reads one point past the box: all tiles that share a point of the plane see all its edges.
     """
     wide = [slice(max(low - 1, 0), high + 1) for low, high in box]
     wide[axis] = slice(at, at + 1)
@@ -117,7 +130,7 @@ def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDA
     """Return points (x, y, z) in lattice units and triangles of values = 0."""
     image = vtkImageData()
     image.SetDimensions(*values.shape[::-1])
-    scalars = np.ascontiguousarray(values).ravel()  # VTK borrows it: it must outlive the filter
+    scalars = np.ascontiguousarray(values).ravel()  # VTK borrows the array, which must stay alive
     image.GetPointData().SetScalars(numpy_to_vtk(scalars))
     filter_ = vtkFlyingEdges3D()
     filter_.SetInputData(image)
@@ -136,7 +149,10 @@ def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDA
 def _normals(
     distance: NDArray[np.float32], at: NDArray[np.float64], spacing_um: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Return unit normals (x, y, z), pointing out of {distance > 0}, at window indices (n, 3)."""
+    """Return unit normals (x, y, z), pointing out of {distance > 0}.
+
+    at  float64 (n, 3), window indices (z, y, x)
+    """
     gradient = np.empty((3, len(at)), np.float32)
     coordinates = at.T
     for axis, step in enumerate(spacing_um):

@@ -1,19 +1,19 @@
-"""What a channel's tiles say together: how sure each iso-value is, and which one each tile takes.
+"""Reconcile the iso-values of a channel's tiles: the confidence and the final value of each tile.
 
-The plateau of a criterion's curve is broad: many levels are nearly as good as the best, and which
-of them wins is chance. Where a neighbour's value lies on the plateau too, there is no evidence for
-a discontinuity, which would show as a step in the surface. A value never leaves its own plateau.
+The plateau of a criterion's curve is broad: many levels are nearly as good as the best, and chance
+picks one. Where a neighbour's value lies on the plateau too, nothing speaks for a discontinuity,
+which would show as a step in the surface. A value never leaves its own plateau.
 
-A discontinuity also weakens weak evidence: confidence = evidence ^ (1 + discontinuity / 4), where
-it is, 0 to 1, the distance to the median of those neighbours that are sure by themselves, by the
-larger of the two heights above the background. Strong evidence stays (.9 beside a neighbour eight
-times as bright: .88), and no more weight than that: a dark part of a real brain, whose cells are
-outlined well at .44 of its neighbour's value, has .49, and keeps .44.
+A discontinuity lowers weak evidence: confidence = evidence ^ (1 + discontinuity / 4). The
+discontinuity, 0 to 1, is the distance to the median of the neighbours that are confident by
+themselves, divided by the larger of the two heights above the background. Strong evidence stays (.9
+beside a neighbour eight times as bright becomes .88). A larger weight would do harm: a dark part of
+a real brain, whose cells are outlined well at .44 of its neighbour's value, has .49, and keeps .44.
 
-A channel is clear if the mean of its tiles' confidences, each with the strength of its edges as
-weight, reaches `isovalue.min_confidence`: tiles in which a stain is absent have hardly any edges
-steeper than noise and don't count against it. In a clear channel a tile that isn't takes the mean
-of those that are. In a channel that isn't, each tile keeps what was found.
+A channel is clear if the mean of its tiles' confidences, weighted by the strength of their edges,
+reaches `isovalue.min_confidence`: tiles in which a stain is absent have hardly any edges steeper
+than noise and don't count against it. In a clear channel, a tile below the bound takes the mean of
+the others. In an unclear channel each tile keeps its own value.
 """
 
 from collections import defaultdict
@@ -27,8 +27,8 @@ import numpy as np
 from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.tiling import Box, Tile
 
-PLATEAU = 0.99  # of the best score: levels that are as good; .95 cost a lone ball 11 % of volume
-DISCONTINUITY_WEIGHT = 0.25
+PLATEAU = 0.99  # share of the best score from which levels are as good; .95 cost a lone ball 11 %
+DISCONTINUITY_WEIGHT = 0.25  # growth of the evidence's exponent at a discontinuity of 1
 Neighbours = Mapping[str, Sequence[str]]
 
 
@@ -36,9 +36,9 @@ Neighbours = Mapping[str, Sequence[str]]
 class Reconciled:
     """One channel's iso-values.
 
-    values              by tile id; None: the tile takes the mean of the others
+    values              voxel values by tile id; None: the tile takes the mean of the others
     confidences         by tile id, 0..1
-    confidence          the channel's, 0..1
+    confidence          of the channel, 0..1
     surface_confidence  whether its surface is clear
     """
 
@@ -53,9 +53,10 @@ def reconcile_iso_values(
 ) -> Reconciled:
     """Return iso-values on which the tiles agree.
 
-    neighbours  by tile id, as of `find_neighbours`
-    found       by tile id: `value` (None: the tile has none); where it has one `confidence`, by its
-                own evidence, `strength`, `levels` and `score`
+    neighbours      by tile id, as `find_neighbours` returns them
+    found           by tile id: `value` (voxel values; None: the tile has none); with a value also
+                    `confidence` by its own evidence, `strength`, `levels` and `score` (bins,)
+    min_confidence  bound of a clear surface, 0..1
     """
     values = {tile: found[tile]["value"] for tile in neighbours}
     evidence = {
@@ -88,7 +89,7 @@ def reconcile_iso_values(
 
 
 def find_neighbours(tiles: Sequence[Tile]) -> dict[str, list[str]]:
-    """Return the ids of the tiles that share a face with each, by tile id."""
+    """Return the ids of the tiles that share a face with each tile, by tile id."""
     starting = defaultdict(list)
     for tile in tiles:
         for axis in range(3):
@@ -122,19 +123,19 @@ def _pulled_towards(
     values: Mapping[str, float | None],
     found: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, float | None]:
-    """Return each tile's value, drawn half-way to the median of its neighbours'."""
+    """Return each tile's value, pulled half-way to the median of its neighbours' values."""
     pulled = dict(values)
     for tile, value in values.items():
         beside = [v for other in neighbours[tile] if (v := values[other]) is not None]
         if value is not None and beside:
             low, high = _plateau(value, found[tile])
-            # half the way: going all of it, two neighbours would only change places
+            # half the way: with all of it two neighbours would only swap values
             pulled[tile] = min(max((value + median(beside)) / 2, low), high)
     return pulled
 
 
 def _plateau(value: float, found: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the range of levels about the value that score nearly as well as the best."""
+    """Return the range of levels around the value that score nearly as well as the best."""
     levels, score = np.asarray(found["levels"]), np.asarray(found["score"])
     best = int(score.argmax())
     worse = np.flatnonzero(score < PLATEAU * score[best])

@@ -7,12 +7,15 @@ from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag, length_um, setting
 
 CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
-ADAPTIVE = "adaptive"  # the channel's threshold, in all tiles; its curves are those of `edges`
+ADAPTIVE = "adaptive"  # the channel's threshold in all tiles; the curves are those of `edges`
 
 
 @dataclass(frozen=True, slots=True)
 class IsoValueOptions:
-    """How iso-values are found."""
+    """How iso-values are found.
+
+    Raises UsageError for an unknown criterion or a number out of range.
+    """
 
     criterion: str = setting(
         "edges",
@@ -26,7 +29,7 @@ class IsoValueOptions:
 
     @property
     def curve(self) -> str:
-        """Which of CRITERIA is the curve over the levels."""
+        """The member of CRITERIA that makes the curve over the levels."""
         return CRITERIA[0] if self.criterion == ADAPTIVE else self.criterion
 
     def __post_init__(self) -> None:
@@ -55,7 +58,7 @@ WRAPS = ("voxels", "alpha-wrap")
 
 @dataclass(frozen=True, slots=True)
 class SurfaceOptions:
-    """Lengths in um; auto follows the voxel spacing."""
+    """Lengths in um; `auto` follows the voxel spacing."""
 
     smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
     alpha_um: float | str = setting(
@@ -96,7 +99,11 @@ class SurfaceOptions:
     )
 
     def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
-        """Return the options with lengths for `auto`; alpha and offset may wait for the solids."""
+        """Return the options with lengths in place of `auto`, but for alpha and offset.
+
+        `auto` alpha and offset follow from the connected components. Raises UsageError for a value
+        out of range.
+        """
         coarsest = max(spacing_um)
         auto = {
             "smoothing_um": min(spacing_um),

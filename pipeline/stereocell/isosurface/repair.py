@@ -1,13 +1,17 @@
-"""Make a solid clean before its surface is extracted: fragments out, gaps closed, cavities filled.
+"""Clean a solid before its surface is extracted: drop fragments, close gaps, fill cavities.
 
-All three work on the signed distance of a window (tile + halo). A verdict on a component may
-differ between neighbouring tiles only if they see different parts of it; hence only components
-that lie wholly inside the window are dropped or filled, and only up to a size that the halo
-covers (`reach_um`): whoever sees such a component near a common plane sees all of it.
+All three steps work on the signed distance of a window (tile + halo). Neighbouring tiles must
+decide alike on a component near their common plane. So only components that lie wholly inside the
+window are dropped or filled, and only up to a size that the halo covers (`reach_um`): a tile that
+sees part of such a component near the plane sees all of it.
 
-Closing is done on voxels, by a ball of radius alpha, and keeps the paper's meaning of alpha (the
-size of the gaps that are bridged) and of offset (how far outside the surface lies) at a fraction
-of the time of an alpha wrap over triangles (Portaneri et al. 2022).
+Gaps are closed on voxels, by a ball of radius alpha. Alpha is the size of the gaps that are
+bridged, and offset the distance of the surface from the solid, as in an alpha wrap over triangles;
+voxels take a fraction of its time.
+
+References
+C. Portaneri, M. Rouxel-Labbe, M. Hemmer, D. Cohen-Steiner & P. Alliez, "Alpha wrapping with an
+offset", ACM Trans. Graphics 41(4), 2022. doi:10.1145/3528223.3530152
 """
 
 from dataclasses import dataclass
@@ -27,12 +31,12 @@ class RepairOptions:
     """What is cleaned, lengths in um.
 
     alpha_um         radius of the ball that closes gaps; 0: none are closed
-    min_diagonal_um  fragments of a smaller diagonal go
+    min_diagonal_um  fragments of a smaller diagonal are dropped
     max_cavity_um    cavities of a smaller diagonal are filled
-    min_faces        fragments of fewer triangles go as well,
+    min_faces        fragments of fewer triangles are dropped too,
     max_fragment_um  if their diagonal is under this
-    offset_um        how far the surface moves outward; at most a voxel, beyond which the field's
-                     distance means nothing
+    offset_um        distance by which the surface moves outward; at most a voxel, since farther
+                     away the field is no distance
     """
 
     alpha_um: float
@@ -43,7 +47,7 @@ class RepairOptions:
     offset_um: float = 0.0
 
     def reach_um(self, spacing_um: tuple[float, float, float]) -> float:
-        """Return how far from a voxel lies what decides on it: the halo must cover it."""
+        """Return how far, in um, a voxel's result depends on others: the halo must cover it."""
         closing = 2 * self.alpha_um + 2 * max(spacing_um) if self.alpha_um > 0 else 0.0
         fragment = max(self.min_diagonal_um, self.max_fragment_um)
         return closing + fragment + self.max_cavity_um + 2 * max(spacing_um)
@@ -51,7 +55,7 @@ class RepairOptions:
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
-    """`distance` (z, y, x) um, positive inside, and what was done to it."""
+    """The cleaned distance float32 (z, y, x) in um, positive inside, and the counts of changes."""
 
     distance: Distance
     fragments_dropped: int
@@ -61,8 +65,11 @@ class Repaired:
 def repair(
     distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
 ) -> Repaired:
-    """Return the cleaned signed distance; the argument stays as it is, and is what comes back where
-    nothing was to be cleaned.
+    """Return the cleaned signed distance.
+
+    distance    float32 (z, y, x), um, positive inside; it is not changed, and it is returned itself
+                where nothing needs cleaning
+    spacing_um  (z, y, x)
     """
     distance, dropped = _drop_fragments(distance, spacing_um, options)
     if options.offset_um > 0:
@@ -78,8 +85,8 @@ def repair(
 def _drop_fragments(
     distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
 ) -> tuple[Distance, int]:
-    """Return the distance with small solids inside the window set far outside, and how many."""
-    # 26-connected: a fragment joined by a corner belongs to its neighbour
+    """Return the distance with small solids inside the window set far outside, and their number."""
+    # 26-connected: a fragment that touches a neighbour by a corner belongs to it
     components = find_components(distance > 0, spacing_um, 26)
     small = components.diagonal_um < options.min_diagonal_um
     doubtful = ~small & (components.diagonal_um < options.max_fragment_um)
@@ -91,7 +98,7 @@ def _drop_fragments(
     outside = np.float32(-2 * max(spacing_um))
     gone = np.concatenate([[False], small])[components.labels]
     if options.offset_um > 0:
-        # just outside a fragment the distance is hardly negative: the offset would bring it back
+        # just outside a fragment the distance is barely negative: the offset would restore it
         near = ndimage.maximum_filter(gone.view(np.uint8), 3, mode="constant")
         kept = ((components.labels > 0) & ~gone).view(np.uint8)
         near &= ~ndimage.maximum_filter(kept, 3, mode="constant") & 1
@@ -102,8 +109,9 @@ def _drop_fragments(
 def _fill_cavities(
     distance: Distance, spacing_um: tuple[float, float, float], max_diagonal_um: float
 ) -> tuple[Distance, int]:
-    """Return the distance with small holes that no path joins to the outside set far inside, and
-    how many.
+    """Return the distance with small cavities set far inside, and their number.
+
+    A cavity is a hole that no path joins to the outside.
     """
     holes = find_components(distance <= 0, spacing_um, 6)
     small = holes.whole & (holes.diagonal_um < max_diagonal_um)
@@ -114,16 +122,16 @@ def _fill_cavities(
 
 
 def _close(distance: Distance, spacing_um: tuple[float, float, float], alpha_um: float) -> Distance:
-    """Add to the solid what a ball of radius alpha, rolling outside, cannot reach.
+    """Add to the solid the voxels that a ball of radius alpha, rolling outside, cannot reach.
 
-    The joint lies one voxel inside, so that smooth parts of the surface stay where they are. It is
-    done on the whole window: in boxes round the solids, with the margins that they need, it took
-    .75 to 1.2 of the time on nuclei, membranes, vessels and the cells of a real brain.
+    The added part lies one voxel inside, so that smooth parts of the surface stay where they are.
+    It is computed on the whole window: in boxes around the components, with the margins that they
+    need, it took .75 to 1.2 of the time on nuclei, membranes, vessels and cells of a real brain.
     """
     h = float(max(spacing_um))
     margin = [int(np.ceil(alpha_um / step)) + 1 for step in spacing_um]
     mask = np.pad(distance <= 0, [(m, m) for m in margin], constant_values=True)
-    # no centres of balls that fit outside, then how far each voxel is from the nearest that is one
+    # first the voxels where no ball has its centre, then their distance to the nearest centre
     mask = edt.edt(mask, anisotropy=spacing_um, parallel=1) < alpha_um
     away = edt.edt(mask, anisotropy=spacing_um, parallel=1)
     away = away[tuple(slice(m, -m) for m in margin)]

@@ -1,15 +1,16 @@
-"""How a channel's surface is wrapped: the gaps that are bridged, the fragments that go.
+"""Choose how a channel's surface is repaired: the gaps that are bridged, the fragments that go.
 
-The first paper's rule, from a channel's solids in all its tiles: fragments of less than half the
-mean number of triangles, or half the mean diagonal, go; then alpha, the size of the gaps that are
-bridged, follows from the means D and F of those that are kept. D / sqrt(F) is the length of a
-triangle's side but for the shape, larger for plain bodies than for frayed ones; ALPHA_SIDES of it
-are .6 um on nuclei in voxels of .28 x .14 x .14 um, .35 on membranes, .3 on vessels, 10.5 on a real
-brain's cells in voxels of 5 x 2 x 2 um (the paper took 1 um). It stays between a coarsest spacing
-and `surface.max_alpha_um`. An offset that is asked for is OFFSET_SHARE of alpha.
+The rule of the first paper uses a channel's connected components in all its tiles. Fragments go
+that have less than half the mean number of triangles, or half the mean diagonal. Then alpha, the
+size of the gaps that are bridged, follows from the means D (diagonal) and F (triangles) of the
+others. D / sqrt(F) is the length of a triangle's side times a factor of shape, larger for plain
+bodies than for frayed ones. ALPHA_SIDES times it is .6 um on nuclei in voxels of .28 x .14 x .14
+um, .35 on membranes, .3 on vessels, 10.5 on a real brain's cells in voxels of 5 x 2 x 2 um (the
+paper took 1 um). It stays between a coarsest spacing and `surface.max_alpha_um`. An offset of
+`auto` is OFFSET_SHARE of alpha.
 
-The rule sees no more of a fragment than a unit's halo: it holds for those up to a length that is
-planned for, and larger ones stay.
+A unit sees no more of a fragment than its halo holds: the rule applies to fragments up to a length
+that the plan allows for, and larger ones stay.
 """
 
 from collections.abc import Iterable, Mapping
@@ -25,15 +26,15 @@ from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.settings import AUTO
 
-SHARE = 0.5  # of the means: what is smaller goes
-ALPHA_SIDES = 6.0
-LEAST_ALPHA = 1.0  # coarsest spacings: nearer voxels have no gap between them
-OFFSET_SHARE = 0.1  # of alpha, as the paper's 0.1 um of 1 um
+SHARE = 0.5  # share of a mean below which a fragment goes
+ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
+LEAST_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
+OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentSums:
-    """Sums over a tile's solids; of all, and of those that the rule keeps."""
+    """Sums over a tile's connected components: over all of them, and over those the rule keeps."""
 
     count: int
     faces: int
@@ -46,9 +47,12 @@ class ComponentSums:
 def sum_components(
     inside: NDArray[np.bool_], spacing_um: tuple[float, float, float], min_diagonal_um: float
 ) -> ComponentSums:
-    """Return the sums over the solids of {field > iso-value} (z, y, x); specks are left out.
+    """Return the sums over the connected components of {field > iso-value}.
 
-    They would rule the means: noise has more of them than a tile has bodies.
+    inside           bool (z, y, x)
+    spacing_um       (z, y, x)
+    min_diagonal_um  smaller components are left out: noise has more of them than a tile has bodies,
+                     so they would decide the means
     """
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
@@ -74,13 +78,13 @@ def choose_repair(
     spacing_um: tuple[float, float, float],
     surface_confidence: SurfaceConfidence,
 ) -> RepairOptions:
-    """Return what is cleaned of a channel's surface.
+    """Return how a channel's surface is repaired.
 
-    tiles       ComponentSums of each, as plain values
-    most        the most that may be cleaned: the units' halo covers it
+    tiles       the ComponentSums of each tile, as dictionaries
+    most        the upper bounds: the units' halo covers them
     spacing_um  (z, y, x)
 
-    No gaps are closed in a surface that is not clear, by either wrap: none is known to be one
+    No gaps are closed in an unclear surface, by either wrap: a gap in noise is no gap of a body
     (building.plan.smoothed_plan).
     """
     sums = list(tiles)
@@ -103,7 +107,7 @@ def choose_repair(
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
     if surface_confidence == "unclear":
         options = replace(options, alpha_um=0.0)
-    wraps_triangles = surface.wrap == "alpha-wrap"  # which knows no offset of 0
+    wraps_triangles = surface.wrap == "alpha-wrap"  # that wrap knows no offset of 0
     if surface.offset_um == AUTO or (wraps_triangles and not options.offset_um):
         options = replace(options, offset_um=OFFSET_SHARE * options.alpha_um)
     return options
