@@ -1,30 +1,35 @@
 """The adaptive binarisation threshold of a channel: between two peaks of its histogram.
 
-The rule, as the paper on streamed MRI states it: the histogram is smoothed by a moving window of
-10 % of its length, and the threshold lies between the second-highest peak and the peak before it.
-Where that is open it is read so:
+The paper on streamed MRI states the rule: the histogram is smoothed by a moving window of 10 % of
+its length, and the threshold lies between the second-highest peak and the peak before it. The rule
+leaves some points open. Here they mean:
 
-- window: the mean over an odd number of bins. At the histogram's ends it holds only the bins that
-  exist: no bins of zero are made up, which would push a peak at the end (the air round a head)
-  away from it.
-- peak: a bin that both sides fall away from; a plateau is one peak, at its middle; at an end of the
-  histogram one side is enough. Counting has peaks of its own, where the mean is flat but for
-  chance: in thin tails, and over a spike narrower than the window. A peak counts if chance does not
-  make it: if the way up from the saddle to any higher one is more than CHANCE standard deviations
-  of the difference of two means of Poisson counts over the window, sqrt(2 height / its bins), of a
-  height of at least one voxel. However low it is beside the others, what is left is a peak.
-- second-highest: by the smoothed height. Of equal ones the darker comes first, as air does.
-- the peak before it: the next one of lower intensity, whichever its height. In a head that is the
-  air, the highest of all. Where nothing lies before it (bright air, dark bodies) the threshold
-  lies between it and the next one of higher intensity.
-- between: at the lowest place of the smoothed histogram between the two, in the middle of a flat
-  one. Fewest voxels lie there, so that a threshold slightly off changes the fewest (the mode method
-  of Prewitt & Mendelsohn, "The analysis of cell images", Annals of the New York Academy of Sciences
-  128, 1966). The peaks' midpoint depends on how wide the peaks are, and cuts the broader one.
-- a single peak has nothing before it. The threshold is then the foot of its longer side: the bin
+- window: the mean over an odd number of bins. At the histogram's ends it holds existing bins only:
+  added bins of zero would push a peak at the end (the air around a head) away from it.
+- peak: a bin that is higher than both sides; a plateau is one peak, at its middle; at an end of the
+  histogram one side is enough. Counting noise has peaks of its own where the mean is flat: in thin
+  tails, and over a spike narrower than the window. A peak counts if it rises above the saddle to
+  any higher peak by more than CHANCE standard deviations of the difference of two means of Poisson
+  counts over the window, sqrt(2 height / its bins), with a height of at least one voxel. A peak
+  that passes this test counts, however low it is beside the others.
+- second-highest: by the smoothed height. Of equal heights the darker comes first, as air does.
+- the peak before it: the next one of lower intensity, of any height. In a head that is the air, the
+  highest of all. Where no peak lies before it (bright air, dark bodies) the threshold lies between
+  it and the next one of higher intensity.
+- between: at the lowest point of the smoothed histogram between the two, in the middle of a flat
+  one. Fewest voxels lie there, so that a small error of the threshold changes the fewest (the mode
+  method of Prewitt & Mendelsohn). The peaks' midpoint depends on the peaks' widths, and cuts the
+  broader one.
+- a single peak has no peak before it. The threshold is then the foot of its longer side: the bin
   farthest below the line from the peak to that side's end (the triangle method of Zack, Rogers &
-  Latt, Journal of Histochemistry and Cytochemistry 25, 1977).
-- a flat histogram, or one of a single filled bin, has neither: no threshold.
+  Latt).
+- a flat histogram, or one with a single filled bin, has no threshold.
+
+References
+J. M. S. Prewitt & M. L. Mendelsohn, "The analysis of cell images", Annals of the New York Academy
+of Sciences 128, 1966. doi:10.1111/j.1749-6632.1965.tb11715.x
+G. W. Zack, W. E. Rogers & S. A. Latt, Journal of Histochemistry and Cytochemistry 25, 1977.
+doi:10.1177/25.7.70454
 """
 
 from dataclasses import dataclass
@@ -33,16 +38,19 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-WINDOW_SHARE = 0.10  # of the histogram's length
-CHANCE = 5.0  # standard deviations
-BINS = 256
-_AT_ONCE = 1 << 20  # voxels
+WINDOW_SHARE = 0.10  # length of the moving window as a share of the histogram's
+CHANCE = 5.0  # standard deviations that a peak must rise above its saddle
+BINS = 256  # most bins of a histogram
+_AT_ONCE = 1 << 20  # voxels counted at once
 Reading = Literal["two peaks", "no peak before", "single peak"]
 
 
 @dataclass(frozen=True, slots=True)
 class Histogram:
-    """Voxel counts (bins,) in equal bins from `low` to `high`, in voxel values."""
+    """Voxel counts in equal bins from `low` to `high`, in voxel values.
+
+    counts  (bins,), voxels
+    """
 
     counts: tuple[int, ...]
     low: float
@@ -50,7 +58,7 @@ class Histogram:
 
     @property
     def levels(self) -> NDArray[np.float64]:
-        """The middle of each bin, in voxel values."""
+        """The middle of each bin, float64 (bins,), in voxel values."""
         middles = np.arange(len(self.counts), dtype=np.float64) + 0.5
         return np.asarray(self.low + middles * self.bin_width, np.float64)
 
@@ -61,14 +69,14 @@ class Histogram:
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """A threshold with all that it was read from, as it is drawn.
+    """A threshold with the evidence for it, for drawing.
 
     value     voxels at or above it are the body; in voxel values
-    peaks     levels of the peaks that count, rising
-    between   the two of them that the value lies between; one, if there is only one
-    smoothed  (bins,) the mean over the moving window
-    reading   how the rule applied
-    chance    levels of the peaks that were left out, which counting alone may have made
+    peaks     levels of the peaks that count, rising, in voxel values
+    between   the two peaks around the value; one, if there is only one
+    smoothed  float64 (bins,), the mean over the moving window, in voxels
+    reading   which case of the rule applied
+    chance    levels of the peaks that counting noise may have made
     """
 
     value: float
@@ -80,11 +88,14 @@ class Threshold:
 
 
 def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogram:
-    """Return the counts of the voxels within the window, at most BINS bins.
+    """Return the counts of the voxels within the window, in at most BINS bins.
 
-    What lies outside is left out: hot voxels would stretch the histogram, and so the moving window,
-    as they please; clipped, they would make a peak of their own. Bins over whole numbers are whole
-    numbers wide: others hold now two, now three of them, and the histogram is a comb.
+    voxels  any shape, any number type, voxel values
+    window  lowest and highest voxel value that count
+
+    Voxels outside are left out: hot voxels would stretch the histogram, and with it the moving
+    window; clipped, they would make a peak. For integers a bin is a whole number wide: other
+    widths hold now two, now three integers, and the histogram is a comb.
     """
     low, high = window
     bins = BINS
@@ -93,7 +104,7 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
         width = max(1.0, np.ceil((last - first + 1) / BINS))
         bins = max(1, int(np.ceil((last - first + 1) / width)))
         low, high = float(first - 0.5), float(first - 0.5 + bins * width)
-    # part by part: a mask of all, and a copy of what it lets through, are memory too
+    # part by part: a mask of the whole, and a copy of the voxels it selects, take memory too
     flat, counts = voxels.reshape(-1), np.zeros(bins, np.int64)
     for start in range(0, flat.size, _AT_ONCE):
         part = flat[start : start + _AT_ONCE]
@@ -104,7 +115,7 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
 
 
 def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
-    """Return the threshold; None for a flat histogram, as that of a constant channel."""
+    """Return the threshold; None for a flat histogram, as of a constant channel."""
     counts = np.asarray(histogram.counts, dtype=np.float64)
     if np.count_nonzero(counts) < 2 or counts.min() == counts.max():
         return None
@@ -138,7 +149,10 @@ def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
 
 
 def smooth(counts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean over a window of WINDOW_SHARE of the bins, an odd number, at least one."""
+    """Return the moving mean of counts (bins,), float64 (bins,).
+
+    The window has WINDOW_SHARE of the bins, an odd number, at least one.
+    """
     sums = np.concatenate([[0.0], np.cumsum(counts)])
     first, stop = _windows(len(counts))
     mean: NDArray[np.float64] = (sums[stop] - sums[first]) / (stop - first)
@@ -153,7 +167,7 @@ def _windows(bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _find_peaks(heights: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the middles (bins, halves too) of the peaks that count, and of chance's; rising."""
+    """Return the middles, in bins, of the peaks that count and of those of chance; rising."""
     starts = np.flatnonzero(np.diff(heights, prepend=np.nan) != 0)  # of runs of equal heights
     stops = np.append(starts[1:], len(heights))
     runs = heights[starts]
@@ -179,7 +193,7 @@ def _find_peaks(heights: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[
 
 
 def _valley(heights: NDArray[np.float64], first: int, last: int) -> float:
-    """Return the lowest place between two peaks; of several the first, in its run's middle."""
+    """Return the lowest bin between two peaks; of several the first run's middle."""
     between = heights[first : last + 1]
     start = int(between.argmin())
     higher = np.flatnonzero(between[start:] > between[start])
@@ -193,5 +207,5 @@ def _foot(heights: NDArray[np.float64], peak: float) -> float:
     end = int(max(filled[0], filled[-1], key=lambda bin_: abs(int(bin_) - top)))
     bins = np.linspace(top, end, abs(end - top) + 1)
     line = np.interp(np.arange(len(bins)), [0, len(bins) - 1], [heights[top], heights[end]])
-    # below the line, straight down: its distance across differs by a factor alone
+    # vertical distance: the distance at right angles differs by a constant factor only
     return float(bins[int((line - heights[bins.astype(int)]).argmax())])

@@ -1,12 +1,16 @@
-"""What an edge between two materials, and a material itself, leave in a histogram of value and
-gradient magnitude.
+"""Model of the traces that an edge, and a material, leave in a histogram of value and gradient.
 
 Across an edge blurred by a Gaussian of s finest voxels, the value d voxels away is a + (b - a)
-Phi(d / s). Central differences along an axis that the edge's normal meets at the cosine n differ by
-(b - a) (Phi((d + n) / s) - Phi((d - n) / s)): for a broad edge n times what they are head-on, so
-that their length is the same whichever way the edge lies (the arc of Kindlmann & Durkin 1998); for
-one sharper than a voxel up to sqrt 3 times as much. So the voxels of one boundary lie on arcs of
-all these heights. Here they are counted over normals of all directions, with noise.
+Phi(d / s). Central differences along an axis at the cosine n to the edge's normal are
+(b - a) (Phi((d + n) / s) - Phi((d - n) / s)). For a broad edge that is n times the head-on
+difference, so that the gradient's length does not depend on the edge's direction (the arc of
+Kindlmann & Durkin). For an edge sharper than a voxel it is up to sqrt 3 times as long. So the
+voxels of one boundary lie on arcs of all these heights. Here they are counted over normals of all
+directions, with noise.
+
+References
+G. Kindlmann & J. W. Durkin, "Semi-automatic generation of transfer functions for direct volume
+rendering", IEEE Symposium on Volume Visualization 1998. doi:10.1145/288126.288167
 """
 
 from dataclasses import dataclass
@@ -17,9 +21,9 @@ from scipy.special import ndtr
 
 from stereocell.transfer.material_peaks import NOISE_FACTOR
 
-DIRECTIONS, PLACES = 128, 96  # of an edge, and across it
-COARSER = 4  # columns of the histogram that make one here
-BEYOND = 3.0  # sigmas of the blur, to either side of an edge
+DIRECTIONS, PLACES = 128, 96  # directions of an edge, and points across it, that are counted
+COARSER = 4  # columns of the histogram that are merged into one here
+BEYOND = 3.0  # sigmas of the blur to either side of an edge that are counted
 
 Ratios = tuple[float, float, float]
 Field = NDArray[np.float64]
@@ -27,10 +31,11 @@ Field = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class HistogramGrid:
-    """The extent of a joint histogram: its size (rows, columns), the gradient of its last row, and
-    its spacings by the finest.
+    """The extent of a joint histogram.
 
-    Columns are already the coarser ones.
+    rows, columns  its size; columns are the merged ones
+    gradient_max   gradient magnitude of the last row
+    ratios         voxel spacings by the finest one, (z, y, x)
     """
 
     rows: int
@@ -40,17 +45,20 @@ class HistogramGrid:
 
 
 def value_noise(noise: float, gradient_max: float) -> float:
-    """Return sigma of the values, 0..1, whose differences have the length that find_noise gives.
+    """Return sigma of the values' noise, 0..1, for a gradient noise of `find_noise`.
 
-    The mode of that length, of three differences of sigma sqrt 2, is 2 sigma.
+    The length of three differences of sigma sqrt 2 has its mode at 2 sigma.
     """
     return noise * gradient_max / NOISE_FACTOR / 2
 
 
 def count_edge(low: float, high: float, *, blur: float, sigma: float, grid: HistogramGrid) -> Field:
-    """Return the voxels of an edge by gradient and value, (rows, columns), per voxel of its area.
+    """Return the voxels of an edge by gradient and value, per voxel of the edge's area.
 
-    low, high  values of the materials; sigma: of the values' noise; blur: in finest voxels
+    low, high  values of the two materials, 0..1
+    blur       sigma of the edge's blur, in finest voxels
+    sigma      of the values' noise, 0..1
+    result     float64 (rows, columns)
     """
     reach = BEYOND * blur + max(grid.ratios)
     at = (2 * (np.arange(PLACES) + 0.5) / PLACES - 1) * reach
@@ -64,7 +72,10 @@ def count_edge(low: float, high: float, *, blur: float, sigma: float, grid: Hist
 
 
 def count_material(value: float, sigma: float, grid: HistogramGrid) -> Field:
-    """Return a material's voxels by gradient and value, (rows, columns), 1 in sum."""
+    """Return a material's voxels by gradient and value, float64 (rows, columns), with the sum 1.
+
+    value, sigma  the material's value and its noise, 0..1
+    """
     squares = sum(
         (np.sqrt(2) * sigma * _CHANCE[axis] / ratio) ** 2 for axis, ratio in enumerate(grid.ratios)
     )
@@ -72,7 +83,11 @@ def count_material(value: float, sigma: float, grid: HistogramGrid) -> Field:
 
 
 def find_steepest(blur: float, ratios: Ratios) -> float:
-    """Return the longest step of an edge of height 1, in the direction that has it."""
+    """Return the longest gradient of an edge of height 1, over all directions.
+
+    blur    sigma in finest voxels
+    ratios  voxel spacings by the finest one, (z, y, x)
+    """
     squares = sum(
         (2 * ndtr(_NORMALS[:, i] * r / blur) - 1) ** 2 / r**2 for i, r in enumerate(ratios)
     )
@@ -97,5 +112,5 @@ def _directions() -> Field:
 
 
 _NORMALS = _directions()
-# of the differences along each axis, and of the value: the same at every call
+# noise of the difference along each axis, and of the value: the same at every call
 _CHANCE = np.random.default_rng(0).standard_normal((4, PLACES, DIRECTIONS))

@@ -1,9 +1,8 @@
-"""Find noise and materials in a histogram of value and gradient magnitude; see
-transfer/joint_histogram.py.
+"""Find noise and materials in a histogram of value and gradient (transfer/joint_histogram.py).
 
-Inside of a material the gradient is noise alone, the length of a vector of three noisy differences,
-and values pile up. So the gradients' modes tell the noise, and the peaks among the voxels that have
-no more gradient than noise has are the materials.
+Inside a material the gradient is noise alone, the length of a vector of three noisy differences,
+and values pile up. So the modes of the gradients give the noise. The peaks among the voxels whose
+gradient is no more than noise are the materials.
 """
 
 import numpy as np
@@ -11,22 +10,26 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 NOISE_FACTOR = 1.9  # x the mode of the gradients: 93 % of such a vector's lengths lie below
-BRIGHT = 0.3  # values from which on noise is looked for that rises with the value
-RISING_PERCENTILE = 10.0
-FLAT_STEP = 3.0 / 255  # what rounding to 8 bits and a slow drift make
-LEAST_IN_COLUMN = 2e-5  # of all voxels, for a column's mode to be asked
-LEAST_SHARE = 0.004  # of the flat voxels, to a material
-LEAST_PROMINENCE = 0.2  # of its own height: a shoulder is no material
+BRIGHT = 0.3  # value, 0..1, above which noise that rises with the value is looked for
+RISING_PERCENTILE = 10.0  # percent of the columns that may rise less than the noise
+FLAT_STEP = 3.0 / 255  # least noise, values are 0..1: rounding to 8 bits and a slow drift
+LEAST_IN_COLUMN = 2e-5  # least share of all voxels in a column whose mode is used
+LEAST_SHARE = 0.004  # least share of the flat voxels that a material has
+LEAST_PROMINENCE = 0.2  # least prominence by the peak's height: a shoulder is no material
 MAX_MATERIALS = 6
 
 
 def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.float64]:
-    """Return the gradient magnitude, 0..1, below which it may be noise, for each column.
+    """Return, for each column, the gradient below which it may be noise.
 
-    From the mode of each column's gradients. The floor is their median over the voxels, most of
-    which lie inside of a material; those at the window's ends, which it clips, have less noise than
-    they had. Counts of light are noisier the brighter: what the modes' squares rise by in nearly
-    all columns, in proportion to the value, is noise too.
+    counts        int64 (rows, columns), voxels by gradient and value, both from 0 up
+    gradient_max  gradient magnitude of the last row
+    result        float64 (columns,), shares of `gradient_max`, 0..1
+
+    It follows from the mode of each column's gradients. Their median over the voxels is the floor,
+    since most voxels lie inside a material. Columns at the window's ends are left out: clipping
+    reduces their noise. Photon noise grows with brightness: a rise of the squared modes in
+    proportion to the value, found in nearly all columns, counts as noise too.
     """
     rows, columns = counts.shape
     inner = counts.copy()
@@ -47,8 +50,12 @@ def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.flo
 
 
 def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the values, 0..1, at which voxels without a boundary pile up."""
-    from scipy import signal  # a second's import: every command and worker would wait for it
+    """Return the values of the materials, 0..1, rising: voxels without a boundary pile up there.
+
+    counts  int64 (rows, columns), voxels by gradient and value
+    noise   float64 (columns,), as `find_noise` returns it
+    """
+    from scipy import signal  # takes a second to import: every command and worker would wait for it
 
     rows, columns = counts.shape
     is_flat = np.arange(rows)[:, np.newaxis] <= noise * (rows - 1)
@@ -74,13 +81,16 @@ def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tup
 
 
 def column_gap(counts: NDArray[np.int64]) -> float:
-    """Return the mean distance, in columns, between those that hold voxels."""
+    """Return the mean distance between the columns that hold voxels, in columns.
+
+    counts  int64 (rows, columns)
+    """
     held = np.flatnonzero(counts.any(axis=0))
     return float(held[-1] - held[0]) / max(1, len(held) - 1) if len(held) else 1.0
 
 
 def _foot(smooth: NDArray[np.float64], peak: int, left: int, right: int) -> tuple[int, int]:
-    """Return where a peak falls to half of its height, inside its bases."""
+    """Return the columns at which a peak falls to half of its height, inside its bases."""
     low = high = peak
     while low > left and smooth[low - 1] > 0.5 * smooth[peak]:
         low -= 1
@@ -90,7 +100,7 @@ def _foot(smooth: NDArray[np.float64], peak: int, left: int, right: int) -> tupl
 
 
 def _centre(smooth: NDArray[np.float64], peak: int, low: int, high: int) -> float:
-    """Return the centre of a peak's upper half, as far to one side as to the other."""
+    """Return the centre of a peak's upper half, over the same distance to both sides."""
     reach = min(peak - low, high - peak) if peak not in (low, high) else 0
     part = np.arange(peak - reach, peak + reach + 1)
     return float(np.average(part, weights=smooth[part]))

@@ -1,8 +1,8 @@
-"""Transfer functions: from a channel's intensities to opacity, made from histogram and iso-value.
+"""Transfer functions from a channel's intensity to opacity, made from histogram and iso-value.
 
-Intensity 0..1 is the channel's window. Opacity is what one finest voxel spacing of the material
-absorbs; the marcher corrects it for its own step. Colour is the channel's, kept apart, so that a
-recoloured channel needs no new table.
+Intensity 0..1 is the channel's window. Opacity, 0..1, is the absorption along one finest voxel
+spacing of the material; the ray-marcher corrects it for its own step. The channel's colour is kept
+apart, so that a recoloured channel needs no new table.
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from stereocell.model.channel import OpacityPoints
 
 NAMES = ("default", "soft", "sharp", "surface")
-THRESHOLD = "threshold"  # of channels that have one
-RAMP = 0.08  # of the window, over which opacity rises from the threshold
+THRESHOLD = "threshold"  # name of the function of channels that have a threshold
+RAMP = 0.08  # share of the window over which opacity rises from the threshold
 
 
 def make_transfer_functions(
@@ -22,9 +22,12 @@ def make_transfer_functions(
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
 
-    `histogram`: voxel counts over 0..1 in equal bins. Background is what most voxels are: opacity
-    starts half-way between the median and the level, which is the iso-value, or the 99th
-    percentile in a channel without a clear surface.
+    histogram             int64 (bins,), voxel counts over 0..1 in equal bins
+    iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
+    threshold_normalized  the adaptive threshold, 0..1; None: there is none
+
+    Opacity starts half-way between the median, since most voxels are background, and the level. The
+    level is the iso-value, or the 99th percentile in a channel without a clear surface.
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
@@ -41,7 +44,7 @@ def make_transfer_functions(
             (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
         ),
     }
-    if threshold_normalized is not None:  # nothing below it: bricks of nothing are not visited
+    if threshold_normalized is not None:  # opacity is 0 below it: the marcher skips such bricks
         start = float(np.clip(threshold_normalized, 0.01, 0.97))
         top = start + min(RAMP, 0.9 * (1 - start))
         functions[THRESHOLD] = _points((start, 0.0), (top, 0.45), (1.0, 0.6))
@@ -49,15 +52,16 @@ def make_transfer_functions(
 
 
 def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:
-    """Return the opacity at `size` intensities from 0 to 1, straight lines between the points.
+    """Return the opacity at `size` intensities from 0 to 1, linear between the points.
 
-    float32 (size,). Before the first and after the last point the opacity stays as it is there.
+    points  (intensity, opacity) pairs, rising, 0..1; outside them the opacity is constant
+    result  float32 (size,), 0..1
     """
     intensities, opacities = np.array(points, dtype=np.float64).T
     return np.interp(np.linspace(0, 1, size), intensities, opacities).astype(np.float32)
 
 
 def _points(*points: tuple[float, float]) -> OpacityPoints:
-    """Return the points after the origin, rounded so that text files repeat."""
+    """Return the origin and the points, rounded so that text files are the same each time."""
     inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]
     return ((0.0, 0.0), *inner)

@@ -8,7 +8,10 @@ from stereocell.model.settings import setting
 
 @dataclass(frozen=True, slots=True)
 class WindowOptions:
-    """Which voxel values become 0 and 255, dataset-wide."""
+    """Which voxel values become 0 and 255, dataset-wide.
+
+    Raises UsageError unless 0 <= low < high <= 100.
+    """
 
     low_percentile: float = setting(0.5, "percent of the voxels that become 0")
     high_percentile: float = setting(99.95, "percent of the voxels that stay below 255")
