@@ -1,4 +1,4 @@
-"""Sources become lazy datasets: voxels (z, y, x), lengths in um, whatever the format held."""
+"""Readers: a source becomes a lazy dataset of voxels (z, y, x), with all lengths in um."""
 
 from stereocell.read.dataset import ChannelInfo, Dataset, Level
 from stereocell.read.open_dataset import list_series, open

@@ -1,9 +1,12 @@
 """From a grid in the patient to canonical axes, and from those to the world.
 
-Canonical voxels (z, y, x) have the axes nearest to (anterior, inferior, left): flips and
-permutations only, nothing is resampled. What is left, a rotation near the identity and an offset,
-is the placement. World: +x is the patient's left, +y superior, +z anterior, so that the patient
-faces the viewer: (L, S, -P) of a point in LPS, a proper rotation.
+Canonical voxels (z, y, x) have the axes nearest to (anterior, inferior, left). Stored voxels are
+only flipped and permuted, never resampled. A rotation near the identity and an offset remain: they
+are the placement. In the world +x is the patient's left, +y superior and +z anterior, so that the
+patient faces the viewer. A point of LPS (DICOM's axes: left, posterior, superior) becomes
+(L, S, -P), a proper rotation.
+
+References: DICOM PS3.3 C.7.6.2.1.1 (patient-based coordinate system).
 """
 
 from dataclasses import dataclass
@@ -15,21 +18,21 @@ from numpy.typing import NDArray
 from stereocell.model.rigid_transform import Matrix, to_matrix
 
 _CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])  # A, I, L in LPS
-LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
+LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])  # (3, 3) for columns
 _UM_PER_MM = 1000.0
-_PLANES = ("sagittal", "coronal", "axial")  # by the axis of LPS that the normal is nearest to
-_OBLIQUE = np.cos(np.radians(2.0))
+_PLANES = ("sagittal", "coronal", "axial")  # indexed by the LPS axis nearest to the normal
+_OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal further from its axis makes the plane oblique
 
 
 @dataclass(frozen=True, slots=True)
 class Canonical:
-    """How stored axes become canonical ones.
+    """The map from stored axes to canonical ones.
 
-    order       which stored axis becomes z, y, x
-    flips       which of z, y, x run backwards through the stored ones
-    spacing_um  (z, y, x)
-    placement   rows of a (4, 4) matrix for columns, um: from the pipeline's world, with the centre
-                of canonical voxel (0, 0, 0) at the origin, to the patient's world
+    order       the stored axis that becomes z, y, x
+    flips       True where z, y, x run backwards along the stored axis
+    spacing_um  (z, y, x), um
+    placement   rows of a (4, 4) matrix for columns, um: from the pipeline's world, whose origin is
+                the centre of canonical voxel (0, 0, 0), to the patient's world
     """
 
     order: tuple[int, int, int]
@@ -38,7 +41,7 @@ class Canonical:
     placement: Matrix
 
     def apply(self, voxels: NDArray[np.generic]) -> NDArray[np.generic]:
-        """Return stored voxels (three axes) as canonical (z, y, x): a view."""
+        """Return stored voxels (three axes, any dtype) as canonical (z, y, x): a view."""
         turned = voxels.transpose(self.order)
         return turned[tuple(slice(None, None, -1 if flip else 1) for flip in self.flips)]
 
@@ -46,11 +49,12 @@ class Canonical:
 def canonical_of(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> Canonical:
     """Return the canonical form of a grid with orthogonal axes.
 
-    affine  (4, 4) for columns, from (i, j, k, 1) of the stored axes to LPS in mm
+    affine  (4, 4) for columns, float64: from (i, j, k, 1) of the stored axes to LPS in mm
+    shape   voxels along the stored axes (i, j, k)
     """
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     axes = affine[:3, :3] / spacing
-    likeness = _CANONICAL @ axes  # canonical axis by stored axis
+    likeness = _CANONICAL @ axes  # absolute cosines; rows: canonical axes, columns: stored axes
     best = max(permutations(range(3)), key=lambda p: sum(abs(likeness[i, p[i]]) for i in range(3)))
     order = (best[0], best[1], best[2])
     backwards = [bool(likeness[i, axis] < 0) for i, axis in enumerate(order)]
@@ -61,19 +65,19 @@ def canonical_of(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> Ca
     signs = np.where(backwards, -1.0, 1.0)
     z, y, x = (LPS_TO_WORLD @ (axes[:, axis] * s) for axis, s in zip(order, signs, strict=True))
     matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([x, -y, z], axis=1)  # rows of an image run downwards
+    matrix[:3, :3] = np.stack([x, -y, z], axis=1)  # image rows run downwards
     matrix[:3, 3] = origin
     sz, sy, sx = (float(spacing[axis]) * _UM_PER_MM for axis in order)
     return Canonical(
         order,
         (backwards[0], backwards[1], backwards[2]),
         (sz, sy, sx),
-        to_matrix((matrix + 0.0).tolist()),  # no negative zeros
+        to_matrix((matrix + 0.0).tolist()),  # adding 0.0 turns -0.0 into 0.0
     )
 
 
 def plane_name(normal: NDArray[np.float64]) -> str:
-    """Return what planes with this normal (LPS) are called: `axial`, `oblique sagittal`, ..."""
+    """Return the name of planes with this normal (3,), LPS: `axial`, `oblique sagittal`, ..."""
     along = np.abs(normal)
     name = _PLANES[int(along.argmax())]
     return name if along.max() >= _OBLIQUE else f"oblique {name}"

@@ -1,4 +1,4 @@
-"""A source's channels, levels and voxels, read only where they are asked for."""
+"""A source's channels, levels and voxels. Voxels are read on request only."""
 
 import difflib
 import weakref
@@ -21,14 +21,14 @@ from stereocell.storage.library_errors import one_line
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 
 
-MAX_VALUE = 1e30  # of a voxel: squares and differences of larger ones leave float32
+MAX_VALUE = 1e30  # largest voxel value: squares and differences of larger ones overflow float32
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
     """One channel. `color` is linear RGB, 0..1, or None where the source states none.
 
-    is_named  False: the source names it not, and the name is made up (`Channel0`)
+    is_named  False: the source gives no name, and the reader made one up (`Channel0`)
     """
 
     name: str
@@ -37,7 +37,7 @@ class ChannelInfo:
 
 
 class StoredArray(Protocol):
-    """What a Zarr array and a WholeArray have in common."""
+    """The interface that a Zarr array and a WholeArray share."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -50,10 +50,10 @@ class StoredArray(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class VoxelArray:
-    """One level's voxels as they are stored.
+    """One level's voxels in the layout of the source.
 
-    axes  what the array's dimensions are: `t`, `c`, `z`, `y`, `x` in any order; any other name
-          stands for a dimension of length 1
+    axes  the names of the array's dimensions: `t`, `c`, `z`, `y`, `x` in any order; a dimension of
+          any other name has length 1
     """
 
     array: StoredArray
@@ -61,23 +61,23 @@ class VoxelArray:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Voxels (z, y, x)."""
+        """The number of voxels (z, y, x)."""
         z, y, x = (self.size(axis) for axis in "zyx")
         return z, y, x
 
     @property
     def chunk(self) -> tuple[int, int, int]:
-        """The block (z, y, x) that the file reads and decodes at once."""
+        """The block (z, y, x) in voxels that one read decodes."""
         chunk = dict(zip(self.axes, self.array.chunks, strict=True))
         z, y, x = (int(chunk.get(axis, 1)) for axis in "zyx")
         return z, y, x
 
     def size(self, axis: str) -> int:
-        """The length along one axis; 1 where the array has none."""
+        """The length along one axis in voxels; 1 where the array lacks the axis."""
         return int(self.array.shape[self.axes.index(axis)]) if axis in self.axes else 1
 
     def window(self, time: int, channel: int, box: Box) -> NDArray[Any]:
-        """Return the voxels of a box, (z, y, x), in this machine's byte order."""
+        """Return the voxels of a box, (z, y, x), stored dtype, in this machine's byte order."""
         wanted: dict[str, int | slice] = dict(zip("zyx", box.slices, strict=True))
         wanted |= {"t": time, "c": channel}
         stored = np.asarray(self.array[tuple(wanted.get(axis, 0) for axis in self.axes)])
@@ -92,18 +92,18 @@ class VoxelArray:
 class Dataset:
     """One image of a source at one time point.
 
-    name         to show: the file's name without its suffix, or for DICOM and NIfTI, whose names
-                 may tell whose they are, what kind of image it is
+    name         the name to display: the file's name without its suffix; for DICOM and NIfTI,
+                 whose file names may identify a patient, the kind of image
     dtype        uint8, uint16, int16 or float32
     levels       finest first
     channels     in the source's order
-    time_points  how many the source holds; `time` is the one that is read
-    images       how many the source holds; the first is the one that is read
-    modality     what took it, as DICOM calls it: `MR`, `CT`, ...; empty: not known
-    placement    rows of a (4, 4) matrix for columns, um: from the world in which the centre of
-                 voxel (0, 0, 0) is the origin (volume.zyx_to_xyz) to the patient's; see
+    time_points  the number of time points in the source; `time` is the index of the one to read
+    images       the number of images in the source; the reader takes the first
+    modality     DICOM's code of the modality (0008,0060): `MR`, `CT`, ...; empty: not known
+    placement    rows of a (4, 4) matrix for columns, um: from the world whose origin is the centre
+                 of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
                  read/anatomical_axes.py
-    remarks      what the reader changed or left out, a sentence each
+    remarks      changes and omissions of the reader, a sentence each
     """
 
     source: str
@@ -127,7 +127,7 @@ class Dataset:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the source is left out or changed, a sentence each, for the user."""
+        """Changes to the source and parts left out, a sentence each, for the user."""
         notes = list(self.remarks)
         if self.images > 1:
             notes.append(f"{self.images} images in the source; building the first alone")
@@ -137,19 +137,23 @@ class Dataset:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hex digest of the metadata and of voxels, read when first asked for.
+        """Hex digest of the metadata and of voxels, computed at the first access.
 
-        It depends on neither path nor date. All voxels are hashed as long as they fit the budget
-        (64 MB), else a spread of blocks of the coarsest and of the finest level.
+        It depends on neither path nor date. All voxels are hashed where they fit the budget of
+        64 MB, else blocks of the coarsest and of the finest level, spread evenly.
         """
         with one_line(self.shown, "chunks that are whole"):
             return fingerprint_of(self)
 
     def read(self, channel: int, box: Box, level: int = 0) -> Volume:
-        """Return the voxels of `box`, in the source's dtype; `origin_um` is from level 0's origin.
+        """Return the voxels of `box`, (z, y, x), in the source's dtype.
 
-        Only the chunks that the box touches are read. Raises SourceError if one of them can't be
-        decoded or holds NaN or infinity, ValueError for a channel, level or box out of range.
+        channel  index into `channels`
+        box      voxels of `level`; only the chunks that it touches are read
+
+        The result's `origin_um` is (z, y, x), um, from the centre of level 0's voxel (0, 0, 0).
+        Raises SourceError where a chunk can't be decoded or holds NaN or infinity, ValueError
+        where the channel, the level or the box is out of range.
         """
         if not 0 <= channel < len(self.channels) or not 0 <= level < len(self.levels):
             raise ValueError(f"channel {channel} of level {level} doesn't exist")
@@ -178,8 +182,8 @@ class Dataset:
     def find_channels(self, selection: Sequence[str]) -> tuple[int, ...]:
         """Return the indices of channels given by name or index, in that order, each once.
 
-        A name goes before an index; a name that is made up is none. Raises UsageError for what
-        isn't there, with what is.
+        A name takes precedence over an index; made-up names don't count. Raises UsageError where
+        the source lacks a channel; the message lists the channels that exist.
         """
         indices = {c.name: index for index, c in enumerate(self.channels) if c.is_named}
         found = []

@@ -1,8 +1,8 @@
-"""What tells one dataset from another, whatever its path, date and container.
+"""A digest that identifies a dataset, whatever its path, date and container.
 
-A digest over the metadata that a build depends on and over voxels, at a bounded cost: everything
-if it fits the budget, else the coarsest level (which the finer ones were averaged into) and blocks
-of the finest, spread evenly.
+It covers the metadata that a build depends on and voxels, at a bounded cost: all voxels where they
+fit the budget, else the coarsest level (an average of the finer ones) and blocks of the finest
+level, spread evenly.
 """
 
 import hashlib
@@ -15,12 +15,12 @@ import numpy as np
 
 from stereocell.model.tiling import Box
 
-BUDGET_BYTES = 64_000_000  # decoded; half for the coarsest level, half for the finest
-_GOLDEN = 0.6180339887498949
+BUDGET_BYTES = 64_000_000  # bytes after decoding; half for the coarsest level, half for the finest
+_GOLDEN = 0.6180339887498949  # 1 / golden ratio, the step of a low-discrepancy sequence
 
 
 class Fingerprinted(Protocol):
-    """What a digest is made of: `arrays` has one entry for each of `levels`, finest first."""
+    """The parts of a dataset that the digest covers. `arrays`: one per level, finest first."""
 
     @property
     def dtype(self) -> np.dtype[Any]: ...
@@ -39,7 +39,7 @@ class Fingerprinted(Protocol):
 
 
 def fingerprint_of(dataset: Fingerprinted) -> str:
-    """Return the digest, 64 hex digits. Raises what the format libraries raise."""
+    """Return the digest, 64 hex digits. Raises the errors of the format's library."""
     metadata = {
         "dtype": dataset.dtype.name,
         "time": dataset.time,
@@ -60,7 +60,7 @@ def fingerprint_of(dataset: Fingerprinted) -> str:
 
 
 def _spread(dataset: Fingerprinted, level: int, budget: int) -> Iterator[tuple[int, Box]]:
-    """Yield (channel, box): the whole level within the budget, else chunks (one at least)."""
+    """Yield (channel, box): the whole level where it fits `budget` (bytes), else some chunks."""
     whole = dataset.levels[level].box
     channels = len(dataset.channels)
     if channels * math.prod(whole.shape) * dataset.dtype.itemsize <= budget:
@@ -69,7 +69,7 @@ def _spread(dataset: Fingerprinted, level: int, budget: int) -> Iterator[tuple[i
     chunk = dataset.arrays[level].chunk
     counts = (channels, *(-(-n // c) for n, c in zip(whole.shape, chunk, strict=True)))
     wanted = max(1, min(math.prod(counts), budget // (math.prod(chunk) * dataset.dtype.itemsize)))
-    # Multiples of the golden ratio fall evenly and never line up with an axis.
+    # Multiples of the golden ratio spread evenly and never line up with an axis.
     indices = {int((k + 0.5) * _GOLDEN % 1.0 * math.prod(counts)) for k in range(wanted)}
     for index in sorted(indices):
         channel, *cell = (int(i) for i in np.unravel_index(index, counts))

@@ -1,4 +1,4 @@
-"""What a format's reader hands over: arrays and metadata, before names and spacings are settled."""
+"""A reader's result: arrays and metadata, before names and spacings are settled."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,12 +16,13 @@ class Image:
     """The first image of a source.
 
     arrays, grids  one for each level, finest first
-    names, colors  one for each channel; None: not said. Colours are linear RGB, 0..1
-    images         how many the source holds
+    names, colors  one for each channel; None: not stated. Colours are linear RGB, 0..1
+    images         the number of images in the source
     close          frees open files, or None
-    title          what the image is called in place of its file's name; None: by the file
-    modality, placement, notes  as in Dataset, whose `remarks` the notes are
-    notes_at       more notes, of one point in time; may read its voxels
+    title          the image's name; None: the file's name is used
+    modality, placement  as in Dataset
+    notes          become Dataset's `remarks`
+    notes_at       returns more notes, about one time point; it may read that point's voxels
     """
 
     arrays: tuple[VoxelArray, ...]
@@ -38,7 +39,10 @@ class Image:
 
 
 def linear_color(rgb: tuple[int, int, int]) -> Color:
-    """Return linear RGB, 0..1, of sRGB bytes (IEC 61966-2-1)."""
+    """Return linear RGB, 0..1, of sRGB bytes 0..255.
+
+    References: IEC 61966-2-1:1999.
+    """
     red, green, blue = (_linear(value / 255.0) for value in rgb)
     return red, green, blue
 

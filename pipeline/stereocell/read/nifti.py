@@ -1,9 +1,11 @@
-"""NIfTI-1 and -2, .nii and .nii.gz: https://nifti.nimh.nih.gov/nifti-1/ by nibabel.
+"""NIfTI-1 and -2, .nii and .nii.gz, read by nibabel.
 
-The affine is the one that nibabel settles on: sform, else qform, else a guess by the shape, which
-is said. NaN, which marks what lies outside a brain that was cut out, is read as the smallest
-finite value of its point in time. Texts in the header (`descrip`, `db_name`, ...) and the file's
-name may hold an identity and are not looked at.
+nibabel chooses the affine: sform, else qform, else a guess by the shape, which a note reports. NaN
+marks voxels outside a brain that was cut out; it is read as the smallest finite value of its time
+point. Texts in the header (`descrip`, `db_name`, ...) and the file's name may identify a patient
+and are not read.
+
+References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/
 """
 
 import logging
@@ -32,8 +34,8 @@ from stereocell.storage.location import Location
 NAME = "NIfTI"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
-_MAX_OFFSET = 1 << 28  # bytes of header and extensions, which gzip has to be unpacked through
-_SKEW = 1e-3  # cosine between two axes: less is rounding
+_MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
+_SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _FAULTS = (
     nibabel.filebasedimages.ImageFileError,
     nibabel.spatialimages.HeaderDataError,
@@ -51,7 +53,7 @@ _FAULTS = (
 
 
 def read_image(location: Location) -> Image:
-    """Return the volume of the file, with its points in time. Raises SourceError."""
+    """Return the volume of the file, with all its time points. Raises SourceError."""
     where = location.shown
     image = _open(location)
     header = image.header
@@ -102,21 +104,21 @@ def read_image(location: Location) -> Image:
 
 
 def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:
-    """Say how many voxels are NaN at a point in time; it is read, and held for whoever asks."""
+    """Note the number of NaN at a time point. This reads the point, and the array caches it."""
     _ = voxels[time, slice(0, 0), 0, 0]
     found = counts.get(time, 0)
     return (f"{found:,} voxels are NaN: read as the smallest finite value",) if found else ()
 
 
 def _open(location: Location) -> Any:
-    logging.getLogger("nibabel.global").disabled = True  # it quotes fields of the header
+    logging.getLogger("nibabel.global").disabled = True  # its messages quote fields of the header
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image: Any = nibabel.load(location.source, mmap=False)
             if not isinstance(image, nibabel.nifti1.Nifti1Pair):
                 raise TypeError
-            # a quaternion, a unit, a type may be none: better here than later
+            # an invalid quaternion, unit or type fails here rather than later
             header: Any = image.header
             image.affine.sum()
             header.get_xyzt_units()
@@ -167,7 +169,10 @@ def _load(
 
 
 def _without_nan(values: NDArray[Any], where: str) -> tuple[NDArray[Any], int]:
-    """Return the values with the smallest finite one for NaN, and how many are NaN."""
+    """Return the values with the smallest finite one in place of NaN, and the number of NaN.
+
+    Raises SourceError where no value is finite.
+    """
     is_nan = np.isnan(values)
     count = int(np.count_nonzero(is_nan))
     if count == 0:

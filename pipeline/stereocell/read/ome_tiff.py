@@ -1,9 +1,11 @@
-"""OME-TIFF: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
+"""OME-TIFF, by bioio (metadata) and tifffile (pixels).
 
 bioio's reader parses the OME-XML (ome-types). Its pixels are not used: it reads level 0 only
-(sub-resolutions, in SubIFDs, are left out), a whole page for each window, and opens the file anew
-for each page. tifffile, on which it stands, serves every level as a Zarr array of the file's own
+(it leaves out sub-resolutions, in SubIFDs), reads a whole page for each window, and opens the file
+anew for each page. tifffile, its own foundation, serves every level as a Zarr array of the file's
 strips or tiles.
+
+References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
 """
 
 import logging
@@ -28,18 +30,18 @@ from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location, require_own
 
-# What the OME-XML and the tags may claim: the libraries make lists of that length at once.
+# Limits of the numbers in OME-XML and tags: the libraries allocate lists of such a length at once.
 _MAX_PLANES = 1_000_000
 _MAX_SIDE = 10_000_000
 _MAX_LEVELS = 64
-_SUB_IFDS = 330
+_SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
 _CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
-logging.getLogger("tifffile").addHandler(logging.NullHandler())  # what matters becomes an error
-_REMOTE_BLOCK = 1 << 18  # bytes; fsspec's 5 MB of read-ahead would be fetched for every tile
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised below
+_REMOTE_BLOCK = 1 << 18  # bytes of a remote read; fsspec's default reads 5 MB ahead for every tile
 
 
 def read_image(location: Location) -> Image:
-    """Return the first image of the file. Raises SourceError."""
+    """Return the first image of the file. Raises SourceError where it can't be read as one."""
     where = location.shown
     stack = ExitStack()
     try:
@@ -50,7 +52,7 @@ def read_image(location: Location) -> Image:
             tiff = _open(location, stack)
             _check_claims(where, tiff)
             _check_files(location, tiff)
-            with warnings.catch_warnings():  # of values that are none: they become errors below
+            with warnings.catch_warnings():  # about invalid values: they become errors below
                 warnings.simplefilter("ignore")
                 reader = Reader(location.source, fs_kwargs=location.storage_options)
                 images = reader.ome_metadata.images
@@ -71,8 +73,8 @@ def read_image(location: Location) -> Image:
 
 
 def _check_claims(where: str, tiff: TiffFile) -> None:
-    """Raise SourceError where the OME-XML or the tags ask for more than any file holds."""
-    text = tiff.pages.first.description  # what bioio parses, even where tifffile sees no OME-XML
+    """Raise SourceError where the OME-XML or the tags request more than any file holds."""
+    text = tiff.pages.first.description  # bioio parses it, even where tifffile finds no OME-XML
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise SourceError(f"{where}: OME-XML: found a DOCTYPE, expected none")
     sizes: dict[str, int] = {}
@@ -95,9 +97,9 @@ def _check_claims(where: str, tiff: TiffFile) -> None:
 
 
 def _check_files(location: Location, tiff: TiffFile) -> None:
-    """Raise SourceError where planes are said to lie in a file that is not the source's own.
+    """Raise SourceError where the OME-XML refers to a file outside the source's folder.
 
-    Before tifffile opens them all; of an address it opens none.
+    This runs before tifffile opens these files. For a remote source tifffile opens none.
     """
     if not location.is_local or not tiff.ome_metadata:
         return
@@ -135,7 +137,7 @@ def _image(
 
 
 def _open(location: Location, stack: ExitStack) -> TiffFile:
-    """Open a file, but not by the formats whose index of other files tifffile would follow."""
+    """Open a file, without the formats whose index makes tifffile open other files."""
     if location.is_local:  # by path, so that the files of a set find each other
         return stack.enter_context(
             TiffFile(os.path.realpath(location.source), is_mmstack=False, is_ndtiff=False)
@@ -147,7 +149,7 @@ def _open(location: Location, stack: ExitStack) -> TiffFile:
 
 
 def _array(series: TiffPageSeries, level: int) -> VoxelArray:
-    """Return a level's voxels. Axes of length 1 are squeezed out: tifffile 2026.5 does no other."""
+    """Return a level's voxels. Axes of length 1 are squeezed out: tifffile 2026.5 requires it."""
     array = zarr.open_array(series.aszarr(level=level), mode="r")
     # tifffile's store is Zarr v3 from 2026.5 on, v2 before; each names the axes in its own way
     names: Any = getattr(array.metadata, "dimension_names", None)
@@ -156,7 +158,7 @@ def _array(series: TiffPageSeries, level: int) -> VoxelArray:
 
 
 def _check_whole(where: str, tiff: TiffFile, pages: Sequence[TiffPage | TiffFrame | None]) -> None:
-    """Raise SourceError for missing planes, which tifffile would read as zeros, and short files."""
+    """Raise SourceError for missing planes, which tifffile would read as zeros, or a short file."""
     present = [page for page in pages if page is not None]
     if len(present) < len(pages):
         raise SourceError(

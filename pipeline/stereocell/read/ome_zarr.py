@@ -1,12 +1,14 @@
-"""OME-Zarr 0.4 (Zarr v2) and 0.5 (Zarr v3): https://ngff.openmicroscopy.org/0.5/
+"""OME-Zarr 0.4 (Zarr v2) and 0.5 (Zarr v3), read by zarr-python.
 
-Read through zarr-python, on which bioio's reader stands. Of that only the metadata's JSON was left
-in use, and its import took 1.5 s of each process, four times as long as zarr's:
-- `physical_pixel_sizes` leaves the units out, and takes the first coordinate transformation for a
-  scale without looking; here all transformations are composed.
-- `xarray_dask_data` builds a graph over all chunks of the dataset for every window; here the
-  window is asked of the Zarr array itself.
+bioio's reader, which stands on zarr-python, is not used. Only its JSON metadata would be left in
+use, and its import took 1.5 s of each process, four times as long as zarr's:
+- `physical_pixel_sizes` leaves out the units, and takes the first coordinate transformation for a
+  scale without checking; this module composes all transformations.
+- `xarray_dask_data` builds a graph over all chunks of the dataset for every window; this module
+  reads the window from the Zarr array.
 - `channel_names` is "" where a label is missing.
+
+References: OME-Zarr 0.5, https://ngff.openmicroscopy.org/0.5/
 """
 
 import math
@@ -27,7 +29,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
-# Groups that hold images, or belong to one, by the attribute that they have in place of one's own
+# attribute of a group without an image of its own -> the group's kind, for messages
 _OTHERS = {
     "plate": "a plate",
     "well": "a well",
@@ -37,7 +39,7 @@ _OTHERS = {
 
 
 def read_image(location: Location) -> Image:
-    """Return the first multiscale image of the group. Raises SourceError."""
+    """Return the first multiscale image of the group. Raises SourceError where there is none."""
     where = location.shown
     with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
         store = _store(location)
@@ -80,7 +82,10 @@ def read_image(location: Location) -> Image:
 
 
 def _axes(multiscale: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[float | None, ...]]:
-    """Return the names of the axes and the um in their units (None: no length)."""
+    """Return the axes' names and their units in um (None: no unit of length).
+
+    Raises ValueError where the metadata are not of OME-Zarr 0.4 or 0.5 or repeat a name.
+    """
     axes = multiscale["axes"]
     if not all(isinstance(axis, Mapping) for axis in axes):
         raise ValueError("axes are not of OME-Zarr 0.4 or 0.5")
@@ -95,7 +100,8 @@ def _placement(
 ) -> tuple[list[float] | None, list[float] | None]:
     """Return scale and translation of a level, in the axes' units; None: not stated.
 
-    The level's own transformations come first, then those of the whole image.
+    The level's own transformations come first, then those of the whole image. Raises ValueError
+    where a transformation is invalid.
     """
     scale: list[float] | None = None
     shift: list[float] | None = None
@@ -125,7 +131,7 @@ def _grid(
     shift: Sequence[float] | None,
 ) -> Grid:
     spacing = None if scale is None else _spatial(level.axes, units, scale)
-    # A scale without a unit is no length: 1.0 is what writers put down when they know nothing.
+    # A scale without a unit is no length: writers that lack the spacing state 1.0.
     offset = None if shift is None or spacing is None else _spatial(level.axes, units, shift)
     return Grid(level.shape, spacing, offset)
 

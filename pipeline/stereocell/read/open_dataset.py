@@ -18,15 +18,15 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
 
 DTYPES = ("uint8", "uint16", "int16", "float32")
-MAX_CHUNK_BYTES = 4 << 30  # a chunk is decoded whole: a header that asks for more is refused
+MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
 
 @dataclass(frozen=True, slots=True)
 class Reader:
     """One format: its names, and the module whose `read_image(location) -> Image` reads it.
 
-    title       the format, as people call it
-    example     a file of it, as people name it
+    title       the format's usual name
+    example     a typical source, for messages
     has_series  one source may hold several volumes: `read_image(location, series)`
     """
 
@@ -36,7 +36,7 @@ class Reader:
     has_series: bool = False
 
     def read_image(self, location: Location, series: int) -> Image:
-        # imported when asked for: each takes up to 2 s, and one is needed
+        # imported on use: each import takes up to 2 s, and a process needs one
         read = import_module(self.module).read_image
         image: Image = read(location, series) if self.has_series else read(location)
         return image
@@ -59,7 +59,7 @@ def reader_of(source: str | Path) -> str:
 
 
 def _formats() -> str:
-    """Return all formats in words, each with an example."""
+    """Return all formats, each with an example, as a phrase for messages."""
     *others, last = (f"{reader.title} ({reader.example})" for reader in READERS.values())
     return f"{', '.join(others)} or {last}"
 
@@ -69,17 +69,19 @@ def open(
 ) -> Dataset:
     """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
 
-    No voxels are read yet; of DICOM at most slices that lie at one place, to tell copies, and
-    NIfTI's floats, to tell how many are none.
+    source      a local path (the only form for DICOM and NIfTI) or an address (`http://`,
+                `https://`, `s3://`, or another one that fsspec knows)
+    time        time point, from 0
+    spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
+    series      series of a DICOM source, from 1 as `list_series` counts; 0: the largest
 
-    `source` is a local path (DICOM and NIfTI only that) or an address (`http://`, `https://`,
-    `s3://`, or another one that fsspec knows). `time` is the time point, from 0. `spacing_um`
-    (z, y, x) replaces the voxel spacing that the source states. `series` picks one of DICOM's, from
-    1 as `list_series` counts; 0 is the largest.
+    No voxels are read yet, with two exceptions: DICOM slices at the same place, to detect copies,
+    and floats of NIfTI, to count NaN. Raises SourceError where the source can't be read as a
+    volume (one line: the found value, its place, the expected value), UsageError where the source
+    lacks the time point or the series, or where `spacing_um` is no length.
 
-    Raises SourceError for a source that can't be read as a volume (one line: what, where, what was
-    expected), UsageError for a time point or a series that it doesn't hold, or a spacing that is no
-    length.
+        dataset = open("head.ome.zarr")
+        volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
     """
     location = Location.of(source)
     if location.is_local and not Path(location.source).exists():
@@ -140,10 +142,10 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
 
 
 def list_series(source: str | Path) -> tuple[str, ...]:
-    """Return a line for each series of a DICOM folder or file; line i is `series` = i.
+    """Return a line for each series of a DICOM folder or file; line i describes `series` = i.
 
-    A line holds modality, orientation, size and spacing, nothing that the files describe
-    themselves by. Raises SourceError, UsageError for a source of another format.
+    A line holds modality, orientation, size and spacing, and no description from the files.
+    Raises SourceError where the source can't be read, UsageError where it has another format.
     """
     location = Location.of(source)
     reader = READERS.get(location.format or "")
@@ -187,14 +189,14 @@ def _check_arrays(where: str, image: Image) -> None:
 
 
 def _shown(name: str) -> str:
-    """Return a name without the characters that nothing shows (controls, NUL, line ends)."""
+    """Return a name without unprintable characters (controls, NUL, line ends)."""
     if name.isprintable():
         return name
     return " ".join("".join(c if c.isprintable() else " " for c in name).split())
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Fill in missing names, and tell equal ones apart (a marker imaged in every cycle)."""
+    """Fill in missing names and number equal ones (a marker imaged in every cycle)."""
     filled = list(names)
     for index in (i for i, name in enumerate(names) if not name):
         filled[index] = f"Channel{index}"

@@ -1,12 +1,14 @@
-"""Where a stack of parallel planes lies, and the even, orthogonal grid that holds it.
+"""The positions of a stack of parallel planes, and the even, orthogonal grid that holds it.
 
-From each plane's position and the planes' orientation alone (ImagePositionPatient and
-ImageOrientationPatient of DICOM): SliceThickness and SpacingBetweenSlices may say anything. Planes
-are sorted along their normal. The median of the gaps says which gaps are regular. Where all are,
-or are whole multiples of it (planes are missing), the spacing is the mean over the length, so that
-rounded positions do not add up; else the length is divided into as many gaps as the median fits in,
-and all planes between are interpolated. Planes that drift sideways (a tilted gantry) are a sheared
-stack, and are moved within their planes onto an orthogonal grid.
+The layout follows from the planes' positions and orientation alone (ImagePositionPatient and
+ImageOrientationPatient): SliceThickness and SpacingBetweenSlices may hold any value. Planes
+are sorted along their normal. The median of the gaps decides which gaps are regular. Where all
+gaps are, or are whole multiples of it (planes are missing), the spacing is the mean over the
+length, so that rounded positions don't add up. Else the length is divided into as many gaps as the
+median fits in, and all planes between are interpolated. Planes that drift sideways (a tilted
+gantry) are a sheared stack; they are shifted within their planes onto an orthogonal grid.
+
+References: DICOM PS3.3 C.7.6.2 (Image Plane module).
 """
 
 import math
@@ -15,30 +17,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-REGULAR = 0.02  # of the median gap: so far may a gap be off (rounded positions) and still be even
-DRIFT = 0.05  # pixels over the whole stack: planes that drift less stand still
-SAME_PLACE = 0.02  # pixels: planes this close lie on each other
+REGULAR = 0.02  # share of the median gap: an even gap deviates by no more (rounded positions)
+DRIFT = 0.05  # pixels over the whole stack: planes that drift less are not shifted
+SAME_PLACE = 0.02  # pixels: planes at a smaller distance count as one place
 
 
 class NoStackError(Exception):
-    """Planes that make no volume; the text says why."""
+    """The planes make no volume; the text gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class StackLayout:
     """A grid of voxels for a stack of n planes. LPS, mm; voxels are (plane, row, column).
 
-    shape        of the grid
+    shape        voxels of the grid
     spacing_mm   of the grid, along its three axes
-    axes         unit vectors along them, one a row, orthogonal; (3, 3)
-    origin_mm    centre of voxel (0, 0, 0)
-    places       (n, 3): where in voxels of the grid each plane's first pixel lies, rising
-    stack        (4, 4): from (plane, row, column, 1) to mm for the planes as they are, evenly
-                 spread from the first to the last: sheared where the gantry was tilted
-    gaps_mm      (n - 1) along the normal
-    missing      planes of the grid that no plane of the stack lies on
+    axes         (3, 3): orthogonal unit vectors along them, one a row
+    origin_mm    (3,): centre of voxel (0, 0, 0)
+    places       (n, 3): each plane's first pixel in voxels of the grid, in rising order
+    stack        (4, 4) for columns: from (plane, row, column, 1) to mm for the original planes,
+                 evenly spread from the first to the last: sheared where the gantry was tilted
+    gaps_mm      (n - 1,): distances along the normal
+    missing      the number of grid planes without a plane of the stack
     is_even      the gaps are whole multiples of the spacing
-    tilt_deg     between the normal and the way from plane to plane; 0: none
+    tilt_deg     angle between the normal and the line through the planes' first pixels; 0: none
     """
 
     shape: tuple[int, int, int]
@@ -54,7 +56,7 @@ class StackLayout:
 
     @property
     def is_resampled(self) -> bool:
-        """Whether the grid's planes are others than the stack's own."""
+        """Whether the grid's planes differ from the stack's own."""
         return self.missing > 0 or not self.is_even or self.tilt_deg > 0
 
     @property
@@ -67,7 +69,7 @@ class StackLayout:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is not as it was taken, a sentence each."""
+        """Differences between the grid and the acquired planes, a sentence each."""
         notes = []
         spacing = self.spacing_mm[0]
         if not self.is_even:
@@ -90,7 +92,7 @@ class StackLayout:
 
 
 def normal_of(along_row: ArrayLike, along_column: ArrayLike) -> NDArray[np.float64]:
-    """Return the unit normal of a plane, right-handed to its row and its column."""
+    """Return the unit normal (3,) of a plane, right-handed to its row and its column."""
     normal = np.cross(np.asarray(along_row, np.float64), np.asarray(along_column, np.float64))
     return normal / np.linalg.norm(normal)
 
@@ -103,18 +105,23 @@ def lay_out(
     pixel_spacing_mm: tuple[float, float],
     plane_shape: tuple[int, int],
 ) -> StackLayout:
-    """Return the grid for planes whose first pixels lie at `positions_mm` (n, 3), LPS.
+    """Return the grid for parallel planes.
 
-    The positions rise along the normal, one plane at each place. `pixel_spacing_mm` is between
-    (rows, columns). Raises NoStackError for fewer than 2 planes, planes beside each other, or more
-    missing planes than there are.
+    positions_mm      (n, 3): centres of the first pixels, LPS, mm; they rise along the normal, one
+                      plane at each place
+    along_row         (3,): unit vector of growing column index; `along_column` of growing row index
+    pixel_spacing_mm  between (rows, columns)
+    plane_shape       pixels (rows, columns)
+
+    Raises NoStackError where there are fewer than 2 planes, where planes lie beside each other, or
+    where more planes are missing than present.
     """
     positions = np.asarray(positions_mm, np.float64)
     if len(positions) < 2:
         raise NoStackError(f"a volume needs at least 2 slices: found {len(positions)}")
     normal = normal_of(along_row, along_column)
     across = np.asarray(along_row, np.float64)
-    down = np.cross(normal, across)  # orthogonal to both, whatever was rounded
+    down = np.cross(normal, across)  # orthogonal to both, also where the vectors are rounded
     axes = np.stack([normal, down, across])
     local = (positions - positions[0]) @ axes.T  # mm along (normal, down, across)
     gaps = np.diff(local[:, 0])
@@ -134,7 +141,7 @@ def lay_out(
     tilt = 0.0
     if np.abs(places[:, 1:]).max() > DRIFT:
         tilt = math.degrees(math.atan2(float(np.linalg.norm(sideways)), local[-1, 0]))
-        tilt = max(tilt, 1e-3)  # planes that wander and come back are moved as well
+        tilt = max(tilt, 1e-3)  # planes that drift and return are shifted as well
     else:
         places[:, 1:] = 0.0
     low = np.floor(places[:, 1:].min(axis=0) + 1e-6)
@@ -162,7 +169,7 @@ def lay_out(
 
 
 def _count_planes(gaps: NDArray[np.float64]) -> tuple[int, bool]:
-    """Return the planes of an even grid over these gaps, and whether the gaps fit it."""
+    """Return the number of planes of an even grid over these gaps, and whether the gaps fit it."""
     median = float(np.median(gaps))
     steps = np.rint(gaps / median)
     if steps.min() >= 1 and (np.abs(gaps - steps * median) <= REGULAR * median * steps).all():

@@ -1,4 +1,4 @@
-"""Bring planes that lie unevenly, or drift sideways, onto an even grid: linear interpolation."""
+"""Resample planes that lie unevenly, or drift sideways, onto an even grid, linearly."""
 
 from itertools import pairwise
 
@@ -12,9 +12,9 @@ from stereocell.read.plane_stack import StackLayout
 def resample_stack(planes: NDArray[np.generic], layout: StackLayout) -> NDArray[np.generic]:
     """Return the grid's voxels (plane, row, column) of a stack's planes, in their dtype.
 
-    planes  (n, rows, columns) in the order of `layout.places`
+    planes  (n, rows, columns), any dtype, in the order of `layout.places`
 
-    What no plane reaches is as low as the lowest voxel. Integers are rounded.
+    Voxels outside all planes take the lowest value of the planes. Integers are rounded.
     """
     fill = float(planes.min())
     grid = np.empty(layout.shape, planes.dtype)
@@ -33,7 +33,7 @@ def resample_stack(planes: NDArray[np.generic], layout: StackLayout) -> NDArray[
 def _moved(
     plane: NDArray[np.generic], place: NDArray[np.float64], layout: StackLayout, fill: float
 ) -> NDArray[np.float32]:
-    """Return a plane on the grid's rows and columns, float32."""
+    """Return a plane on the grid's rows and columns, float32; `fill` is the value outside it."""
     _, rows, columns = layout.shape
     whole = np.floor(place[1:] + 1e-9).astype(int)
     moved = np.full((rows + 1, columns + 1), fill, np.float32)
@@ -41,7 +41,7 @@ def _moved(
     for axis in (0, 1):
         part = np.float32(max(place[1 + axis] - whole[axis], 0.0))
         if part > 1e-6:
-            neighbour = np.roll(moved, 1, axis)  # the last row is spare, so that none comes round
+            neighbour = np.roll(moved, 1, axis)  # the last row is padding: none wraps round
             moved = (1 - part) * moved + part * neighbour
     return moved[:rows, :columns]
 
@@ -49,10 +49,13 @@ def _moved(
 def resample_sheared(
     voxels: NDArray[np.generic], affine: NDArray[np.float64]
 ) -> tuple[NDArray[np.generic], NDArray[np.float64]]:
-    """Return voxels on an orthogonal grid, and its affine, of a grid whose axes are skew.
+    """Return voxels resampled from a skew grid onto an orthogonal one, and its affine (4, 4).
 
-    `affine` (4, 4) for columns goes from (i, j, k, 1) to mm. The new axes are the nearest
-    orthogonal ones (polar decomposition), the spacings stay, and all of the old grid lies inside.
+    voxels  (i, j, k), any dtype, which the result keeps
+    affine  (4, 4) for columns, float64: from (i, j, k, 1) to mm
+
+    The new axes are the nearest orthogonal ones (polar decomposition), the spacings stay, and the
+    new grid contains all of the old one.
     """
     shape, orthogonal = orthogonal_grid(voxels.shape, affine)
     back = np.linalg.inv(affine) @ orthogonal
@@ -66,7 +69,11 @@ def resample_sheared(
 def orthogonal_grid(
     shape: tuple[int, ...], affine: NDArray[np.float64]
 ) -> tuple[tuple[int, int, int], NDArray[np.float64]]:
-    """Return shape and affine of the orthogonal grid round a skew one; nothing is read."""
+    """Return shape and affine (4, 4) of the orthogonal grid around a skew one; reads no voxels.
+
+    shape   voxels (i, j, k) of the skew grid
+    affine  (4, 4) for columns: from (i, j, k, 1) to mm
+    """
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     u, _, vt = np.linalg.svd(affine[:3, :3] / spacing)
     axes = u @ vt

@@ -1,7 +1,7 @@
-"""The dtype that holds a format's values after its rescale, and the rescale itself.
+"""The dtype for a format's values after its rescale, and the rescale itself.
 
-Whole numbers stay whole: if slopes and intercepts are, the narrowest of uint8, uint16 and int16
-that holds all that the stored bits can become; else float32.
+Integers stay integers: where slopes and intercepts are whole, the dtype is the narrowest of uint8,
+uint16 and int16 that holds all values of the stored bits; else float32.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,10 @@ _INTEGERS = (np.uint8, np.uint16, np.int16)
 
 
 def dtype_for(ranges: Iterable[tuple[float, float, float, float]]) -> np.dtype[Any]:
-    """Return the dtype for (lowest, highest stored value, slope, intercept) of every slice."""
+    """Return the dtype for all slices' values.
+
+    ranges  (lowest stored value, highest stored value, slope, intercept) of each slice
+    """
     ends: list[float] = []
     for low, high, slope, intercept in ranges:
         if not (slope.is_integer() and intercept.is_integer()):
@@ -30,9 +33,11 @@ def dtype_for(ranges: Iterable[tuple[float, float, float, float]]) -> np.dtype[A
 def rescale(
     stored: NDArray[Any], slope: float, intercept: float, dtype: np.dtype[Any]
 ) -> NDArray[Any]:
-    """Return slope * stored + intercept in `dtype`, worked out without overflow.
+    """Return slope * stored + intercept in `dtype`, computed without integer overflow.
 
-    What float32 can't hold becomes infinite, which whoever reads the voxels refuses.
+    stored  any shape and dtype; the result has the same shape
+
+    Values beyond float32 become infinity; the caller checks for it.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         if slope == 1 and intercept == 0:

@@ -1,4 +1,4 @@
-"""Voxel spacings and the places of levels, in um, from what the metadata say."""
+"""Voxel spacings and origins of levels, in um, from the metadata."""
 
 import math
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from stereocell.model.tiling import Box
 
 Triple = tuple[float, float, float]
 
-# Both spellings: OME-Zarr's (UDUNITS-2 names) and OME-XML's (symbols).
+# unit -> um, in both spellings: OME-Zarr's (UDUNITS-2 names) and OME-XML's (symbols)
 _UM: dict[str, float] = {
     "angstrom": 1e-4,
     "\u00c5": 1e-4,
@@ -41,8 +41,8 @@ class Level:
     """One resolution of a dataset; level 0 is the finest.
 
     shape       voxels (z, y, x)
-    spacing_um  (z, y, x)
-    origin_um   centre of voxel (0, 0, 0), (z, y, x), from level 0's
+    spacing_um  (z, y, x), um
+    origin_um   centre of voxel (0, 0, 0), (z, y, x), um, from level 0's
     """
 
     shape: tuple[int, int, int]
@@ -51,15 +51,17 @@ class Level:
 
     @property
     def box(self) -> Box:
-        """The whole level."""
+        """The box of the whole level."""
         return Box((0, 0, 0), self.shape)
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """One level as its metadata describe it; None: not said.
+    """The metadata of one level; None: not stated.
 
-    spacing_um, offset_um  (z, y, x); `offset_um` is the centre of voxel (0, 0, 0)
+    shape       voxels (z, y, x)
+    spacing_um  (z, y, x), um
+    offset_um   centre of voxel (0, 0, 0), (z, y, x), um
     """
 
     shape: tuple[int, int, int]
@@ -77,10 +79,12 @@ def um_per(unit: object) -> float | None:
 def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> tuple[Level, ...]:
     """Return the levels, finest first.
 
-    `given_um` (z, y, x), the user's `--spacing-um`, replaces what the metadata say about level 0.
-    A coarser level without a translation has averaged blocks of voxels: its first centre lies at
-    0.5 (f - 1) of level 0's spacing, f being its factor. Raises SourceError if the spacing is
-    missing or isn't a positive length, UsageError if the given one isn't.
+    given_um  (z, y, x), um, the user's `--spacing-um`; replaces the metadata of level 0
+    where     the source's name, for messages
+
+    A coarser level without a translation is taken for an average of blocks of voxels: its first
+    centre lies at 0.5 (f - 1) of level 0's spacing, where f is its factor. Raises SourceError where
+    the spacing is missing or isn't a positive length, UsageError where `given_um` isn't.
     """
     if given_um is not None:
         if len(given_um) != 3 or not all(_is_length(value) for value in given_um):
@@ -140,14 +144,14 @@ def _check(grids: tuple[Grid, ...], where: str) -> None:
 
 
 def _factors(grid: Grid, finest: Grid) -> Triple:
-    """How many voxels of level 0 one voxel of this level spans, (z, y, x)."""
+    """The voxels of level 0 per voxel of this level, (z, y, x)."""
     if grid.spacing_um is not None and finest.spacing_um is not None:
         return _triple(a / b for a, b in zip(grid.spacing_um, finest.spacing_um, strict=True))
     return _triple(_shape_factor(n, m) for n, m in zip(finest.shape, grid.shape, strict=True))
 
 
 def _shape_factor(fine: int, coarse: int) -> float:
-    """The factor between two lengths in voxels: an integer if halving and rounding explain them."""
+    """The factor between two lengths in voxels: a whole number where halving and rounding fit."""
     whole = round(fine / coarse)
     if coarse in (fine // whole, -(-fine // whole)):
         return float(whole)
@@ -159,7 +163,7 @@ def _is_sound(grid: Grid) -> bool:
 
 
 def _is_length(value: float) -> bool:
-    """Whether it is one that voxels can have, in um: any other is a unit gone wrong."""
+    """Whether a voxel can have this spacing (um): any other is a wrong unit."""
     return 1e-6 <= value <= 1e9
 
 

@@ -1,10 +1,10 @@
-"""Voxels that are decoded all at once, when the first of them is asked for, and kept.
+"""Voxels that are decoded all at once, at the first access, and cached.
 
-What lies in a file for each slice, or behind one stream of gzip, has no blocks. A tile's window is
-cut along canonical axes, which cross nearly every slice of nearly every series, so reading by
-slices would decode the whole series for each window; a volume of this kind is some hundred MB at
-most. So a process decodes it once and holds it. Its size is known from the headers and is checked
-(read/open_dataset.py) before any memory is taken.
+A file for each slice, or one stream of gzip, has no blocks. A tile's window is cut along canonical
+axes, which cross nearly every slice of nearly every series, so that reading by slices would decode
+the whole series for each window. A volume of this kind takes some hundred MB at most, so a process
+decodes it once and caches it. Its size is known from the headers and is checked
+(read/open_dataset.py) before memory is allocated.
 """
 
 from collections.abc import Callable
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 
 class WholeArray:
-    """Points in time of one volume, (t, z, y, x); one of them is held.
+    """Time points of one volume, (t, z, y, x); one of them is cached.
 
-    load  returns the voxels (z, y, x) of a point in time; it may return a view
+    shape  (t, z, y, x) in voxels
+    load   returns the voxels (z, y, x) of a time point; may return a view
     """
 
     def __init__(
@@ -39,6 +40,6 @@ class WholeArray:
         time, *place = key
         with self._lock:
             if self._held is None or self._held[0] != time:
-                self._held = None  # never two at once
+                self._held = None  # frees the old one first: never two in memory
                 self._held = (time, self._load(time))
             return self._held[1][tuple(place)]

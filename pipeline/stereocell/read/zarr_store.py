@@ -1,9 +1,9 @@
-"""What Zarr reads through: whole files of the group's own, chunks that unpack to what is said.
+"""The store that Zarr reads through: it checks paths, file lengths and sizes after decoding.
 
-A chunk's size is known from the array's metadata, but the decoders don't ask: gzip and zstd unpack
+A chunk's size is known from the array's metadata, but the decoders ignore it: gzip and zstd unpack
 until the stream ends, whatever the memory, and Blosc trusts the length in the chunk's header and
-reads past the end of the buffer, so that a truncated file would come out as noise. Of a shard that
-is read as a whole only the file's size is known here, not what its inner chunks unpack to.
+reads past the end of the buffer, so that a truncated file would be read as noise. For a shard that
+is read whole only the file's size is known here, not the decoded size of its inner chunks.
 """
 
 import bz2
@@ -22,18 +22,20 @@ from zarr.storage import WrapperStore
 from stereocell.storage.location import Location, require_own, require_own_key
 
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
-_METADATA_BYTES = 64 << 20
-_ROOM = 1 << 20  # bytes over a chunk's own: what poor compression, checksums and an index add
-_BLOSC_HEADER = struct.Struct("<4B3I")  # the last three: bytes unpacked, of a block, of the chunk
+_METADATA_BYTES = 64 << 20  # largest size of a metadata file in bytes
+_ROOM = 1 << 20  # bytes beyond a chunk's decoded size: poor compression, checksums, an index
+_BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: decoded, of a block, encoded
 
 
 class GuardedStore(WrapperStore[Store]):
-    """Refuses what is no file of the group's own, is cut short, or unpacks to more than a chunk.
+    """Refuses files outside the group, truncated chunks and chunks that decode to too many bytes.
 
     location  of the group
-    codecs    the names of the bytes-to-bytes codecs, in the order of encoding
-    chunk     bytes of a chunk as it is in memory; None: metadata alone are read
-    array     the array's metadata file: where that is gone, a missing chunk is no empty one
+    codecs    names of the bytes-to-bytes codecs, in the order of encoding
+    chunk     bytes of a decoded chunk; None: only metadata are read
+    array     path of the array's metadata file: once it is gone, a missing chunk isn't empty
+
+    Reads raise OSError for these, SourceError for a path outside the group.
     """
 
     def __init__(
@@ -100,7 +102,7 @@ class GuardedStore(WrapperStore[Store]):
 
 def _of_zstd(data: bytes, most: int) -> int:
     size: int = zstandard.get_frame_parameters(data).content_size
-    if 0 <= size < 1 << 62:  # else it isn't said
+    if 0 <= size < 1 << 62:  # else the size is not stated
         return size
     total = 0
     reader = zstandard.ZstdDecompressor().stream_reader(data)
@@ -123,7 +125,7 @@ def _of_lz4(data: bytes, most: int) -> int:
 
 
 def _streamed(make: Callable[[], Any]) -> Callable[[bytes, int], int]:
-    """Return a measure that unpacks, no further than it has to, and keeps nothing."""
+    """Return a measure that decodes up to its limit in bytes and discards the result."""
 
     def measure(data: bytes, most: int) -> int:
         total = 0
