@@ -1,8 +1,9 @@
 """DICOM: a folder at any depth, or one file, single-frame or enhanced multi-frame.
 
-PS3.3 for the attributes; read/dicom/header.py says what is looked at, read/dicom/series.py how
-frames become volumes, read/plane_stack.py where they lie. Files are found by content, whatever they
-are called.
+read/dicom/header.py lists the attributes that are read, read/dicom/series.py sorts frames into
+volumes, read/plane_stack.py lays out the planes. Files are found by content, not by name.
+
+References: DICOM PS3.3 (information object definitions).
 """
 
 import os
@@ -29,12 +30,15 @@ from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, is_own
 
-UNKNOWN = "DICOM"  # the name of what has no modality that we know
+UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What lies in a folder: DICOM files in the order of names, stacks, and why others are none."""
+    """The DICOM files of a folder in the order of names, their stacks, and counts of the others.
+
+    left_out  reason -> number of files without a usable plane
+    """
 
     paths: tuple[Path, ...]
     stacks: tuple[Stack, ...]
@@ -44,7 +48,7 @@ class Found:
 def read_image(location: Location, series: int = 0) -> Image:
     """Return one series; 0 is the largest, others count from 1 as `list_series` does.
 
-    Raises SourceError, UsageError for a series that isn't there.
+    Raises SourceError where it makes no volume, UsageError where the source lacks the series.
     """
     found = _find(location)
     if series > len(found.stacks):
@@ -105,7 +109,7 @@ def _find(location: Location) -> Found:
         except NoPlaneError as error:
             left_out[str(error)] += 1
     compare = partial(_are_equal, paths, location.shown)
-    for earlier, frame in copies:  # the same image twice; if pixels differ, it is another
+    for earlier, frame in copies:  # one image stored twice; with other pixels it is another image
         if earlier.position == frame.position and compare(earlier, frame):
             left_out["copies of others"] += 1
         else:
@@ -121,7 +125,7 @@ def _find(location: Location) -> Found:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return all files below a folder, sorted, so that another disk gives the same order."""
+    """Return all files below a folder, sorted: the order doesn't depend on the disk."""
     found = [Path(at) / name for at, _, names in os.walk(folder) for name in names]
     return sorted(found, key=lambda path: path.relative_to(folder).parts)
 
@@ -129,7 +133,7 @@ def _files(folder: Path) -> list[Path]:
 def _require_own(location: Location, files: Sequence[Path]) -> None:
     """Raise SourceError for a link that leads out of the folder, by its number: names are private.
 
-    Pipes, devices and links that lead nowhere are left out: they are not opened.
+    Pipes, devices and broken links are skipped: the reader doesn't open them.
     """
     own = [location.folder]
     for number, path in enumerate(files, start=1):

@@ -1,4 +1,4 @@
-"""What is known of one plane of pixels before it is decoded: how it is stored, where it lies."""
+"""The header of one plane of pixels, before decoding: how it is stored, where it lies."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,14 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """How a stored value becomes a grey value: bits, sign, then slope * value + intercept.
+    """The map from a stored value to a grey value: bits, sign, then slope * value + intercept.
 
     bits, high_bit  of the value inside its container of `allocated` bits; 0 bits: floats
     is_inverted     MONOCHROME1: the lowest value is the brightest
-    padding         lowest and highest stored value that are no part of the image, before the
-                    inversion; None: there are none
+    padding         lowest and highest stored value outside the image, before the inversion;
+                    None: the header names none
+
+    References: DICOM PS3.3 C.7.6.3 (Image Pixel module).
     """
 
     allocated: int
@@ -26,22 +28,24 @@ class Encoding:
 
     @property
     def stored_range(self) -> tuple[int, int]:
-        """The lowest and highest stored value that these bits can hold."""
+        """The lowest and highest stored value of this many bits."""
         half = 1 << (self.bits - 1)
         return (-half, half - 1) if self.is_signed else (0, 2 * half - 1)
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One plane of pixels and where it lies in the patient (LPS, mm).
+    """One plane of pixels and its place in the patient (LPS, mm).
 
-    file, index        which file in the order of names, which frame in it, both from 0
-    series, instance   digests that tell series, and copies of one image, apart
+    file, index        file in the order of names, frame in the file; both from 0
+    series, instance   digests of the UIDs of the series and of the image
     reference          digest of the frame of reference
-    stack              digest of the stack that an enhanced image puts the frame in
+    stack              digest of the stack ID in an enhanced image
     position           centre of the first pixel
     along_row          unit vector of growing column index; `along_column` of growing row index
     spacing            mm between (rows, columns)
+
+    References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
 
     file: int

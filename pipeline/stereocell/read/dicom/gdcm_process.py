@@ -1,8 +1,8 @@
-"""GDCM in a process of its own: on some damaged JPEG streams it aborts, and it talks on stderr.
+"""GDCM in a process of its own: it aborts on some damaged JPEG streams, and it prints to stderr.
 
-Run as a program, it reads requests from stdin, a line of JSON each with `path` and `indices`, and
-answers each frame by a line of JSON, `dtype` and `shape`, and the bytes; by `null` for a frame that
-can't be decoded. What it says on stderr is thrown away.
+As a program, this module reads requests from stdin, a line of JSON each with `path` and `indices`.
+It answers each frame with a line of JSON, `dtype` and `shape`, and the bytes, or with `null` where
+the frame can't be decoded. Its stderr is discarded.
 """
 
 import json
@@ -21,7 +21,7 @@ from stereocell.read.dicom.stored_values import open_pixels, stored_values
 
 
 class GdcmProcess:
-    """Decodes files by GDCM; started with the first of them, gone with the `with` block."""
+    """Decodes files by GDCM; the process starts with the first file and ends with the block."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -40,7 +40,7 @@ class GdcmProcess:
             self._process.communicate()
 
     def decode(self, path: Path, indices: Sequence[int]) -> Iterator[NDArray[Any]]:
-        """Yield the stored values of frames. Raises ValueError, OSError if it can't be done."""
+        """Yield the stored values (rows, columns) of frames. Raises ValueError, OSError."""
         if self._process is None:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", __name__],
@@ -55,7 +55,7 @@ class GdcmProcess:
         pipes.stdin.write(json.dumps(request).encode() + b"\n")
         pipes.stdin.flush()
         for _ in indices:
-            answer = json.loads(pipes.stdout.readline() or "null")  # nothing comes: it is dead
+            answer = json.loads(pipes.stdout.readline() or "null")  # no line: the process is dead
             if answer is None:
                 raise ValueError
             dtype, shape = np.dtype(answer["dtype"]), tuple(answer["shape"])

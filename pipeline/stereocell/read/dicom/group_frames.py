@@ -1,10 +1,10 @@
-"""Which DICOM frames belong to one stack: the same in all that is stated, and parallel.
+"""Group DICOM frames into stacks: equal in all stated attributes, and parallel.
 
-Decimal strings are rounded, and may be rounded anew in each slice: pixel spacings and orientations
-that differ by no more than that are one. They are compared with the mean of those that are in the
-group already, so that a wobble about it keeps them together, and the mean is the stack's. Planes
-that are turned into it turn about their first pixels, whose places are stated, or about their
-middles: about whichever of the two lie more evenly, since a wobble moves one and not the other.
+Decimal strings are rounded, in each slice anew, so pixel spacings and orientations that differ by
+rounding count as equal. They are compared with the group's mean, so that a wobble about it
+keeps the frames together, and the mean is the stack's. A plane is turned into the mean orientation
+about its first pixel, whose place is stated, or about its middle: the pivot that gives the more
+even steps is taken, since a wobble moves the one and not the other.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from stereocell.read.dicom.frame import Frame, Vector
 
-PARALLEL = 2e-3  # rad: planes further apart in orientation are another stack
-ALIKE = 1e-3  # of the pixel spacing: half a pixel over 512 of them
-_SAME_WAY = np.cos(np.radians(5.0))  # stacks whose normals are closer than that can interleave
+PARALLEL = 2e-3  # rad: planes that differ more in orientation belong to different stacks
+ALIKE = 1e-3  # share of the pixel spacing: half a pixel over 512 pixels
+_SAME_WAY = np.cos(np.radians(5.0))  # cosine; stacks whose normals are closer can interleave
 
-# what tells stacks apart, in the standard's words
+# attributes that separate stacks: field of Frame, name in the standard
 _STATED: tuple[tuple[str, str], ...] = (
     ("series", "SeriesInstanceUID"),
     ("reference", "FrameOfReferenceUID"),
@@ -31,16 +31,16 @@ _STATED: tuple[tuple[str, str], ...] = (
 
 
 class Group:
-    """Frames of one stack, in the order in which they came."""
+    """Frames of one stack, in the order of insertion."""
 
     def __init__(self, first: Frame) -> None:
         self.frames = [first]
         self._directions = _directions(first)
         self._spacing = np.array(first.spacing)
-        self._is_exact = True  # all state the same: no mean, which rounds
+        self._is_exact = True  # all frames state the same: no mean, which rounds
 
     def takes(self, frame: Frame) -> bool:
-        """Return whether a frame with the same key is parallel to these, and as finely sampled."""
+        """Return whether a frame with equal attributes matches in orientation and pixel spacing."""
         return not (_turns(self._mean_directions, _directions(frame)) or self._is_other(frame))
 
     def add(self, frame: Frame) -> None:
@@ -55,7 +55,7 @@ class Group:
         self._spacing = self._spacing + frame.spacing
 
     def straighten(self) -> None:
-        """Turn the planes into the mean orientation; call it when all frames are there."""
+        """Turn the planes into the mean orientation; call it after the last `add`."""
         if self._is_exact or len(self.frames) < 3:
             return
         first = self.frames[0]
@@ -99,7 +99,7 @@ class Group:
         return bool((np.abs(frame.spacing - mean) > ALIKE * mean).any())
 
     def differences(self, other: "Group") -> list[str]:
-        """Return what tells this stack from another, in the standard's words."""
+        """Return the attributes that differ from another stack's, in the standard's words."""
         a, b = self.frames[0], other.frames[0]
         found = [word for name, word in _STATED if getattr(a, name) != getattr(b, name)]
         mean, step = np.array(other.spacing), ALIKE * np.array(self.spacing)
@@ -110,7 +110,7 @@ class Group:
         return found
 
     def interleaves(self, other: "Group") -> bool:
-        """Return whether these planes lie, at least in part, among the other stack's."""
+        """Return whether these planes lie, at least in part, between the other stack's."""
         axes = _axes(self)
         if abs(axes[0] @ _axes(other)[0]) < _SAME_WAY:
             return False
@@ -119,7 +119,7 @@ class Group:
         return bool(shared[0] >= 0 and (shared[1:] > 0).all())  # a single plane is not thick
 
     def _box(self, axes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return lowest and highest place (2, 3), mm along the axes."""
+        """Return lowest and highest place (2, 3), mm along the axes (3, 3), one a row."""
         first = self.frames[0]
         size = np.array(self.spacing) * (first.rows, first.columns)
         corner = _directions(first)[::-1] * size[:, None]  # down the rows, then along them
@@ -145,7 +145,7 @@ def find_groups(frames: Iterable[Frame]) -> list[Group]:
 
 
 def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...]:
-    """Say, in a sentence or none, how much of the same series lies among a group's planes."""
+    """Return a sentence, or none, about other stacks of the series between a group's planes."""
     if len(group.frames) < 2:
         return ()
     among = [
@@ -166,7 +166,7 @@ def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...
 
 
 def _unevenness(points: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
-    """Return how the steps from point to point (n, 3) change along a normal, squared and summed."""
+    """Return the sum of squared changes between steps from point to point (n, 3) along a normal."""
     rising = points[np.argsort(points @ normal)]
     return float((np.diff(rising, 2, axis=0) ** 2).sum())
 
@@ -176,7 +176,7 @@ def _directions(frame: Frame) -> NDArray[np.float64]:
 
 
 def _turns(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-    """Return whether directions (2, 3) differ by more than rounding: a chord is its angle here."""
+    """Return whether directions (2, 3) differ by more than rounding; chord = angle (rad)."""
     return bool(np.linalg.norm(a - b, axis=1).max() > PARALLEL)
 
 

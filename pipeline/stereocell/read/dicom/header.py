@@ -1,9 +1,9 @@
-"""What of a DICOM file's header the reader looks at: geometry, modality, how pixels are stored.
+"""The part of a DICOM file's header that is read: geometry, modality, storage of the pixels.
 
-Privacy begins here. pydicom is asked for the tags of `_TAGS` alone and skips the values of all
-others; UIDs, which tell series and copies apart, leave as digests; what pydicom logs or warns
-about, which may quote values, is not passed on, nor is the text of its exceptions; and a file is
-known by its number in the order of names, never by its name.
+Privacy begins here. pydicom reads the tags of `_TAGS` alone and skips the values of all others.
+UIDs, which identify series and copies, become digests. Logs, warnings and texts of exceptions of
+pydicom may quote values; they are discarded. A file is named by its number in the order of names,
+never by its name.
 """
 
 import hashlib
@@ -49,16 +49,16 @@ _TAGS: list[Any] = [
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
 ]
-# mm between pixels; beyond it, distances that are told in pixels mean nothing
+# smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
 
 class NoPlaneError(Exception):
-    """A file holds no plane that we can use; the text says why in words without its values."""
+    """A file holds no usable plane; the text gives the reason without the file's values."""
 
 
 def is_dicom(path: Path) -> bool:
-    """Return whether a regular file begins as DICOM does, with its preamble or without."""
+    """Return whether a file is a regular one that begins like DICOM, with or without preamble."""
     try:
         if not path.is_file():
             return False
@@ -70,7 +70,7 @@ def is_dicom(path: Path) -> bool:
 
 
 def _lacks_preamble(head: bytes) -> bool:
-    """Old files begin with their first element: group 2 or 8, little-endian, a low element."""
+    """Files without preamble begin with an element of group 2 or 8, little-endian, a low number."""
     if len(head) < 8:
         return False
     group, element = struct.unpack_from("<HH", head)
@@ -80,7 +80,9 @@ def _lacks_preamble(head: bytes) -> bool:
 def read_frames(path: Path, file: int) -> list[Frame]:
     """Return the planes of a file, from its header alone.
 
-    Raises NoPlaneError, whose text holds nothing of the file.
+    file  the file's number in the order of names
+
+    Raises NoPlaneError, whose text holds no value of the file.
     """
     try:
         with quiet(), path.open("rb") as opened:
@@ -99,7 +101,7 @@ def read_frames(path: Path, file: int) -> list[Frame]:
 
 
 def _refuse_deflated(path: Path) -> None:
-    """A deflated file would be unpacked whole, whatever it claims to become."""
+    """Raise NoPlaneError for a deflated file: it would be unpacked whole, whatever its size."""
     meta = pydicom.filereader.read_file_meta_info(path)
     if meta.get("TransferSyntaxUID") == DeflatedExplicitVRLittleEndian:
         raise NoPlaneError("deflated as a whole, which is not read")
@@ -121,7 +123,7 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
         hashlib.sha256(str(header.get(key, "")).encode()).digest()
         for key in ("SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID")
     )
-    if "SOPInstanceUID" not in header:  # then nothing tells copies
+    if "SOPInstanceUID" not in header:  # then nothing identifies copies
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
     shared = _first(header.get("SharedFunctionalGroupsSequence"))
@@ -156,24 +158,27 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
 
 
 def _kind(header: Any) -> str:
-    """Return what a file without pixels is, in the words of the standard: " (...)"; or nothing."""
+    """Return the kind of a file without pixels, in the standard's words: " (...)", or nothing."""
     kind = UID(str(header.get("SOPClassUID", "")))
-    return f" ({kind.name})" if kind.name != kind else ""  # of one that is private it is the UID
+    return f" ({kind.name})" if kind.name != kind else ""  # the name of a private UID is the UID
 
 
 def _padding(header: Any) -> tuple[int, int] | None:
-    """Return the lowest and highest value that pads: PS3.3 C.7.5.1.1.2, stored as pixels are."""
+    """Return the lowest and highest padding value, encoded as the pixels are; None: none named.
+
+    References: DICOM PS3.3 C.7.5.1.1.2.
+    """
     ends = []
     for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
         value = header.get(key)
-        if isinstance(value, bytes) and len(value) == 2:  # where the VR is not told
+        if isinstance(value, bytes) and len(value) == 2:  # where the VR is unknown
             little = header.original_encoding[1]
             value = int.from_bytes(value, "little" if little else "big")
         if isinstance(value, int):
             ends.append(value)
         elif not ends:
             return None
-    if header.get("PixelRepresentation"):  # whatever sign its VR gave it
+    if header.get("PixelRepresentation"):  # whatever sign the VR gave it
         ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
     else:
         ends = [end & 0xFFFF for end in ends]
@@ -181,9 +186,10 @@ def _padding(header: Any) -> tuple[int, int] | None:
 
 
 def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
-    """Return whether the pixels are floats. Raises NoPlaneError if they are cut short.
+    """Return whether the pixels are floats. Raises NoPlaneError where they are cut short.
 
-    `opened` stands at the element of the pixels: tag, (VR, 2 bytes,) length.
+    opened  stands at the element of the pixels: tag, (VR, 2 bytes,) length
+    size    of the file in bytes
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -212,7 +218,9 @@ def _first(sequence: Any) -> Any:
 def _found(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
     """Return a value from the frame's group, the shared one, or the header itself; None: nowhere.
 
-    An enhanced image states these in functional groups, PS3.3 C.7.6.16.
+    An enhanced image states these in functional groups.
+
+    References: DICOM PS3.3 C.7.6.16 (Multi-frame Functional Groups module).
     """
     for group in groups:
         item = None if group is None else _first(group.get(sequence))

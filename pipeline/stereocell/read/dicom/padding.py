@@ -1,16 +1,18 @@
-"""Pixels that are no part of the image: Pixel Padding Value and Range Limit of DICOM.
+"""Pixels outside the image: Pixel Padding Value and Range Limit of DICOM.
 
-PS3.3 C.7.5.1.1.2. CT fills what lies outside its circle with, say, -2000, which the rescale makes
--3024: a value that nothing measured, and that pulls window, histogram and threshold off. So padding
-becomes the smallest grey value of the other pixels of all slices at that point in time (of all, so
-that a slice with few dark pixels is no step in the background). Two kinds stay as they are:
+CT fills the area outside its circle with, say, -2000, which the rescale turns into -3024: nothing
+measured this value, and it distorts window, histogram and threshold. So padding becomes the
+smallest grey value of the other pixels of all slices at that time point (of all slices, so that a
+slice with few dark pixels makes no step in the background). Two kinds stay as they are:
 
-- what lies within the range of the other pixels, which it doesn't stretch: the values can't be told
-  from measured ones, since writers name as padding what their images hold as well
-- grey value 0 below all others: no signal in MR and PET, often named as padding; a brain cut out on
-  0 would else lie on the value of its darkest voxel
+- Values within the range of the other pixels, which they don't stretch. They can't be
+  distinguished from measured ones: writers name values as padding that their images contain.
+- Grey value 0 below all others: no signal in MR and PET, often named as padding. A brain cut out
+  on 0 would else lie on the value of its darkest voxel.
 
-Where all pixels are padding there is nothing to go by, and they stay.
+Where all pixels are padding there is no other value, and they stay.
+
+References: DICOM PS3.3 C.7.5.1.1.2.
 """
 
 from typing import Any
@@ -24,16 +26,16 @@ from stereocell.read.dicom.frame import Encoding
 def is_padding(
     contained: NDArray[Any], stored: NDArray[Any], encoding: Encoding
 ) -> NDArray[np.bool_] | None:
-    """Return which pixels are padding; None: none are.
+    """Return a mask of the pixels that are padding; None: no pixel is.
 
-    contained  values with all bits of their containers
-    stored     the same values of the stored bits alone, inverted if `encoding` says so
+    contained  values with all bits of their containers, integers of any shape
+    stored     the same values of the stored bits alone, inverted if `encoding` says so; same shape
     """
     if encoding.padding is None or encoding.bits == 0:
         return None
     low, high = encoding.padding
     least, most = encoding.stored_range
-    if low < least or high > most:  # a value that only the whole container can hold
+    if low < least or high > most:  # only the whole container can hold such a value
         mask = (contained >= low) & (contained <= high)
     elif encoding.is_inverted:
         mask = (stored >= least + most - high) & (stored <= least + most - low)
@@ -43,14 +45,14 @@ def is_padding(
 
 
 class Padding:
-    """Which pixels of planes are padding, a bit each, and the range of the others."""
+    """The padding masks of planes, a bit per pixel, and the range of the other pixels."""
 
     def __init__(self) -> None:
         self._masks: dict[int, NDArray[np.uint8]] = {}
         self._low, self._high = np.inf, -np.inf
 
     def add(self, place: int, plane: NDArray[np.generic], mask: NDArray[np.bool_] | None) -> None:
-        """Take note of the plane (rows, columns) of grey values at index `place`."""
+        """Record the plane (rows, columns) of grey values at index `place`, and its mask."""
         others = plane if mask is None else plane[~mask]
         if others.size:
             self._low = min(self._low, float(others.min()))
@@ -59,7 +61,7 @@ class Padding:
             self._masks[place] = np.packbits(mask)
 
     def fill(self, planes: NDArray[np.generic]) -> None:
-        """Give the padding of planes (n, rows, columns) its new value, in place."""
+        """Replace the padding of planes (n, rows, columns) by its new value, in place."""
         if self._low > self._high:
             return
         for place, packed in self._masks.items():

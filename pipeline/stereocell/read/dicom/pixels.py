@@ -19,7 +19,7 @@ from stereocell.storage.library_errors import raise_if_short
 
 
 def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
-    """Return the dtype that holds the values of all frames, from their headers alone."""
+    """Return the dtype that holds the grey values of all frames, from their headers alone."""
     encodings = {frame.encoding for frame in frames}
     if any(encoding.bits == 0 for encoding in encodings):
         return np.dtype(np.float32)
@@ -29,11 +29,14 @@ def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
 def decode(
     frames: Sequence[Frame], paths: Sequence[Path], dtype: np.dtype[Any], shown: str
 ) -> NDArray[Any]:
-    """Return the values of frames of one size, (n, rows, columns), in their order.
+    """Return the grey values of frames of one size, (n, rows, columns), `dtype`, in their order.
+
+    paths  the files; `Frame.file` is the index
+    shown  the source's name, for messages
 
     Each file is read once; the frames' padding is replaced (read/dicom/padding.py). Raises
-    SourceError for a frame that can't be decoded: it names the file by its number among `paths`,
-    never by name.
+    SourceError where a frame can't be decoded; the message names the file by its number among
+    `paths`, never by its name.
     """
     padding = Padding()
     planes = np.empty((len(frames), frames[0].rows, frames[0].columns), dtype)
@@ -59,7 +62,7 @@ def decode(
                         if has_padding:
                             mask = is_padding(values, raw, encoding)
                             padding.add(place, planes[place], mask)
-            except DICOM_FAULTS as error:  # its text may quote what the file says
+            except DICOM_FAULTS as error:  # its text may quote values of the file
                 raise_if_short(error, where)
                 raise SourceError(
                     f"{where}: its pixels can't be decoded, expected {frames[wanted[0]].rows} x "
@@ -70,9 +73,12 @@ def decode(
 
 
 def unpack_bits(values: NDArray[Any], encoding: Encoding) -> NDArray[Any]:
-    """Return stored values out of their containers: shifted down, masked, with their sign.
+    """Return stored values extracted from their containers: shifted, masked, sign-extended.
 
-    Bits above `high_bit` may hold an overlay. Integers come back as int64 or as they are.
+    values  integers or floats of any shape
+
+    Bits above `high_bit` may hold an overlay; they are cut off. Integers are returned as int64 or
+    in their own dtype.
     """
     if encoding.bits == 0:
         return values

@@ -1,9 +1,9 @@
-"""Sort DICOM frames into stacks, each a volume, and say what each holds without its description.
+"""Sort DICOM frames into stacks, each a volume, and label each without its description.
 
-A stack is one series, one frame of reference, one StackID, one size of pixels and planes, one
-orientation (read/dicom/group_frames.py): a localizer of three orientations is three stacks. Of
-frames at one place the first by instance number is taken; if every place holds the same number of
-them, and they differ, they are points in time (or echoes, or b-values) in the order of instance
+A stack has one series, one frame of reference, one StackID, one size of pixels and planes and one
+orientation (read/dicom/group_frames.py): a localizer of three orientations makes three stacks. Of
+frames at one place the first by instance number is taken. Where every place holds the same number
+of frames, and they differ, they are time points (or echoes, or b-values) in the order of instance
 numbers.
 """
 
@@ -30,9 +30,9 @@ AreEqual = Callable[[Frame, Frame], bool]
 class Stack:
     """Frames of one orientation.
 
-    times    for each point in time the frames along the normal; all equally many
-    layout   where they lie; None: they make no volume, and `problem` says why
-    notes    what is left out or changed, a sentence each
+    times    for each time point the frames along the normal; each point has the same number
+    layout   the planes' grid; None: they make no volume, and `problem` gives the reason
+    notes    changes and omissions, a sentence each
     """
 
     times: tuple[tuple[Frame, ...], ...]
@@ -46,14 +46,14 @@ class Stack:
 
     @property
     def voxels(self) -> int:
-        """How many the volume has; what can't be one has as many as its frames."""
+        """The number of voxels of the volume; without a volume, that of the frames' pixels."""
         if self.layout is not None:
             return int(np.prod(self.layout.shape, dtype=np.int64))
         return len(self.times[0]) * self.first.rows * self.first.columns
 
     @property
     def label(self) -> str:
-        """Modality, orientation, size and spacing: nothing that the file describes itself by."""
+        """Modality, orientation, size and spacing, without any description from the file."""
         frame = self.first
         normal = normal_of(frame.along_row, frame.along_column)
         name = f"{frame.modality or 'DICOM'}, {plane_name(normal)}"
@@ -67,9 +67,9 @@ class Stack:
 
 
 def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ...]:
-    """Return all stacks, volumes first, the largest first.
+    """Return all stacks: volumes before others, the largest first.
 
-    `are_equal` compares the pixels of two frames; it is asked only about frames at one place.
+    are_equal  compares the pixels of two frames; it is called only for frames at one place
     """
     groups = find_groups(frames)
     stacks = [_stack(group, are_equal, describe_neighbours(group, groups)) for group in groups]
@@ -83,7 +83,7 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
 
 
 def _explain_single(stacks: list[Stack], groups: list[Group]) -> list[Stack]:
-    """Where each of several stacks is one slice, say of each what keeps them apart."""
+    """Where each of several stacks is one slice, name the attributes that separate them."""
     if len(stacks) < 2 or any(len(stack.times[0]) > 1 for stack in stacks):
         return stacks
     apart = sorted({word for group in groups[1:] for word in group.differences(groups[0])})
@@ -99,7 +99,7 @@ def _stack(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> St
     times = 1
     if extra:
         pairs = ((place[0], other) for place in places for other in place[1:])
-        differ = any(not are_equal(a, b) for a, b in pairs)  # the first that differs ends it
+        differ = any(not are_equal(a, b) for a, b in pairs)  # stops at the first pair that differs
         if counts == {max(counts)} and differ:
             times = max(counts)
         else:

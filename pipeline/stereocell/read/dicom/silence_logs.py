@@ -1,4 +1,4 @@
-"""What pydicom and codecs say about damaged files may quote their values: it is not passed on."""
+"""Silence pydicom and the codecs: their messages about damaged files may quote the values."""
 
 import logging
 import struct
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pydicom import config as pydicom_config
 from pydicom.errors import BytesLengthException, InvalidDicomError
 
-# What pydicom and its codecs raise on damaged files; their texts may quote the values of tags.
+# Errors of pydicom and its codecs on damaged files; their texts may quote the values of tags.
 DICOM_FAULTS = (
     InvalidDicomError,
     BytesLengthException,
@@ -30,10 +30,10 @@ DICOM_FAULTS = (
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Let nothing of what pydicom and the codecs say reach a log or a warning inside the block."""
+    """Suppress all logs and warnings of pydicom and the codecs inside the block."""
     for name in ("pydicom", "pylibjpeg", "openjpeg", "highdicom"):
         logger = logging.getLogger(name)
-        logger.setLevel(logging.CRITICAL + 1)  # for good, and for all loggers below
+        logger.setLevel(logging.CRITICAL + 1)  # permanently, and for all loggers below
         logger.propagate = False
     mode = pydicom_config.settings.reading_validation_mode
     pydicom_config.settings.reading_validation_mode = pydicom_config.IGNORE

@@ -1,14 +1,17 @@
-"""Stored values of a DICOM file's frames, as pydicom hands them out, and the decoders behind it.
+"""Stored values of a DICOM file's frames, as pydicom returns them, and the decoders behind it.
 
-PLUGINS names which decoder unpacks which compressed pixels (transfer syntaxes of PS3.5 annex A.4),
-one by one: pydicom would take any that is installed, and one of these, pylibjpeg-libjpeg, is under
-the GPL. GDCM decodes JPEG (baseline, extended, lossless), CharLS JPEG-LS, OpenJPEG JPEG 2000 in
-both of its forms, and pydicom itself RLE: 1 ms for 384 x 274 x 16 bits, .3 ms by pylibjpeg-rle,
-which panics, with a backtrace that nothing stops, on a stream that is too long.
+PLUGINS assigns a decoder to every compressed transfer syntax, since pydicom would take any that is
+installed, and one of these, pylibjpeg-libjpeg, is under the GPL. GDCM decodes JPEG (baseline,
+extended, lossless), CharLS JPEG-LS, OpenJPEG both forms of JPEG 2000, and pydicom itself RLE: 1 ms
+for 384 x 274 x 16 bits. pylibjpeg-rle takes 0.3 ms, but panics on a stream that is too long, with a
+backtrace that can't be suppressed.
 
-A compressed image states its own size, which is checked before a decoder takes memory for it. JPEG
-and JPEG-LS: the frame header SOFn (ITU-T T.81 B.2.2, T.87 C.2.2). JPEG 2000: the marker SIZ (ITU-T
-T.800 A.5.1), bare or inside JP2 boxes. RLE states none.
+A compressed image states its own size, which is checked before a decoder allocates memory for it.
+JPEG and JPEG-LS: in the frame header SOFn. JPEG 2000: in the marker SIZ, bare or inside JP2 boxes.
+RLE states none.
+
+References: DICOM PS3.5 A.4 (transfer syntaxes of encapsulated pixels); ITU-T T.81 B.2.2 (JPEG);
+ITU-T T.87 C.2.2 (JPEG-LS); ITU-T T.800 A.5.1 (JPEG 2000).
 """
 
 import struct
@@ -42,13 +45,13 @@ _TAGS: list[Any] = [
 
 
 def open_pixels(path: Path) -> tuple[Any, str]:
-    """Return a file's pixels and what they need to be decoded, and the decoder; empty: none.
+    """Return a file's dataset with its pixels, and the decoder's name; empty: none needed.
 
-    Raises DICOM_FAULTS.
+    Raises DICOM_FAULTS where the file can't be read.
     """
     dataset = pydicom.dcmread(path, force=True, specific_tags=_TAGS)
     syntax = dataset.file_meta.get("TransferSyntaxUID") if dataset.file_meta else None
-    if syntax is None:  # without a file meta group: what the reader found the file to be
+    if syntax is None:  # no file meta group: the syntax that the reader detected
         implicit, little = dataset.original_encoding
         syntax = (
             pydicom.uid.ImplicitVRLittleEndian
@@ -66,14 +69,14 @@ def stored_values(dataset: Any, plugin: str, indices: Sequence[int]) -> Iterator
     """Yield the values (rows, columns) of frames, in their containers. Raises DICOM_FAULTS."""
     if plugin:
         _check_streams(dataset)
-    # all bits of the container: padding may lie in those above the stored ones
+    # all bits of the container: padding may use those above the stored ones
     return iter_pixels(
         dataset, indices=indices, raw=True, decoding_plugin=plugin, correct_unused_bits=False
     )
 
 
 def _check_streams(dataset: Any) -> None:
-    """Raise ValueError for a stream of another size than the header's: decoders believe streams."""
+    """Raise ValueError for a stream of another size than the header's: decoders trust streams."""
     count = int(dataset.get("NumberOfFrames") or 1)
     offsets = None
     if "ExtendedOffsetTable" in dataset:
@@ -104,17 +107,17 @@ _NATIVE = (uid.ImplicitVRLittleEndian, uid.ExplicitVRLittleEndian, uid.ExplicitV
 
 
 def is_compressed(syntax: str | None) -> bool:
-    """Return whether pixels in this transfer syntax must be unpacked; None: it is not stated."""
+    """Return whether pixels in this transfer syntax must be decoded; None: it is not stated."""
     return syntax is not None and syntax not in _NATIVE
 
 
-_J2K = b"\xff\x4f\xff\x51"  # SOC, then SIZ
-# SOF0 to SOF15 without DHT, JPG and DAC, which lie among them; SOF55 is JPEG-LS
+_J2K = b"\xff\x4f\xff\x51"  # markers SOC, then SIZ
+# markers SOF0 to SOF15 without DHT, JPG and DAC, which lie between them; SOF55 is JPEG-LS
 _FRAMES = {*range(0xC0, 0xD0), 0xF7} - {0xC4, 0xC8, 0xCC}
 
 
 def plane_size(stream: bytes) -> tuple[int, int] | None:
-    """Return (rows, columns) of a stream; None: it states none. Raises struct.error if cut."""
+    """Return (rows, columns) of a stream; None: none stated. Raises struct.error if cut short."""
     start = stream.find(_J2K, 0, 4096)
     if start >= 0:
         right, bottom, left, top = struct.unpack_from(">4I", stream, start + 8)
