@@ -1,1 +1,1 @@
-"""Tasks, on this machine or on a cluster."""
+"""Run tasks on this machine or on a cluster."""

@@ -1,4 +1,4 @@
-"""Join a Dask cluster that others have started, and see that it can do the work."""
+"""Join a running Dask cluster, and check that it can do the work."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.cache_key import key_of, libraries_of
 
-# The modules whose code workers must have in common, by name: this package stands below them
+# modules whose code must be equal on all workers; by name, since this package stands below them
 _MAKERS = (
     "stereocell.building.tasks.window",
     "stereocell.building.tasks.iso_value",
@@ -26,9 +26,9 @@ _MAKERS = (
 T = TypeVar("T")
 R = TypeVar("R")
 
-_ANSWER_S = 8  # in which a scheduler has to answer
-_WORKER_S = 20  # and to have its first worker
-_MAX_BYTES = 1 << 20  # of a scheduler file
+_ANSWER_S = 8  # s for a scheduler to answer
+_WORKER_S = 20  # s for its first worker to appear
+_MAX_BYTES = 1 << 20  # largest size of a scheduler file in bytes
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+")
 _EXPECTED = "expected the address of a Dask scheduler, as tcp://host:8786, or its scheduler file"
 
@@ -41,10 +41,11 @@ def join(scheduler: str, shared: Path | None) -> Any:
     """Return a client of a cluster.
 
     scheduler  address, as `tcp://host:8786`, or the path of a scheduler file
-    shared     a file that all workers have to see, or None
+    shared     a file that all workers must see, or None
 
-    Raises ClusterError if nobody answers, or the workers lack StereoCell, would make other bytes
-    than this process (another version, of a library too, or other code), or don't see the file.
+    Raises ClusterError where the scheduler doesn't answer, or where the workers lack StereoCell,
+    would write other bytes than this process (another version of StereoCell or of a library, other
+    code), or don't see the file.
     """
     is_file = Path(scheduler).is_file()
     address = _address_in(Path(scheduler)) if is_file else scheduler
@@ -93,16 +94,16 @@ def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
 
 
 def able(function: Callable[[T], R], shared: Path | None) -> Callable[[T], R]:
-    """Return a function that first holds its worker to what `join` asks of those that are there.
+    """Return a function that first applies the checks of `join` to its own worker.
 
-    Workers may come while others are at work.
+    Workers may join while others are at work.
     """
     return _Able(function, _look(), shared)
 
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """A worker: versions of what makes the bytes, a digest of our code, whether it sees a file."""
+    """A worker: versions of StereoCell and libraries, a digest of our code, access to a file."""
 
     host: str
     versions: tuple[tuple[str, str], ...]

@@ -1,6 +1,6 @@
-"""How a command is stopped: by Ctrl-C, or by SIGTERM, as batch systems and Kubernetes do it.
+"""Stop a command by Ctrl-C, or by SIGTERM, which batch systems and Kubernetes send.
 
-Ctrl-C reaches every process of a terminal's group; only the command itself is to answer it.
+Ctrl-C reaches every process of a terminal's group; only the command itself must react to it.
 """
 
 import signal
@@ -11,12 +11,12 @@ from multiprocessing import resource_tracker
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, which stops a command as Ctrl-C does: locks and half-made files are taken away."""
+    """SIGTERM; it stops a command as Ctrl-C does: locks and half-written files are removed."""
 
 
 @contextmanager
 def answering_sigterm() -> Iterator[None]:
-    """Within, SIGTERM raises Terminated. Only the main thread can ask for that."""
+    """Raise Terminated on SIGTERM inside the block; without effect outside the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -33,12 +33,12 @@ def _stop(*_: object) -> None:
 
 @contextmanager
 def children_ignore_interrupts() -> Iterator[None]:
-    """Within, processes and threads are started that SIGINT doesn't reach: they inherit the mask.
+    """Inside the block, start processes and threads that SIGINT doesn't reach (inherited mask).
 
-    Without it each worker prints a traceback of its own. One that comes meanwhile is not lost: it
+    Without it each worker prints a traceback of its own. A SIGINT inside the block is not lost: it
     is delivered at the end.
     """
-    resource_tracker.ensure_running()  # when it starts, it unblocks SIGINT in our thread
+    resource_tracker.ensure_running()  # its start unblocks SIGINT in our thread
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

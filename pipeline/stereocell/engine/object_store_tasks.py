@@ -1,4 +1,4 @@
-"""Tasks whose OUT lies on object storage: each worker finds it by itself, and tells what it put."""
+"""Tasks with OUT on object storage: each worker opens it and returns a list of its uploads."""
 
 import threading
 from collections.abc import Callable
@@ -13,12 +13,12 @@ from stereocell.storage.workspace import forget, joined, opened_here
 T = TypeVar("T")
 R = TypeVar("R")
 
-_working = threading.Lock()  # a worker of several threads does one task at a time
+_working = threading.Lock()  # a worker of several threads runs one task at a time
 
 
 @dataclass(frozen=True, slots=True)
 class _Carried(Generic[T, R]):
-    """A function that finds its OUT on any machine, and tells what it has put there."""
+    """A function that opens OUT on any machine, and returns its result and its uploads."""
 
     function: Callable[[T], R]
     place: Place
@@ -33,7 +33,7 @@ class _Carried(Generic[T, R]):
 
 @dataclass(frozen=True, slots=True)
 class _Asked(Generic[T, R]):
-    """A function that writes into a folder as long as the command is at work that asked for it."""
+    """A function that writes into a folder as long as the command that holds the claim runs."""
 
     function: Callable[[T], R]
     claim: Claim
@@ -44,7 +44,7 @@ class _Asked(Generic[T, R]):
 
 
 def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[Any], R]]:
-    """Return what workers are to run instead of a function, and what makes its result of theirs."""
+    """Return the function for workers to run in its place, and one that unpacks its result."""
     mirror = opened_here()
     if mirror is None:
         claim = held()
@@ -59,8 +59,8 @@ def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[A
 
 
 def forget_scratch(client: Any) -> None:
-    """Remove, on a cluster's workers, the folders in which they worked."""
+    """Remove the working folders on a cluster's workers."""
     mirror = opened_here()
     if mirror is not None:
-        with suppress(Exception):  # whatever befell the cluster
+        with suppress(Exception):  # whatever happened to the cluster
             client.run(forget, mirror.place.root)

@@ -1,8 +1,8 @@
 """Run a function over many tasks: inline, on worker processes of this machine, or on a cluster.
 
-The last two are one path, the `distributed` client. A cluster is whatever answers at a scheduler's
-address: `dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or dask-kubernetes.
-Its workers have to see OUT and the input under the same paths, and to run the same StereoCell.
+The last two share one path, the `distributed` client. A cluster is a scheduler at an address:
+`dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or dask-kubernetes. Its
+workers must see OUT and the input under the same paths, and run the same StereoCell.
 """
 
 import logging
@@ -32,8 +32,8 @@ from stereocell.storage.processes import shortage
 T = TypeVar("T")
 R = TypeVar("R")
 
-_START_S = 300  # for workers of this machine to answer: it may be busy
-_LOOK_S, _LOOKS = 15, 12  # for workers, while a task waits for one; a killed one is started anew
+_START_S = 300  # s for workers of this machine to start: it may be busy
+_LOOK_S, _LOOKS = 15, 12  # s between looks for workers, and looks until they count as gone
 _POLL_S = 0.05
 _AHEAD = 64  # tasks that wait for a worker
 _GONE = "its workers are gone and did not come back: the same command goes on from here"
@@ -42,15 +42,15 @@ console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 class TasksFailedError(StereoCellError):
-    """Some tasks failed; all others are finished. A line for each reason."""
+    """Some tasks failed; all others are finished. The text has a line for each reason."""
 
 
 class Engine:
-    """Workers for the length of a build.
+    """Workers for the duration of a build.
 
-    workers    processes of this machine; 0: none, tasks run inline (for debugging)
-    scheduler  address (`tcp://...`) or scheduler file of a running cluster, which is used instead
-    shared     a file that the cluster's workers have to see: it lies in OUT
+    workers    processes on this machine; 0: none, tasks run inline (for debugging)
+    scheduler  address (`tcp://...`) or scheduler file of a running cluster, used instead
+    shared     a file that the cluster's workers must see: it lies in OUT
     """
 
     def __init__(self, workers: int, scheduler: str = "", shared: Path | None = None) -> None:
@@ -64,7 +64,8 @@ class Engine:
     ) -> list[R]:
         """Return a result for each (name, argument), in their order, with a progress bar.
 
-        A task that fails doesn't stop the others. Raises TasksFailedError at the end.
+        A task that fails doesn't stop the others. Raises TasksFailedError at the end where some
+        failed, ClusterError where the workers can't be started or joined.
         """
         if not tasks:
             return []
@@ -79,10 +80,10 @@ class Engine:
                         failures[place] = _in_words(error)
                     advance(tasks[place][0], error is not None)
         except KeyboardInterrupt:
-            self.close()  # now: workers would go on writing into folders that are being removed
+            self.close()  # at once: workers would write into folders that are being removed
             raise
         if failures:
-            named: dict[str, list[str]] = {}  # one line for all that failed alike
+            named: dict[str, list[str]] = {}  # one line for all tasks that failed alike
             for place in sorted(failures):
                 named.setdefault(failures[place], []).append(tasks[place][0])
             lines = [f"{', '.join(names)}: {reason}" for reason, names in named.items()]
@@ -98,7 +99,7 @@ class Engine:
             for place, task in enumerate(tasks):
                 try:
                     result = function(task)
-                except Exception as error:  # as on a worker: one unit's failure is not the build's
+                except Exception as error:  # as on a worker: a unit's failure doesn't end the build
                     yield place, None, error
                 else:
                     yield place, result, None
@@ -127,8 +128,8 @@ class Engine:
             future.release()
         for place in (*futures.values(), *left):
             yield place, None, ClusterError(_GONE)
-        # whoever waited on a worker when another task killed it is blamed too: each once more, by
-        # itself, and only the one to blame fails again
+        # a killed worker fails all tasks that waited on it: each runs once more, alone, and only
+        # the task that kills its worker fails again
         for place in sorted(suspects):
             future = client.submit(work, tasks[place], pure=False)
             result, failure = _outcome_of(client, future)
@@ -143,7 +144,7 @@ class Engine:
             from distributed import Client
             from distributed.gc import disable_gc_diagnosis
 
-            # a killed worker that a busy machine does not start anew in 15 s is given up for good
+            # distributed drops a killed worker for good where a busy machine needs over 15 s for it
             dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
             with children_ignore_interrupts(), _started_in_time():
                 # units hold arrays of known size; distributed's spilling and pausing is in the way
@@ -156,13 +157,13 @@ class Engine:
                     silence_logs=logging.CRITICAL,
                     timeout=_START_S,
                 )
-            # its callback stays for good, and Python drops a Ctrl-C that falls into a callback
+            # its callback stays installed, and Python loses a Ctrl-C that arrives in a callback
             disable_gc_diagnosis()
         return self._client
 
     def close(self) -> None:
         if self._client is not None:
-            cluster = self._client.cluster  # None of one that others started: it stays
+            cluster = self._client.cluster  # None for a cluster that was running before: it stays
             if cluster is None:
                 forget_scratch(self._client)
             self._client.close()
@@ -173,7 +174,7 @@ class Engine:
 
 @contextmanager
 def _started_in_time() -> Iterator[None]:
-    """Raise ClusterError where distributed has only a TimeoutError without words."""
+    """Raise ClusterError in place of distributed's TimeoutError, which has no text."""
     try:
         yield
     except TimeoutError:
@@ -184,10 +185,10 @@ def _started_in_time() -> Iterator[None]:
 
 
 def _as_they_end(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
-    """Yield the futures that `submit` returns, until it returns None, as they end.
+    """Yield the futures that `submit` returns, in the order of completion, until it returns None.
 
-    Few more than there are workers wait at a time: each takes the scheduler's memory. No more are
-    yielded once there have been no workers for long.
+    Few more tasks than workers wait at a time: each takes memory of the scheduler. The iterator
+    ends early once the workers have been absent for long.
     """
     from distributed import as_completed
 
@@ -196,7 +197,7 @@ def _as_they_end(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
     while missed < _LOOKS:
         if time.monotonic() - looked > _LOOK_S:
             threads = 0
-            with suppress(Exception):  # a scheduler that is gone: its futures are told so
+            with suppress(Exception):  # the scheduler is gone: its futures report it
                 threads = sum(client.nthreads().values())
             looked, missed = time.monotonic(), 0 if threads else missed + 1
             most = max(_AHEAD, 2 * threads)
@@ -213,9 +214,9 @@ def _as_they_end(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
 
 
 def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
-    """Wait for a task and return its result and None, or None and why it failed.
+    """Wait for a task; return its result and None, or None and the error.
 
-    A scheduler that is gone is such a reason, and so are workers that stay away.
+    A lost scheduler is such an error, and so are workers that stay away.
     """
     from distributed import CancelledError
 
@@ -252,9 +253,9 @@ def _in_words(error: BaseException) -> str:
 
 @contextmanager
 def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
-    """Yield a function to call once a task is over, with its name and whether it failed.
+    """Yield a function to call at the end of each task, with its name and whether it failed.
 
-    A bar on a terminal; elsewhere, as in a log, a line for each task.
+    On a terminal it draws a bar; elsewhere, as in a log, it prints a line for each task.
     """
     if not console.is_terminal:
         done = 0

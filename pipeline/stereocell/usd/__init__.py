@@ -1,1 +1,1 @@
-"""The USD stage: written, and read back composed."""
+"""The USD stage: writers, readers of the composed stage, validation."""

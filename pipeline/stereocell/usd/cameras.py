@@ -1,11 +1,13 @@
 """Frame a specimen with three cameras: `mono`, and `left` and `right` for a stereo pair.
 
-The specimen is looked at as the viewer shows it in a room, its longest edge 1.2 m: the distance
-between the eyes, 63 mm, shrinks by the same scale. The eyes look straight ahead, parallel; their
+The viewer shows the specimen in a room, its longest edge 1.2 m; the cameras use the same scale. The
+distance between the eyes, 63 mm, shrinks by it. The eyes look straight ahead, parallel; their
 windows are shifted so that both see the specimen's centre at the same place (off-axis stereo, no
 keystone distortion).
 
-USD gives lens numbers in tenths of a stage unit, so millimetres become mm * 0.01 / metersPerUnit.
+USD states lens numbers in tenths of a stage unit: millimetres become mm * 0.01 / metersPerUnit.
+
+References: OpenUSD, UsdGeomCamera (units of camera lens attributes).
 """
 
 import numpy as np
@@ -14,21 +16,21 @@ from pxr import Gf, Usd, UsdGeom
 
 from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, vec3d
 
-ROOM_SIZE_M = 1.2  # the specimen's longest edge, as the viewer shows it
+ROOM_SIZE_M = 1.2  # m, the specimen's longest edge in the viewer's room
 PUPIL_DISTANCE_M = 0.063
 FOCAL_LENGTH_MM = 35.0
-APERTURE_MM = (36.0, 20.25)  # 16:9
-MARGIN = 1.08  # so much farther away than where the specimen would fill the frame
+APERTURE_MM = (36.0, 20.25)  # (width, height), 16:9
+MARGIN = 1.08  # distance as a multiple of the one at which the specimen fills the frame
 
-_LENS = 0.01 / METERS_PER_UNIT
+_LENS = 0.01 / METERS_PER_UNIT  # mm -> tenths of a stage unit
 
 
 def define_cameras(stage: Usd.Stage, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
-    """Define the cameras for a box in world um (x, y, z), seen from +z."""
+    """Define the cameras, seen from +z, for a box with corners (x, y, z), float64, world um."""
     width, height, depth = (float(v) for v in high - low)
     eye = 0.5 * PUPIL_DISTANCE_M * max(width, height, depth) / ROOM_SIZE_M
     across, upwards = (0.5 * a / FOCAL_LENGTH_MM for a in APERTURE_MM)
-    # the front of the box fills the frame first; half an eye distance more keeps it in both eyes'
+    # the front of the box fills the frame first; half an eye distance keeps it in both eyes' frames
     to_front = MARGIN * max((width / 2 + eye) / across, height / 2 / upwards)
     distance = to_front + depth / 2
     centre = (low + high) / 2

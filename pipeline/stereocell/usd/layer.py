@@ -1,4 +1,4 @@
-"""What every layer of a stage has in common: its units, its root prim, how it gets to disk.
+"""The common part of every layer of a stage: units, root prim, export to disk.
 
 USD never rescales between layers, so each layer states micrometres, Y up and its default prim.
 Importing this module registers the codeless API schema of schemas/usd with USD, which reads its
@@ -17,7 +17,7 @@ from stereocell.model.volume import zyx_to_xyz
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing
 
-METERS_PER_UNIT = 1e-6
+METERS_PER_UNIT = 1e-6  # a stage unit is 1 um
 UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
 CHANNELS = ROOT.AppendChild("Channels")
@@ -27,15 +27,15 @@ CHANNEL_API = "StereoCellChannelAPI"
 SPECIMEN_API = "StereoCellSpecimenAPI"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 
-SHAPE_HASH = "stereocell:shapeHash"  # of a mesh: the shape that the pipeline gave it
+SHAPE_HASH = "stereocell:shapeHash"  # attribute: hash of a mesh's shape as built
 
 Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
 
 
 def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
-    """Return a stage in memory whose one layer has its units and the name of its root prim.
+    """Return a stage in memory with one layer, its units and the name of its root prim.
 
-    Payloads stay unloaded: the files that they name need not exist yet.
+    Payloads stay unloaded: their files need not exist yet.
     """
     layer = Sdf.Layer.CreateAnonymous(suffix)
     layer.defaultPrim = default_prim
@@ -46,8 +46,8 @@ def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
 
 
 def is_layer(file: Path) -> bool:
-    """Return whether USD can open a file as a layer, read anew from the disk."""
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # of a damaged one USD prints pages
+    """Return whether USD can open a file as a layer; the file is read anew from the disk."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD prints pages about a damaged layer
     try:
         return Sdf.Layer.OpenAsAnonymous(str(file)) is not None
     except Tf.ErrorException:
@@ -57,7 +57,7 @@ def is_layer(file: Path) -> bool:
 
 
 def export(layer: Sdf.Layer, path: Path) -> None:
-    """Write a layer, whole or not at all. Raises OutputError."""
+    """Write a layer, whole or not at all. Raises OutputError where it can't be written."""
     with replacing(path) as temporary:
         try:
             written = layer.Export(str(temporary))
@@ -76,7 +76,7 @@ def set_attribute(
 
 
 def hash_shape(mesh: UsdGeom.Mesh) -> str:
-    """Return a hash of a mesh's points and faces as composed; empty: they are no numbers."""
+    """Return a hash of a composed mesh's points and faces; empty where they aren't numbers."""
     digest = hashlib.sha256()
     faces = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
     for attribute, kind in ((mesh.GetPointsAttr(), "<f4"), *((one, "<i4") for one in faces)):
@@ -90,22 +90,29 @@ def hash_shape(mesh: UsdGeom.Mesh) -> str:
 
 
 def vec3f(points: ArrayLike) -> Vt.Vec3fArray:
-    """Return (n, 3) numbers as USD's array."""
+    """Return (n, 3) numbers of any dtype as USD's array of float32."""
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, dtype=np.float32))
 
 
 def world_box(
     first_um: ArrayLike, last_um: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lower and upper corner (x, y, z) in world of a box between points (z, y, x)."""
-    corners = zyx_to_xyz(np.stack([first_um, last_um])) + 0.0  # no negative zeros
+    """Return the lower and upper corner (x, y, z), world um, of the box between two points.
+
+    first_um, last_um  (z, y, x), um
+    """
+    corners = zyx_to_xyz(np.stack([first_um, last_um])) + 0.0  # adding 0.0 turns -0.0 into 0.0
     return corners.min(axis=0), corners.max(axis=0)
 
 
 def move_box(
     low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the box along the world's axes around a box moved by a (4, 4) matrix for rows."""
+    """Return the axis-aligned box around a moved box: lower and upper corner (x, y, z), world um.
+
+    low, high  corners (x, y, z), um
+    matrix     (4, 4) for row vectors
+    """
     picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
     corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
     return corners.min(axis=0), corners.max(axis=0)

@@ -1,4 +1,4 @@
-"""Read single values of a composed stage, and say which prim lacks one."""
+"""Read single values of a composed stage. Errors name the prim."""
 
 from math import isfinite
 from pathlib import Path
@@ -12,8 +12,8 @@ from stereocell.model.errors import StageError
 Point = tuple[float, float, float]
 
 
-def value_of(prim: Usd.Prim, name: str) -> Any:  # what USD holds there
-    """Return an attribute's value at the default time. Raises StageError if it has none."""
+def value_of(prim: Usd.Prim, name: str) -> Any:  # USD's type of the attribute
+    """Return an attribute's value at the default time. Raises StageError where it has none."""
     value = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
     if value is None:
         raise StageError(f"{prim.GetPath()}.{name}: no value")
@@ -30,7 +30,7 @@ def file_of(attribute: Usd.Attribute) -> Path:
 
 
 def color_of(attribute: Usd.Attribute) -> tuple[float, float, float]:
-    """Return a colour. Raises StageError if it is none, or one brighter than glTF can say."""
+    """Return a colour, linear RGB. Raises StageError where a part is absent or outside 0..1."""
     value = attribute.Get() if attribute else None
     if value is None or not all(0 <= part <= 1 for part in value):
         raise StageError(f"{attribute.GetPath()}: {value}, expected three numbers in 0..1")
@@ -53,7 +53,7 @@ def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
 
 
 def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
-    """Return an attribute's whole numbers, each 0 or more. Raises StageError."""
+    """Return an attribute's whole numbers. Raises StageError unless there are `count`, all >= 0."""
     numbers = numbers_of(prim, name, count)
     if not all(number >= 0 and number.is_integer() for number in numbers):
         raise StageError(f"{prim.GetPath()}.{name}: found {numbers}, expected sizes in voxels")
@@ -61,13 +61,13 @@ def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
 
 
 def point_of(prim: Usd.Prim, name: str) -> Point:
-    """Return a place, or a distance along three axes. Raises StageError."""
+    """Return a point or a vector (x, y, z). Raises StageError unless it has 3 finite numbers."""
     x, y, z = numbers_of(prim, name, 3)
     return x, y, z
 
 
 def shortest(number: float) -> float:
-    """Return the shortest decimal that is this float32: 0.2, not 0.20000000298023224."""
+    """Return the shortest decimal of a float32: 0.2, not 0.20000000298023224."""
     return float(str(np.float32(number)))
 
 
@@ -79,10 +79,10 @@ def select_variant(prim: Usd.Prim, variant_set: str, variant: str) -> None:
 
 
 def one_line(error: object) -> str:
-    """Return what USD says about an error, without its line breaks and places in its source."""
+    """Return USD's message of an error without line breaks and places in USD's source."""
     args = error.args if isinstance(error, Tf.ErrorException) else ()
     try:
         text = "; ".join(entry.commentary for entry in args) or str(error)
-    except UnicodeDecodeError:  # it quotes what is no text
+    except UnicodeDecodeError:  # the message quotes bytes that aren't text
         text = "a layer or a file of it is damaged"
     return " ".join(text.split())

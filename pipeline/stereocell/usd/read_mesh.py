@@ -1,8 +1,8 @@
-"""Read a mesh of a composed stage as it is drawn: triangles, in the world, one value a vertex.
+"""Read a mesh of a composed stage as USD draws it: triangles in the world, one value per vertex.
 
-The pipeline's own meshes are triangles with vertex normals and pass through unchanged. What a DCC
-tool may have made of them passes too: polygons, values per face corner, left-handed orientation,
-moved and mirrored tiles.
+The pipeline's own meshes are triangles with vertex normals and pass through unchanged. Edits by a
+DCC tool are converted: polygons, values per face corner, left-handed orientation, moved and
+mirrored tiles.
 """
 
 from collections.abc import Collection
@@ -25,10 +25,11 @@ def read_mesh(
     *,
     is_edited: bool = False,
 ) -> Mesh | None:
-    """Return the mesh in world um, at the default time; None if it has no faces.
+    """Return the mesh in world um, at the default time; None where it has no faces.
 
-    `to_world`: matrix for row vectors, (4, 4). `shown`: which of the primvars `displayColor` and
-    `occlusion` its look takes up. `is_edited`: primvars that fit other faces are left out.
+    to_world   (4, 4), float64, for row vectors
+    shown      the primvars that its material reads: `displayColor`, `occlusion`
+    is_edited  drop the primvars that fit other faces
 
     Raises StageError where its arrays contradict each other.
     """
@@ -115,7 +116,7 @@ def _primvar(primvar: UsdGeom.Primvar) -> _Values | None:
 
 
 def _triangulate(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles of each face as a fan, (m, 3), as positions in the face corners."""
+    """Return the triangles of each face as a fan, (m, 3), as indices of face corners."""
     starts = np.cumsum(counts) - counts
     if (counts == 3).all():
         return starts[:, np.newaxis] + np.arange(3)
@@ -133,9 +134,10 @@ def _split(
     corners: NDArray[np.int64],
     values: dict[str, _Values],
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], dict[str, NDArray[np.float32]]]:
-    """Give every face corner a vertex, and join those that are equal in all values.
+    """Give every face corner a vertex, and join vertices that are equal in all values.
 
-    Returns triangles (m, 3), points (n, 3) and the values per vertex.
+    Returns triangles (m, 3), points (n, 3) and the values per vertex. Raises StageError where a
+    number of values doesn't fit its interpolation.
     """
     columns = {"points": points[indices]}
     for name, (array, kind) in values.items():
@@ -162,7 +164,7 @@ def _split(
 def _smooth_normals(
     points: NDArray[np.float32], triangles: NDArray[np.int64]
 ) -> NDArray[np.float32]:
-    """Return unit normals at the vertices, each face weighted by its area."""
+    """Return unit normals (n, 3) at the vertices, each face weighted by its area."""
     a, b, c = (points[triangles[:, i]].astype(np.float64) for i in range(3))
     facing = np.cross(b - a, c - a)
     total = np.zeros((len(points), 3))

@@ -1,8 +1,7 @@
-"""Read the tiles of a composed stage, whatever layers an artist put over it.
+"""Read the tiles of a composed stage, including all layers that an artist put over it.
 
-Everything comes through pxr's composition: colours, visibility, moved tiles, chosen variants. The
-levels of detail are variants; they are looked through one by one by selections in the session
-layer.
+All values pass pxr's composition: colours, visibility, moved tiles, chosen variants. The levels of
+detail are variants; the reader selects one after the other in the session layer.
 """
 
 from collections.abc import Iterator
@@ -45,12 +44,12 @@ from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
 from stereocell.usd.written_files import AsWritten
 
-_FARTHEST_UM = 1e12  # from the origin: what float32 and browsers still draw
+_FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
 @dataclass(frozen=True, slots=True)
 class MadeMaps:
-    """Maps of a level that was made anew, uint8: normals (h, w, 3), openness (h, w), sRGB."""
+    """Maps of a recomputed level, uint8: normals (h, w, 3), openness (h, w), sRGB (h, w, 3)."""
 
     normal: NDArray[np.uint8] | None
     occlusion: NDArray[np.uint8] | None
@@ -62,10 +61,11 @@ class ComposedLod:
     """One level of detail, in world um. `level` counts from the finest, 0.
 
     matrix  (4, 4) for row vectors, from the mesh's own space to world um
-    shape   hash of the points and faces as composed; `built`: as the pipeline made them, or empty
+    shape   hash of the composed points and faces
+    built   the same hash as the pipeline wrote it; empty: the stage has none
     own     the mesh prim's own transform
-    lost    what an edit left without sense: values for other vertices
-    images  maps in memory, where the level was made anew: see bundle/edited_meshes.py
+    lost    values that an edit invalidated: they belong to other vertices
+    images  maps in memory, where the level was recomputed: see bundle/edited_meshes.py
     """
 
     level: int
@@ -83,10 +83,11 @@ class ComposedLod:
 
 @dataclass(frozen=True, slots=True)
 class ComposedVolume:
-    """One volume: the file with its voxels, and where they are.
+    """One volume: the file with its voxels, and its place.
 
     field       the .vdb that other programs draw; None: the stage names none
     size        voxels (x, y, z) with the apron
+    apron       voxels on each side
     low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
     matrix      (4, 4) for row vectors, to world um
     """
@@ -101,8 +102,8 @@ class ComposedVolume:
 
 
 def open_stage(path: Path) -> Usd.Stage:
-    """Open a stage without its payloads. Raises StageError if it is none, or in other units."""
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    """Open a stage without its payloads. Raises StageError where it can't, or for other units."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     except Tf.ErrorException as error:
@@ -124,10 +125,12 @@ def open_stage(path: Path) -> Usd.Stage:
 
 
 def dependencies(path: Path, stage_dir: Path) -> list[Path]:
-    """Return every file that a stage is made of: layers, also unselected ones, and assets.
+    """Return every file of a stage: layers, including unselected ones, and assets.
 
-    None is opened that isn't the stage's own: in the folder of the layer `path`, in `stage_dir` or
-    below. Raises StageError for one that is not; what can't be opened, `open_stage` tells.
+    path       the stage's layer; `stage_dir` is the folder of the stage below it
+
+    Only files in the folder of `path`, in `stage_dir` or below are opened. Raises StageError for a
+    file outside them. Files that can't be opened are skipped: `open_stage` reports them.
     """
     folders = [Location.of(path).folder, Location.of(stage_dir).folder]
     files, names, waiting = {path}, {str(path)}, [str(path)]
@@ -135,7 +138,7 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
     try:
         while waiting:
             for asset, name in _named_in(waiting.pop()):
-                file = Path(Ar.SplitPackageRelativePathOuter(name)[0])  # what is in a .usdz: that
+                file = Path(Ar.SplitPackageRelativePathOuter(name)[0])  # of an entry: its .usdz
                 if name in names or not require_own(file, folders, named=asset, raised=StageError):
                     continue
                 files.add(file)
@@ -148,13 +151,13 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
 
 
 def _named_in(name: str) -> Iterator[tuple[str, str]]:
-    """Yield what one layer names, as an error would say it, and the path that USD would open."""
+    """Yield the references of one layer: their names for messages, and the paths that USD opens."""
     try:
         layer = Sdf.Layer.FindOrOpen(name)
         named = chain(*UsdUtils.ExtractExternalReferences(name)) if layer else ()
     except Tf.ErrorException:
         return
-    if layer and layer.expressionVariables:  # layers above it could make other paths of them
+    if layer and layer.expressionVariables:  # layers above can change the paths
         raise StageError(f"{name}: expressionVariables: found some, expected paths without them")
     for asset in named:
         path = Sdf.ComputeAssetPathRelativeToLayer(layer, Sdf.Layer.SplitIdentifier(asset)[0])
@@ -169,7 +172,7 @@ def specimen_name(stage: Usd.Stage) -> str:
 
 
 def modality_of(stage: Usd.Stage) -> str:
-    """Return what took the specimen, `MR` or the like; empty: the stage does not say."""
+    """Return DICOM's code of the modality, `MR` or the like; empty: the stage states none."""
     attribute = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality")
     return str((attribute.Get() if attribute else None) or "")
 
@@ -182,9 +185,9 @@ def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:
 
 
 def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the box in the world, um, that a tile says it fills, loaded or not: its extentsHint.
+    """Return the lower and upper corner (x, y, z), world um, of a tile's extentsHint.
 
-    Raises StageError if it has none.
+    The tile need not be loaded. Raises StageError where it has no hint or an invalid one.
     """
     hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
     if not hint:
@@ -199,10 +202,12 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
 def loaded(
     stage: Usd.Stage, tile_id: str, as_written: AsWritten | None = None
 ) -> Iterator[tuple[Usd.Prim, TileChoice]]:
-    """Yield a tile's prim with its payload loaded, and what is chosen for it.
+    """Yield a tile's prim with its payload loaded, and its selected variants.
 
-    Its meshes and volumes are both active, whichever was chosen. Raises StageError; for a layer
-    that is damaged, too, where the stage is held against its list.
+    as_written  the lists to compare the tile's files with; None: no comparison
+
+    Its meshes and volumes are both active, whatever was selected. Raises StageError where the
+    payload can't be composed, or where a layer differs from its list as a damaged one does.
     """
     path = TILES.AppendChild(tile_id)
     with cached(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
@@ -213,13 +218,13 @@ def loaded(
 
 
 def _stage_folders(stage: Usd.Stage) -> list[Path]:
-    """Return where the layers lie that a stage is made of, without its payloads."""
+    """Return the folders of a stage's layers, without its payloads."""
     paths = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
     return sorted({Path(path).parent for path in paths})
 
 
 def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileChoice]]:
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     stage.Load(path)
     del quiet
     try:
@@ -234,7 +239,7 @@ def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileCh
 
 
 def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[ComposedLod]:
-    """Yield a loaded tile's levels of detail of one channel, `finest` first; none: no surface.
+    """Yield a loaded tile's levels of detail of one channel from `finest` on; none: no surface.
 
     Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
     """
@@ -272,7 +277,7 @@ def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[Comp
 
 
 def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> ComposedLod:
-    """Return an edited level without the maps and values at vertices that fit other faces."""
+    """Return an edited level without maps and vertex values that belong to other faces."""
     mesh, lost, has_color = lod.mesh, [], True
     if lod.maps.any and mesh.uvs is None:
         has_color = lod.maps.color is None
@@ -284,14 +289,14 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
         lost.append("colours")
         has_color = False
     colors = np.array(UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() or [], np.float64)
-    if not has_color and colors.size:  # one instead of them
+    if not has_color and colors.size:  # one average colour replaces them
         r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
         lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
     return replace(lod, lost=tuple(lost))
 
 
 def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
-    """Return an edited level's mesh in its own space. Raises StageError."""
+    """Return an edited level's mesh in its own space. Raises StageError where it is gone."""
     prim = mesh_at(tile, channel_id, level)
     found = None
     if prim is not None:
@@ -303,7 +308,7 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
 
 
 def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
-    """Return the levels whose faces somebody took away, all of them."""
+    """Return the levels whose faces an edit removed, all of them."""
     found = []
     for level in lod_levels(tile) or [0]:
         prim = mesh_at(tile, channel_id, level)
@@ -315,7 +320,7 @@ def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
 
 
 def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
-    """Return the mesh that is drawn at a level, which is selected; None: none is."""
+    """Select a level and return the mesh that it draws; None: it draws none."""
     if lod_levels(tile):
         select_variant(tile, "lod", f"lod{level}")
     prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))
@@ -323,7 +328,7 @@ def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
 
 
 def _edit_advice(level: int) -> str:
-    """An edit outside the variants lies over every level of detail, and fits one at most."""
+    """Explain that an edit outside the variants overrides all levels, and fits one at most."""
     return (
         f" at lod{level}: edit inside the variant lod=lod{level}, or override points, "
         "faceVertexCounts, faceVertexIndices and normals together"
@@ -331,7 +336,10 @@ def _edit_advice(level: int) -> str:
 
 
 def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
-    """Return a loaded tile's volume of one channel; None if it is not drawn. Raises StageError."""
+    """Return a loaded tile's volume of one channel; None if it is not drawn.
+
+    Raises StageError where its attributes are missing or contradict each other.
+    """
     name = f"{channel_id}_{tile.GetName()}_volume"
     prim = _drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{name}"))
     if prim is None:
@@ -363,7 +371,7 @@ def _field_of(volume: Usd.Prim) -> Path | None:
 
 
 def _check_composition(stage: Usd.Stage) -> None:
-    """Raise StageError on the first layer, payload or reference that did not come in."""
+    """Raise StageError for the first layer, payload or reference that USD failed to compose."""
     errors = stage.GetCompositionErrors()
     if errors:
         raise StageError(f"{stage.GetRootLayer().realPath}: {one_line(errors[0])}")
@@ -379,11 +387,11 @@ def _is_visible(prim: Usd.Prim) -> bool:
 
 
 def _to_world(prim: Usd.Prim) -> NDArray[np.float64]:
-    """Return the matrix from a prim's space to the world for row vectors, (4, 4).
+    """Return the matrix (4, 4) from a prim's space to the world, for row vectors.
 
-    Raises StageError for one that no surface survives.
+    Raises StageError where it is flat, infinite or leads too far away.
     """
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     try:
         matrix = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
     except Tf.ErrorException as error:

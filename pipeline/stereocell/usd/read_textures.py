@@ -1,4 +1,4 @@
-"""What feeds a surface shader of a composed stage beside plain values: images, mesh vertices."""
+"""Inputs of a surface shader of a composed stage other than plain values: images, vertex values."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from stereocell.usd.shader_inputs import FEEDS, Kind
 
 @dataclass(frozen=True, slots=True)
 class ComposedMaps:
-    """Images of a surface: normals (raw), ambient occlusion (raw, red), colours (sRGB)."""
+    """Image files of a surface: normals (raw), ambient occlusion (raw, red), colours (sRGB)."""
 
     normal: Path | None = None
     occlusion: Path | None = None
@@ -31,14 +31,17 @@ class ComposedMaps:
 
 
 def maps_of(surface: UsdShade.Shader) -> ComposedMaps:
-    """Return the images that feed a surface. Raises StageError if one is missing."""
+    """Return the images that feed a surface. Raises StageError where one is missing."""
     return ComposedMaps(*(_image(surface, kind) for kind in ("normal", "occlusion", "color")))
 
 
 def read_image(path: Path | NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return an image uint8 (y, x, 3), both edges multiples of 4, as Basis Universal asks.
+    """Return an image uint8 (y, x, 3), both edges multiples of 4, as Basis Universal requires.
 
-    One that was made in memory has such edges, and may be (y, x). Raises StageError.
+    path  a file, which is resized where needed, or an image in memory, uint8, (y, x) or (y, x, 3),
+          with such edges
+
+    Raises StageError where the file can't be read as an image.
     """
     if not isinstance(path, Path):
         return path if path.ndim == 3 else np.repeat(path[..., None], 3, axis=2)
@@ -54,7 +57,7 @@ def read_image(path: Path | NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def vertex_values_of(surface: UsdShade.Shader) -> set[str]:
-    """Return the primvars of the mesh that feed occlusion and colour: those that we author."""
+    """Return the primvars of the mesh that feed occlusion and colour, of those that we author."""
     kinds: tuple[Kind, ...] = ("occlusion", "color")
     readers = {FEEDS[kind].primvar: (feeder(surface, kind), FEEDS[kind].reader) for kind in kinds}
     return {

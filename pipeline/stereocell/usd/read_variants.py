@@ -1,4 +1,4 @@
-"""Read what an artist has chosen for a tile of a composed stage: its two sets of variants."""
+"""Read the variants that an artist selected for a tile of a composed stage: two variant sets."""
 
 import re
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ _LOD = re.compile(r"lod(\d+)")
 
 @dataclass(frozen=True, slots=True)
 class TileChoice:
-    """How a tile is to be drawn, and its finest level of detail that anyone is to see.
+    """The representation of a tile to draw, and the finest level of detail to show.
 
-    `lod1` is what a stage selects by itself, so it says no more than `lod0`: that all levels are
-    wanted. A coarser one is a choice.
+    finest_lod  0: all levels. A stage selects `lod1` by default, so `lod1` means the same as
+                `lod0`; a coarser level is an artist's choice.
     """
 
     representation: Representation
@@ -27,7 +27,7 @@ class TileChoice:
 
 
 def read_choice(tile: Usd.Prim) -> TileChoice:
-    """Return what is chosen for a loaded tile. Raises StageError for a variant that is none."""
+    """Return the selections of a loaded tile. Raises StageError for an unknown variant."""
     return TileChoice(_representation(tile), _finest_lod(tile))
 
 
@@ -51,8 +51,8 @@ def _representation(tile: Usd.Prim) -> Representation:
 
 
 def _what_is_active(tile: Usd.Prim) -> Representation:
-    """Return what a tile without a choice draws: flattening leaves what was chosen, no variants."""
-    prims = list(Usd.PrimRange(tile))  # inactive ones are left out
+    """Return the drawn representation of a flattened tile, which has no variants any more."""
+    prims = list(Usd.PrimRange(tile))  # inactive prims are left out
     has_volume = any(prim.IsA(UsdVol.Volume) for prim in prims)
     if not has_volume:
         return "mesh"

@@ -1,7 +1,7 @@
-"""Feed a surface shader from what lies on a mesh: images by its UVs, or values at its vertices.
+"""Feed a surface shader from the mesh: images by its UVs, or values at its vertices.
 
-One shader network for stage and usdz. Everything is fed into the look's `surface`, a
-UsdPreviewSurface; image files are PNG, colours in sRGB, all else raw.
+Stage and usdz share this shader network. All inputs feed the material's `surface`, a
+UsdPreviewSurface. Image files are PNG: colours in sRGB, all others raw.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class _Feed:
-    """How one kind gets into the shader: its input, the image's output, and a primvar's name."""
+    """One kind's way into the shader: its input, the image's output, the primvar's name."""
 
     input: str
     type: Any
@@ -44,7 +44,7 @@ FEEDS: dict[Kind, _Feed] = {
 
 
 def feed_image(stage: Usd.Stage, look: Sdf.Path, kind: Kind, file: str) -> None:
-    """Feed an image to the surface shader of a look, by the mesh's `primvars:st`."""
+    """Feed an image to the surface shader of a material (`look`), by the mesh's `primvars:st`."""
     feed = FEEDS[kind]
     reader = UsdShade.Shader.Define(stage, look.AppendChild("st"))
     reader.CreateIdAttr("UsdPrimvarReader_float2")
@@ -67,7 +67,7 @@ def feed_image(stage: Usd.Stage, look: Sdf.Path, kind: Kind, file: str) -> None:
 def feed_vertices(
     mesh: UsdGeom.Mesh, look: Sdf.Path, kind: Kind, values: NDArray[np.float32]
 ) -> None:
-    """Put values on a mesh's vertices, (n,) or (n, 3), and feed them to its look's surface."""
+    """Store values at a mesh's vertices, (n,) or (n, 3), float32, and feed them to its surface."""
     feed, stage = FEEDS[kind], mesh.GetPrim().GetStage()
     set_primvar(mesh, kind, values)
     reader = UsdShade.Shader.Define(stage, look.AppendChild(feed.primvar))
@@ -77,7 +77,7 @@ def feed_vertices(
 
 
 def set_primvar(mesh: UsdGeom.Mesh, kind: Kind, values: NDArray[np.float32]) -> None:
-    """Put values on a mesh's vertices."""
+    """Store values at a mesh's vertices: (n,), or (n, 3) for colours."""
     data = np.ascontiguousarray(values, dtype=np.float32)
     is_color = kind == "color"
     primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(

@@ -1,13 +1,13 @@
-"""Check a stage: every validator that USD ships, and what they do not see.
+"""Check a stage: every validator that USD ships, and the faults that they miss.
 
-USD's validators find missing files (in unselected variants too), faults of metadata, of API schemas
-and of nesting. They do not see units that differ between layers, selections of variants that do
-not exist, wrong counts, indices and extents, names that only their folder tells apart, fields whose
-grid their .vdb lacks: those are checked here. No validator needs an exception: what
-usd/write_stage.py writes passes all of them.
+USD's validators find missing files (in unselected variants too) and faults of metadata, of API
+schemas and of nesting. They miss units that differ between layers, selections of variants that
+don't exist, wrong counts, indices and extents, names that are unique only within their folder, and
+fields whose grid is missing in their .vdb: this module checks those. No validator needs an
+exception: the output of usd/write_stage.py passes all of them.
 
-Both run once for each level of detail, since each has a geometry of its own; the channels' transfer
-functions take turns with them, and meshes and volumes are active together.
+Both run once for each level of detail, since each has its own geometry; the channels' transfer
+functions alternate with the levels, and meshes and volumes are active together.
 """
 
 import math
@@ -26,7 +26,7 @@ from stereocell.usd.layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
 from stereocell.usd.read_attributes import one_line
 
 _ALL_SHOWN = {"representation": "both"}
-_TOLERANCE = 1e-4  # of a box's size: extents are float32
+_TOLERANCE = 1e-4  # share of a box's size: extents are float32
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +42,8 @@ class Finding:
 
 
 def validate_stage(path: Path) -> list[Finding]:
-    """Return the faults of a stage with all its payloads; an empty list says that it is clean."""
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would also print what is returned here
+    """Return the faults of a stage with all its payloads; an empty list: the stage is valid."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the findings, too
     findings: list[Finding] = []
     try:
         stage = Usd.Stage.Open(str(path))
@@ -52,14 +52,14 @@ def validate_stage(path: Path) -> list[Finding]:
         for turn in range(passes):
             _select_variants(stage, turn)
             findings += _check_all(stage)
-    except Tf.ErrorException as error:  # a layer that can't be read ends it all
+    except Tf.ErrorException as error:  # an unreadable layer ends the check
         findings.append(Finding("open", str(path), one_line(error)))
     del quiet
     return list(dict.fromkeys(findings))
 
 
 def validate_usdz(path: Path) -> list[Finding]:
-    """Return the faults of a specimen.usdz: USD's validators, those of usdz among them, and ours.
+    """Return the faults of a specimen.usdz by USD's validators, those of usdz included, and ours.
 
     Its units are metres, as AR viewers expect, and all of it is drawn at once.
     """
@@ -120,7 +120,7 @@ def _name_layer(layer: Sdf.Layer) -> str:
 
 
 def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
-    """Yield layers whose units, up axis or default prim are not the stage's: USD rescales none."""
+    """Yield layers with other units, up axis or default prim than the stage: USD never rescales."""
     session = stage.GetSessionLayer()
     for layer in sorted(stage.GetUsedLayers(), key=_name_layer):
         if layer == session:
@@ -140,7 +140,7 @@ def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def _check_names(stage: Usd.Stage) -> Iterator[Finding]:
-    """Yield names that two drawn things share: clients that flatten the tree rename one of them."""
+    """Yield names that two drawn prims share: clients that flatten the tree rename one of them."""
     leaves = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Gprim)]
     counts = Counter(prim.GetName() for prim in leaves)
     for prim in leaves:
@@ -160,7 +160,7 @@ def _check_selections(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def _select_variants(stage: Usd.Stage, turn: int) -> int:
-    """Select the `turn`-th variant of every set, in the session; return how many turns there are.
+    """Select the `turn`-th variant of every set, in the session; return the number of turns.
 
     A set with fewer variants stays at its last.
     """
@@ -225,7 +225,11 @@ def _is_inside_out(
     indices: NDArray[np.float64],
     normals: NDArray[np.float64],
 ) -> bool:
-    """Tell whether a mesh of triangles was mirrored without turning its faces over."""
+    """Return whether a mesh of triangles was mirrored without reversing its faces.
+
+    points   (n, 3); `counts` is (m,), `indices` (3 m,)
+    normals  (n, 3), at the vertices
+    """
     if len(counts) == 0 or (counts != 3).any() or len(normals) != len(points):
         return False
     corners = indices.astype(np.int64).reshape(-1, 3)
@@ -259,15 +263,15 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     if (cells < 1).any() or (box[1] <= box[0]).any():
         yield Finding("volume", where, f"atlas of {list(size)} voxels in a box of {box.tolist()}")
         return
-    # own voxels reach half a voxel out of the lattice's box, or end half a voxel before it
+    # a volume's own voxels end half a voxel outside or inside the lattice's box
     yield from _check_extent(volume, where, box, 0.5 * (box[1] - box[0]) / cells)
 
 
 def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Finding]:
-    """Yield a field whose file lacks its grid, or has it in other units: clients draw nothing."""
+    """Yield fields whose file lacks the grid or states other units: clients draw nothing then."""
     where, file = str(asset.GetPath()), asset.GetFilePathAttr().Get()
     if file is None or not file.resolvedPath:
-        return  # a validator of USD's finds it
+        return  # a validator of USD's reports it
     try:
         grids = read_vdb_head(Path(file.resolvedPath))
     except StageError as error:
@@ -287,7 +291,7 @@ def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Findin
 
 
 def _voxel_spacing(volume: Usd.Prim) -> NDArray[np.float64] | None:
-    """Return the voxels' spacing (x, y, z) by the volume's own attributes; None if they lack."""
+    """Return the voxel spacing (x, y, z), um, by the volume's own attributes; None if missing."""
     names = ("boundsMin", "boundsMax", "atlasSize")
     low, high, size = (volume.GetAttribute(f"stereocell:{name}").Get() for name in names)
     if low is None or high is None or size is None:
@@ -335,7 +339,7 @@ def _check_opacity(prim: Usd.Prim) -> Iterator[Finding]:
 
 
 def _place(prim: Usd.Prim) -> str:
-    """Return the prim's path and, inside a tile, the level of detail that is shown."""
+    """Return the prim's path and, inside a tile, the level of detail that is selected."""
     for ancestor in prim.GetPath().GetPrefixes():
         variants = prim.GetStage().GetPrimAtPath(ancestor).GetVariantSets()
         if variants.HasVariantSet("lod"):
@@ -344,7 +348,7 @@ def _place(prim: Usd.Prim) -> str:
 
 
 def _array(attribute: Usd.Attribute, width: int = 0) -> NDArray[np.float64]:
-    """Return the value as float64, (n,) or (n, width); an attribute without value has n = 0."""
+    """Return the value as float64, (n,) or (n, width); n = 0 for an attribute without a value."""
     value = attribute.Get() if attribute else None
     shape = (-1, width) if width else (-1,)
     return np.asarray([] if value is None else value, dtype=np.float64).reshape(shape)

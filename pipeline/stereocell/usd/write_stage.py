@@ -7,9 +7,9 @@ tiles/<tile>/tile.usdc        see usd/write_tile.py
 
 specimen.usdz                 see usd/write_usdz.py
 
-stage.usda says nothing about what the tiles and looks hold but which variants of the tiles are
-selected, so that they are seen, and changed, in the one layer that a person reads, and known while
-a tile is unloaded. A layer of an artist's over it is stronger than all of them.
+Of the content of tiles and looks, stage.usda states only the selected variants of the tiles. So
+they can be read and changed in the one layer that a person reads, and are known while a tile is
+unloaded. An artist's layer over the stage is stronger than all of these.
 """
 
 import json
@@ -54,7 +54,7 @@ Edit in a layer of your own that has this one as a sublayer; a new build writes 
 
 @dataclass(frozen=True, slots=True)
 class TileExtent:
-    """Where a tile lies: see TileContent. All (z, y, x) in um."""
+    """A tile's place, as in TileContent. All (z, y, x) in um."""
 
     id: str
     first_um: tuple[float, float, float]
@@ -67,7 +67,7 @@ class TileExtent:
 
     @property
     def drawn_box(self) -> NDArray[np.float64]:
-        """Lower and upper corner (x, y, z) of all that it draws, half a voxel wider; (2, 3)."""
+        """Lower and upper corner (x, y, z), um, of the drawn tile, half a voxel wider; (2, 3)."""
         half = np.asarray(self.spacing_um) / 2
         return np.array(world_box(self.first_um - half, self.last_um + half))
 
@@ -84,15 +84,16 @@ def write_stage(
 ) -> None:
     """Write stage.usda and looks/ over tiles that `write_tile` has written.
 
-    A tile that is written afterwards has its default variants, and no selection in stage.usda.
+    A tile that is written later has its default variants, and no selection in stage.usda.
 
-    name        the specimen's, kept as the display name of /Specimen
-    provenance  settings and versions, kept in the layer's customLayerData; numbers, text and
-                dictionaries as they are, anything else as JSON text
-    modality    what took the specimen (`MR`, `CT`, ...), on /Specimen; empty: not known
-    placement   where the tiles stand, on /Specimen/Tiles; where that is no move, nothing is said
+    name        the specimen's; becomes the display name of /Specimen
+    provenance  settings and versions; stored in the layer's customLayerData: numbers, texts and
+                dictionaries as they are, other values as JSON text
+    modality    DICOM's code of the modality (`MR`, `CT`, ...), on /Specimen; empty: not known
+    placement   rows of a (4, 4) matrix for columns, um: a transform on /Specimen/Tiles; the
+                identity is not written
 
-    Raises OutputError.
+    Raises OutputError where a file can't be written.
     """
     with replacing_folder(stage_dir / "looks") as folder:
         write_appearances(folder, appearances)
@@ -106,7 +107,7 @@ def write_stage(
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
     group = UsdGeom.Xform.Define(stage, TILES)
     Usd.ModelAPI(group.GetPrim()).SetKind(Kind.Tokens.group)
-    move = np.array(placement).T  # USD's matrices are for rows
+    move = np.array(placement).T  # USD's matrices are for row vectors
     if placement != IDENTITY:
         group.AddTransformOp().Set(Gf.Matrix4d(*move.ravel().tolist()))
     boxes = np.zeros((len(tiles), 2, 3))
@@ -119,7 +120,7 @@ def write_stage(
             selections, extents = _read_layer(file)
         for variant_set, variant in selections:
             prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
-        # what an unloaded tile is known by; an offset takes surfaces further than its own box
+        # the box of an unloaded tile; an offset moves surfaces beyond the tile's own box
         every = np.array([tile.drawn_box, *extents])
         box[:] = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
@@ -137,7 +138,7 @@ def write_stage(
 def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
     """Return the variants that a tile's own layer selects, (variant set, variant), and all extents.
 
-    Extents (2, 3) are of everything in it, whatever is selected.
+    The extents (2, 3), um, cover all its prims, whatever is selected.
     """
     if not file.is_file():
         return [], []

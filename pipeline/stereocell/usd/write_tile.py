@@ -1,15 +1,15 @@
-"""Write one tile of a stage: tile.usdc, and beside it the volumes and baked maps that it names.
+"""Write one tile of a stage: tile.usdc, and beside it its volumes and baked maps.
 
 A tile names no look but its channel's: its materials inherit the prim /Specimen/Channels/<channel>,
-which lies outside this file. USD resolves such an inherit in the stage that holds the payload, so
-the one prim there gives the look to all tiles, and an opinion about it in any layer over the stage
-reaches them all. What is baked is the tile's own: normals, occlusion and paint of each level are
-fed to the shader inside its variant. An opinion of the channel's would be the stronger one, so the
-look of a channel that is painted has no opinion about diffuseColor.
+which lies outside this file. USD resolves such an inherit in the stage that holds the payload. So
+that one prim sets the look of all tiles, and an opinion about it in any layer over the stage
+reaches them all. Baked maps belong to the tile: normals, occlusion and sampled channel of each
+level feed the shader inside the level's variant. The channel's opinion would be the stronger one,
+so a channel with a sampled channel has no opinion about diffuseColor.
 
-`lod1` is selected unless someone asks otherwise: an artist arranges and lights all tiles at once,
-for which the finest level is millions of triangles too heavy, and picks `lod0` for the final frame.
-So neither of the two is a wish for less on the phone, but a coarser one is (usd/read_variants.py).
+`lod1` is the default: an artist arranges and lights all tiles at once, for which the finest level
+is millions of triangles too heavy, and selects `lod0` for the final frame. So neither of the two
+requests less detail on the phone, but a coarser level does (usd/read_variants.py).
 """
 
 import shutil
@@ -44,7 +44,7 @@ from stereocell.usd.layer import (
 )
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
 
-DEFAULT_LOD = 1
+DEFAULT_LOD = 1  # level of detail that a stage selects
 LAYER_NAME = "tile.usdc"
 
 _Types = Sdf.ValueTypeNames
@@ -53,8 +53,8 @@ _Types = Sdf.ValueTypeNames
 def write_tile(stage_dir: Path, tile: TileContent) -> FileList:
     """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one; return its files.
 
-    Tiles are independent. Raises OutputError. A volume whose shape does not fit its tile is a bug:
-    ValueError.
+    Tiles are independent. Raises OutputError where a file can't be written, ValueError (a bug)
+    where a volume's shape doesn't fit its tile.
     """
     for channel in tile.channels:
         _check_shape(tile, channel)
@@ -66,12 +66,15 @@ def write_tile(stage_dir: Path, tile: TileContent) -> FileList:
 
 
 def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:
-    """Return where `write_tile` puts the closed copy of one channel."""
+    """Return the path of the closed copy of one channel, as `write_tile` writes it."""
     return stage_dir / "tiles" / tile_id / _closed_name(channel_id)
 
 
 def has_mesh(stage_dir: Path, tile_id: str, channel_id: str) -> bool:
-    """Return whether a channel has a surface in a tile. Raises StageError."""
+    """Return whether a channel has a surface in a tile.
+
+    Raises StageError where the tile's layer is missing or damaged.
+    """
     path = stage_dir / "tiles" / tile_id / LAYER_NAME
     layer = Sdf.Layer.FindOrOpen(str(path)) if path.is_file() else None
     if layer is None:
@@ -127,7 +130,7 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> No
 
 
 def _images(channel: ChannelContent, lod: Lod) -> Iterator[tuple[Kind, NDArray[np.uint8]]]:
-    """Yield the images of a level that has UVs."""
+    """Yield the maps of a level that has UVs: uint8, (h, w, 3) or (h, w)."""
     if lod.normal_map is None:
         return
     yield "normal", lod.normal_map
@@ -159,16 +162,16 @@ def _bind(gprim: UsdGeom.Gprim, branch: UsdGeom.Xform, look: str) -> None:
 
 
 def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
-    """Define what the levels of detail have in common."""
+    """Define the properties that all levels of detail share."""
     stage = branch.GetPrim().GetStage()
     mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # a surface is cut open where its tile ends
+    mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
 
 
 def _define_volume(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
-    """Define the volume and its one field, nested below: clients read one file a volume."""
+    """Define the volume and its one field, nested below: clients read one file per volume."""
     stage = branch.GetPrim().GetStage()
     path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
     volume = UsdVol.Volume.Define(stage, path)
@@ -240,7 +243,7 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
 
 
 def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, level: int) -> None:
-    """Feed what is baked to the surface shader that the look inherits."""
+    """Feed the baked maps to the surface shader that the look inherits."""
     lod, stage = channel.lods[level], mesh.GetPrim().GetStage()
     has_maps = lod.normal_map is not None
     if has_maps and lod.mesh.uvs is None:
@@ -258,7 +261,7 @@ def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, le
         return
     if has_maps:
         feed_image(stage, look, "color", f"./{_map_name(channel, level, 'color')}")
-        # for those that draw without materials
+        # for clients that draw without materials
         average = channel.paint.mix(baked.paint).reshape(-1, 3).mean(axis=0)
         UsdGeom.Gprim(mesh).CreateDisplayColorAttr([Gf.Vec3f(*map(float, average))])
     else:

@@ -1,14 +1,15 @@
 """Write specimen.usdz: the meshes of a composed stage as one small file for AR viewers.
 
-AR viewers take metres, a scene that stands on the floor, and a few hundred thousand triangles. So
-the specimen is scaled to the size of a hand, its longest edge SIZE_M long, stands with its lowest
-point at y = 0 with its middle above the origin, and shows the finest level of detail of at most
-MAX_TRIANGLES triangles (the coarsest one, if none is so small). The scale stands in the layer's
-customLayerData: `stereocell:scale`, metres in the file for one metre of the specimen, and `size`.
+AR viewers expect metres, a scene that stands on the floor, and a few hundred thousand triangles. So
+the specimen is scaled to the size of a hand (its longest edge is SIZE_M long), stands with its
+lowest point at y = 0 and its middle above the origin, and has the finest level of detail of at most
+MAX_TRIANGLES triangles (the coarsest, if none is that small). The layer's customLayerData states
+`stereocell:scale`, metres in the file for one metre of the specimen, and `size`.
 
-Volumes stay out: usdz allows no .vdb. Nothing is composed: one .usdc without variants or payloads,
-first in the archive, and beside it the baked maps of that level. The same stage gives the same
-bytes.
+Volumes are left out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
+which comes first, and the baked maps of that level. The same stage gives the same bytes.
+
+References: OpenUSD, Usdz File Format Specification, https://openusd.org/release/spec_usdz.html
 """
 
 import struct
@@ -41,11 +42,11 @@ from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
 from stereocell.usd.written_files import AsWritten
 
 USDZ_NAME = "specimen.usdz"
-SIZE_M = 0.15
+SIZE_M = 0.15  # m, the specimen's longest edge
 MAX_TRIANGLES = 200_000
 
 _LAYER = "specimen.usdc"
-# zip: a local file's head without its name, the head of an extra field, and its id for padding
+# zip: bytes of a local header without its name, of an extra field's header; its ID for padding
 _HEAD_BYTES, _EXTRA_BYTES, _PADDING_ID = 30, 4, 0x1986
 _Types = Sdf.ValueTypeNames
 
@@ -62,9 +63,10 @@ class _Part:
 def write_usdz(stage_path: Path, path: Path, as_written: AsWritten | None = None) -> int | None:
     """Write the meshes of a stage, or of a layer over it, as `path`; return the level of detail.
 
-    as_written  what the stage's files are held against; None: nothing
+    as_written  the lists to compare the stage's files with; None: no comparison
 
-    None if no mesh is drawn: then no file is left at `path`. Raises StageError, OutputError.
+    Returns None where no mesh is drawn; then no file is left at `path`. Raises StageError where
+    the stage can't be read, OutputError where the file can't be written.
     """
     as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
@@ -145,9 +147,9 @@ def _new_stage(name: str, longest_um: float, level: int) -> Usd.Stage:
 def _define_parts(
     stage: Usd.Stage, parts: list[_Part], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> None:
-    """Define the meshes, tile by tile; `low` and `high` bound the specimen in world um.
+    """Define the meshes, tile by tile; `low` and `high` bound the specimen, (x, y, z), world um.
 
-    A channel's meshes share one material, but for those with a normal map or a look of their own.
+    A channel's meshes share one material, except those with a normal map or a look of their own.
     """
     foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     scale = SIZE_M / float((high - low).max())
@@ -169,7 +171,7 @@ def _define_parts(
 def _fill_mesh(mesh: UsdGeom.Mesh, lod: ComposedLod, positions: NDArray[np.float64]) -> None:
     points, triangles = vec3f(positions), lod.mesh.triangles.astype(np.int32)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # a surface is cut open where its tile ends
+    mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
     mesh.CreatePointsAttr(points)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
@@ -205,7 +207,7 @@ def _define_look(
 
 
 def _images(part: _Part) -> dict[Kind, Path]:
-    """Return the images of a mesh."""
+    """Return the image files of a mesh."""
     maps = part.lod.maps
     named: dict[Kind, Path | None] = {
         "normal": maps.normal,
@@ -222,7 +224,7 @@ def _texture_name(part: _Part, kind: Kind) -> str:
 def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path, as_written: AsWritten) -> None:
     """Put the layer and its textures into an archive, the layer first.
 
-    Raises OutputError; StageError for a texture that is damaged.
+    Raises OutputError where it can't be written, StageError for a damaged texture.
     """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
@@ -239,10 +241,10 @@ def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path, as_written: AsWritte
 
 
 def _entry(name: str, offset: int) -> zipfile.ZipInfo:
-    """Return the head of an uncompressed file in the archive, padded so that its bytes start at a
-    multiple of 64, as the specification of usdz asks.
+    """Return the header of an uncompressed file in the archive, padded so that its bytes start at
+    a multiple of 64, as the specification of usdz requires.
 
-    USD's own writer dates the files by the clock, so that no two archives are equal.
+    USD's own writer dates the files by the clock, so that its archives differ in each run.
     """
     info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
     padding = -(offset + _HEAD_BYTES + len(name.encode()) + _EXTRA_BYTES) % 64
