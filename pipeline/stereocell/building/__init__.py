@@ -1,1 +1,1 @@
-"""Plan, units and phases: the only package that knows their order."""
+"""Plan, units and phases. Only this package knows their order."""

@@ -1,9 +1,9 @@
-"""Closed copies of tiles, for printing and for booleans.
+"""Closed copies of tiles, for 3D printing and for boolean operations.
 
-The mesh that is drawn is open where another tile follows. A copy ends there in a cap, less than a
-voxel past the cut: neighbours overlap by that, so that a union has no faces that lie on each other.
+A tile's drawn mesh is open at its neighbours. The copy ends there in a cap, less than a voxel past
+the cut: neighbours overlap by that, so that a union has no coincident faces.
 
-A copy is certified as every mesh is; one that simplification left with faults stays unsimplified.
+A copy is validated like every mesh; where simplification leaves defects, it stays unsimplified.
 """
 
 import numpy as np
@@ -19,11 +19,12 @@ from stereocell.model.unit import Closed
 def close_tile(
     distance: NDArray[np.float32], lattice: Lattice, *, max_error_um: float
 ) -> Closed | None:
-    """Return the closed surface of the solids of a tile, simplified soundly, in world um.
+    """Return the closed surface of the tile's solid, simplified without defects, in world um.
 
-    None where there are no solids.
+    distance      (z, y, x), float32, um, positive inside; covers `lattice.window`
+    max_error_um  largest distance between the simplified and the original surface
 
-    distance float32 (z, y, x), um, positive inside, covers `lattice.window`.
+    Returns None where nothing is inside.
     """
     own = distance[lattice.own.slices_in(lattice.window)]
     fine = extract_surface(own, lattice.alone())

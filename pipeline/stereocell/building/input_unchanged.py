@@ -1,4 +1,4 @@
-"""Is a plan's source, and that of each channel it added, still what was planned?"""
+"""Check that a plan's source, and that of each added channel, is unchanged since the plan."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ def require_input(plan: Plan) -> None:
     """Raise SourceError unless the input holds the voxels that were planned."""
     dataset = open_source(source_of(plan))
     if dataset.fingerprint != plan.fingerprint:
-        # of DICOM, where a file that is cut short is left out, the remarks say so
+        # DICOM leaves out truncated files; the remarks report them
         remarks = "".join(f"; {remark}" for remark in dataset.remarks)
         raise SourceError(
             f"{plan.name}: changed since it was planned (fingerprint {dataset.fingerprint[:12]}, "
@@ -31,7 +31,7 @@ def require_input(plan: Plan) -> None:
 
 
 def require_added(plan: Plan) -> None:
-    """Raise SourceError or OutputError unless the added channels' voxels are whole, and theirs."""
+    """Raise SourceError or OutputError unless the added channels' voxels are unchanged."""
     for folder in {Path(channel.source).parent for channel in plan.channels if channel.source}:
         read_whole(folder)
     for channel in plan.channels:

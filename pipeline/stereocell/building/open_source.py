@@ -1,4 +1,4 @@
-"""How a worker opens the source again: by its address, once a process."""
+"""Open the source in a worker again: by its address, once per process."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,11 +11,11 @@ from stereocell.storage.workspace import fetch
 
 @dataclass(frozen=True, slots=True)
 class SourceRef:
-    """An address and what was asked of it.
+    """An address and the options of `read.open`.
 
-    spacing_um   (z, y, x), or empty for the file's own
+    spacing_um   (z, y, x), um, or empty for the file's own
     series       of DICOM, from 1; 0: the largest
-    fingerprint  that was planned: another volume may lie there by now; empty: whatever lies there
+    fingerprint  the planned one, since the address may hold another volume now; empty: any volume
     """
 
     source: str
@@ -28,7 +28,7 @@ class SourceRef:
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
-    fetch(Path(ref.source))  # an added channel's lies in OUT
+    fetch(Path(ref.source))  # an added channel's source lies in OUT
     if not ref.spacing_um:
         return read.open(ref.source, time=ref.time, series=ref.series)
     z, y, x = ref.spacing_um

@@ -1,7 +1,8 @@
-"""OUT: where everything lies, and how it is found again.
+"""OUT: the paths of all results, and the files that list them.
 
-Results are named by a hash of all that they depend on (input, settings of the step, its code), are
-written under a temporary name and renamed: a killed run resumes, a finished one is a no-op.
+A result's name is a hash of everything that it depends on (input, settings of the step, code). It
+is written under a temporary name and renamed, so a killed run resumes and a finished one does
+nothing.
 """
 
 import secrets
@@ -46,11 +47,11 @@ class OutFolder:
         self.stage_file = self.stage_dir / "stage.usda"
         self.stage_list = self.stage_dir / "files.json"
         self.bundle_dir = out / "bundle"
-        self.parts_dir = out / "bundle_parts"  # its finished tiles, until it is whole
+        self.parts_dir = out / "bundle_parts"  # the bundle's finished tiles, until it is complete
         self.report_file = out / "report" / "index.html"
 
     def require_writable(self) -> None:
-        """Make OUT. Raises OutputError if it can't be made or written."""
+        """Create OUT. Raises OutputError where it can't be created or written."""
         try:
             self.out.mkdir(parents=True, exist_ok=True)
             probe = self.out / f".writable.{secrets.token_hex(4)}"
@@ -66,7 +67,7 @@ class OutFolder:
     def save_plan(self, plan: Plan) -> bool:
         """Write plan.json; return whether it changed.
 
-        Raises OutputError if OUT holds a build of another input.
+        Raises OutputError where OUT holds a build of another input.
         """
         there = self.plan() if self.plan_file.exists() else None
         if there == plan:
@@ -87,7 +88,7 @@ class OutFolder:
         return self._in_place(from_json(read_json(self.plan_file, _PLAN, remedy)))
 
     def _without_place(self, plan: Plan) -> Plan:
-        """Return a plan whose channels' own sources, where they lie in OUT, are told from there."""
+        """Return a plan whose channel sources inside OUT are paths relative to OUT."""
         root = self.out.resolve()
 
         def told(source: str) -> str:
@@ -123,11 +124,11 @@ class OutFolder:
         write_sealed(self.survey_file, {"channels": dict(content)})
 
     def index(self) -> dict[str, str]:
-        """Return the key of each finished unit, by `<tile>/<channel>`."""
+        """Return the key of each finished unit, by `<tile>/<channel>`. Raises OutputError."""
         return dict(read_json(self.index_file, "units.schema.json#Index", _RUN_UNITS))
 
     def save_units(self, plan: Plan, keys: Mapping[str, str]) -> None:
-        """Keep the units' keys, and which plan they were built for."""
+        """Save the units' keys, and a hash of the plan that they were built for."""
         write_json(self.index_file, dict(keys))
         write_bytes(self.units_plan_file, self._key(plan).encode())
 
@@ -135,7 +136,7 @@ class OutFolder:
         return key_of(to_json(self._without_place(plan)), plan_module)
 
     def require_units_of(self, plan: Plan) -> None:
-        """Raise OutputError unless all units of the plan are known to be there."""
+        """Raise OutputError unless all units of the plan are listed as built."""
         signed = self.units_plan_file
         if not signed.is_file() or signed.read_bytes() != self._key(plan).encode():
             raise OutputError(
@@ -152,7 +153,7 @@ class OutFolder:
                     raise OutputError(f"{self.index_file}: {name} is not in it: {_RUN_UNITS}")
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
-        """Remove the folders in `parent` that an earlier plan left."""
+        """Remove the folders in `parent` that an earlier plan left, all except `keep`."""
         names = {file.relative_to(parent).parts for file in sizes_below(parent)}
         for name in {parts[0] for parts in names if len(parts) > 1} - keep:
             remove(parent / name)
@@ -160,22 +161,22 @@ class OutFolder:
     # --- the phases
 
     def phases(self) -> dict[str, dict[str, Any]]:
-        """Return what is known of each phase; damaged, nothing counts as done."""
+        """Return the record of each phase; without a valid file no phase counts as done."""
         return dict(find_json(self.phases_file, _PHASES) or {})
 
     def is_begun(self, name: str) -> bool:
-        """Return whether a phase was begun and never came to its end."""
+        """Return whether a phase began and did not finish."""
         return not self.phases().get(name, {"key": "done"})["key"]
 
     def require_finished(self, name: str) -> None:
-        """Raise OutputError if a phase was begun and never came to its end."""
+        """Raise OutputError where a phase began and did not finish."""
         if self.is_begun(name):
             raise OutputError(
                 f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
             )
 
     def save_phase(self, name: str, key: str, results: str, seconds: float, about: str) -> None:
-        """Keep what a phase was made from and left; an empty key: it isn't finished."""
+        """Save a phase's key and a digest of its results; an empty key: it isn't finished."""
         entry = {"key": key, "results": results, "seconds": round(seconds, 2), "about": about}
         write_json(self.phases_file, {**self.phases(), name: entry})
 
@@ -186,7 +187,7 @@ def _with_sources(plan: Plan, change: Callable[[str], str]) -> Plan:
 
 
 def _what_differs(there: Plan, plan: Plan) -> str:
-    """Return what OUT holds, not what was asked for: what tells the two inputs apart."""
+    """Return the difference between the two inputs: OUT's, then the requested one."""
     old, new = there.settings.plan, plan.settings.plan
     if there.source == plan.source and old.time != new.time:
         return f"{there.name!r} with --time {old.time}, not {new.time}"

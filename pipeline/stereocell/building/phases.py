@@ -1,6 +1,6 @@
 """The phases of a build, each a function on OUT: plan -> units -> stage -> bundle (-> report).
 
-Every phase skips what is done already: results are named by what they depend on.
+Every phase skips finished work: a result is named by everything that it depends on.
 """
 
 import hashlib
@@ -42,9 +42,9 @@ from stereocell.usd.written_files import AsWritten
 
 
 def make(source: str, out: Path, settings: Settings) -> Plan:
-    """Write OUT/plan.json (and the settings used, as TOML). The same plan again changes nothing.
+    """Write OUT/plan.json and the settings used (TOML). The same plan again changes nothing.
 
-    Raises StereoCellError; OUT is left as it was.
+    Raises StereoCellError; OUT is unchanged then.
     """
     require_apart(source, out)
     out_folder = OutFolder(out)
@@ -63,9 +63,9 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
 
 
 def settle(source: str, settings: Settings) -> Plan:
-    """Return the plan of a build, and tell what is odd about the source. Nothing is written.
+    """Return the plan of a build, and print remarks about the source. Nothing is written.
 
-    Raises StereoCellError.
+    Raises StereoCellError where the source can't be read, or the settings don't fit it.
     """
     location = Location.of(source).source
     options = settings.plan
@@ -102,7 +102,7 @@ def settle(source: str, settings: Settings) -> Plan:
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
-    """Return what a reader of the results may know of their making: no paths, no identities."""
+    """Return the provenance that results carry: settings and versions, no paths, no identities."""
     settings = to_dict(plan.settings)
     readers = [reader.module for reader in READERS.values()]
     return {
@@ -117,13 +117,18 @@ def provenance(plan: Plan) -> dict[str, Any]:
 
 
 def _added(plan: Plan) -> dict[str, Any]:
-    """Return the channels that have a source of their own, and its fingerprint."""
+    """Return the channels with a source of their own, and that source's fingerprint."""
     added = {c.name: c.fingerprint for c in plan.channels if c.source}
     return {"added_channels": added} if added else {}
 
 
 def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
-    """Find windows and iso-values for all units, then build the units (or `only` one of them)."""
+    """Find windows and iso-values for all units, then build the units, or `only` one of them.
+
+    only  `<tile>/<channel>`; None: all units
+
+    Raises SourceError where the source changed since the plan, TasksFailedError where units fail.
+    """
     out_folder = OutFolder(out)
     plan = out_folder.plan()
     with phase_of(out_folder, "units") as phase:
@@ -137,7 +142,9 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
 
 def run_stage(out: Path, engine: Engine) -> None:
     """Write OUT/stage from the units: stage.usda, looks/, tiles/ and, where there is a surface,
-    specimen.usdz; last the list of all these, files.json. Other files are left alone.
+    specimen.usdz; last their list, files.json. Other files stay.
+
+    Raises OutputError where units are missing or damaged, TasksFailedError where tiles fail.
     """
     out_folder = OutFolder(out)
     plan = out_folder.plan()
@@ -160,7 +167,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         key = key_of(depends, stage_tasks, usdz_writer)
         if phase.is_done(key, partial(_digest_of_stage, out_folder)):
             return
-        remove(out_folder.stage_list)  # of what was
+        remove(out_folder.stage_list)  # the list of the earlier stage
         engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
         extents = [
             stage_writer.TileExtent(
@@ -192,7 +199,10 @@ def run_stage(out: Path, engine: Engine) -> None:
 
 
 def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
-    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it."""
+    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
+
+    Raises OutputError where the stage is missing, StageError where it can't be read.
+    """
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
         out_folder.require_finished("stage")
@@ -202,15 +212,13 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
             raise OutputError(f"{path} is missing: {remedy}")
         viewer = viewer_dist()
         kept = objects_below(path.parent)
-        files = dependencies(path, out_folder.stage_dir)  # first: it refuses those of others
+        files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
         made_of = [str(path.absolute()), _states(files)] if kept is None else kept
         page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
         key = key_of([made_of, page], bundle_writer)
         if kept is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
-        bundle_writer.require_bundle(
-            out_folder.bundle_dir
-        )  # before it is written down that it was begun
+        bundle_writer.require_bundle(out_folder.bundle_dir)  # before the phase is recorded as begun
         if not phase.is_done(key, partial(_digest_of_bundle, out_folder)):
             out_folder.remove_other_folders(out_folder.parts_dir, {key})
             parts = out_folder.parts_dir / key
@@ -234,13 +242,13 @@ def _print_line(line: str) -> None:
 
 
 def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
-    """Return each file's name, size and time of change: what an edit alters."""
+    """Return each file's path, size and modification time: an edit changes them."""
     found = [(file, file.stat()) for file in files]
     return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
 
 
 def digest_of(results: Iterable[Path]) -> str:
-    """Return a digest of all files' names and sizes: what a damage alters."""
+    """Return a digest of all files' names and sizes: damage changes it."""
     digest = hashlib.sha256()
     for result in results:
         for file, size in (sizes_below(result) or {result: -1}).items():
@@ -249,7 +257,7 @@ def digest_of(results: Iterable[Path]) -> str:
 
 
 def _digest_of_bundle(out_folder: OutFolder) -> str:
-    """Return a digest of the bundle, whose files stand whole; empty: one does not."""
+    """Return a digest of the bundle; empty where one of its files is missing or damaged."""
     path = out_folder.bundle_dir / bundle_writer.FILES
     try:
         listed = read_list(path, "")
@@ -267,7 +275,7 @@ def digest_of_manifest(out_folder: OutFolder) -> str:
 
 
 def _digest_of_stage(out_folder: OutFolder) -> str:
-    """Return a digest of the stage's list, whose files stand whole; empty: one does not."""
+    """Return a digest of the stage's list; empty where one of its files is missing or damaged."""
     try:
         listed = written_files.read_stage_list(out_folder.stage_dir)
     except OutputError:
@@ -278,7 +286,7 @@ def _digest_of_stage(out_folder: OutFolder) -> str:
 
 
 class Phase:
-    """One phase at work: does it have anything to do, and how long does it take."""
+    """A running phase: whether it has work to do, and its duration."""
 
     def __init__(self, out_folder: OutFolder, name: str) -> None:
         self.out_folder, self.name = out_folder, name
@@ -287,22 +295,23 @@ class Phase:
         self.is_up_to_date = False
 
     def is_done(self, key: str, results: Callable[[], str]) -> bool:
-        """Return whether what the phase leaves stands whole and comes from the same things.
+        """Return whether the phase's results are whole and made from the same inputs.
 
-        results  returns a digest of it
+        key      digest of the inputs
+        results  returns a digest of the results
         """
         self.key, self.results = key, results
         entry = self.out_folder.phases().get(self.name, {})
         self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
         if not self.is_up_to_date:
-            # killed half-way, it is not done
+            # an empty key: a killed phase is not done
             self.out_folder.save_phase(self.name, "", "", 0.0, "")
         return self.is_up_to_date
 
 
 @contextmanager
 def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
-    """Tell how long a phase took and keep it for the report; one with nothing to do says so."""
+    """Print and save a phase's duration; print "up to date" for a phase without work."""
     start = time.perf_counter()
     phase = Phase(out_folder, name)
     yield phase

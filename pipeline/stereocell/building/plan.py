@@ -1,6 +1,6 @@
-"""The plan of a build: which voxels, cut how, into which units. It is pure: nothing is read or run.
+"""The plan of a build: the voxels, the tiles, the units. Pure: it reads and runs nothing.
 
-Everything later phases need is in it, with every `auto` resolved; plan.json is its file
+It holds everything that later phases need, with every `auto` resolved; plan.json is its file
 (schemas/plan.schema.json).
 """
 
@@ -22,13 +22,13 @@ from stereocell.model.tiling import Box, Tile, cut, cut_evenly
 
 T = TypeVar("T")
 
-# What a unit may work on, about 30 bytes a voxel: so many voxels, or so many times its tile.
-UNIT_VOXELS = 1 << 27
-UNIT_TILES = 8
-LEAST_PLANES = 4  # of voxels that carry the surface, along each axis of a tile: fewer hold no body
+# Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
+UNIT_VOXELS = 1 << 27  # voxels
+UNIT_TILES = 8  # tiles
+LEAST_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
 
-# Colours for channels whose file names none (linear RGB), told apart on a dark ground; the first
-# ones are the usual blue, magenta and green of microscopy.
+# Colours (linear RGB) for channels whose file names none, distinct on a dark ground; the first
+# three are the usual blue, magenta and green of microscopy.
 PALETTE = (
     (0.07, 0.22, 1.0),
     (1.0, 0.05, 0.45),
@@ -41,13 +41,13 @@ PALETTE = (
 )
 
 
-# of MR and CT: warm and neutral, as bone and tissue are drawn; a blue head is none
+# colour (linear RGB) of MR and CT: warm and neutral, as bone and tissue are usually drawn
 FLESH = (0.78, 0.66, 0.55)
 BODY_MODALITIES = ("MR", "CT")
 
 
 def choose_color(place: int, modality: str) -> tuple[float, float, float]:
-    """Return the colour (linear RGB) of the channel at `place` of those built, if it has none."""
+    """Return the colour (linear RGB) of a channel without one, the `place`-th that is built."""
     if place == 0 and modality in BODY_MODALITIES:
         return FLESH
     return PALETTE[place % len(PALETTE)]
@@ -66,8 +66,8 @@ class LevelLike(Protocol):
 class Channel:
     """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1.
 
-    source       of this channel alone, with one level, the planned one, and 8 bits that are shown
-                 as they are (0..255): what a command added to a plan; empty: the plan's
+    source       a source for this channel alone, which a command added to the plan: one level, the
+                 planned one, and voxels uint8 with the window 0..255; empty: the plan's source
     fingerprint  of that source
     """
 
@@ -84,11 +84,14 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A build, settled. Boxes are voxels (z, y, x) of `level`; voxel (0, 0, 0) lies at the origin.
+    """A build with all choices made. Boxes are voxels (z, y, x) of `level`.
 
-    halo       voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
-    modality   what took the volume, as DICOM calls it: `MR`, `CT`, ...; empty: not known
-    placement  from the world of the voxels, um (volume.zyx_to_xyz), to where the specimen stands
+    spacing_um  (z, y, x), um
+    origin_um   centre of voxel (0, 0, 0), (z, y, x), um
+    halo        voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
+    modality    DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
+    placement   rows of a (4, 4) matrix for columns, um: from the world of the voxels
+                (volume.zyx_to_xyz) to the specimen's place
     """
 
     source: str
@@ -108,20 +111,20 @@ class Plan:
 
     @property
     def repair(self) -> RepairOptions:
-        """The most that is cleaned: the halo covers it (channels' own: repair_rules.py)."""
+        """The largest repair of any channel; the halo covers it (per channel: repair_rules.py)."""
         return _repair_options(self.settings)
 
     @property
     def step(self) -> tuple[int, int, int]:
-        """Every so many planes of voxels (z, y, x) carry the surface."""
+        """The step in voxels (z, y, x) between planes that carry the surface."""
         return _step(self.settings, self.spacing_um)
 
     def level_of(self, channel: Channel) -> int:
-        """Return the level of its source that a channel is read at."""
+        """Return the level of its source at which a channel is read."""
         return 0 if channel.source else self.level
 
     def painter(self, channel: Channel) -> Channel | None:
-        """Return the channel that is painted on a channel's surface; None: none is."""
+        """Return the channel sampled onto a channel's surface; None: none is."""
         painted = self.settings.paint.get(channel.name)
         return next((other for other in self.channels if other.name == painted), None)
 
@@ -129,7 +132,7 @@ class Plan:
         return next(tile for tile in self.tiles if tile.id == tile_id)
 
     def position_um(self, index_zyx: Sequence[float]) -> tuple[float, float, float]:
-        """Return where a voxel's centre lies, (z, y, x) in um."""
+        """Return the place of a voxel's centre, (z, y, x) in um."""
         z, y, x = (
             float(o + i * s)
             for o, i, s in zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
@@ -138,10 +141,10 @@ class Plan:
 
 
 def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings) -> tuple[int, str]:
-    """Return the level to build and why: the one asked for, else the finest within the limit.
+    """Return the level to build and the reason: the requested one, else the finest within limits.
 
-    The region counts voxels of the level that is built; a level too small to hold it is none to
-    build. Raises UsageError if there is no such level.
+    The region counts voxels of the level that is built, so a level that is too small to hold it is
+    skipped. Raises UsageError where there is no such level.
     """
     wanted = settings.plan.level
     if wanted != AUTO:
@@ -186,6 +189,8 @@ def make_plan(
 ) -> Plan:
     """Return the plan for these channels at this level (index and reason).
 
+    origin_um  centre of voxel (0, 0, 0) of the level, (z, y, x), um
+
     Raises UsageError for settings that don't fit the data, SourceError for data that can't be cut.
     """
     chosen = levels[level[0]]
@@ -229,7 +234,10 @@ def make_plan(
 
 
 def parse_region(text: str, whole: Box) -> Box:
-    """Return the box that `z0:z1,y0:y1,x0:x1` names; an empty end means the data's own."""
+    """Return the box of `z0:z1,y0:y1,x0:x1` in voxels; an empty end means the data's own.
+
+    Raises UsageError where the text isn't a box inside `whole`.
+    """
     if not text:
         return whole
     match = re.fullmatch(r"(\d*):(\d*),(\d*):(\d*),(\d*):(\d*)", text.replace(" ", ""))
@@ -246,7 +254,7 @@ def parse_region(text: str, whole: Box) -> Box:
 
 
 def _tiles(settings: Settings, region: Box) -> tuple[tuple[int, int, int], tuple[Tile, ...]]:
-    """Return the tiles and their size, that of the largest where a grid is asked for."""
+    """Return the tile size (z, y, x) in voxels, with a grid that of the largest, and the tiles."""
     options = settings.plan
     if options.grid:
         match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", options.grid)
@@ -276,8 +284,8 @@ def _halo(
 ) -> tuple[int, int, int]:
     """Return the voxels (z, y, x) that a unit reads around its tile, at most the region's.
 
-    Raises UsageError where that, and what closing and smoothing add at the ends of what is read,
-    is out of proportion to the tile: such lengths are meant for other voxels.
+    Raises UsageError where these, and the voxels that closing and smoothing add at the ends, are
+    out of proportion to the tile: such lengths are meant for other voxels.
     """
     surface = settings.surface
     smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
@@ -315,7 +323,7 @@ def _halo(
 
 
 def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
-    """Return what is given by the channels' names; an index stands for one without that name."""
+    """Return values by channel name; a key is a name, or an index where no name equals it."""
     found: dict[str, T] = {}
     for key, value in given.items():
         name = _name(flag, key, channels)
@@ -326,7 +334,7 @@ def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> 
 
 
 def _painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
-    """Return, by the name of a channel, that of the channel that is painted on its surface."""
+    """Return channel name -> name of the channel that is sampled onto its surface."""
     by_name = _by_name("--paint", paint, channels)
     found = {name: _name("--paint", key, channels) for name, key in by_name.items()}
     for name, painted in found.items():
@@ -347,7 +355,7 @@ def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
 
 
 def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, int]:
-    # a hair more: .42 um are three times .14 um
+    # 0.01 for rounding: 0.42 um are three times 0.14 um
     z, y, x = (max(1, int(settings.surface.grid_um / h + 0.01)) for h in spacing_um)
     return z, y, x
 
@@ -383,14 +391,14 @@ def _by(numbers: Sequence[float]) -> str:
 
 
 def smoothed_plan(plan: Plan, surface_confidence: SurfaceConfidence) -> Plan:
-    """Return the plan by which a channel is built; one whose surface is unclear is smoothed more.
+    """Return the plan by which a channel is built; an unclear surface is smoothed more.
 
-    At the level of a surface that nothing tells from noise the field is frayed, in solids that join
-    into one: a tile of a real brain's autofluorescence (30 x 510 x 512 voxels) came to 1.42 million
-    triangles after 376 s of simplifying, where cells have 0.14 million after 10 s. There is no gap
-    in it that is known to be one, so none is closed, and what closing would have reached is spent
-    on smoothing: the unit reads no more voxels, neighbours still see the same field, and that tile
-    has 65 thousand triangles after 4.5 s.
+    An unclear surface can't be distinguished from noise: its field is frayed, and parts join into
+    one. A tile of a real brain's autofluorescence (30 x 510 x 512 voxels) had 1.42 million
+    triangles after 376 s of simplifying, where cells have 0.14 million after 10 s. No gap in such a
+    field is known to be real, so none is closed, and the reach of closing is spent on smoothing:
+    the unit reads no more voxels, neighbours still see the same field, and that tile has 65
+    thousand triangles after 4.5 s.
     """
     if surface_confidence != "unclear":
         return plan

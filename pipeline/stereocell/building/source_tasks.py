@@ -1,4 +1,4 @@
-"""Tasks that read a plan's source: how they are run, and what their results' keys hold of it."""
+"""Tasks that read a plan's source: how they run, and the source's part of their results' keys."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
@@ -21,7 +21,7 @@ def run_on_input(
     function: Callable[[T], R],
     tasks: Sequence[tuple[str, T]],
 ) -> list[R]:
-    """Run tasks that read the source; it must be the one that was planned."""
+    """Run tasks that read the source. Raises SourceError where it changed since the plan."""
     if not tasks:
         return []
     require_input(plan)
@@ -40,7 +40,7 @@ def input_key(plan: Plan, channel: Channel) -> list[Any]:
 
 
 def reader_module(plan: Plan, channel: Channel) -> str:
-    """Return the module that reads a channel: other formats' readers change nothing of it."""
+    """Return the module that reads a channel: other formats' readers don't affect its results."""
     return reader_of(channel.source or plan.source)
 
 

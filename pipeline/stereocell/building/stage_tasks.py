@@ -1,6 +1,6 @@
-"""What a worker is given and does to write one tile of the stage from its units. Picklable.
+"""The task of a worker that writes one tile of the stage from its units. Picklable.
 
-The keys of the stage and of its tiles hold this module's whole lineage: see storage/cache_key.py.
+The keys of the stage and of its tiles cover this module's whole lineage: see storage/cache_key.py.
 """
 
 import sys
@@ -29,9 +29,9 @@ class TileTask:
     """One tile of the stage.
 
     content  the tile without its channels
-    units    id, unit folder and paint of each channel
-    record   where is kept from what the tile was made, and its files: units/<tile>/stage.json
-    key      from what it is to be made
+    units    ID, unit folder and sampled colours of each channel
+    record   units/<tile>/stage.json: the key of the tile as written, and its files
+    key      digest of the inputs of the tile to write
     """
 
     stage_dir: Path
@@ -87,7 +87,7 @@ def tile_task(
 
 
 def run_tile(task: TileTask) -> None:
-    """Write one tile of the stage from its units. Raises OutputError."""
+    """Write one tile of the stage from its units. Raises OutputError where one is damaged."""
     remove(task.record)
     with cached(*(folder for _, folder, _ in task.units)):
         channels = tuple(

@@ -1,7 +1,7 @@
-"""Tissue classes as channels of a build: learned in the planned region, kept in OUT/tissue.
+"""Tissue classes as channels of a build: learned in the planned region, stored in OUT/tissue.
 
-Each class becomes a channel whose voxels are probabilities of 8 bits: OUT/tissue/classes.ome.zarr,
-a second source in the plan. The window is 0..255, the surface lies where the probability is a half.
+Each class becomes a channel of 8-bit probabilities: OUT/tissue/classes.ome.zarr, a second source in
+the plan. Its window is 0..255; its surface lies at probability 1/2.
 """
 
 import math
@@ -38,9 +38,9 @@ from stereocell.tissue import onnx_classifier as network_module
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
 from stereocell.tissue.onnx_classifier import Network, apply_network
 
-LEVEL = 127.5  # of 255: probability 1/2
-MOST_VOXELS = 250_000_000  # about 40 bytes each while learning
-# of three classes in a head, by rising T1 intensity; linear RGB
+LEVEL = 127.5  # iso-value, 0..255: probability 1/2
+MOST_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes each
+# names and colours (linear RGB) of three classes in a head, by rising T1 intensity
 HEAD = (
     ("CSF", (0.03, 0.3, 1.0)),
     ("grey matter", (1.0, 0.22, 0.1)),
@@ -50,12 +50,12 @@ HEAD = (
 
 @dataclass(frozen=True, slots=True)
 class TissueRequest:
-    """What is asked for.
+    """The options of `stereocell tissue`.
 
-    classes     how many; None: auto, or what the model has
+    classes     number of classes; None: auto, or the model's number
     channel     of the input, by name or index; empty: the first
-    model       an ONNX file of the user's own; None: they are learned
-    everywhere  learn in all that isn't background; else in MR inside the brain
+    model       the user's ONNX file; None: the classes are learned
+    everywhere  learn in all voxels outside the background; else, in MR, inside the brain
     """
 
     classes: int | Literal["auto"] | None = None
@@ -68,12 +68,12 @@ class TissueRequest:
 class _Class:
     name: str
     color: tuple[float, float, float]
-    intensity: float | None  # mean, bias removed; None: a network doesn't say
+    intensity: float | None  # mean, bias removed; None: not known of a network
     probabilities: NDArray[np.uint8]
 
 
 def parse_classes(text: str) -> int | Literal["auto"]:
-    """Return `--classes`. Raises UsageError."""
+    """Return the value of `--classes`. Raises UsageError where it is invalid."""
     if text == "auto":
         return "auto"
     if not text.isdecimal() or int(text) not in AUTO_CLASSES:
@@ -83,10 +83,10 @@ def parse_classes(text: str) -> int | Literal["auto"]:
 
 
 def add_tissue(out: Path, request: TissueRequest) -> Plan:
-    """Learn the classes, write OUT/tissue, and put them into the plan in place of earlier ones.
+    """Learn the classes, write OUT/tissue, and replace earlier ones in the plan.
 
-    Nothing is learned anew where OUT/tissue comes from the same voxels, options and code and is
-    whole. Raises StereoCellError; plan and OUT/tissue are then as they were.
+    Classes are not learned anew where OUT/tissue is whole and made from the same voxels, options
+    and code. Raises StereoCellError; plan and OUT/tissue are unchanged then.
     """
     out_folder = OutFolder(out)
     plan = without_tissue(out_folder.plan())
@@ -142,7 +142,7 @@ def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
 
 
 def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of OUT/tissue if it is what `key` names, and whole; say what it is."""
+    """Return the record of OUT/tissue if it has this key and is whole; print which."""
     if not folder.exists():
         return None
     try:
@@ -219,7 +219,7 @@ def _learn(
             origin_um=plan.origin_um,
         )
         write_json(folder / RECORD, {**record, "files": digests_of(folder)})
-    open_source.cache_clear()  # another volume lies at the same address now
+    open_source.cache_clear()  # the same address holds another volume now
     return record
 
 
@@ -239,7 +239,7 @@ def _find_channel(plan: Plan, wanted: str) -> Channel:
 
 
 def _require_free(names: Sequence[str], plan: Plan) -> None:
-    """Raise SourceError if a class has the name of one of the input's channels."""
+    """Raise SourceError where a class has the name of one of the input's channels."""
     taken = {channel.name for channel in plan.channels}
     for name in names:
         if name in taken:
@@ -255,7 +255,7 @@ def _names(plan: Plan, count: int, is_brain: bool) -> list[str]:
 
 
 def _colored(names: Sequence[str], plan: Plan) -> list[tuple[str, tuple[float, float, float]]]:
-    """Return each name with a colour that no other class and no channel of the input has."""
+    """Return each name with a colour (linear RGB) of its own, not a channel's of the input."""
     known = dict(HEAD)
     taken = {channel.color for channel in plan.channels}
     free = [color for color in PALETTE if color not in taken] or list(PALETTE)

@@ -1,7 +1,7 @@
-"""OUT/tissue: probabilities of the classes and their record, and whether both are still whole.
+"""OUT/tissue: probabilities of the classes and their record, and a check that both are whole.
 
-The record lists the SHA-256 of every file, as a build's voxels are sampled only: Zarr takes a chunk
-that was lost for zeros, and zstd decodes some damage to other voxels without a word.
+The record lists the SHA-256 of every file, since the fingerprint covers a sample of the voxels
+only: Zarr reads a lost chunk as zeros, and zstd decodes some damage to other voxels without error.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ _AGAIN = "run `stereocell tissue OUT` again"
 
 
 def digests_of(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file of the probabilities in `folder`, by its path there."""
+    """Return the SHA-256 of each file of the probabilities in `folder`, by relative path."""
     return {
         file.relative_to(folder).as_posix(): measure(file)["sha256"]
         for file in sorted((folder / VOXELS).rglob("*"))
@@ -27,14 +27,14 @@ def digests_of(folder: Path) -> dict[str, str]:
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """Return the record in OUT/tissue. Raises OutputError, which names file and remedy."""
+    """Return the record in OUT/tissue. Raises OutputError where it is missing or invalid."""
     return dict(read_json(folder / RECORD, _SCHEMA, _AGAIN))
 
 
 def read_whole(folder: Path) -> dict[str, Any]:
-    """Return the record in OUT/tissue, all of whose files are as they were written.
+    """Return the record in OUT/tissue after a check that all its files are as written.
 
-    Raises OutputError, which names the first file that is not, and the remedy.
+    Raises OutputError for the first file that isn't.
     """
     record = read_record(folder)
     fetch(folder)

@@ -27,20 +27,20 @@ from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.sample_channel import sample_channel
 from stereocell.transfer.joint_histogram import to_eight_bits
 
-PAST = 3  # voxels past a cut that maps are baked from: the halo is larger, and texels smaller
+PAST = 3  # voxels beyond a cut that maps are baked from; the halo is larger, texels smaller
 
 
 @dataclass(frozen=True, slots=True)
 class UnitInput:
-    """What a unit depends on, besides its voxels.
+    """The inputs of a unit, besides its voxels.
 
-    lattice     where its voxels lie; the volumes cover its window
-    iso         the iso-value near the tile, above the background; None: no surface
-    background  what lies under it; None: nothing is subtracted
-    repair      what is cleaned of the channel's surface
-    step        every so many planes of voxels (z, y, x) carry the surface
+    lattice     the places of its voxels; the volumes cover its window
+    iso         the iso-value near the tile, above the background, voxel values; None: no surface
+    background  in voxel values; None: nothing is subtracted
+    repair      cleaning of the channel's surface
+    step        voxels (z, y, x) between planes that carry the surface
     intensity_window  voxel values that become 0 and 255
-    painted     those of the channel that is painted on the surface; None: no paint
+    painted     the same of the channel that is sampled onto the surface; None: none is
     """
 
     lattice: Lattice
@@ -56,10 +56,10 @@ class UnitInput:
 def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) -> Unit:
     """Return meshes and volume of one unit.
 
-    volume   its voxels (z, y, x); they cover the lattice's window
-    painted  those of the channel that is painted on the surface
+    volume   voxels (z, y, x) of any dtype; they cover the lattice's window
+    painted  those of the channel that is sampled onto the surface
 
-    A unit whose part of the field never crosses the iso-value has no surface, and says so.
+    A unit whose field never crosses the iso-value has no surface; the result gives the reason.
     """
     clock = Clock()
     with clock("volume"):
@@ -87,8 +87,9 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
 
 
 def find_surface(volume: Volume, given: UnitInput) -> Mesh:
-    """Return a unit's iso-surface, repaired, before any level of detail is made of it; it may be
-    empty. The same numbers as in `build_unit`.
+    """Return a unit's iso-surface, repaired, before levels of detail are made; it may be empty.
+
+    It has the same numbers as in `build_unit`.
     """
     if given.iso is None:
         nothing = np.zeros((0, 3), np.float32)
@@ -100,9 +101,10 @@ def find_surface(volume: Volume, given: UnitInput) -> Mesh:
 def _repaired(
     volume: Volume, given: UnitInput, lattice: Lattice, iso: LatticeField, clock: Clock
 ) -> tuple[Repaired, bool]:
-    """Return the repaired distance, and whether gaps are still to be closed by triangles.
+    """Return the repaired distance, and whether triangles must still close gaps.
 
-    A function of its own: its float32 copies of the window are gone when levels are made.
+    A function of its own, so that its float32 copies of the window are freed before levels are
+    made.
     """
     surface, spacing = given.settings.surface, lattice.spacing_um
     with clock("distance"):
@@ -144,8 +146,8 @@ def _fine_surface(
     painted: Volume | None,
     clock: Clock,
 ) -> tuple[Mesh, Closed | None, FineSurface, int, int]:
-    """Return the repaired surface, its closed copy, what maps are baked from, and the numbers of
-    fragments dropped and cavities filled.
+    """Return the repaired surface, its closed copy, the source of the baked maps, and the numbers
+    of fragments dropped and cavities filled.
     """
     repaired, by_triangles = _repaired(volume, given, lattice, iso, clock)
     fine = _extract(repaired, by_triangles, given, lattice, clock)
@@ -168,10 +170,10 @@ def _with_surroundings(
     options: UnwrapOptions,
     painted: Volume | None,
 ) -> FineSurface:
-    """Return the surface, some voxels past the cut, with how open it lies and what is painted."""
+    """Return the surface, some voxels beyond the cut, with its openness and the sampled channel."""
     past = lattice.grown(PAST)
     mesh = fine if past == lattice else extract_surface(distance, past, cut_as=lattice)
-    # a little smaller: rays start outside of it
+    # slightly smaller, so that rays start outside of it
     solid = distance > 0.25 * max(lattice.spacing_um)
     radius, depth = float(options.occlusion_um), float(options.paint_um)
     openness = find_ambient_visibility(solid, lattice, mesh, radius_um=radius)
@@ -184,7 +186,7 @@ def _with_surroundings(
 
 
 def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
-    """Return the lattice's voxels and an apron, window applied; ends of the region repeat."""
+    """Return the lattice's voxels and an apron (z, y, x), windowed; the region's ends repeat."""
     lattice = given.lattice
     index = [
         np.clip(np.arange(a - APRON, b + APRON), low, high - 1) - w

@@ -1,8 +1,8 @@
 """A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail.
 
-Same input, same bytes; but for seconds.json, which lies beside them and which nothing is built of.
-unit.json lists the others with their hashes, and holds one of itself: each file is held against its
-own before it is read.
+The same input gives the same bytes, except in seconds.json, which nothing is built from. unit.json
+lists the other files with their hashes, and holds a hash of itself: each file is compared with its
+own hash before it is read.
 """
 
 import io
@@ -35,7 +35,7 @@ _RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
-    """Write a unit as a folder under its final name. Raises OutputError."""
+    """Write a unit as a folder under its final name. Raises OutputError where it can't."""
     lods = [
         {
             "triangles": len(lod.mesh.triangles),
@@ -47,7 +47,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
         for lod in unit.lods
     ]
     with replacing_folder(directory) as folder:
-        # numpy's own way to a file has no word for a full disk
+        # numpy's own file writer reports no full disk
         buffer = io.BytesIO()
         np.save(buffer, unit.volume)
         (folder / _VOLUME).write_bytes(buffer.getbuffer())
@@ -65,14 +65,14 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
         }
         write_sealed(folder / _RECORD, record)
-        # after the files were listed: a unit is whole without
+        # after the list of files: a unit is whole without it
         write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
 
 
 def is_whole(directory: Path) -> bool:
-    """Return whether a unit's folder holds all that its record names, as it was written.
+    """Return whether a unit's folder holds all files of its record, as written.
 
-    What has not changed since by its size and time is not read: see file_list.py.
+    Files whose size and time are unchanged are not read: see file_list.py.
     """
     record = find_sealed(directory / _RECORD, SCHEMA)
     if record is None:
@@ -81,7 +81,7 @@ def is_whole(directory: Path) -> bool:
 
 
 def find_damage(directory: Path) -> dict[str, str]:
-    """Return what is wrong with each file of a unit, by name; all are hashed."""
+    """Return the fault of each damaged file of a unit, by name; all are hashed."""
     if not is_file(directory / _RECORD):
         return {_RECORD: MISSING}
     record = find_sealed(directory / _RECORD, SCHEMA)
@@ -96,7 +96,7 @@ def load_record(directory: Path) -> dict[str, Any]:
 
 
 def _as_written(directory: Path, file: Path) -> Path:
-    """Return a file of a unit, which is what the record says. Raises OutputError."""
+    """Fetch a file of a unit and return it. Raises OutputError unless it matches the record."""
     fetch(file)
     entry = load_record(directory)["files"].get(file.name)
     fault = "not in unit.json" if entry is None else ""
@@ -110,12 +110,12 @@ def _as_written(directory: Path, file: Path) -> Path:
 
 
 def find_seconds(directory: Path) -> dict[str, float]:
-    """Return the seconds of each step of a unit; none where they were lost."""
+    """Return the seconds of each step of a unit; empty where their file is lost."""
     return dict(find_json(directory / _SECONDS, _SECONDS_SCHEMA) or {})
 
 
 def lod_file(directory: Path, level: int) -> Path:
-    """Return where `save_unit` puts one level of detail."""
+    """Return the path of one level of detail."""
     return directory / f"lod{level}.npz"
 
 
@@ -126,7 +126,7 @@ def find_closed(directory: Path) -> Path | None:
 
 
 def load_lods(directory: Path) -> tuple[Lod, ...]:
-    """Return the levels of detail that `save_unit` wrote. Raises OutputError for a damaged file."""
+    """Return the levels of detail, finest first. Raises OutputError for a damaged file."""
     lods = load_record(directory)["lods"]
     try:
         return tuple(_load_lod(directory, level, lod) for level, lod in enumerate(lods))
@@ -135,13 +135,13 @@ def load_lods(directory: Path) -> tuple[Lod, ...]:
 
 
 def load_quality(stored: Mapping[str, Any]) -> Quality:
-    """Return what a record holds of one level's quality."""
+    """Return the quality of one level from its entry in a record."""
     ways = {way: Spread(**stored[way]) for way in ("away", "back")}
     return Quality(**{**stored, **ways})
 
 
 def load_volume(directory: Path) -> NDArray[np.uint8]:
-    """Return the 8-bit voxels (z, y, x), mapped from the file. Raises OutputError."""
+    """Return the 8-bit voxels (z, y, x), uint8, mapped from the file. Raises OutputError."""
     file = _as_written(directory, directory / _VOLUME)
     try:
         volume: NDArray[np.uint8] = np.load(file, mmap_mode="r")
@@ -173,7 +173,7 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
 
 
 def _describe_closed(closed: Closed | None) -> dict[str, int] | None:
-    """Return what unit.json says of the closed copy."""
+    """Return the entry of the closed copy in unit.json."""
     if closed is None:
         return None
     return {
@@ -184,7 +184,7 @@ def _describe_closed(closed: Closed | None) -> dict[str, int] | None:
 
 
 def _describe_maps(lod: Lod) -> dict[str, Any]:
-    """Return what unit.json says of a level's maps."""
+    """Return the entry of a level's maps in unit.json."""
     height, width = (0, 0) if lod.normal_map is None else lod.normal_map.shape[:2]
     baked = lod.baked
     return {

@@ -1,1 +1,1 @@
-"""The tasks of workers. The key of a result holds the code of the one module that makes it."""
+"""The tasks of workers. A result's key covers the code of the one module that makes it."""

@@ -33,10 +33,10 @@ class IsoTask:
 
 @dataclass(frozen=True, slots=True)
 class IsoField:
-    """What iso-values are sought in, float32 (z, y, x): denoised, above the background.
+    """The field in which an iso-value is searched, float32 (z, y, x): denoised, above background.
 
-    below     the background, mean over the tile; 0: none
-    constant  what every voxel is, background and all; None: they differ
+    below     mean of the background over the tile, voxel values; 0: none
+    constant  the value of all voxels, background included; None: they differ
     """
 
     values: NDArray[np.float32]
@@ -45,14 +45,14 @@ class IsoField:
     constant: float | None
 
     def find_iso_value(self, options: IsoValueOptions) -> IsoValue:
-        """Return the iso-value. Raises NoSurfaceError."""
-        if self.constant is not None:  # said of the voxels as they are, not above the background
+        """Return the iso-value. Raises NoSurfaceError where all voxels are equal."""
+        if self.constant is not None:  # the message has the voxels' value, background included
             raise NoSurfaceError(f"every voxel is {self.constant:g}")
         return find_iso_value(self.values, self.volume.spacing_um, options)
 
 
 def read_iso_field(task: IsoTask) -> IsoField:
-    """Read one unit's voxels, without a halo, and make of them what iso-values are sought in."""
+    """Read one unit's voxels, without a halo, and return the field to search in."""
     volume = open_source(task.ref).read(task.channel, task.box, task.level)
     field = denoise(volume, float(task.settings.surface.smoothing_um))
     first, below = float(field.flat[0]), 0.0
@@ -65,7 +65,7 @@ def read_iso_field(task: IsoTask) -> IsoField:
 
 
 def write_iso(task_and_file: tuple[IsoTask, Path]) -> None:
-    """Find one unit's iso-value and write it down with its curve."""
+    """Find one unit's iso-value and write it with its curve."""
     task, file = task_and_file
     write_sealed(file, _find(task))
 
@@ -90,6 +90,6 @@ def _find(task: IsoTask) -> dict[str, Any]:
         result["solids"] = asdict(sums)
         result["levels"] = [float(f"{v:.6g}") for v in found.levels]
         result["score"] = [round(float(v), 5) for v in found.score]
-    if task.given is not None and "found" in result:  # who gives a value is sure of it
+    if task.given is not None and "found" in result:  # a given value counts as certain
         result |= {"value": task.given, "confidence": 1.0}
     return result

@@ -16,11 +16,11 @@ class UnitTask:
     channel: int
     given: UnitInput
     directory: Path
-    painted: int | None = None  # the channel that is painted on the surface
+    painted: int | None = None  # index of the channel that is sampled onto the surface
 
 
 def run_unit(task: UnitTask) -> None:
-    """Build one unit and write it down."""
+    """Build one unit and write its folder. Raises SourceError, OutputError."""
     start = time.perf_counter()
     source, window = open_source(task.ref), task.given.lattice.window
     volume = source.read(task.channel, window, task.level)
