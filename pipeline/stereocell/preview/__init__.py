@@ -1,1 +1,1 @@
-"""Pictures of a source, before anything is built."""
+"""Pictures of a source before a build."""

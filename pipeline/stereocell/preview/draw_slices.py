@@ -1,8 +1,8 @@
-"""Mid-slices of a unit in xy, xz and yz, with what was extracted drawn on them.
+"""Mid-slices of a unit in xy, xz and yz, with the extracted surface drawn on them.
 
-The amber line is the cross-section of the LOD0 mesh with the plane, so it shows what is there and
-not what should be. The dashed line is where the smoothed 8-bit field meets the iso-value: where
-the two part, repair or simplification has been at work.
+The amber line is the cross-section of the LOD0 mesh with the plane: the actual surface, not the
+intended one. The dashed line is where the smoothed 8-bit field meets the iso-value. Where the two
+differ, repair or simplification changed the surface.
 """
 
 import io
@@ -23,28 +23,29 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
 
-# the axes (of z, y, x) that are cut, run down the picture, and run to its right
+# name -> axes (of z, y, x): the cut one, the picture's rows, the picture's columns
 VIEWS = {"xy": (0, 1, 2), "xz": (1, 0, 2), "yz": (2, 1, 0)}
 Color = tuple[int, int, int]
-OUTLINE = (255, 190, 40)
+OUTLINE = (255, 190, 40)  # sRGB, 0..255
 FIELD = (70, 190, 255)
 _GROUND = (38, 43, 51)
-_LONGEST_PX = 300
-_GAP_PX = 6
-_FINE = 3  # lines are drawn this many times larger and averaged down
-_DASH_PX = 4
-_SHOWN_PX = 330  # as wide as a phone or a card shows it: lines and words grow with wider pictures
+_LONGEST_PX = 300  # pixels, longest side of a slice
+_GAP_PX = 6  # pixels between slices
+_FINE = 3  # factor by which lines are drawn larger, then averaged down
+_DASH_PX = 4  # pixels, length of a dash
+_SHOWN_PX = 330  # pixels, width of display for which lines and text have weight 1
 
 
 @dataclass(frozen=True, slots=True)
 class Slice:
     """One plane through a unit; row and column are the picture's.
 
-    grey     uint8 (rows, columns), window applied
-    spacing_um  (row, column)
-    outline  float64 (n, 2, 2): n line segments between two points (row, column), in voxels
-    above    float32 (rows, columns): field minus iso-value, or None without an iso-value
-    contours colours (RGB), each with a field like `above` whose zero line is drawn whole
+    grey        uint8 (rows, columns), windowed
+    spacing_um  (row, column), um
+    outline     float64 (n, 2, 2): n line segments between two points (row, column), in voxels
+    above       float32 (rows, columns): field minus iso-value, or None without an iso-value
+    contours    colours (sRGB, 0..255), each with a field like `above`, whose zero line is drawn
+                solid
     """
 
     name: str
@@ -67,11 +68,12 @@ def cut_unit(
 ) -> list[Slice]:
     """Return the three mid-slices of a unit.
 
-    volume    uint8 (z, y, x), the lattice's voxels, without an apron
-    first_um  (z, y, x), the centre of the first of them
-    mesh      the finest, in world um; None: no surface
-    sigma_um  of the smoothing before the surface
-    iso_at    the iso-value in steps of 8 bits at the voxels of a box of the dataset
+    volume     uint8 (z, y, x), the lattice's voxels, without an apron
+    lattice    its box in voxels of the dataset
+    first_um   (z, y, x), um, the centre of the first voxel; `spacing_um` is (z, y, x), um
+    mesh       the finest, in world um; None: no surface
+    sigma_um   of the Gaussian before surface extraction
+    iso_at     returns the iso-value on the scale of 8 bits at the voxels of a box of the dataset
     """
     points = None if mesh is None else voxels_of(mesh, first_um, spacing_um)
     slices = []
@@ -106,7 +108,9 @@ def voxels_of(
 def cross_section(
     points: NDArray[np.float64], triangles: NDArray[np.uint32], axis: int, at: float
 ) -> NDArray[np.float64]:
-    """Return where triangles meet the plane points[:, axis] = at: segments, float64 (n, 2, 3).
+    """Return the cut of triangles with the plane points[:, axis] = at: segments, float64 (n, 2, 3).
+
+    points     (m, 3), float64; `triangles` is (k, 3), indices of points
 
     A vertex on the plane counts as above it, so that each triangle gives one segment or none and
     closed meshes give closed lines.
@@ -115,7 +119,7 @@ def cross_section(
     sides = above[triangles]
     mixed = sides.any(axis=1) & ~sides.all(axis=1)
     met, sides = triangles[mixed].astype(np.int64), sides[mixed]
-    # of the three corners one is alone on its side; both ends lie on its edges
+    # one of the three corners is alone on its side; both ends lie on its edges
     lone = np.where(sides[:, 0] == sides[:, 1], 2, np.where(sides[:, 0] == sides[:, 2], 1, 0))
     rows = np.arange(len(met))
     tip = points[met[rows, lone]]
@@ -136,11 +140,12 @@ def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
 def paint_slices(
     slices: Sequence[Slice], longest_px: int, shown_px: int = _SHOWN_PX
 ) -> Image.Image:
-    """Return a picture of the slices, none longer than so many pixels: yz right of xy, xz below it.
+    """Return a picture of the slices: yz to the right of xy, xz below it.
 
-    shown_px  how wide it will be shown
+    longest_px  longest side of a slice
+    shown_px    width of display; lines and text scale with it
 
-    All three have one scale, the specimen's own proportions, and xy's image rows run downwards.
+    All three slices have one scale, in the specimen's own proportions; rows of xy run downwards.
     """
     longest = max(um for s in slices for um in _extent(s))
     scale = longest_px / longest
@@ -195,7 +200,7 @@ def _panel(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
 def _zero_line(
     above: NDArray[np.float32], size: tuple[int, int], weight: float, *, is_dashed: bool
 ) -> Image.Image:
-    """Return the mask of the zero line of `above`, whole or broken into dashes."""
+    """Return the mask of the zero line of `above` (rows, columns), solid or dashed."""
     fine = (size[0] * _FINE, size[1] * _FINE)
     inside = np.asarray(Image.fromarray(above).resize(fine, Image.Resampling.BILINEAR)) > 0
     edge = np.zeros(inside.shape, bool)
@@ -208,7 +213,7 @@ def _zero_line(
 
 
 def _lines(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
-    """Return the mask of the outline: points close enough along each segment to join up."""
+    """Return the mask of the outline: points close enough along each segment to touch."""
     shape = (size[1] * _FINE, size[0] * _FINE)
     fine = np.array(shape)
     pixels = (part.outline + 0.5) * (fine / np.array(part.grey.shape))
@@ -225,7 +230,7 @@ def _lines(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
 
 
 def _averaged(mask: NDArray[np.bool_], weight: float) -> Image.Image:
-    """Return the mask at the picture's size, its lines about `weight` pixels wide."""
+    """Return the mask at the picture's size, with lines about `weight` pixels wide."""
     reach = max(1, round((_FINE * weight - 1) / 2))
     wide = mask.astype(np.uint8) * 255
     for axis in (0, 1):
@@ -240,12 +245,15 @@ def _write(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, weight
 
 @cache
 def find_font(size: int) -> ImageFont.FreeTypeFont:
-    """Return a font that every machine with this program has, and that has a micro sign."""
+    """Return a font that ships with matplotlib and that has a micro sign; `size` in pixels."""
     return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf", size)
 
 
 def _scale_bar(draw: ImageDraw.ImageDraw, xy: tuple[int, int], scale: float, weight: float) -> None:
-    """Draw a bar of 1, 2 or 5 times a power of ten um at the lower left of xy (width, height)."""
+    """Draw a bar of 1, 2 or 5 times a power of ten um at the lower left of xy (width, height).
+
+    scale  pixels per um
+    """
     longest = 0.35 * xy[0] / scale
     power = 10.0 ** math.floor(math.log10(longest))
     length = max(step * power for step in (1, 2, 5) if step * power <= longest)

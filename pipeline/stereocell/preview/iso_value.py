@@ -1,8 +1,9 @@
-"""Look at one tile's iso-value before anything is built: slices with contours, the curve, a table.
+"""Preview one tile's iso-value before a build: slices with contours, the curve, a table.
 
-Every criterion's level is a candidate, and so is a value that the user gives. The field is the one
-that a build of the same settings would seek the iso-value in. What is found is one tile's: a build
-hears the neighbours too and may draw it towards theirs (`agreement`); a given value it takes as is.
+The candidates are every criterion's level, and a value that the user gives. The field is the one
+in which a build of the same settings searches the iso-value. The result covers one tile: a build
+also considers the neighbours and may draw a found value towards theirs (`agreement`); it takes a
+given value as is.
 """
 
 from collections.abc import Sequence
@@ -34,20 +35,20 @@ COLORS: dict[str, Color] = {
     "given": (255, 255, 255),
     ADAPTIVE: (255, 255, 255),
 }
-_LONGEST_PX = 900
-_CHART_PX = 200
+_LONGEST_PX = 900  # pixels, longest side of a slice
+_CHART_PX = 200  # pixels, height of the curve
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
 _MARGIN_PX, _TEXT_PX = 14, 14
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A level that the surface could be taken at.
+    """A level at which the surface could be taken.
 
-    level       above the background, in voxel values; `raw`: the background's mean added
+    level       above the background, in voxel values; `raw`: with the background's mean added
     inside      share of the tile's voxels above it
-    confidence  of the tile by itself, 0..1; None: nobody judged it
-    is_chosen   given, or found by the criterion that the settings name: what a build starts from
+    confidence  from this tile alone, 0..1; None: not rated
+    is_chosen   given, or found by the criterion of the settings: a build starts from it
     """
 
     name: str
@@ -63,10 +64,11 @@ def preview(
 ) -> tuple[list[Candidate], Path]:
     """Write the picture; return the candidates and the picture's path. Nothing else is written.
 
-    out  a .png; None: iso_<channel>_<tile>.png in the current folder
+    channel_name  name, ID or index
+    out           a .png; None: iso_<channel>_<tile>.png in the current folder
 
-    Raises UsageError for a channel or tile that the plan doesn't have, NoSurfaceError where no
-    level separates anything, SourceError.
+    Raises UsageError for a channel or tile that the plan lacks, NoSurfaceError where no level
+    separates anything, SourceError where the source can't be read.
     """
     if out is not None and out.suffix.lower() != ".png":
         raise UsageError(f"-o is {str(out)!r}, expected a file named .png")
@@ -99,7 +101,7 @@ def preview(
 
 
 def table(candidates: Sequence[Candidate]) -> list[str]:
-    """Return the candidates as lines of text, the one a build starts from with a star."""
+    """Return the candidates as lines of text; a star marks the one that a build starts from."""
     lines = [
         f"{'candidate':<14}{'above background':>17}{'raw':>12}{'inside':>10}{'confidence':>12}"
     ]
@@ -113,7 +115,7 @@ def table(candidates: Sequence[Candidate]) -> list[str]:
 
 
 def _note(candidates: Sequence[Candidate]) -> str:
-    """Return what the star says: the neighbours, which a build hears too, aren't looked at here."""
+    """Return the star's meaning; a build also considers the neighbours, which are not read here."""
     if any(c.is_chosen and c.confidence is None for c in candidates):
         return "* given; a build takes it"
     return "* found; a build may draw it towards its neighbours'"
@@ -160,7 +162,7 @@ def _candidates(
 def _slices(
     field: IsoField, candidates: Sequence[Candidate], window: tuple[float, float], plan: Plan
 ) -> list[Slice]:
-    """Return the tile's mid-slices, window applied, with the candidates' contours."""
+    """Return the tile's mid-slices, windowed, with the candidates' contours."""
     low, high = window
     slices = []
     for name, order in VIEWS.items():
@@ -184,7 +186,7 @@ def _slices(
 def _compose(
     slices: Image.Image, title: str, candidates: Sequence[Candidate], chosen: IsoValue
 ) -> Image.Image:
-    """Return slices, the criterion's curve below them, and a legend."""
+    """Return a picture of the slices, the criterion's curve below them, and a legend."""
     line = round(1.5 * _TEXT_PX)
     legend = 2 * _MARGIN_PX + line * (len(candidates) + 1)
     width = max(slices.width, 520) + 2 * _MARGIN_PX

@@ -1,9 +1,9 @@
-"""Write one channel as 8-bit PNG slices, with a JSON of what they show.
+"""Write one channel as 8-bit PNG slices, with a JSON that describes them.
 
     000.png 001.png ...     slice z, from posterior to anterior for DICOM and NIfTI
     slices.json             size, spacing, window, orientation, modality: schemas/slices.schema.json
 
-The window is found as a build finds it, so that 0 and 255 mean the same here as there.
+The window is found as in a build, so that 0 and 255 mean the same here as there.
 """
 
 import json
@@ -29,22 +29,24 @@ from stereocell.storage.atomic_write import replacing_folder
 
 INDEX = "slices.json"
 FORMAT, VERSION = "stereocell-slices", 1
-# where a slice's axes run, for a source whose place in a body is known
+# directions of growing index, for a source with a known place in a body
 ANATOMICAL = {"slices": "anterior", "rows": "inferior", "columns": "left"}
 UNKNOWN = {"slices": "towards the viewer", "rows": "down", "columns": "right"}
 
 
 def without_surface(settings: Settings) -> Settings:
-    """Return settings whose lengths of surfaces, which slices don't have, suit all voxels."""
+    """Return settings with all surface lengths 0, so that they suit all voxels."""
     lengths = {f.name: 0.0 for f in fields(SurfaceOptions) if f.name.endswith("_um")}
     return replace(settings, surface=SurfaceOptions(**lengths))  # type: ignore[arg-type]
 
 
 def write_slices(plan: Plan, folder: Path) -> int:
-    """Write the plan's region of its one channel; return how many slices there are.
+    """Write the plan's region of its one channel; return the number of slices.
 
-    `folder` is replaced as a whole if it holds slices. Raises UsageError for more than one channel,
-    OutputError for a folder that holds something else, SourceError.
+    folder  replaced as a whole if it holds slices
+
+    Raises UsageError for more than one channel, OutputError for a folder with other content,
+    SourceError where the source can't be read.
     """
     if len(plan.channels) != 1:
         found = ", ".join(channel.name for channel in plan.channels)
@@ -64,7 +66,7 @@ def write_slices(plan: Plan, folder: Path) -> int:
 
 
 def to_bytes(plane: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return grey values as uint8: the window's ends become 0 and 255, what is outside is cut."""
+    """Return grey values as uint8 of the same shape: the window becomes 0..255, the rest is cut."""
     low, high = window
     share = (plane.astype(np.float32) - np.float32(low)) / np.float32(high - low)
     return np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The report: one page of what a build left, in numbers, curves and pictures."""
+"""The report: one page about a build, with numbers, curves and pictures."""
 
 from stereocell.report.page import TEMPLATE, write_report
 

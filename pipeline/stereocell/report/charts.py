@@ -1,4 +1,4 @@
-"""Curves as inline SVG, made of numbers alone: crisp, small, and coloured by the page's own CSS."""
+"""Curves as inline SVG: crisp, small, and coloured by the page's own CSS."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stereocell.model.channel import OpacityPoints
 
-WIDTH, HEIGHT = 320.0, 120.0
+WIDTH, HEIGHT = 320.0, 120.0  # units of the SVG's viewBox
 _BINS = 128
 
 
@@ -16,6 +16,9 @@ def histogram(
     counts: Sequence[int], functions: Mapping[str, OpacityPoints], iso_normalized: float | None
 ) -> Markup:
     """Return a channel's histogram (log counts) over its window, with opacities and iso-value.
+
+    counts          of equal bins over the window
+    iso_normalized  0..1 in the window; None: no line
 
     The lines have the classes `tf` and `tf-<name>`; opacity runs from 0 at the bottom to 1.
     """
@@ -38,7 +41,7 @@ def criterion(
     """Return the criterion's curve over the levels (voxel values).
 
     taken  the iso-value, marked `mark`; None: the tile has none of its own
-    found  the criterion's optimum, marked `found` where another value was taken, or none
+    found  the criterion's optimum, marked `found` where it wasn't taken; None: there is none
     """
     low, high = levels[0], levels[-1]
     span = (high - low) or 1.0
@@ -59,10 +62,11 @@ def threshold(
     peaks: Sequence[float],
     rules: Mapping[str, float],
 ) -> Markup:
-    """Return a histogram and its moving mean, with upright lines by their class.
+    """Return a histogram and its moving mean, with vertical lines by their class.
 
-    top           the count at the top; what is more stops there
-    peaks, rules  places on the axis, 0..1; peaks are marked by ticks at the top
+    counts, smoothed  of equal bins along the axis, (n,)
+    top               count at the chart's top; larger counts are cut there
+    peaks, rules      places on the axis, 0..1; ticks at the top mark the peaks
     """
     edges = np.linspace(0, 1, len(counts) + 1)
     steps = _path(np.repeat(edges, 2)[1:-1], np.repeat(np.minimum(np.divide(counts, top), 1), 2))
@@ -87,7 +91,7 @@ def _point(point: NDArray[np.float64]) -> str:
 
 
 def _rule(kind: str, at: float) -> str:
-    """Return an upright line; one beyond the axis stands at its end."""
+    """Return a vertical line at `at`, clamped to 0..1."""
     x = min(max(at, 0.0), 1.0) * WIDTH
     return f'<path class="{kind}" d="M{x:.1f},0V{HEIGHT:g}"/>'
 

@@ -1,7 +1,7 @@
 """The process that draws meshes: `python report/draw_meshes_process.py FOLDER`.
 
-It reads FOLDER/scenes.json and writes FOLDER/0.png, 1.png, ...; where the machine has no OpenGL it
-writes why into FOLDER/refused.txt, unless VTK ends the process first.
+It reads FOLDER/scenes.json and writes FOLDER/0.png, 1.png, ... On a machine without OpenGL it
+writes the reason into FOLDER/refused.txt, unless VTK ends the process first.
 """
 
 import json
@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# From the front, from above and from the right: x right, y up, z towards the viewer.
+# Direction of the eye, from the front, above and the right: x right, y up, z towards the viewer.
 _EYE = np.array([0.42, 0.5, 1.0])
 _UP = np.array([0.0, 1.0, 0.0])
 _GROUND = (11, 13, 16)
-_FINE = 2  # drawn this many times larger, then averaged down
-_MARGIN = 1.04
+_FINE = 2  # factor by which a picture is drawn larger, then averaged down
+_MARGIN = 1.04  # factor by which the view exceeds the frame
 
 
 def main(folder: Path) -> None:
     try:
         import pyvista
-    except ImportError as error:  # a system library that VTK links to is not there
+    except ImportError as error:  # a system library that VTK links to is missing
         (folder / "refused.txt").write_text(f"VTK can't be loaded ({error.msg})")
         return
     for i, scene in enumerate(json.loads((folder / "scenes.json").read_text())):
@@ -45,7 +45,7 @@ def _draw(pyvista: Any, scene: dict[str, Any]) -> NDArray[np.uint8]:
     right = np.cross(_UP, to_eye)
     right /= np.linalg.norm(right)
     up = np.cross(to_eye, right)
-    # how wide and high the frame's box looks from there
+    # width and height of the frame's box from the eye
     size = high - low
     across, upright = float(np.abs(right) @ size), float(np.abs(up) @ size)
     width, most = scene["size"]
@@ -78,6 +78,6 @@ def _draw(pyvista: Any, scene: dict[str, Any]) -> NDArray[np.uint8]:
 
 
 if __name__ == "__main__":
-    # without OpenGL, VTK ends by a segmentation fault: expected, so no core is left lying about
+    # without OpenGL, VTK ends by a segmentation fault: expected, so no core file is written
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     main(Path(sys.argv[1]))

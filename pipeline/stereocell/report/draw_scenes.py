@@ -1,4 +1,4 @@
-"""Pictures of meshes, drawn by a process of their own: without OpenGL, VTK ends its process."""
+"""Pictures of meshes, drawn in a separate process: without OpenGL, VTK ends its process."""
 
 import json
 import signal
@@ -14,9 +14,9 @@ from PIL import Image
 
 from stereocell.preview.draw_slices import encode
 
-# by its path, and -P: it needs nothing of this package
+# run by its path, with -P: it needs no other module of this package
 COMMAND = (sys.executable, "-P", str(Path(__file__).with_name("draw_meshes_process.py")))
-_SECONDS = 120.0, 30.0  # given to the process, and on top for each picture
+_SECONDS = 120.0, 30.0  # time limit: for the process, and in addition for each picture
 _REMEDY = "pictures of meshes need off-screen OpenGL, as Debian's libegl1 and libgl1-mesa-dri give"
 
 
@@ -30,10 +30,11 @@ class Surface:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What is on one picture. Boxes are (min, max) corners (x, y, z) in world um.
+    """The content of one picture. Boxes are (min, max) corners (x, y, z) in world um.
 
-    frame  fills the picture; boxes are outlined
-    size   pixels: width, and the most height
+    boxes  drawn as outlines
+    frame  fills the picture
+    size   pixels: width, largest height
     """
 
     surfaces: tuple[Surface, ...]
@@ -52,9 +53,9 @@ class Picture:
 
 
 def draw_scenes(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
-    """Return a picture of each scene, or none of them and why this machine can't draw.
+    """Return a picture of each scene and "", or no picture and the reason why it can't draw.
 
-    Raises RuntimeError if the drawing itself is at fault.
+    Raises RuntimeError where the drawing itself fails.
     """
     with tempfile.TemporaryDirectory(prefix="stereocell-") as name:
         folder = Path(name)
@@ -78,7 +79,7 @@ def draw_scenes(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
 
 
 def can_draw() -> str:
-    """Return why this machine can't draw meshes; empty: it can. Draws one triangle."""
+    """Return the reason why this machine can't draw meshes; empty: it can. Draws one triangle."""
     with tempfile.TemporaryDirectory(prefix="stereocell-") as name:
         file = Path(name) / "triangle.npz"
         corners = np.eye(3, dtype=np.float32)

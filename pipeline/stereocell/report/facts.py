@@ -1,4 +1,4 @@
-"""What a build left, in numbers: read from OUT, summed up, nothing drawn."""
+"""A build in numbers: read from OUT and summed up, nothing drawn."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -23,10 +23,10 @@ PHASES = ("plan", "units", "stage", "bundle")
 
 @dataclass(frozen=True, slots=True)
 class LodFacts:
-    """One level of detail; None where the record doesn't tell.
+    """One level of detail; None where the record lacks the number.
 
     bytes     of the glb where the bundle has one, else of the unit's own file
-    mean_um, p95_um, max_um  distance between mesh and iso-surface, of both ways the larger
+    mean_um, p95_um, max_um  distance between mesh and iso-surface, the larger of both directions
     """
 
     triangles: int
@@ -45,16 +45,16 @@ class LodFacts:
 class UnitFacts:
     """One finished (tile, channel).
 
-    directory   its results
+    directory   the folder of its results
     iso_file    the criterion's curve, relative to OUT
-    iso_value   above the background; None: the tile has none of its own
-    background  its mean over the tile; 0: none was subtracted
+    iso_value   above the background, voxel values; None: the tile has none of its own
+    background  its mean over the tile, voxel values; 0: none was subtracted
     confidence  0..1
-    iso_reason  why the criterion found nothing; empty if it did
-    reason      why there is no surface; empty if there is one
-    voxels      (x, y, z) of the stored volume, its apron among them
+    iso_reason  the reason why the criterion found nothing; empty: it found a value
+    reason      the reason for a missing surface; empty: there is one
+    voxels      (x, y, z) of the stored volume, with its apron
     volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
-    seconds     by step; empty if they were lost
+    seconds     by step; empty where they were lost
     """
 
     tile: Tile
@@ -81,7 +81,7 @@ class UnitFacts:
 
 @dataclass(frozen=True, slots=True)
 class StepFacts:
-    """Seconds that one step of the units took; `slowest` names the unit that took longest."""
+    """Seconds that one step took over all units; `slowest` names the unit with the largest."""
 
     name: str
     median: float
@@ -102,7 +102,7 @@ class FileFacts:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """All of a build. `phases`: seconds of each, and on what where not on all."""
+    """All facts of a build. `phases`: seconds of each, and its part of the units where not all."""
 
     plan: Plan
     survey: Survey
@@ -114,7 +114,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Total:
-    """Sums over units; the distance is the largest. One entry per level of detail in `lods`."""
+    """Sums over units; the distance is the largest. `lods` has one entry per level of detail."""
 
     lods: tuple[LodFacts, ...]
     units: int
@@ -126,7 +126,7 @@ class Total:
 
 
 def gather(out_folder: OutFolder) -> Facts:
-    """Return the facts of OUT. Raises OutputError where plan or a unit is missing."""
+    """Return the facts of OUT. Raises OutputError where the plan or a unit is missing."""
     plan = out_folder.plan()
     out_folder.require_units_of(plan)
     survey, index = read_survey(out_folder), out_folder.index()
@@ -257,9 +257,9 @@ class _Spent:
 
 
 def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
-    """Return the steps in the order in which units go through them."""
+    """Return the steps in the order in which units run them."""
     spent: dict[str, _Spent] = defaultdict(_Spent)
-    for unit in sorted(units, key=lambda unit: -len(unit.seconds)):  # the longest ways first
+    for unit in sorted(units, key=lambda unit: -len(unit.seconds)):  # most steps first
         for step, seconds in unit.seconds.items():
             entry = spent[step]
             entry.seconds.append(seconds)

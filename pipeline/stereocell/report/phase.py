@@ -1,4 +1,4 @@
-"""The report as a phase of a build: it is drawn where what it shows has changed."""
+"""The report as a phase of a build: it is written anew where its content has changed."""
 
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,10 @@ from stereocell.storage.cache_key import key_of
 
 
 def run_report(out: Path) -> None:
-    """Write OUT/report/index.html: pictures, sizes, times."""
+    """Write OUT/report/index.html: pictures, sizes, times.
+
+    Raises OutputError where units are missing or damaged.
+    """
     out_folder = OutFolder(out)
     with phase_of(out_folder, "report") as phase:
         plan = out_folder.plan()

@@ -1,18 +1,18 @@
-"""What a reader of the report should look at: said in words, unit by unit."""
+"""Remarks for a reader of the report, unit by unit."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from stereocell.report.facts import Facts, UnitFacts
 
-LOW_CONFIDENCE = 0.2
-LEAST_ANGLE_DEG = 12.0  # of lod0, 1st percentile: below, renderers shade slivers as streaks
-_MOST_LINES = 30
+LOW_CONFIDENCE = 0.2  # confidence, 0..1; a unit below gets a remark
+LEAST_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
+_MOST_LINES = 30  # lines printed of one remark
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """A kind of thing with the units that show it. `is_note`: nothing is wrong, but know it."""
+    """One kind of finding with its units. `is_note`: worth knowing, but not a problem."""
 
     title: str
     lines: tuple[str, ...]
@@ -20,7 +20,7 @@ class Remark:
 
 
 def find_remarks(facts: Facts) -> list[Remark]:
-    """Return the remarks, gravest first."""
+    """Return the remarks, most severe first."""
     units = facts.units
     with_surface = {u.channel.name for u in units if not u.reason}
     empty = [u for u in units if u.channel.name not in with_surface]
@@ -107,7 +107,7 @@ def _remark(
 def _counts(
     what: str, units: Iterable[UnitFacts], count: Callable[[UnitFacts], int]
 ) -> Remark | None:
-    """Return a note with the sum, its lines by channel."""
+    """Return a note with the sum of `count` over the units, its lines by channel."""
     by_channel: dict[str, list[UnitFacts]] = {}
     for unit in units:
         if count(unit):

@@ -1,17 +1,16 @@
-"""Choose what a page can carry: evenly spread units, and a level of detail that draws in time."""
+"""Choose units for a page, evenly spread, and a level of detail that draws in time."""
 
 from collections.abc import Sequence
 
-FEWEST_TILES = 6  # shown of a build with very many channels, each with some of them
-_GOLDEN = (5**0.5 - 1) / 2
+FEWEST_TILES = 6  # tiles pictured at least, where channels are many
+_GOLDEN = (5**0.5 - 1) / 2  # 1 / golden ratio
 
 
 def choose_units(tiles: int, channels: int, most: int) -> list[tuple[int, list[int]]]:
-    """Return which units are pictured: (tile, its channels), all by index; at most `most` units.
+    """Return the units to picture: (tile, its channels), all by index; at most `most` units.
 
-    All of them if they fit. Else evenly spaced tiles with all channels; where so few tiles would
-    fit that they say little of the specimen, more tiles with some channels each, not always the
-    same ones.
+    All units where they fit. Else evenly spaced tiles with all channels; where too few tiles would
+    fit, more tiles with some channels each, in rotation.
     """
     if tiles * channels <= most:
         return [(tile, list(range(channels))) for tile in range(tiles)]
@@ -26,10 +25,12 @@ def choose_units(tiles: int, channels: int, most: int) -> list[tuple[int, list[i
 
 
 def choose_level(triangles: Sequence[Sequence[int]], most: int) -> tuple[int, int]:
-    """Return the finest level at which meshes can be drawn, and every how manyth of them is.
+    """Return the finest level at which meshes can be drawn, and k: every k-th mesh is drawn.
 
-    `triangles`: per mesh, of each of its levels, finest first; at least one mesh. If even the
-    coarsest level of all is more than `most` triangles, only every k-th mesh is drawn.
+    triangles  per mesh, of each of its levels, finest first; at least one mesh
+    most       largest number of triangles to draw
+
+    k is 1 unless even the coarsest level of all meshes exceeds `most`.
     """
     levels = max(len(mesh) for mesh in triangles)
     for level in range(levels):
@@ -42,6 +43,6 @@ def choose_level(triangles: Sequence[Sequence[int]], most: int) -> tuple[int, in
 def thin_out(count: int, every: int) -> list[int]:
     """Return about one in `every` of the indices below `count`, rising.
 
-    Steps of the golden ratio: a fixed stride could hit the same channel in every tile.
+    By steps of the golden ratio: a fixed stride could hit the same channel in every tile.
     """
     return [i for i in range(count) if i * _GOLDEN % 1 < 1 / every]

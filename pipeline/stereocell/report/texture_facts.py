@@ -1,4 +1,4 @@
-"""What the report says of baked maps: texels, charts, levels that go without, and likeness."""
+"""The report's facts about baked maps: texels, charts, levels without maps, likeness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,14 +10,15 @@ from stereocell.report.select_units import thin_out
 from stereocell.report.texture_similarity import find_close_likeness, find_likeness
 
 MOST_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
-COMPARED = 2  # the level, or the coarsest if there are fewer
+COMPARED = 2  # the compared level; the coarsest where there are fewer
 
 
 @dataclass(frozen=True, slots=True)
 class LevelMaps:
-    """The maps of one channel at one level; um a texel from the finest to the coarsest.
+    """The maps of one channel at one level.
 
-    without  tiles whose level has its values at vertices, by the reason
+    texel_um  (smallest, largest) edge of a texel over the tiles
+    without   reason -> number of tiles with values at vertices in place of maps
     """
 
     level: int
@@ -31,7 +32,7 @@ class LevelMaps:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """How like lod0 a unit looks at a level with its maps: SSIM at each view, and close up."""
+    """The likeness of a level with its maps to lod0: SSIM, -1..1, at each view and close up."""
 
     unit: str
     level: int
@@ -44,7 +45,7 @@ class Likeness:
 
 
 def sum_up_maps(units: Sequence[UnitFacts]) -> list[LevelMaps]:
-    """Return what the levels of one channel's units wear."""
+    """Return the maps of each level of one channel's units."""
     records = [load_record(unit.directory)["lods"] for unit in units if unit.lods]
     levels = max(map(len, records), default=0)
     return [

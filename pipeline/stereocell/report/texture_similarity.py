@@ -1,15 +1,18 @@
-"""How like the finest level a coarser one looks with its baked maps: pictures, compared by SSIM.
+"""Compare pictures of a coarser level with its baked maps and of the finest level, by SSIM.
 
-Drawn here in plain numpy: the figures are the same on every machine, with OpenGL or without.
-Parallel projection, one light beside the viewer's eye, and ambient light that occlusion dims. The
-shading is per pixel, by the normal map in the frame of the interpolated tangents, as glTF and USD
-renderers do it; without maps by the interpolated normals.
+The pictures are drawn in plain numpy, so that the figures are equal on every machine, with OpenGL
+or without. Parallel projection, one light beside the viewer's eye, and ambient light that occlusion
+dims. Shading is per pixel, by the normal map in the frame of the interpolated tangents, as in glTF
+and USD renderers; without maps by the interpolated normals.
 
-A picture is as large as the viewer draws the surface at the moment when it takes this level for the
-next finer one: the level's distance from the iso-surface spans ERROR_PX there.
+A picture is as large as the surface in the viewer at the distance at which the viewer switches to
+the next finer level: there the level's distance from the iso-surface spans ERROR_PX.
 
-SSIM: Wang, Bovik, Sheikh & Simoncelli, IEEE Transactions on Image Processing 13, 2004
-(https://doi.org/10.1109/TIP.2003.819861), mean over the picture, by scikit-image.
+SSIM is the mean over the picture, by scikit-image.
+
+References: Wang, Bovik, Sheikh & Simoncelli, "Image quality assessment: from error visibility to
+structural similarity", IEEE Transactions on Image Processing 13(4), 2004,
+https://doi.org/10.1109/TIP.2003.819861
 """
 
 from collections.abc import Sequence
@@ -22,17 +25,17 @@ from skimage.metrics import structural_similarity
 from stereocell.model.mesh import Lod
 from stereocell.textures.rasterize import find_pixels
 
-# where the viewer is, x right, y up, z towards them: in front, then around it
+# directions of the viewer, x right, y up, z towards the viewer: in front, then around
 VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
-ERROR_PX = 2.0  # as the viewer's target
-LEAST_PX, MOST_PX = 48, 256  # of a picture's edge
-CLOSE_PX = 512  # the same for every level, however far off the viewer shows it
-_FINE = 2  # drawn this many times larger, then averaged down
-_AMBIENT, _GROUND = 0.35, 0.0
+ERROR_PX = 2.0  # pixels, the viewer's target error
+LEAST_PX, MOST_PX = 48, 256  # pixels, smallest and largest edge of a picture
+CLOSE_PX = 512  # pixels, edge of the close picture, equal for every level
+_FINE = 2  # factor by which a picture is drawn larger, then averaged down
+_AMBIENT, _GROUND = 0.35, 0.0  # grey values, 0..1
 
 
 def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
-    """Return the SSIM of two levels of one surface, for each of VIEWS."""
+    """Return the SSIM, -1..1, of two levels of one surface, for each of VIEWS."""
     ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
     diagonal = float(np.linalg.norm(ends[1] - ends[0]))
     wanted = ERROR_PX * diagonal / max(coarse.distance_um, 1e-9)
@@ -44,7 +47,7 @@ def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
 
 
 def find_close_likeness(fine: Lod, coarse: Lod) -> float:
-    """Return the SSIM of two levels of one surface from the front, in CLOSE_PX."""
+    """Return the SSIM, -1..1, of two levels of one surface from the front, at CLOSE_PX."""
     ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
     pictures = (draw(lod, VIEWS[0], ends=ends, size=CLOSE_PX) for lod in (fine, coarse))
     return compare(*pictures)
@@ -53,9 +56,11 @@ def find_close_likeness(fine: Lod, coarse: Lod) -> float:
 def draw(
     lod: Lod, view: Sequence[float], *, ends: NDArray[np.float32], size: int
 ) -> NDArray[np.float64]:
-    """Return the level as seen from `view`, grey 0..1 (size, size).
+    """Return the level as seen from `view`: float64 (size, size), grey 0..1.
 
-    `ends`: two corners (x, y, z) of the box that fills the picture.
+    view  direction (x, y, z) towards the viewer
+    ends  (2, 3): corners (x, y, z), um, of the box that fills the picture
+    size  pixels along an edge
     """
     mesh = lod.mesh
     to_eye = np.asarray(view) / np.linalg.norm(view)
@@ -83,7 +88,11 @@ def draw(
 def _shading(
     lod: Lod, triangle: NDArray[np.int64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return unit normals (n, 3) and openness (n,) at places of triangles."""
+    """Return unit normals (n, 3) and openness (n,), 0..1, at points of triangles.
+
+    triangle  (n,), index of each point's triangle
+    weights   (n, 3), barycentric coordinates
+    """
     mesh, baked = lod.mesh, lod.baked
     corners = mesh.triangles[triangle]
 
@@ -107,7 +116,7 @@ def _shading(
 
 
 def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an image (h, w), row 0 at v = 1, at UVs (n, 2): bilinear, clamped at its edges."""
+    """Return an image uint8 (h, w), row 0 at v = 1, at UVs (n, 2): (n,), bilinear, clamped."""
     height, width = image.shape
     place = [(1 - uvs[:, 1]) * height - 0.5, uvs[:, 0] * width - 0.5]
     found: NDArray[np.float64] = ndimage.map_coordinates(
@@ -117,7 +126,7 @@ def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def compare(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the mean SSIM of two pictures of values 0..1, each (height, width)."""
+    """Return the mean SSIM of two pictures of values 0..1, each float64 (height, width)."""
     # Gaussian window of 11 x 11 pixels and variances of the population, as in the paper
     return float(
         structural_similarity(

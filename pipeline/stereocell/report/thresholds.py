@@ -1,8 +1,11 @@
-"""A channel's adaptive threshold as the report shows it: the figure, its peers, slices behind it.
+"""A channel's adaptive threshold in the report: the figure, other methods' thresholds, slices.
 
-Peers are thresholds of scikit-image on the same counts: Otsu, "A threshold selection method from
-gray-level histograms", IEEE Trans. Systems, Man, and Cybernetics 9 (1979); Li & Tam, "An iterative
-algorithm for minimum cross entropy thresholding", Pattern Recognition Letters 19 (1998).
+The others are thresholds of scikit-image on the same counts.
+
+References: Otsu, "A threshold selection method from gray-level histograms", IEEE Transactions on
+Systems, Man, and Cybernetics 9(1), 1979, https://doi.org/10.1109/TSMC.1979.4310076
+Li & Tam, "An iterative algorithm for minimum cross entropy thresholding", Pattern Recognition
+Letters 19(8), 1998, https://doi.org/10.1016/S0167-8655(98)00057-9
 """
 
 from dataclasses import dataclass
@@ -18,15 +21,15 @@ from stereocell.report.draw_scenes import Picture
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
-READINGS = {  # of the levels of Threshold.between
+READINGS = {  # format arguments: the levels of Threshold.between
     "two peaks": "between the second-highest peak, at {1:.5g}, and the peak before it, at {0:.5g}",
     "no peak before": "between the second-highest peak, at {0:.5g}, before which there is none, "
     "and the next one, at {1:.5g}",
     "single peak": "at the foot of the longer side of the only peak, at {0:.5g}",
 }
-MOST_NAMED = 6
-_ROOM = 1.6  # of the second-highest peak: the highest, air, would leave no room for the others
-_LI_VOXELS = 200_000  # Li's method wants voxels: about so many stand for the counts
+MOST_NAMED = 6  # largest number of chance rises that are listed
+_ROOM = 1.6  # chart's top as a multiple of the second-highest peak: air, the highest, is cut
+_LI_VOXELS = 200_000  # about the number of voxels that represent the counts in Li's method
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +81,7 @@ def draw_threshold(statistics: ChannelStatistics) -> ThresholdFigure | None:
 
 
 def describe(found: Threshold) -> str:
-    """Return how a threshold was read, with the levels of its peaks, and what was left out."""
+    """Return how a threshold follows from its peaks, and the rises that were dropped, as text."""
     reading = READINGS[found.reading].format(*found.between)
     left_out = ", ".join(f"{level:.5g}" for level in found.chance[:MOST_NAMED])
     if len(found.chance) > MOST_NAMED:
@@ -89,7 +92,7 @@ def describe(found: Threshold) -> str:
 
 
 def find_peers(histogram: Histogram) -> tuple[float, float]:
-    """Return Otsu's and Li's thresholds, voxel values; of counts in at least two bins."""
+    """Return Otsu's and Li's thresholds, voxel values. At least two bins must have counts."""
     counts, levels = np.asarray(histogram.counts), histogram.levels
     otsu = filters.threshold_otsu(hist=(counts, levels))
     fewer = np.ceil(counts * min(1.0, _LI_VOXELS / counts.sum())).astype(np.int64)
@@ -100,9 +103,10 @@ def find_peers(histogram: Histogram) -> tuple[float, float]:
 def draw_cut(
     volume: NDArray[np.uint8], spacing_um: tuple[float, float, float], threshold: float
 ) -> Picture:
-    """Return a volume's mid-slices with all below the threshold taken away.
+    """Return a volume's mid-slices in which voxels below the threshold are hidden.
 
-    volume  uint8 (z, y, x), window applied; threshold: 0..1 in the window
+    volume     uint8 (z, y, x), windowed
+    threshold  0..1 in the window
     """
     slices = []
     for name, order in VIEWS.items():

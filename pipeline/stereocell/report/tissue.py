@@ -17,22 +17,22 @@ from stereocell.model.color import to_srgb8
 from stereocell.model.tiling import Box
 from stereocell.preview.draw_slices import VIEWS, encode
 
-SHOWN_PX = 330  # the longest side of a plane
-_GAP_PX = 6
+SHOWN_PX = 330  # pixels, longest side of a plane
+_GAP_PX = 6  # pixels between planes
 
 
 @dataclass(frozen=True, slots=True)
 class TissueFacts:
-    """record: OUT/tissue/tissue.json. picture: WebP, its width and height."""
+    """record: OUT/tissue/tissue.json. picture: WebP data, width and height in pixels."""
 
     record: dict[str, Any]
     picture: tuple[bytes, int, int]
 
 
 def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
-    """Return what to show of the plan's tissue channels; None where there are none.
+    """Return the facts of the plan's tissue channels; None where there are none.
 
-    Raises OutputError, SourceError where OUT/tissue is damaged or another than was planned.
+    Raises OutputError or SourceError where OUT/tissue is damaged or differs from the plan.
     """
     added = [channel for channel in plan.channels if channel.source]
     if not added:
@@ -59,7 +59,10 @@ def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
 
 
 def _middle(read: Callable[[Box], NDArray[np.float32]], region: Box) -> list[int]:
-    """Return the voxel (z, y, x) in the middle of what has a class, by planes across the region."""
+    """Return the voxel (z, y, x) at the centre of all classes, from planes across the region.
+
+    read  returns probabilities of a box, float32 (class, z, y, x), 0..1
+    """
     found = []
     for axis in range(3):
         first, last = region.start[axis], region.stop[axis] - 1
@@ -78,7 +81,7 @@ def _plane(region: Box, axis: int, at: int) -> Box:
 
 
 def _paint(panels: list[tuple[Image.Image, list[float]]]) -> tuple[bytes, int, int]:
-    """Return the planes side by side, all at one scale, as WebP with its size."""
+    """Return the planes side by side, at one scale: WebP data, width and height in pixels."""
     scale = SHOWN_PX / max(max(extent) for _, extent in panels)
     sizes = [tuple(max(2, round(um * scale)) for um in extent) for _, extent in panels]
     width = sum(right for _, right in sizes) + _GAP_PX * (len(sizes) - 1)

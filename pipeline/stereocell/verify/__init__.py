@@ -1,1 +1,1 @@
-"""Outputs compared with format rules, with the stage and with the source."""
+"""Compare outputs with format rules, with the stage and with the source."""

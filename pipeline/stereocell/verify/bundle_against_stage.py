@@ -1,6 +1,6 @@
-"""Compare a bundle with the stage that it was exported from: what each file of a tile decodes to.
+"""Compare a bundle with the stage that it was exported from, by the decoded files of a tile.
 
-See bundle_manifest, bundle_surfaces and bundle_volumes for what is compared.
+The comparisons are in bundle_manifest, bundle_surfaces and bundle_volumes.
 """
 
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ class BundleTask:
 
 @dataclass(frozen=True, slots=True)
 class TileFinding:
-    """What was seen of one tile.
+    """The result of comparing one tile.
 
-    worst   a vertex's way from its place, in lattice steps
-    edits   what was edited by hand, a line for each surface
-    joints  each volume's histogram of value and gradient, packed, by channel
+    worst   largest distance of a vertex from its place, in lattice steps
+    edits   edits by hand, a line for each surface
+    joints  each volume's joint histogram of value and gradient, packed, by channel
     """
 
     name: str
@@ -45,7 +45,7 @@ class TileFinding:
 
 
 def compare_tile(task: BundleTask) -> TileFinding:
-    """Return how one tile's files agree with the composed stage. Raises StereoCellError."""
+    """Compare one tile's files with the composed stage. Raises StereoCellError if unreadable."""
     manifest = read_manifest(task.bundle)
     channels = {channel["id"]: channel for channel in manifest["channels"]}
     problems: list[str] = []
@@ -54,7 +54,7 @@ def compare_tile(task: BundleTask) -> TileFinding:
     surfaces = 0
     worst = 0.0
     stage = open_stage(task.stage_file)
-    # what the manifest lacks is told of the manifest
+    # channels that the manifest lacks are reported with the manifest
     appearances = [
         appearance for appearance in read_appearances(stage) if appearance.id in channels
     ]

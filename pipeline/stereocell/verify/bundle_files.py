@@ -1,4 +1,4 @@
-"""The files of a bundle, read for a comparison with what they were made of."""
+"""Read the files of a bundle, to compare them with their sources."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +13,7 @@ from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 
 REMEDY = "run `stereocell bundle OUT`"
-COLOR_STEP = 1 / 255 + 1e-6
+COLOR_STEP = 1 / 255 + 1e-6  # largest difference of a colour, 0..1: one step of 8 bits
 
 
 def read_manifest(bundle: Path) -> dict[str, Any]:
@@ -26,7 +26,10 @@ def read_transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_texels(file: Path) -> list[NDArray[np.uint8]]:
-    """Return the levels of a KTX2 file of ours, finest first, each (z, y, x, components)."""
+    """Return the levels of a KTX2 file of ours, finest first, each uint8 (z, y, x, components).
+
+    Raises CheckError where the file can't be read or decoded.
+    """
     try:
         data = file.read_bytes()
         width, height, depth, _, _, count = np.frombuffer(data, "<u4", 6, 20).tolist()

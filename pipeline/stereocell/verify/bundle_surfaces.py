@@ -1,9 +1,9 @@
 """Compare a tile's surfaces in a bundle with those of the stage.
 
-Every vertex of a decoded .glb lies within the lattice's half diagonal of a vertex of the composed
-mesh, and the other way round, triangle by triangle too, which face the same way and have the same
-place in the maps; colours within 1/255; maps as the stage's images would be encoded now. Boxes and
-errors of the tilesets: as the surfaces and the stage give them.
+Every vertex of a decoded .glb must lie within the lattice's half diagonal of a vertex of the
+composed mesh, and the other way round. Triangle by triangle, too; triangles must face the same way
+and have the same place in the maps. Colours must agree within 1/255, maps with a new encoding of
+the stage's images, boxes and errors of the tilesets with the surfaces and the stage.
 """
 
 import io
@@ -28,12 +28,12 @@ from stereocell.usd.read_textures import read_image
 from stereocell.verify.bundle_files import COLOR_STEP
 
 _UM_PER_METRE = 1e6
-_MAP_DIFFERENCE = 1.0  # of 255, in the mean: the same image by another version of the encoder
-_ODD_SHARE = 0.01  # of a surface's area: slivers that the lattice turns over
-_ALONG = math.cos(math.radians(3))  # a normal's 8 bits on an octahedron, and as much again
-_UV_STEP = 1e-4  # of a map's edge; 16 bits hold a sixth of it
-_ROUNDED = 1.001  # four digits, upwards
-_BOX_M = 2e-9  # whole nm, outwards
+_MAP_DIFFERENCE = 1.0  # largest mean difference of texels, 0..255: encoders differ
+_ODD_SHARE = 0.01  # share of a surface's area that may face away (slivers)
+_ALONG = math.cos(math.radians(3))  # smallest cosine: octahedral normals of 8 bits, twofold
+_UV_STEP = 1e-4  # share of a map's edge; the step of 16 bits is a sixth of it
+_ROUNDED = 1.001  # factor: four digits, rounded up
+_BOX_M = 2e-9  # m: whole nm, rounded outwards
 _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
     "normalTexture": ("normal", encode_normal_map),
     "occlusionTexture": ("occlusion", encode_occlusion_map),
@@ -42,7 +42,7 @@ _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
 
 
 def without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
-    """Yield the levels that a bundle has: of those that are alike, the finest."""
+    """Yield the levels that a bundle has: the finest of each run of equal ones."""
     last: ComposedLod | None = None
     for lod in lods:
         if last is None or not _are_alike(last, lod):
@@ -77,7 +77,7 @@ def surfaces_of(
 def compare_surfaces(
     contents: dict[int, Content], lods: dict[int, ComposedLod]
 ) -> tuple[float, list[str]]:
-    """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
+    """Return the largest distance of a vertex from its place (lattice steps), and the problems."""
     problems = [f"lod{level} is not in the stage" for level in contents if level not in lods]
     problems += [f"the bundle lacks lod{level}" for level in sorted(lods.keys() - contents.keys())]
     worst, error_m, corners = 0.0, 0.0, []
@@ -88,7 +88,7 @@ def compare_surfaces(
         apart, faults = _compare_surface(drawn, lod, is_last)
         worst = max(worst, apart)
         problems += [f"lod{level}: {fault}" for fault in faults]
-        # a coarser one states no less than a finer one; the finest, which all are held to, nothing
+        # errors don't fall from fine to coarse; the finest level, the reference, states none
         if level > min(contents):
             moved_m = math.sqrt(3) / 2 * drawn.step_m if is_last else 0.0
             error_m = max(error_m, lod.distance_um / _UM_PER_METRE + moved_m)
@@ -105,12 +105,12 @@ def compare_surfaces(
 def _compare_boxes(
     contents: dict[int, Content], corners: Sequence[tuple[NDArray[Any], NDArray[Any]]]
 ) -> Iterator[str]:
-    """Yield which box of a tileset isn't that of the surfaces in it; `corners`: theirs, metres."""
+    """Yield the boxes of a tileset that don't fit its surfaces; `corners`: theirs (x, y, z), m."""
     if not corners:
         return
     low = np.min([low for low, _ in corners], axis=0).astype(np.float64)
     high = np.max([high for _, high in corners], axis=0).astype(np.float64)
-    # y up, which boxes are not
+    # meshes have y up, boxes z
     low, high = np.array([low[0], -high[2], low[1]]), np.array([high[0], -low[2], high[1]])
     slack = _BOX_M + 4e-7 * max(float(np.abs(low).max()), float(np.abs(high).max()))
     for level, content in contents.items():
@@ -125,7 +125,7 @@ def _compare_boxes(
 
 
 def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
-    """Return how far a vertex is from its place, in lattice steps, and what is wrong."""
+    """Return the largest distance of a vertex from its place (lattice steps), and the problems."""
     problems = []
     triangles = lod.mesh.triangles
     if len(drawn.triangles) != len(triangles):
@@ -158,9 +158,9 @@ def _compare_faces(
     drawn: Drawn,
     mesh: Mesh,
 ) -> Iterator[str]:
-    """Yield what is wrong with the way that triangles face, and with their place in the maps.
+    """Yield problems with the facing of triangles, and with their place in the maps.
 
-    there, here  corners (n, 3, 3) of the stage's and of the bundle's
+    there, here  corners (n, 3, 3) of the stage's and of the bundle's triangles, m
     """
     _, twins = cKDTree(here.mean(axis=1)).query(there.mean(axis=1))
     normals, turned = (
@@ -190,7 +190,7 @@ def _compare_faces(
         if odd > _ODD_SHARE * whole:
             yield f"{odd / whole:.0%} of its area has other colours or occlusion at its vertices"
     if drawn.uvs is None or mesh.uvs is None:
-        return  # a map without them is told of the map
+        return  # missing UVs are reported with the map
     wanted = mesh.uvs.astype(np.float64)[triangles].mean(axis=1)
     found = drawn.uvs[drawn.triangles].mean(axis=1)[np.asarray(twins)]
     off = np.abs(found - np.stack([wanted[:, 0], 1 - wanted[:, 1]], axis=1)).max(axis=1)
@@ -200,13 +200,13 @@ def _compare_faces(
 
 
 def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the direction (m, 3) of each triangle's three normals."""
+    """Return the mean direction (m, 3) of each triangle's three normals, unit length."""
     means = normals.astype(np.float64)[triangles].sum(axis=1)
     return np.asarray(means / np.maximum(np.linalg.norm(means, axis=1, keepdims=True), 1e-12))
 
 
 def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
-    """Return what the colour of each vertex is multiplied by (n, 3), or None: see gltf.py."""
+    """Return the factor (n, 3), 0..1, of each vertex's colour, or None: see gltf.py."""
     if mesh.colors is None and mesh.openness is None:
         return None
     colors = np.ones((len(mesh.positions), 3))
@@ -219,7 +219,7 @@ def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
 
 
 def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the largest distance from a point of either set to the nearest of the other."""
+    """Return the largest distance from a point (n, 3) of either set to the nearest of the other."""
     there, back = (np.asarray(cKDTree(c).query(d)[0]) for c, d in ((a, b), (b, a)))
     return float(max(there.max(), back.max()))
 
@@ -233,7 +233,7 @@ def _compare_vertex_colors(
         yield "the mesh's own colours are lost"
         return
     _, nearest = cKDTree(decoded).query(places)
-    dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # by occlusion, or not at all
+    dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # dimmed by occlusion, or not at all
     if float((dimmed - np.clip(mesh.colors, 0, 1)).max()) > 2 * COLOR_STEP:
         yield "the mesh's own colours are others"
 
@@ -245,7 +245,7 @@ def _compare_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
                 yield f"a map ({kind}) that the stage has not"
-            continue  # the coarsest level goes without
+            continue  # the coarsest level has none
         if name not in drawn.maps:
             yield f"the map {named} is missing"
             continue

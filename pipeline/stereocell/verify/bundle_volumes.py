@@ -14,7 +14,7 @@ from stereocell.verify.bundle_files import REMEDY, read_texels
 
 
 def placement_of(volume: ComposedVolume) -> dict[str, Any]:
-    """Return where a volume is, as the bundle says it."""
+    """Return the volume's place in the form of the bundle's volumes.json."""
     return {
         "size": list(volume.size),
         "apron": volume.apron,
@@ -29,7 +29,7 @@ def find_volume(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[str
 
 
 def compare_volume(bundle: Path, entry: dict[str, Any], voxels: NDArray[np.uint8]) -> Iterator[str]:
-    """Yield what is wrong with a volume's levels and with its bricks; uint8 (z, y, x)."""
+    """Yield problems with a volume's levels and bricks; `voxels`: uint8 (z, y, x)."""
     file = bundle / entry["file"]["path"]
     found, expected = read_texels(file), mip_levels(voxels)
     if [level.shape[:3] for level in found] != [level.shape for level in expected]:

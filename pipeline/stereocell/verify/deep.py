@@ -1,4 +1,4 @@
-"""`stereocell check OUT --deep`: stage against source, and bundle against stage, as a table."""
+"""`stereocell check OUT --deep`: compare stage with source and bundle with stage, as a table."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -24,10 +24,10 @@ from stereocell.verify.stage_against_source import SourceTask, UnitFinding, comp
 def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
     """Yield a line for each comparison.
 
-    stage  what the bundle was exported from, if not OUT's own
+    stage  the layer that the bundle was exported from; None: OUT's own
 
-    A source that is gone is one failed line: the bundle is held against the stage all the same.
-    Raises StereoCellError where there is no plan.
+    A missing source gives one failed line; the bundle is compared with the stage all the same.
+    Raises OutputError where OUT is a bundle by itself or has no plan.
     """
     out_folder = OutFolder(out)
     if not out_folder.plan_file.exists() and (out / MANIFEST).is_file():
@@ -71,7 +71,7 @@ def _one_line(error: StereoCellError) -> str:
 
 
 def _tiles_in(path: Path) -> list[str]:
-    stage = open_stage(path)  # prims end with it
+    stage = open_stage(path)  # prims become invalid when it is freed
     return [str(prim.GetName()) for prim in tile_prims(stage)]
 
 
@@ -86,9 +86,9 @@ def _compare_tiles(out_folder: OutFolder, plan: Plan) -> str:
 
 
 def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
-    """Yield which channel of the stage has other values than were found in the source.
+    """Yield the channels of the stage whose values differ from those found in the source.
 
-    Its window is not among them: it may be set to taste. That of its volumes is.
+    The window is not compared, since an artist may set it; that of the volumes is.
     """
     stage = open_stage(out_folder.stage_file)
     survey = read_survey(out_folder)
@@ -114,8 +114,8 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
     for name, task, _ in unit_tasks(out_folder, plan, read_survey(out_folder)):
         tile_id, channel_id = name.split("/")
         if tile_id not in there:
-            continue  # told already
-        # as it was built, maybe by an earlier version
+            continue  # reported before
+        # the unit as built, possibly by an earlier version
         unit = replace(task, directory=out_folder.unit_dir(tile_id, channel_id, index[name]))
         tile = plan.tile(tile_id)
         yield (

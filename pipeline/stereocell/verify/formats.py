@@ -1,8 +1,8 @@
-"""Hold what a build left against the rules of its formats: the body of `stereocell check`.
+"""Compare a build's files with the rules of their formats: the body of `stereocell check`.
 
-Each check is one line, and none keeps the others from running. Other people's validators do most
-of it: JSON Schema, UsdValidation, the Khronos glTF validator, ktx-parse. The last two are node
-packages; where node or they are missing, their line fails and says how to get them.
+Each check prints one line, and a failed check doesn't stop the others. Most of the work is done by
+standard validators: JSON Schema, UsdValidation, the Khronos glTF validator, ktx-parse. The last two
+are node packages; where node or a package is missing, their line fails and names the remedy.
 """
 
 import hashlib
@@ -41,7 +41,7 @@ from stereocell.usd.write_tile import closed_file, has_mesh
 from stereocell.usd.write_usdz import USDZ_NAME
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
-_MOST_SHOWN = 3  # problems in one line
+_MOST_SHOWN = 3  # problems printed in one line
 _NODE_TIMEOUT_S = 1200.0
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
@@ -51,7 +51,7 @@ _Check = tuple[str, Callable[[], str]]
 
 @dataclass(frozen=True, slots=True)
 class CheckLine:
-    """One line of the answer. `detail`: what was looked at, or what is wrong."""
+    """One line of the result. `detail`: the checked parts, or the problem."""
 
     name: str
     ok: bool
@@ -59,8 +59,8 @@ class CheckLine:
 
 
 def check(out: Path) -> Iterator[CheckLine]:
-    """Yield a line for each check of a build's folder: plan, stage and bundle; or of a bundle that
-    lies by itself, as on a web host.
+    """Yield a line for each check of a build's folder (plan, stage and bundle), or of a bundle by
+    itself, as on a web host.
 
     Raises OutputError, before any line, where there is neither.
     """
@@ -112,7 +112,7 @@ def _check_json(path: Path, schema: str, remedy: str) -> str:
 
 
 def _check_tissue(out: Path) -> str:
-    """Check what `stereocell tissue` left; the bundle needs none of it."""
+    """Check the files of `stereocell tissue`; the bundle needs none of them."""
     files = read_whole(out / FOLDER)["files"]
     require_added(OutFolder(out).plan())
     return f"{RECORD} and {len(files)} files that it lists"
@@ -171,7 +171,7 @@ def _check_stage(out: Path) -> str:
     out_folder = OutFolder(out)
     out_folder.require_finished("stage")
     path = out_folder.stage_file
-    dependencies(path, path.parent)  # refuses what is not the stage's own
+    dependencies(path, path.parent)  # refuses files outside the stage
     findings = validate_stage(path)
     raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"
@@ -188,8 +188,8 @@ def _check_usdz(path: Path) -> str:
 
 
 def _check_stage_files(out: Path) -> str:
-    """Check that volumes and lookup tables are whole, of which USD only sees that they exist, and
-    the closed copies, of which it sees nothing."""
+    """Check that volumes, lookup tables and closed copies are whole: USD checks only that the
+    first two exist."""
     folder = out / "stage"
     paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
     if not paths:
@@ -208,9 +208,9 @@ def _check_stage_files(out: Path) -> str:
 
 
 def _lost_copies(out: Path) -> list[str]:
-    """Return what is wrong where the plan asks for closed copies, and surfaces have none."""
+    """Return the problems where the plan requests closed copies, and a surface has none."""
     out_folder = OutFolder(out)
-    if not out_folder.plan_file.is_file():  # the line `plan` says so
+    if not out_folder.plan_file.is_file():  # the line `plan` reports it
         return []
     plan = out_folder.plan()
     if not plan.settings.surface.closed_tiles:
@@ -225,7 +225,7 @@ def _lost_copies(out: Path) -> list[str]:
 
 
 def _check_volume_lists(bundle: Path) -> str:
-    """Check each volumes.json, and what it says of the levels in the textures."""
+    """Check each volumes.json, and its hashes of the levels in the textures."""
     problems = []
     volumes = 0
     for channel in _channels(bundle):
@@ -244,7 +244,7 @@ def _check_volume_lists(bundle: Path) -> str:
 
 
 def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
-    """Return offset and length of a KTX2 file's levels; nothing if it has another number."""
+    """Return offset and length in bytes of a KTX2 file's levels; empty for another number."""
     try:
         with texture.open("rb") as file:
             head = file.read(80 + 24 * count)
@@ -256,7 +256,7 @@ def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
 
 
 def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
-    """Return what is wrong where a level, whose place is right, is not what its hash says."""
+    """Return the levels that lie at the right place but don't match their hash."""
     problems = []
     try:
         with texture.open("rb") as file:
@@ -286,7 +286,7 @@ def _transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_transfer2d(bundle: Path) -> str:
-    """Check each transfer2d.json: its names, and what a schema can't say of its shapes."""
+    """Check each transfer2d.json: its names, and rules of its shapes beyond the schema."""
     problems = []
     count = 0
     for channel in _channels(bundle):
@@ -325,7 +325,7 @@ def _check_tilesets(bundle: Path) -> str:
 
 
 def _spoilt_content(content: Content) -> list[str]:
-    """Return what is wrong with a file that a tileset names, and with what it says of it."""
+    """Return the problems of a file that a tileset names, and of the tileset's entry."""
     uri = content.named["uri"]
     name = f"{content.tileset}: {uri}"
     problems = []
@@ -336,7 +336,7 @@ def _spoilt_content(content: Content) -> list[str]:
     except (KeyError, TypeError):
         return [*problems, f"{name} has no hash, expected extras.{CONTENT_HASH}"]
     if not content.path.is_file():
-        if not content.is_tileset:  # of those, the walk tells
+        if not content.is_tileset:  # the walk reports missing tilesets
             problems.append(f"{content.tileset}: no file at {uri}")
         return problems
     found = content_hash(measure(content.path)["sha256"])
@@ -408,7 +408,7 @@ def _textures(bundle: Path) -> list[Path]:
 
 
 def _run_node(script_name: str, paths: list[Path]) -> str:
-    """Run one of viewer_gltf/tools over all files at once."""
+    """Run one script of viewer_gltf/tools over all files at once. Raises CheckError."""
     if not paths:
         raise CheckError("no file to check, expected some in the bundle")
     try:

@@ -1,10 +1,10 @@
-"""Compare a stage with its source: the surfaces and volumes of each unit, made anew from voxels.
+"""Compare a stage with its source: recompute the surfaces and volumes of each unit from voxels.
 
-Surfaces: the iso-surface of the unit's own voxels, before any level of detail is made of it, and
-from it, and to it, the distance of each level: by the same measure as a level's stated distance
-(the 99th percentile over both areas), and the largest of all, vertices too, as the unit's record
-has it. They face as it does; normals, occlusion, maps and the places in them are the unit's.
-Volumes: every voxel in 8 bits, and the .vdb that the stage names byte by byte.
+Surfaces: the reference is the iso-surface of the unit's own voxels, before levels of detail are
+made. Two distances of each level to it, and back, are compared with the unit's record: the 99th
+percentile over both areas, by the same measure as a level's stated distance, and the largest of
+all, vertices included. Surfaces must face the same way; normals, occlusion, maps and UVs must be
+the unit's. Volumes: every voxel in 8 bits, and the stage's .vdb byte by byte.
 """
 
 import tempfile
@@ -38,18 +38,19 @@ from stereocell.usd.read_stage import (
     read_volume,
 )
 
-# what float32 and another order of the same triangles may do to a distance
+# slack of a distance, as a share and in um: float32, and another order of the same triangles
 _SHARE, _HAIR_UM = 0.02, 1e-3
-_STEP = 1e-6  # of what is 0 to 1
-_ALONG = 1 - 1e-6  # the cosine between two normals that are alike: .08 degrees
+_STEP = 1e-6  # largest difference of values 0..1
+_ALONG = 1 - 1e-6  # smallest cosine between two equal normals: 0.08 degrees
 
 
 @dataclass(frozen=True, slots=True)
 class SourceTask:
     """One unit, and the tile of the stage that holds it.
 
-    first_um   (z, y, x), centre of its first own voxel; own_shape: its voxels without apron
-    placement  from the voxels' world to where the stage's tiles stand
+    first_um   (z, y, x), um, centre of its first own voxel
+    own_shape  (z, y, x), its voxels without apron
+    placement  rows of a (4, 4) matrix for columns, um: from the voxels' world to the stage's tiles
     samples    points spread over each surface
     """
 
@@ -66,7 +67,7 @@ class SourceTask:
 
 @dataclass(frozen=True, slots=True)
 class UnitFinding:
-    """What was seen of one unit: problems, and for each level (stated, found, largest) in um."""
+    """The result of one unit: problems, and (stated, found, largest) distance of each level, um."""
 
     name: str
     levels: tuple[tuple[float, float, float], ...]
@@ -74,7 +75,7 @@ class UnitFinding:
 
 
 def compare_unit(task: SourceTask) -> UnitFinding:
-    """Return how a unit's part of the stage agrees with its voxels. Raises StereoCellError."""
+    """Compare a unit's part of the stage with its voxels. Raises StereoCellError if unreadable."""
     given = task.unit.given
     dataset = open_source(task.unit.ref)
     volume = dataset.read(task.unit.channel, given.lattice.window, task.unit.level)
@@ -144,9 +145,9 @@ def _compare_lods(
 
 
 def _facing(mesh: Mesh, fine: Nearest) -> float:
-    """Return how far a mesh faces as the finest surface does where it is near: 1 all of it, to -1.
+    """Return how well a mesh faces the same way as the finest surface near it, 1 (best) to -1.
 
-    The mean over its area of the cosine between its normal and the nearest triangle's.
+    It is the mean over the mesh's area of the cosine between its normal and the nearest triangle's.
     """
     near = fine.nearest_triangles(mesh.positions.astype(np.float64)[mesh.triangles].mean(axis=1))
     own, other = (
@@ -164,7 +165,7 @@ def _facing(mesh: Mesh, fine: Nearest) -> float:
 def _compare_shading(
     lods: list[ComposedLod], built: tuple[Lod, ...], placement: Matrix
 ) -> list[str]:
-    """Return what of a level's normals, occlusion and maps is not as the unit has it."""
+    """Return the normals, occlusion and maps of levels that differ from the unit's."""
     odd = []
     for lod in lods:
         wanted = built[min(lod.level, len(built) - 1)]
@@ -178,7 +179,7 @@ def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[s
     if mesh.normals.shape != wanted.mesh.normals.shape:
         if maps.normal is not None and mesh.uvs is not None and wanted.mesh.uvs is not None:
             yield "UVs are"
-        return  # other vertices: their places tell
+        return  # other vertices: their distances are compared elsewhere
     turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
     if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:
         yield "normals are"
@@ -206,7 +207,10 @@ def _is_like(found: NDArray[Any] | None, wanted: NDArray[Any] | None) -> bool:
 
 
 def _is_image(file: Path | None, wanted: NDArray[np.uint8]) -> bool:
-    """Return whether a file is an image of these pixels, uint8 (y, x) or (y, x, 3)."""
+    """Return whether a file is an image of these pixels, uint8 (y, x) or (y, x, 3).
+
+    Raises StereoCellError where it can't be read.
+    """
     if file is None:
         return False
     try:
