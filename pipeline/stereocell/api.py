@@ -1,4 +1,4 @@
-"""What `import stereocell` gives: the whole build from Python. Heavy imports wait until a call."""
+"""The functions of `import stereocell`: a whole build from Python. Imports are lazy."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What a build left: paths, or addresses where OUT is one."""
+    """The results of a build: paths, or addresses where OUT is one."""
 
     out: str
     stage: str
@@ -36,13 +36,17 @@ def build(
     """Build stage, bundle and report of a source in OUT, as the command `stereocell build` does.
 
     source     a path, or an address (http(s)://, s3://)
-    out        a folder, or an s3:// address; whatever is finished there is not done again
-    preset     cycif, lightsheet, mri, or a TOML file; config: a TOML file over it
-    settings   sections and keys over both, as in the TOML: `{"plan": {"grid": "5x2"}}`
-    workers    processes; 0: in this one. More than 0 wants `if __name__ == "__main__":` in scripts
-    scheduler  address or scheduler file of a Dask cluster, instead
+    out        a folder, or an s3:// address; finished work there is not repeated
+    preset     cycif, lightsheet, mri, or a TOML file
+    config     a TOML file; its values override the preset's
+    settings   sections and keys that override both, as in the TOML
+    workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`
+    scheduler  address or scheduler file of a Dask cluster, used instead of `workers`
 
-    Progress goes to stderr. Raises StereoCellError, one line that says what and where.
+    Progress goes to stderr. Raises StereoCellError, whose text is one line (a line for each
+    reason where tasks fail).
+
+        built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
     from stereocell.building.settings import load
@@ -94,10 +98,16 @@ def build(
 
 
 def open_volume(source: str | Path, **options: Any) -> "Dataset":
-    """Open a source without reading voxels; see `stereocell.read.open` for the options.
+    """Open a source without reading voxels.
 
-    The dataset has `channels`, `levels` (shape and spacing in um, (z, y, x)) and `read(channel,
-    box, level)`, which returns a Volume: `voxels` (z, y, x), `spacing_um`, `origin_um`.
+    options  `time`, `spacing_um`, `series`: see `stereocell.read.open`, which also lists the errors
+
+    The dataset has `channels`, `levels` (shape in voxels and spacing in um, (z, y, x)) and
+    `read(channel, box, level)`. That returns a Volume: `voxels` (z, y, x) in the source's dtype,
+    `spacing_um` and `origin_um`, both (z, y, x).
+
+        dataset = open_volume("head.nii.gz")
+        volume = dataset.read(0, dataset.levels[-1].box, level=len(dataset.levels) - 1)
     """
     from stereocell import read
 

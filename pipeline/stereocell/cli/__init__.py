@@ -1,1 +1,1 @@
-"""The command `stereocell`: the only package that prints."""
+"""The command `stereocell`. Only this package prints answers."""

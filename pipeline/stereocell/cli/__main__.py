@@ -26,22 +26,22 @@ EXIT_CODES = """exit codes:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # what its encoding lacks is escaped
+        if isinstance(stream, TextIOWrapper):  # characters that its encoding lacks are escaped
             stream.reconfigure(errors="backslashreplace")
     try:
         return _main(sys.argv[1:] if arguments is None else arguments)
     except commands.StdoutLost as lost:
-        # Python would try again at its end what stdout still holds
+        # Python would try to flush stdout again at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         error = lost.error
     if isinstance(error, BrokenPipeError):
-        return 141  # as a shell has it of what SIGPIPE ends
+        return 141  # as shells report a program that SIGPIPE ends
     print(f"stereocell: stdout: {error.strerror or error}", file=sys.stderr)
     return 1
 
 
 def _main(words: Sequence[str]) -> int:
-    options = argparse.Namespace(json="--json" in words)  # until they are read
+    options = argparse.Namespace(json="--json" in words)  # until the arguments are parsed
     try:
         options = _parser().parse_args(words)
         with answering_sigterm():
@@ -56,13 +56,13 @@ def _main(words: Sequence[str]) -> int:
 
 
 def _reason(error: Exception) -> str:
-    """Return the line for what this machine lacks; all other errors are bugs, and raised on."""
+    """Return one line for a lack of this machine; all other errors are bugs, and raised again."""
     if words := shortage(error):
         return words
     if isinstance(error, ModuleNotFoundError):
         told = f"the package {error.name} is missing: install StereoCell anew"
         return f"{told}; `stereocell doctor` lists what else is"
-    if isinstance(error, OSError):  # the disk is full, a folder was taken away
+    if isinstance(error, OSError):  # the disk is full, a folder was removed
         place = f"{error.filename}: " if error.filename else ""
         return f"{place}{error.strerror or error}"
     raise error
@@ -76,13 +76,13 @@ def _fail(options: argparse.Namespace, line: str, code: int) -> int:
 
 
 def _shortened(line: str) -> str:
-    """Leave out the middle of lines that nobody reads to their end."""
+    """Cut the middle out of very long lines."""
     lines = commands.plain(line).split("\n")
     return "\n".join(one if len(one) < 1200 else f"{one[:700]} ... {one[-400:]}" for one in lines)
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Run a command, alone in its OUT if it writes there: storage/lock.py, workspace.py."""
+    """Run a command; one that writes into OUT locks it: storage/lock.py, workspace.py."""
     out, name = getattr(options, "out", None), options.command
     options.shown = out
     if name not in LIGHT:
@@ -113,7 +113,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Refuses as the commands do: in a line, and in JSON where that is asked for."""
+    """Reports errors as the commands do: in a line, and in JSON where requested."""
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message}; `{self.prog} --help` says what there is")
@@ -236,11 +236,11 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
     ),
 }
 
-# One of them at a time in an OUT
+# Commands that write into OUT: one of them at a time
 WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
-# ... and these, of an OUT on object storage, fetch this first: all, or what phones are shown
+# Commands that read an OUT on object storage -> the part that is fetched first; "": all of it
 READERS = {"check": "", "view": "bundle", "serve": "bundle"}
-# These load nothing that is large
+# Commands that import no large library
 LIGHT = frozenset({"settings", "doctor"})
 
 if __name__ == "__main__":

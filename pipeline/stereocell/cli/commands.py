@@ -1,8 +1,8 @@
-"""What each command does, and what it answers.
+"""The commands' work and their answers.
 
-Lines for people are printed as they come; with --json they are not, and the answer's data is
+Lines for people are printed as they come. With --json they are not, and the answer's data is
 printed as one JSON object at the end. Progress and errors go to stderr either way. Heavy imports
-wait until they are needed, so that --help is quick.
+are lazy, so that --help is quick.
 """
 
 import argparse
@@ -31,7 +31,7 @@ Handler = Callable[[argparse.Namespace], Answer]
 
 
 class StdoutLost(Exception):
-    """What is answered can't be told: stdout takes no more. `error` says why."""
+    """The answer can't be printed: stdout accepts no more. `error` has the reason."""
 
     def __init__(self, error: OSError) -> None:
         super().__init__(error)
@@ -39,7 +39,7 @@ class StdoutLost(Exception):
 
 
 def print_line(text: str) -> None:
-    """Print a line on stdout, now. Raises StdoutLost."""
+    """Print a line on stdout and flush it. Raises StdoutLost."""
     try:
         print(text, flush=True)
     except OSError as error:
@@ -47,33 +47,33 @@ def print_line(text: str) -> None:
 
 
 def print_unless_json(options: argparse.Namespace, text: str) -> None:
-    """Print a text for a person."""
+    """Print a text for a person, unless --json is given."""
     if not options.json:
         print_line(plain(_as_given(options, text)))
 
 
 def plain(text: str) -> str:
-    """Escape what a file's name or content may hold to trouble a terminal; line ends are ours."""
+    """Escape control characters of file names and contents for a terminal; keep line ends."""
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
     )
 
 
 def answer(options: argparse.Namespace, found: Answer) -> int:
-    """Print the answer for a machine, if one asked; return the exit code."""
+    """Print the answer's data with --json; return the exit code."""
     if options.json and found.data:
         print_line(_as_given(options, to_json(found.data)))
     return found.code
 
 
 def to_json(data: Mapping[str, Any]) -> str:
-    """Return one line of JSON in the words of its names, which a lone surrogate is none of."""
+    """Return one line of JSON, in its own characters where stdout can print them, else escaped."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False)
     return text if _can_be_printed(text) else json.dumps(data, allow_nan=False)
 
 
 def _can_be_printed(text: str) -> bool:
-    """Return whether stdout has all of its letters, and a terminal no trouble with them."""
+    """Return whether stdout can encode the text, and a terminal can show it."""
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
@@ -82,7 +82,7 @@ def _can_be_printed(text: str) -> bool:
 
 
 def _as_given(options: argparse.Namespace, text: str) -> str:
-    """Name an OUT on object storage, not the folder in which it is worked on."""
+    """Name an OUT on object storage by its address, not by its working folder."""
     is_kept = isinstance(getattr(options, "shown", None), str)
     return text.replace(str(options.out), options.shown.rstrip("/")) if is_kept else text
 
@@ -98,7 +98,7 @@ def settings(options: argparse.Namespace) -> Answer:
 
 
 def _series(options: argparse.Namespace) -> Answer | None:
-    """List the series of a source if that is all that was asked for."""
+    """List the series of a source if the user requested only that."""
     if options.series != "list":
         return None
     from stereocell import read
@@ -152,13 +152,13 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
     from stereocell.storage.claim import LOCK
 
     scheduler, edited = getattr(options, "scheduler", ""), getattr(options, "stage", None)
-    is_kept = isinstance(options.shown, str)  # on object storage: workers find it by themselves
+    is_kept = isinstance(options.shown, str)  # on object storage: workers open it by themselves
     if is_kept and edited:
         raise UsageError(
             f"--stage {edited}: {options.shown} is on object storage, expected OUT in a folder: "
             "copy its stage/ there"
         )
-    out = options.out.absolute() if scheduler else options.out  # workers may stand elsewhere
+    out = options.out.absolute() if scheduler else options.out  # workers may have another folder
     engine = Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
     try:
         for name in names:
@@ -264,7 +264,7 @@ def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
     from stereocell.engine.run import Engine
     from stereocell.verify.deep import check_deep
 
-    out = options.out.absolute()  # workers may stand elsewhere
+    out = options.out.absolute()  # workers may have another folder
     is_kept = isinstance(options.shown, str)
     engine = Engine(options.workers, options.scheduler, None if is_kept else out / "plan.json")
     try:
@@ -288,7 +288,7 @@ def doctor(options: argparse.Namespace) -> Answer:
 
 
 def view(options: argparse.Namespace) -> Answer:
-    # on the LAN everybody needs the code that is shown here
+    # on the LAN every browser needs the code that is shown here
     return _serve(options, not (options.no_browser or options.lan))
 
 
@@ -307,6 +307,6 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             open_browser=open_browser,
             for_program=options.json,
         )
-    except BrokenPipeError as error:  # of who was to read its address
+    except BrokenPipeError as error:  # the reader of the address has gone
         raise StdoutLost(error) from error
     return Answer()

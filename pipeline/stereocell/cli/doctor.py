@@ -1,4 +1,4 @@
-"""What this machine has for the work, what it lacks, and what each missing thing costs."""
+"""The parts of this machine that builds need, the missing ones, and the cost of each lack."""
 
 import os
 import platform
@@ -17,18 +17,18 @@ from stereocell.storage.assets import viewer_dist
 from stereocell.storage.processes import available_bytes, cores
 
 _GIB = 1 << 30
-UNIT_BYTES = 3.5 * _GIB  # what a unit of 194 x 512 x 512 voxels is allowed for
-_LEAST_FREE = 20 * _GIB
-_NODE = "20.19"
+UNIT_BYTES = 3.5 * _GIB  # memory planned for a unit of 194 x 512 x 512 voxels
+_LEAST_FREE = 20 * _GIB  # bytes of free disk
+_NODE = "20.19"  # oldest version of Node.js
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "open")
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked for.
+    """One part that was looked for.
 
-    found      what is there, or what was seen instead
-    cost       what does not work, or slower, without it; empty if it is there
+    found      the part, or the finding in its place
+    cost       the loss without it; empty where it is present
     is_needed  whether nothing can be built without it
     """
 
@@ -40,14 +40,14 @@ class Finding:
 
 
 def examine() -> Iterator[Finding]:
-    """Yield what was found, one thing after another. Changes nothing on this machine."""
+    """Yield the findings, one after another. Changes nothing on this machine."""
     for look in LOOKS:
         try:
             yield look()
-        except ImportError as error:  # the line of the packages says which are missing
+        except ImportError as error:  # the line of the packages names the missing ones
             name = look.__name__.strip("_")
             yield Finding(name, False, str(error), "not looked at: install StereoCell anew")
-        except OSError as error:  # a folder that is gone, or not to be read
+        except OSError as error:  # a folder that is gone or unreadable
             name = look.__name__.strip("_")
             yield Finding(name, False, error.strerror or str(error), "not looked at")
 
@@ -59,7 +59,7 @@ def _python() -> Finding:
 
 
 def _packages() -> Finding:
-    """Look for the packages that StereoCell names, by their metadata alone: nothing is imported."""
+    """Check the packages that StereoCell requires, by their metadata; nothing is imported."""
     cost = "what needs them fails: install StereoCell anew"
     try:
         from packaging.requirements import Requirement
@@ -139,7 +139,7 @@ def _viewer() -> Finding:
 
 def _browser() -> Finding:
     named = os.environ.get("BROWSER") or os.environ.get("CHROMIUM") or ""
-    # BROWSER is a list of commands, maybe with arguments
+    # BROWSER is a list of commands, possibly with arguments
     names = [one.split()[0] for one in named.split(os.pathsep) if one.strip()] or _BROWSERS
     found = next((name for name in names if shutil.which(name)), "")
     lacking = f"BROWSER names {named}, which is not there" if named else "none on the PATH"

@@ -1,8 +1,8 @@
 """Solids with known surfaces: ellipsoids, balls and tubes. Lengths in um, axes (z, y, x).
 
-Points come as three arrays z, y, x that broadcast together, so that a grid needs no full
-coordinates. Sums are written out: a BLAS may add in another order with more threads, and the
-samples must come out the same to the last bit.
+Points are three arrays z, y, x (um) that broadcast together, so that a grid needs no full
+coordinates. Sums are written out: with more threads a BLAS may add in another order, and the
+samples must be equal to the last bit.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,10 @@ Values = NDArray[np.float64]
 class Nucleus:
     """An ellipsoid.
 
+    center_um     (z, y, x)
     semi_axes_um  along the columns of `rotation`, a (3, 3) rotation of (z, y, x)
     brightness    of the dye inside, times the channel's amplitude
-    cell_um       radius of the cell body, a ball round the same centre; 0: no tumour cell
+    cell_um       radius of the cell body, a ball around the same centre; 0: no tumour cell
     """
 
     center_um: Triple
@@ -36,10 +37,12 @@ class Nucleus:
         return max(self.semi_axes_um)
 
     def distance(self, points: Points) -> Values:
-        """Return signed distances in um, negative inside.
+        """Return signed distances in um, negative inside, in the broadcast shape of `points`.
 
-        First order: k0 (k0 - 1) / k1 with k0 = |p / a|, k1 = |p / a^2| (Quilez). Exact on the
-        surface; a small fraction of the distance off near it.
+        First order: k0 (k0 - 1) / k1 with k0 = |p / a|, k1 = |p / a^2|. Exact on the surface, with
+        a small relative error near it.
+
+        References: Quilez, "Ellipsoid SDF", https://iquilezles.org/articles/ellipsoids/
         """
         z, y, x = _offsets(points, self.center_um)
         k0 = np.zeros(np.broadcast_shapes(z.shape, y.shape, x.shape))
@@ -59,7 +62,7 @@ class Nucleus:
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """A piece of vessel: all points within `radius_um` of a straight line, round at both ends."""
+    """A piece of vessel: all points within `radius_um` of a segment, with round ends."""
 
     start_um: Triple
     end_um: Triple
@@ -67,13 +70,13 @@ class Tube:
 
     @property
     def low_um(self) -> Triple:
-        """The lower corner of its bounding box."""
+        """The lower corner (z, y, x) of its bounding box."""
         z, y, x = (min(a, b) for a, b in zip(self.start_um, self.end_um, strict=True))
         return z - self.radius_um, y - self.radius_um, x - self.radius_um
 
     @property
     def high_um(self) -> Triple:
-        """The upper corner of its bounding box."""
+        """The upper corner (z, y, x) of its bounding box."""
         z, y, x = (max(a, b) for a, b in zip(self.start_um, self.end_um, strict=True))
         return z + self.radius_um, y + self.radius_um, x + self.radius_um
 
@@ -86,9 +89,9 @@ class Tube:
 
 
 def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotation matrix of a quaternion (w, x, y, z) of any length but 0.
+    """Return the (3, 3) rotation of a quaternion (w, x, y, z), float64 (4,), of any length but 0.
 
-    Four normal numbers give a rotation that is uniform over all rotations.
+    Four normally distributed numbers give a uniform distribution over all rotations.
     """
     w, x, y, z = quaternion
     s = 2.0 / (w * w + x * x + y * y + z * z)

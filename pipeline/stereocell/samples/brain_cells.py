@@ -12,10 +12,10 @@ _FOLDER = files("stereocell.samples") / "brain-cells"
 
 
 def write_brain_cells(path: Path) -> None:
-    """Copy the sample to `path` (NAME.ome.tif), its licence to NAME.LICENSE beside it.
+    """Copy the sample to `path` (NAME.ome.tif), and its licence to NAME.LICENSE beside it.
 
-    Where it is already, nothing is done. Raises UsageError for another kind of name, OutputError
-    if something else lies there or it can't be written.
+    An existing equal sample stays. Raises UsageError for a name of another kind, OutputError where
+    other content lies at the path or it can't be written.
     """
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
         raise UsageError(f"{path}: the sample is an OME-TIFF, expected a name like NAME{SUFFIX}")

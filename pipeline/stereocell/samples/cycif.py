@@ -1,4 +1,4 @@
-"""The sample `cycif`: a synthetic CyCIF block as OME-Zarr 0.5, and the truth it was made from."""
+"""The sample `cycif`: a synthetic CyCIF block as OME-Zarr 0.5, and its ground truth."""
 
 import json
 import math
@@ -21,7 +21,7 @@ from stereocell.storage.atomic_write import replacing, replacing_folder
 
 SUFFIX = ".ome.zarr"
 _CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
-_COARSEST = 64  # voxels: the pyramid ends when the longer side in the plane is no longer than this
+_COARSEST = 64  # voxels: largest longer side, in the plane, of the coarsest level
 
 
 def write_cycif(
@@ -34,10 +34,13 @@ def write_cycif(
 ) -> None:
     """Write the sample to `path` (NAME.ome.zarr) and its truth to NAME.truth.json beside it.
 
-    `grid` is columns x rows of tiles of `tile_size` (z, y, x) voxels. Brightness of the cells is
-    log-uniform over 1 .. 1 + `brightness_spread`. The same arguments give the same bytes; where
-    they are there already, nothing is done. Raises UsageError for arguments that make no volume,
-    OutputError if something else lies at `path` or it can't be written.
+    grid               columns x rows of tiles
+    tile_size          voxels (z, y, x)
+    brightness_spread  brightness of the cells is log-uniform over 1 .. 1 + this
+
+    The voxels are uint16 (c, z, y, x). The same arguments give the same bytes; an existing equal
+    sample stays. Raises UsageError for arguments that make no volume, OutputError where other
+    content lies at `path` or it can't be written.
     """
     _check(path, grid, tile_size, seed, brightness_spread)
     depth, height, width = tile_size
@@ -155,9 +158,9 @@ def _write_zarr(
     attributes: dict[str, Any],
     seed: int,
 ) -> None:
-    """Write the voxels, by way of memory, compressed.
+    """Write the voxels, by way of compressed memory.
 
-    zarr writes from threads of its own, which would go on beside an exception of ours.
+    zarr writes from threads of its own, which would continue after an exception of ours.
     """
     files: dict[str, Buffer] = {}
     group = zarr.open_group(MemoryStore(files), mode="w", zarr_format=3, attributes=attributes)
@@ -204,7 +207,7 @@ def _halve(finer: zarr.Array[Any], coarser: zarr.Array[Any]) -> None:
 
 
 def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return what the voxels were made from. Lengths in um, positions (z, y, x)."""
+    """Return the ground truth of the voxels. Lengths in um, positions (z, y, x)."""
     waves = [
         microscope.waves_of(index, tissue.size_um, settings["seed"]) for index in range(len(STAINS))
     ]

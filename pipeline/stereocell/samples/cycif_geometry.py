@@ -1,7 +1,10 @@
-"""Where the synthetic block has its nuclei, tumour cells and vessels: geometry alone, no voxels.
+"""The synthetic block's nuclei, tumour cells and vessels: geometry alone, no voxels.
 
-Vessels grow first, as trees that fork; nuclei are thrown at random and kept where they touch
+Vessels grow first, as trees that fork. Nuclei are then placed at random, and kept where they touch
 nothing (random sequential packing). Positions are (z, y, x) in um.
+
+References: Murray, "The physiological principle of minimum work", Proceedings of the National
+Academy of Sciences 12(3), 1926, https://doi.org/10.1073/pnas.12.3.207
 """
 
 from collections import defaultdict
@@ -14,21 +17,21 @@ from scipy.spatial import KDTree
 
 from stereocell.samples.bodies import Nucleus, Triple, Tube, rotation_of
 
-MARGIN_UM = 4.0  # bodies are placed this far outside, so that the block cuts through some
-NUCLEUS_GAP_UM = 1.0  # at least, between the surfaces of two nuclei
-STROMA_GAP_UM = 5.0  # outside the tumour nuclei lie apart
-VESSEL_GAP_UM = 1.0  # at least, between a nucleus and a vessel
-CELL_RIM_UM = 1.4  # of cytoplasm round a tumour nucleus
-TUMOR_SHARE = 0.58  # of the block's width
-_THROW_UM3 = 5.0  # one throw for this much space: more hardly pack denser
-_STEP_UM = 1.5
-_FORK_UM = (14.0, 26.0)  # length of a branch before it forks
-_SHRINK = 0.794  # of the radius at a fork: Murray's law for two equal branches, 2^(-1/3)
+MARGIN_UM = 4.0  # width of a margin with bodies, so that the block cuts some of them
+NUCLEUS_GAP_UM = 1.0  # smallest distance between the surfaces of two nuclei
+STROMA_GAP_UM = 5.0  # smallest distance between nuclei outside the tumour
+VESSEL_GAP_UM = 1.0  # smallest distance between a nucleus and a vessel
+CELL_RIM_UM = 1.4  # cytoplasm around a tumour nucleus
+TUMOR_SHARE = 0.58  # share of the block's width
+_THROW_UM3 = 5.0  # um3 per random placement: more placements hardly pack denser
+_STEP_UM = 1.5  # length of a vessel's segment
+_FORK_UM = (14.0, 26.0)  # length of a branch before it forks, smallest and largest
+_SHRINK = 0.794  # factor of the radius at a fork: Murray's law for two equal branches, 2^(-1/3)
 
 
 @dataclass(frozen=True, slots=True)
 class Tissue:
-    """What the block holds. `size_um` (z, y, x)."""
+    """The bodies of the block. `size_um` is (z, y, x)."""
 
     size_um: Triple
     nuclei: tuple[Nucleus, ...]
@@ -36,7 +39,7 @@ class Tissue:
 
 
 def grow_tissue(size_um: Triple, seed: int, brightness_spread: float) -> Tissue:
-    """Return the tissue that fills a block.
+    """Return the tissue that fills a block of `size_um` (z, y, x).
 
     Brightness is log-uniform over 1 .. 1 + `brightness_spread`; 0 makes all cells equally bright.
     """
@@ -86,7 +89,7 @@ def _grow_tree(
             for angle in (turn, -turn):
                 tips.append((at, _turned(heading, angle), radius * _SHRINK))
         elif length <= 0.0:
-            tips.append((at, heading, radius))  # a capillary goes on until it leaves the block
+            tips.append((at, heading, radius))  # a capillary continues until it leaves the block
 
 
 def _turned(heading: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
@@ -102,7 +105,7 @@ def _place_nuclei(
     rng: np.random.Generator,
     brightness_spread: float,
 ) -> tuple[Nucleus, ...]:
-    """Tumour nuclei are large and round, those of the stroma small and drawn out."""
+    """Place nuclei: large and round in the tumour, small and elongated in the stroma."""
     low = np.full(3, -MARGIN_UM)
     high = np.asarray(size_um) + MARGIN_UM
     throws = int(np.prod(high - low) / _THROW_UM3)
@@ -133,11 +136,12 @@ def _kept_apart(
     in_tumor: NDArray[np.bool_],
     candidates: NDArray[np.bool_],
 ) -> list[int]:
-    """Return the throws that keep their distance from those kept before them.
+    """Return the placements that keep their distance from those accepted before.
 
-    The three arrays hold the candidates alone; the indices count all throws.
+    centers     (n, 3), float64, (z, y, x), um, of the candidates; `reach`, `in_tumor` are (n,)
+    candidates  (m,), a mask over all placements, which the returned indices count
     """
-    cell = 14.0  # um: no two centres further apart than this can be too close
+    cell = 14.0  # um: centres further apart than this are never too close
     bins: defaultdict[tuple[int, int, int], list[tuple[float, ...]]] = defaultdict(list)
     kept = []
     throws = np.flatnonzero(candidates).tolist()
@@ -163,7 +167,7 @@ def _kept_apart(
 def _in_tumor(
     points: NDArray[np.float64], size_um: Triple, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """The tumour fills the block from the left up to a wavy front."""
+    """Return a mask (n,) of the points in the tumour: left of a wavy front."""
     _, height, width = size_um
     phases = rng.uniform(0.0, 2.0 * np.pi, 2)
     front = TUMOR_SHARE * width + 0.06 * width * np.sin(points[:, 1] / 0.28 / height + phases[0])
@@ -175,7 +179,7 @@ def _in_tumor(
 def _distance_to_vessels(
     points: NDArray[np.float64], vessels: tuple[Tube, ...]
 ) -> NDArray[np.float64]:
-    """Return signed distances, capped at 10 um, to the nearest vessel."""
+    """Return signed distances (n,), capped at 10 um, from points (n, 3) to the nearest vessel."""
     nearest = np.full(len(points), 10.0)
     tree = KDTree(points)
     for tube in vessels:

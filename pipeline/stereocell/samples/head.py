@@ -1,17 +1,22 @@
-"""A head as T1-weighted MRI shows it, made of ellipsoids, and the truth it was made from.
+"""A head in T1-weighted MRI, made of ellipsoids, and its ground truth.
 
-In the manner of Shepp & Logan, "The Fourier reconstruction of a head section", IEEE Trans. Nuclear
-Science 21 (1974), in three dimensions as Kak & Slaney, Principles of Computerized Tomographic
-Imaging (1988), table 3.2, and for MRI as Gach, Tanase & Boada, "2D & 3D Shepp-Logan phantom
-standards for MRI" (2008): the outer ellipsoid and the two tilted, unequal ventricles have the
-proportions of that table at 104 mm a unit. Tissues are what a head has, the surfaces of grey and
-white matter are folded, and nothing is its own mirror image: nose and eyes in front, the neck
-below, and a capsule of oil on the left temple, as radiographers tape one there to tell the sides.
+It follows the phantom of Shepp & Logan, in three dimensions by Kak & Slaney (table 3.2), for MRI by
+Gach, Tanase & Boada. The outer ellipsoid and the two tilted, unequal ventricles have the
+proportions of that table at 104 mm a unit. The tissues are those of a head, and the surfaces of
+grey and white matter are folded. Nothing is its own mirror image: nose and eyes in front, the neck
+below, and a capsule of oil on the left temple, which radiographers tape there to mark the side.
 
 Bodies are painted one over the other, each with the share of a voxel that it covers (a ramp one
 voxel wide over its surface), so that the truth is known as shares, too. A receive coil's bias
-field multiplies the signal; noise is Rician, as in magnitude images (Gudbjartsson & Patz, Magnetic
-Resonance in Medicine 34, 1995).
+field multiplies the signal; noise is Rician, as in magnitude images.
+
+References: Shepp & Logan, "The Fourier reconstruction of a head section", IEEE Transactions on
+Nuclear Science 21(3), 1974, https://doi.org/10.1109/TNS.1974.6499235
+Kak & Slaney, Principles of Computerized Tomographic Imaging, IEEE Press, 1988
+Gach, Tanase & Boada, "2D & 3D Shepp-Logan phantom standards for MRI", International Conference on
+Systems Engineering, 2008, https://doi.org/10.1109/ICSEng.2008.15
+Gudbjartsson & Patz, "The Rician distribution of noisy MRI data", Magnetic Resonance in Medicine
+34(6), 1995, https://doi.org/10.1002/mrm.1910340618
 """
 
 from dataclasses import dataclass
@@ -24,8 +29,8 @@ from stereocell.model.errors import UsageError
 Triple = tuple[float, float, float]
 Field = NDArray[np.float32]
 
-SHAPE = (112, 96, 96)
-FIELD_MM: Triple = (224.0, 192.0, 201.6)  # of view, whatever the shape
+SHAPE = (112, 96, 96)  # voxels (z, y, x)
+FIELD_MM: Triple = (224.0, 192.0, 201.6)  # (z, y, x), field of view for every shape
 BACKGROUND, CSF, GREY, WHITE, OTHER = range(5)
 CLASSES = ("background", "CSF", "grey", "white", "other")
 WHITE_LEVEL = 1000.0  # voxel value of white matter, without bias
@@ -37,8 +42,8 @@ class Body:
     front, down, to the patient's left.
 
     signal   as a share of white matter's
-    turn     degrees about the y axis; positive: its front end goes to the left
-    fold_mm  how far its surface goes up and down in folds
+    turn     degrees about the y axis; positive: its front end turns to the left
+    fold_mm  amplitude of its surface's folds
     """
 
     name: str
@@ -50,7 +55,7 @@ class Body:
     fold_mm: float = 0.0
 
 
-# in the order in which they are painted: what comes later lies over what came before
+# in the order of painting: later bodies cover earlier ones
 BODIES = (
     Body("neck", OTHER, 0.55, (-22, 75, 0), (44, 62, 42)),
     Body("nose", OTHER, 0.70, (92, 22, 0), (18, 20, 12)),
@@ -79,10 +84,11 @@ BODIES = (
 class HeadPhantom:
     """A head in the pipeline's axes: z to the front, y down, x to the patient's left.
 
-    voxels      uint16 (z, y, x): bias field and noise are in
+    voxels      uint16 (z, y, x), with bias field and noise
+    spacing_um  (z, y, x), um
     labels      uint8 (z, y, x): the class (BACKGROUND .. OTHER) that covers most of the voxel
-    fractions   float32 (class, z, y, x): the share of each voxel that each class covers
-    bias        float32 (z, y, x): what the signal was multiplied by; about 1 in the mean
+    fractions   float32 (class, z, y, x): the share of each voxel that each class covers, 0..1
+    bias        float32 (z, y, x): the factor of the signal; its mean is about 1
     """
 
     voxels: NDArray[np.uint16]
@@ -97,8 +103,8 @@ def make_head(
 ) -> HeadPhantom:
     """Return the head in `shape` (z, y, x) voxels over the same field of view.
 
-    noise  sigma of each of the two receive channels, a share of white matter's signal
-    bias   how far apart the field's ends lie: 0.2 is 0.9 to 1.1, as BrainWeb counts it
+    noise  sigma of each of the two receive channels, as a share of white matter's signal
+    bias   range of the bias field: 0.2 means 0.9 to 1.1, as in BrainWeb
 
     The same arguments give the same voxels. Raises UsageError for arguments that make no head.
     """
@@ -144,7 +150,7 @@ def _check(shape: tuple[int, int, int], noise: float, bias: float, seed: int) ->
 
 
 def _reach(axis: Field, body: Body, k: int, width: float) -> slice:
-    """Return where along axis k a body may cover anything."""
+    """Return the range along axis k that a body may cover; `axis`: coordinates (n,), mm."""
     radius = max(body.semi_axes) if body.turn and k != 1 else body.semi_axes[k]
     reach = radius + body.fold_mm + width
     ends = (body.center[k] - reach, body.center[k] + reach)
@@ -153,9 +159,11 @@ def _reach(axis: Field, body: Body, k: int, width: float) -> slice:
 
 
 def _distance(body: Body, axes: list[Field]) -> Field:
-    """Return about how far outside of a body the points lie, mm, float32 (z, y, x).
+    """Return the approximate distance of the points outside a body, mm, float32 (z, y, x).
 
-    To first order: the value of the ellipsoid's implicit function over its gradient.
+    axes  coordinates (n,) along z, y, x, mm
+
+    First order: the value of the ellipsoid's implicit function over its gradient.
     """
     z, y, x = np.meshgrid(
         *(axis - np.float32(c) for axis, c in zip(axes, body.center, strict=True)),
@@ -182,7 +190,8 @@ def _distance(body: Body, axes: list[Field]) -> Field:
 
 
 def _bias(axes: list[Field], share: float) -> Field:
-    """Return a smooth field from 1 - share/2 to 1 + share/2, brightest off the middle."""
+    """Return a smooth field from 1 - share/2 to 1 + share/2, float32 (z, y, x), brightest off the
+    middle."""
     z, y, x = np.meshgrid(
         *(axis / np.float32(length / 2) for axis, length in zip(axes, FIELD_MM, strict=True)),
         indexing="ij", sparse=True,

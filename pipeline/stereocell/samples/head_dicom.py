@@ -1,10 +1,12 @@
 """The sample `mri`: the head phantom as a DICOM series of sagittal slices, of a made-up patient.
 
-As scanners leave them: the grid is turned a few degrees against the patient (which
-ImageOrientationPatient says; the voxels are the phantom's own, so that its truth lies on the same
-grid), file names and instance numbers are not in the order of positions, and SliceThickness is no
-spacing. Attributes are those of the MR Image IOD, DICOM PS3.3 A.4. The bytes are the same each
-time: no date of today, and UIDs as PS3.5 B.2 allows them, of UUIDs hashed from what is written.
+The series has the usual properties of a scanner's: the grid is turned a few degrees against the
+patient, as ImageOrientationPatient states (the voxels are the phantom's own, so that its truth lies
+on the same grid), file names and instance numbers are not in the order of positions, and
+SliceThickness isn't the spacing. The bytes are the same each time: no current date, and UIDs
+derived from hashes of the content.
+
+References: DICOM PS3.3 A.4 (MR Image IOD); PS3.5 B.2 (UUID derived UIDs).
 """
 
 from io import BytesIO
@@ -21,9 +23,9 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.samples.head import HeadPhantom, make_head
 from stereocell.storage.atomic_write import replacing_folder
 
-_UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # the namespace of this sample's UIDs
+_UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # namespace of this sample's UIDs
 PATIENT = "Ovoidsen^Emmeline"
-IDENTITY = {  # nobody's
+IDENTITY = {  # a made-up patient
     "PatientName": PATIENT,
     "PatientID": "PHANTOM-1974-0613",
     "PatientBirthDate": "19740613",
@@ -37,16 +39,16 @@ IDENTITY = {  # nobody's
     "StudyDescription": "Quadrics of the head",
     "SeriesDescription": "T1w sagittal phantom",
 }
-# A nod, a turn and a lean, degrees about (left, posterior, superior): the patient lay askew.
+# Tilt of the head: nod, turn and lean, degrees about (left, posterior, superior).
 TURN_DEG = (4.0, -3.0, 6.0)
 ISOCENTRE_MM = (3.0, -12.0, 21.0)  # LPS of the middle of the grid
-SLICE_THICKNESS_MM = 5.0  # no spacing of this series
+SLICE_THICKNESS_MM = 5.0  # differs from the spacing of this series
 
 
 def write_head(path: Path, seed: int = 0) -> None:
-    """Write the phantom of `seed` to the folder `path`. Where it is already, nothing is done.
+    """Write the phantom of `seed` to the folder `path`. An existing equal sample stays.
 
-    Raises UsageError for a seed below 0, OutputError if something else lies there or it can't be
+    Raises UsageError for a seed below 0, OutputError where other content lies there or it can't be
     written.
     """
     if seed < 0:
@@ -55,9 +57,9 @@ def write_head(path: Path, seed: int = 0) -> None:
 
 
 def write_dicom(path: Path, head: HeadPhantom, seed: int = 0) -> None:
-    """Write one file a sagittal slice into the folder `path`, in an order shuffled by `seed`.
+    """Write one file per sagittal slice into the folder `path`, in an order shuffled by `seed`.
 
-    Raises OutputError if something else lies there or it can't be written.
+    Raises OutputError where other content lies there or it can't be written.
     """
     files = _files(head, seed)
     if path.exists():
@@ -90,7 +92,7 @@ def affine_of(head: HeadPhantom) -> NDArray[np.float64]:
 
 
 def _turn(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Return the rotation (3, 3) by angles about x, then y, then z."""
+    """Return the rotation (3, 3) by angles (degrees) about x, then y, then z."""
     turn = np.eye(3)
     for axis, angle in enumerate(np.radians(degrees)):
         a, b = [k for k in range(3) if k != axis]
@@ -155,5 +157,5 @@ def _uid(seed: int, name: str) -> UID:
 
 
 def _decimal(value: float) -> str:
-    """Return a number in at most the 16 characters of a DS."""
+    """Return a number in at most the 16 characters of a DS (DICOM PS3.5 6.2)."""
     return f"{value + 0.0:.10f}"[:16]

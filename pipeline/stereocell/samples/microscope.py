@@ -1,10 +1,10 @@
-"""What a confocal microscope would record of the tissue: dye, blur, background, noise.
+"""A model of a confocal microscope's recording of the tissue: dye, blur, background, noise.
 
 Each dye is drawn with partial volumes from its signed distance (a ramp one sample wide over the
-surface), on samples as fine along z as in the plane, averaged into voxels, blurred by a Gaussian,
-and lifted by an uneven background; then come Poisson noise of the photons and Gaussian noise of
-the camera. A box is drawn from the bodies that reach into it, so any part of the block can be made
-by itself.
+surface), on samples as fine along z as in the plane. They are averaged into voxels, blurred by a
+Gaussian, and lifted by an uneven background. Poisson noise of the photons and Gaussian noise of the
+camera are added. A box is drawn from the bodies that reach into it, so any part of the block can be
+made by itself.
 """
 
 from collections.abc import Callable
@@ -21,23 +21,23 @@ from stereocell.samples.cycif_geometry import Tissue
 
 Field = NDArray[np.float32]
 
-SPACING_UM: Triple = (0.28, 0.14, 0.14)
-BLUR_UM: Triple = (0.30, 0.12, 0.12)  # sigma; wider along z, as an objective blurs
+SPACING_UM: Triple = (0.28, 0.14, 0.14)  # (z, y, x)
+BLUR_UM: Triple = (0.30, 0.12, 0.12)  # sigma (z, y, x); wider along z, as an objective blurs
 OFFSET = 100.0  # counts of a dark voxel
-GAIN = 1.5  # counts a photo-electron
+GAIN = 1.5  # counts per photo-electron
 READ_NOISE = 4.0  # counts, sigma
-MEMBRANE_UM = 0.5
-CYTOPLASM = 0.3  # of the membrane's brightness
-WALL_UM = 0.7  # of a vessel
-CHROMATIN = 0.2  # how much clumps inside a nucleus are brighter or darker than its dye
-CHROMATIN_FROM_UM = 0.4  # below the surface; full at twice that depth
-_TRUNCATE = 4.0  # sigmas
+MEMBRANE_UM = 0.5  # thickness of a cell's membrane
+CYTOPLASM = 0.3  # as a share of the membrane's brightness
+WALL_UM = 0.7  # thickness of a vessel's wall
+CHROMATIN = 0.2  # amplitude of clumps inside a nucleus, as a share of its dye
+CHROMATIN_FROM_UM = 0.4  # depth below the surface at which clumps begin; full at twice that depth
+_TRUNCATE = 4.0  # sigmas of the Gaussian that are summed
 _SAMPLES = 2  # along z in a voxel: makes the samples cubes
 
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """One cosine of the background: weight * cos(k . position + phase); k in 1/um."""
+    """One cosine of the background: weight * cos(k . position + phase); k (z, y, x) in rad/um."""
 
     k: Triple
     phase: float
@@ -62,7 +62,7 @@ STAINS = (
 
 
 def waves_of(stain: int, size_um: Triple, seed: int) -> tuple[Wave, ...]:
-    """Return the unevenness of a stain's background: weights add up to 0.45 at most."""
+    """Return the unevenness of a stain's background; the weights add up to at most 0.45."""
     rng = np.random.default_rng([seed, 1, stain])
     longest = max(size_um)
     waves = []
@@ -76,7 +76,7 @@ def waves_of(stain: int, size_um: Triple, seed: int) -> tuple[Wave, ...]:
 
 
 def background(stain: Stain, waves: tuple[Wave, ...], points: Points) -> Values:
-    """Return the background in counts, offset included, at points in um."""
+    """Return the background in counts, offset included, at points z, y, x in um, float64."""
     z, y, x = points
     level = np.ones(np.broadcast_shapes(z.shape, y.shape, x.shape))
     for wave in waves:
@@ -90,7 +90,7 @@ def background(stain: Stain, waves: tuple[Wave, ...], points: Points) -> Values:
 
 
 def record(tissue: Tissue, stain: int, *, box: Box, seed: int) -> NDArray[np.uint16]:
-    """Return the voxels (z, y, x) of a box in one channel.
+    """Return the voxels (z, y, x), uint16 counts, of a box in one channel.
 
     The noise belongs to the box: another box that overlaps it repeats the dye, not the noise.
     """
@@ -128,7 +128,7 @@ class _Canvas:
     def around(
         self, low_um: Triple, high_um: Triple
     ) -> tuple[tuple[slice, slice, slice], Points] | None:
-        """Return the samples between two corners and where they lie; None: outside."""
+        """Return the samples between two corners (z, y, x) and their points, um; None: outside."""
         pad = 2.0 * self.width_um
         z, y, x = (
             slice(*(int(i) for i in np.searchsorted(axis, (a - pad, b + pad))))
@@ -139,12 +139,12 @@ class _Canvas:
         return (z, y, x), _open_grid(self.axes[0][z], self.axes[1][y], self.axes[2][x])
 
     def share_inside(self, distance: NDArray[np.floating[Any]]) -> Field:
-        """Return how much of each sample lies inside, 0..1."""
+        """Return the share of each sample that lies inside, 0..1; `distance`: um."""
         share: Field = np.clip(0.5 - distance / self.width_um, 0.0, 1.0).astype(np.float32)
         return share
 
     def in_voxels(self, samples: Field) -> Field:
-        """Average the samples of each voxel."""
+        """Return the mean of each voxel's samples, float32 (z, y, x)."""
         depth, height, width = samples.shape
         means: Field = samples.reshape(depth // _SAMPLES, _SAMPLES, height, width).mean(axis=1)
         return means
@@ -157,7 +157,7 @@ def _draw_nuclei(tissue: Tissue, canvas: _Canvas) -> Field:
         if found is not None:
             where, points = found
             distance = nucleus.distance(points)
-            # Chromatin shows well inside only: at the surface the dye is even, as the truth says.
+            # Chromatin shows well inside only: at the surface the dye is even, as in the truth.
             depth = np.clip((-distance - CHROMATIN_FROM_UM) / CHROMATIN_FROM_UM, 0.0, 1.0)
             even = nucleus.brightness * (1.0 + CHROMATIN * depth * _chromatin(points))
             dye[where] = np.maximum(dye[where], even * canvas.share_inside(distance))
@@ -165,7 +165,7 @@ def _draw_nuclei(tissue: Tissue, canvas: _Canvas) -> Field:
 
 
 def _chromatin(points: Points) -> Values:
-    """Clumps about 1.5 um apart, -1 .. 1: slanted waves that bend one another."""
+    """Return clumps about 1.5 um apart, -1 .. 1: slanted waves that bend one another."""
     z, y, x = points
     a = 3.1 * z + 2.9 * y + 1.0 * x
     b = 0.9 * z - 2.4 * y + 3.7 * x
@@ -175,7 +175,7 @@ def _chromatin(points: Points) -> Values:
 
 
 def _draw_membranes(tissue: Tissue, canvas: _Canvas) -> Field:
-    """Tumour cells: balls that share a flat wall where two overlap, as soap bubbles do."""
+    """Draw tumour cells: balls that share a flat wall where two overlap, as soap bubbles do."""
     nearest = np.full(canvas.shape, 1e3, np.float32)
     second = np.full(canvas.shape, 1e3, np.float32)
     brightness = np.zeros(canvas.shape, np.float32)
@@ -203,7 +203,7 @@ def _draw_membranes(tissue: Tissue, canvas: _Canvas) -> Field:
 
 
 def _draw_vessels(tissue: Tissue, canvas: _Canvas) -> Field:
-    """Tubes with a wall and an open lumen, which runs on through the forks."""
+    """Draw tubes with a wall and an open lumen, which continues through the forks."""
     outer = np.full(canvas.shape, 1e3, np.float32)
     for tube in tissue.vessels:
         found = canvas.around(tube.low_um, tube.high_um)

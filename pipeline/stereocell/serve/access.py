@@ -1,12 +1,14 @@
-"""Who may ask a server: requests by its own names, pages of its own origin, holders of a session.
+"""Access to a server: requests to its own names, from its own origin, with a session on the LAN.
 
-A page of another site can have a browser send requests here. Against that: the Host header must be
-one of the server's names (DNS rebinding), and the Origin, which browsers always send with a
-websocket and pages can't change, must be the same host and port (cross-site websocket hijacking).
-Where a page of another site asks without one (an image, a script, a frame), browsers say so by
-Sec-Fetch-Site; it may only lead a person here. Programs that are no browsers send neither and need
-none. On the LAN all requests need a session besides: a one-time token, in the address that a QR
-code carries, is exchanged for a cookie and then void.
+A page of another site can make a browser send requests here. Two checks prevent this. The Host
+header must be one of the server's names (against DNS rebinding). The Origin must be the same host
+and port (against cross-site websocket hijacking): browsers always send it with a websocket, and
+pages can't change it. Requests of another site's page without an Origin (an image, a script, a
+frame) carry Sec-Fetch-Site; such a page may only link here. Programs other than browsers send
+neither header and need none. On the LAN every request also needs a session: a one-time token, in
+the address of the QR code, is exchanged for a cookie and becomes void.
+
+References: RFC 6454 (the Origin header); W3C Fetch Metadata Request Headers.
 """
 
 import secrets
@@ -22,23 +24,23 @@ from starlette.websockets import WebSocket
 from stereocell.serve.headers import protect
 from stereocell.serve.static_files import redirect
 
-# __Host-: browsers take it with Secure and Path=/ only, and from no neighbouring host.
-# Lax: the page may be opened from a scanner's link; websockets of other sites go without it.
+# Browsers accept __Host- with Secure and Path=/ only, and from no neighbouring host.
+# Lax: a scanner's link may open the page; websockets of other sites come without the cookie.
 COOKIE = "__Host-stereocell"
 _ATTRIBUTES = "Path=/; Secure; HttpOnly; SameSite=Lax"
 
 
 class Gate:
-    """Tokens and sessions of a server on the LAN. Nothing is kept beyond the process."""
+    """Tokens and sessions of a server on the LAN. They end with the process."""
 
     def __init__(self, on_used: Callable[[], None]) -> None:
-        """on_used: called when a token was used; `token` is then a new one, for another device."""
+        """on_used: called after a token was used; `token` is then new, for another device."""
         self._on_used = on_used
         self._sessions: list[str] = []
         self.token = secrets.token_urlsafe(32)
 
     def exchange(self, token: str) -> str | None:
-        """Return a new session for the token, which is void from now on; None: it is wrong."""
+        """Return a new session for the token, which becomes void; None: the token is wrong."""
         if not secrets.compare_digest(token.encode(), self.token.encode()):
             return None
         self.token = secrets.token_urlsafe(32)
@@ -47,7 +49,7 @@ class Gate:
         return self._sessions[-1]
 
     def knows(self, session: str) -> bool:
-        """Return whether this is a session."""
+        """Return whether this is a session. Takes the same time for all values."""
         found = False
         for known in self._sessions:
             found |= secrets.compare_digest(session.encode(), known.encode())
@@ -55,9 +57,9 @@ class Gate:
 
 
 class Access:
-    """ASGI middleware: refuses with 403 whoever may not ask, before anything is looked at.
+    """ASGI middleware: answers 403 to clients without access, before the request is processed.
 
-    All answers get the headers that protect them (serve/headers.py): it is the outermost layer.
+    It is the outermost layer: all answers get the protective headers of serve/headers.py.
     """
 
     def __init__(self, app: ASGIApp, names: Collection[str], gate: Gate | None) -> None:
@@ -82,11 +84,11 @@ class Access:
         elif scope["type"] == "http":
             await answer(scope, receive, send_protected)
         else:
-            # 403 without a word: after a response of its own uvicorn logs a fault that is none
+            # 403 without a text: after a response of our own uvicorn logs a false fault
             await WebSocket(scope, receive, send).close()
 
     def _judge(self, scope: Scope) -> Response | None:
-        """Return the answer to a request that goes no further, or None."""
+        """Return the refusal of a request, or None where it may pass."""
         headers = Headers(scope=scope)
         host = headers.get("host", "").lower()
         if _name(host) not in self._names:
@@ -120,7 +122,7 @@ def _is_own_origin(headers: Headers, host: str) -> bool:
 
 
 def _is_own_fetch(headers: Headers) -> bool:
-    """Return whether it is this server's page, a person, or no browser that asks."""
+    """Return whether the request comes from this server's page, a person or no browser."""
     if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
         return True
     goes = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")

@@ -1,13 +1,13 @@
-"""The trees of a bundle's volumes: built when first asked for, kept in OUT/bricks, read from there.
+"""The trees of a bundle's volumes: built on first request, stored in OUT/bricks, read from there.
 
-A file is named by the hash of what it is made of: the volume's KTX2 file, the threshold, the code's
-version. So a second start builds nothing, and a bundle that was written anew is noticed. Files
-that no volume of the bundle calls for are removed when one is built.
+A file's name is a hash of its inputs: the volume's KTX2 file, the threshold, the code's version. So
+a second start builds nothing, and a new bundle is detected. When a tree is built, files that belong
+to no volume of the bundle are removed.
 
-The threshold is the largest intensity that the channel's transfer function leaves invisible, the
-one that is chosen in the stage and that a viewer opens with. Of all of them it would be the lowest,
-which mostly is that of a function that nobody looks at; a viewer that is switched to one that shows
-more takes the volume's KTX2 file instead.
+The threshold is the largest intensity that the channel's transfer function leaves invisible. The
+function is the one selected in the stage, with which a viewer opens. The lowest threshold of all
+functions would mostly come from one that nobody uses. A viewer that switches to a function that
+shows more fetches the volume's KTX2 file instead.
 """
 
 import hashlib
@@ -37,20 +37,20 @@ from stereocell.serve.brick_order import PlacedTree, place
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.json_files import read_json
 
-CODE_VERSION = 1  # of build() and encode_tree(): whoever changes their bytes raises it
+CODE_VERSION = 1  # of build() and encode_tree(): increase it with every change of their bytes
 MANIFEST = "manifest.json"
 _REMEDY = "run `stereocell bundle OUT`"
-_KEPT_NODES = 2_000_000  # of the trees that are kept at hand: some 300 MB
-_KEPT_FILES = 256  # each keeps its file open
+_KEPT_NODES = 2_000_000  # nodes of the cached trees: some 300 MB
+_KEPT_FILES = 256  # cached trees; each holds its file open
 
 
 class UnknownVolumeError(OutputError):
-    """The bundle has no such volume."""
+    """The bundle lacks this volume."""
 
 
 @dataclass(frozen=True, slots=True)
 class Volume:
-    """A volume as the bundle lists it. entry: of volumes.json; threshold: -1 to 254."""
+    """A volume of the bundle. entry: its part of volumes.json; threshold: intensity, -1 to 254."""
 
     tile: str
     channel: str
@@ -71,10 +71,10 @@ class Volume:
 
 
 class BrickFile:
-    """A tree on disk: its table in memory, its bricks read when they are asked for."""
+    """A tree on disk: its table is in memory, its bricks are read on request."""
 
     def __init__(self, path: Path, volume: Volume) -> None:
-        """Open a tree. Raises BrickFormatError where it isn't whole, OSError where none is."""
+        """Open a tree. Raises BrickFormatError where it is damaged, OSError where it is missing."""
         data = path.read_bytes()
         table = parse_table(data)
         if table.source.hex() != volume.source[: 2 * HASH_BYTES]:
@@ -109,10 +109,10 @@ class BrickFile:
 
 
 class BrickLibrary:
-    """The trees of one bundle. Methods may be called from any thread, and may take seconds."""
+    """The trees of one bundle. Its methods are thread-safe and may take seconds."""
 
     def __init__(self, bundle: Path, folder: Path) -> None:
-        """bundle: the folder of manifest.json; folder: where trees are kept."""
+        """bundle: the folder of manifest.json; folder: the folder of the trees."""
         self._bundle = bundle
         self._folder = folder
         self._stamp: tuple[int, int] | None = None
@@ -124,9 +124,9 @@ class BrickLibrary:
         self.built = 0
 
     def volumes(self) -> dict[tuple[str, str], Volume]:
-        """Return the volumes by (tile, channel), read anew when the bundle was written anew.
+        """Return the volumes by (tile, channel), read again where the bundle was written anew.
 
-        Raises OutputError.
+        Raises OutputError where the bundle is missing, SourceError where it is damaged.
         """
         with self._listing:
             path = self._bundle / MANIFEST
@@ -141,22 +141,22 @@ class BrickLibrary:
             return self._volumes
 
     def open(self, tile: str, channel: str) -> BrickFile:
-        """Return a volume's tree, which is built if it has to be.
+        """Return a volume's tree; build it where necessary.
 
         Raises UnknownVolumeError; OutputError and SourceError where the bundle is damaged.
         """
         file = self.open_built(tile, channel)
         if file is None:
             with self._building:
-                file = self.open_built(tile, channel)  # somebody else may have asked for it, too
+                file = self.open_built(tile, channel)  # another thread may have built it
                 if file is None:
                     file = self._make(self._volume(tile, channel))
         return file
 
     def open_built(self, tile: str, channel: str) -> BrickFile | None:
-        """Return a volume's tree if it is there, whole; waits for nothing that is being built.
+        """Return a volume's tree if it exists and is whole; never waits for a build.
 
-        Raises as open() does.
+        Raises the errors of open().
         """
         volume = self._volume(tile, channel)
         file = self._find(volume)
@@ -183,7 +183,7 @@ class BrickLibrary:
             return file
 
     def _keep(self, file: BrickFile) -> None:
-        """Keep a tree at hand; those that were asked for longest ago go."""
+        """Cache a tree; drop those that were used longest ago."""
         with self._keeping:
             self._files[_key(file.volume)] = file
             self._files.move_to_end(_key(file.volume))
@@ -224,8 +224,8 @@ def _key(volume: Volume) -> tuple[str, str]:
 def invisible_below(row: NDArray[np.uint8]) -> int:
     """Return the largest intensity that a row of a table, uint8 (256, 4), leaves at 0; -1: none.
 
-    Texel k stands for intensity k; between texels opacity runs linearly, so what lies at or below
-    the last texel before the first opaque one is invisible.
+    Texel k is intensity k; between texels opacity is linear, so everything up to the last texel
+    before the first opaque one is invisible.
     """
     shown = row[:, 3] > 0
     first = int(shown.argmax()) if shown.any() else 255
@@ -258,7 +258,7 @@ def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
 
 
 def _read(bundle: Path, ref: dict[str, Any]) -> bytes:
-    """Return a file of the bundle that is what its FileRef says."""
+    """Return a file of the bundle. Raises SourceError where it doesn't match its FileRef."""
     try:
         data = (bundle / ref["path"]).read_bytes()
     except OSError as error:

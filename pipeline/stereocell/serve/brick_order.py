@@ -1,11 +1,14 @@
-"""Which bricks a view wants, and in which order: what is most wrong on the screen comes first.
+"""The bricks that a view needs, in the order of their screen-space error.
 
-A brick's worth is what its absence costs: the error of its parent (what is shown instead), times
-the size of its box on the screen, times a weight that falls off the gaze's direction. A brick never
-comes before its parent: it is worth no more than the parent, and of equals the coarser comes first.
-After Guthe & Strasser, "Advanced techniques for high-quality multi-resolution volume rendering",
-Computers & Graphics 2004, with foveation as in "Gaze-directed volume rendering" (Levoy & Whitaker
-1990).
+A brick's worth is the cost of its absence: the error of its parent (shown instead), times the size
+of its box on the screen, times a weight that falls off from the gaze's direction. A brick never
+comes before its parent: its worth is at most the parent's, and of equals the coarser comes first.
+
+References: Guthe & Strasser, "Advanced techniques for high-quality multi-resolution volume
+rendering", Computers & Graphics 28(1), 2004, https://doi.org/10.1016/j.cag.2003.10.018
+Levoy & Whitaker, "Gaze-directed volume rendering", Symposium on Interactive 3D Graphics, 1990
+Gribb & Hartmann, "Fast extraction of viewing frustum planes from the world-view-projection
+matrix", 2001
 """
 
 import math
@@ -20,17 +23,20 @@ from stereocell.formats.brick_stream import Table
 from stereocell.formats.voxel_bvh import EMPTY, STREAM_BRICK
 from stereocell.model.errors import SourceError
 
-_FOVEA_RAD = math.radians(20)  # off the gaze by this much, a brick is worth half
-_ROOT_ERROR = 255.0  # before the root has come, all may be wrong
+_FOVEA_RAD = math.radians(20)  # rad, angle to the gaze at which a brick's worth is halved
+_ROOT_ERROR = 255.0  # grey values; the error while the root is missing
 
 Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is looked at; fields as in the message `view`, vectors (x, y, z) in um of the world.
+    """A view, with the fields of the message `view`; vectors (x, y, z) in um of the world.
 
-    clip: 4 x 4 for column vectors; row i, column j.
+    clip               (4, 4) for column vectors; row i, column j
+    pixels_per_radian  resolution of the screen
+    texel_px           longest edge of a texel on the screen, pixels
+    error_grey         error that needs no refinement, 0..255
     """
 
     clip: NDArray[np.float64]
@@ -43,11 +49,13 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class PlacedTree:
-    """A tree where its tile lies; boxes (n, 3), (x, y, z), um before the tile's matrix.
+    """A tree at its tile's place; boxes (n, 3), (x, y, z), um before the tile's matrix.
 
-    to_world  4 x 4 for column vectors; to_tile: its inverse
-    texel_um  longest edge of a finest texel
-    parents   index of each node's parent; the root's is 0
+    center, half  of the nodes' boxes
+    to_world      (4, 4) for column vectors; to_tile: its inverse
+    texel_um      longest edge of a finest texel
+    parents       (n,), index of each node's parent; the root's is 0
+    error_max, error_rms  (n,), grey values 0..255
     """
 
     center: Floats
@@ -64,11 +72,13 @@ class PlacedTree:
 
 
 def place(table: Table, entry: dict[str, Any]) -> PlacedTree:
-    """Return a tree in the box of its volume, an entry of volumes.json.
+    """Return a tree in the box of its volume.
 
-    Boxes are those of what is drawn: they end at the centres of the last texels inside the apron,
-    and those of nodes that hold apron alone have negative edges. Raises SourceError for a matrix
-    that can't be undone.
+    entry  of volumes.json
+
+    The boxes are those of the drawn part: they end at the centres of the last texels inside the
+    apron, and boxes of nodes with apron only have negative edges. Raises SourceError for a matrix
+    that can't be inverted.
     """
     nodes = table.nodes
     size = np.array(table.size[::-1], dtype=np.float64)
@@ -113,11 +123,12 @@ def place(table: Table, entry: dict[str, Any]) -> PlacedTree:
 def order(
     view: View, trees: Sequence[PlacedTree]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return tree (index into `trees`), node and worth of the bricks that a view wants, in order.
+    """Return tree (index into `trees`), node and worth of the bricks that a view needs, in order.
 
-    A root is wanted if its box is in the frustum; a child if its parent is, its own box is in the
-    frustum, and the parent is too coarse: its texels are longer than `texel_px` on the screen
-    where its box is nearest, and its error_max exceeds `error_grey`. Empty nodes are never.
+    All three are (k,). A root is needed if its box is in the frustum. A child is needed if its
+    parent is, its own box is in the frustum, and the parent is too coarse: its texels are longer
+    than `texel_px` on the screen at the nearest point of its box, and its error_max exceeds
+    `error_grey`. Empty nodes are never sent.
     """
     trees_, nodes, worths, levels = [], [], [], []
     for i, tree in enumerate(trees):
@@ -133,10 +144,10 @@ def order(
 
 
 def _weigh(view: View, tree: PlacedTree) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Return which nodes the view wants, and what each is worth, at most as much as its parent.
+    """Return a mask (n,) of the nodes that the view needs, and the worth of each, (n,).
 
-    Worked out in the tile's own space, where boxes lie along the axes; a matrix that scales alike
-    along all axes, as a moved tile's does, changes no ratio of size to distance.
+    It is computed in the tile's own space, where boxes are axis-aligned. A matrix with the same
+    scale along all axes, as a moved tile's, changes no ratio of size to distance.
     """
     eye = (tree.to_tile @ np.append(view.eye, 1.0))[:3]
     gaze = tree.to_tile[:3, :3] @ view.gaze
@@ -168,7 +179,7 @@ def _weigh(view: View, tree: PlacedTree) -> tuple[NDArray[np.bool_], NDArray[np.
 
 
 def _in_frustum(clip: NDArray[np.float64], center: Floats, half: Floats) -> NDArray[np.bool_]:
-    """Return which boxes reach into the six half-spaces -w <= x, y, z <= w (Gribb & Hartmann)."""
+    """Return a mask (n,) of the boxes that reach into the half-spaces -w <= x, y, z <= w."""
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
     reach = center @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
     return (reach >= 0).all(axis=1) & (half >= 0).all(axis=1)

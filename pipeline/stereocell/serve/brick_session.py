@@ -1,15 +1,15 @@
-"""One client's websocket `/bricks`: what it asks for by view comes in order, coarse to fine.
+"""One client's websocket `/bricks`: it sends the bricks of the client's view, coarse to fine.
 
-Three tasks share a connection: one reads messages, one opens trees (which may have to be built),
-one sends. Whatever takes time runs in threads, so that no client waits for another's. What is on
-its way, unacknowledged, never exceeds the client's window. Whoever breaks the rules of
-docs/brick-stream.md is closed with a code and a reason:
+Three tasks share a connection: one reads messages, one opens (or builds) trees, one sends. Slow
+work runs in threads, so that no client waits for another's. The unacknowledged bytes never exceed
+the client's window. A client that breaks the rules of docs/brick-stream.md is closed with a code
+and a reason:
 
-    1003  a binary frame                    1007  no UTF-8, no JSON, not as the schema asks
+    1003  a binary frame                    1007  invalid UTF-8, JSON or schema
     1008  against the order or the limits   1009  a message that is too long
     1012  the bundle was written anew       1013  too many connections
 
-(1001, the server ends, and limits of frames that are no messages: serve/websocket_protocol.py.)
+(1001, the server ends, and the limits of single frames: serve/websocket_protocol.py.)
 """
 
 import asyncio
@@ -58,13 +58,13 @@ from stereocell.serve.limits import (
     Refusal,
 )
 
-_AHEAD = 2048  # bricks that are looked at for one frame
+_AHEAD = 2048  # bricks considered for one frame
 _LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 
 
 class BrickEndpoint:
-    """The websocket's side of a server: its connections share a library and threads."""
+    """The websocket part of a server: its connections share a library and threads."""
 
     def __init__(self, library: BrickLibrary) -> None:
         self._library = library
@@ -86,10 +86,10 @@ class BrickEndpoint:
             await BrickSession(socket, self._library, self._builder, self._quick).run()
         finally:
             counts[address] -= 1
-            counts += Counter()  # leaves out those at 0
+            counts += Counter()  # removes entries of 0
 
     def close(self) -> None:
-        """Let the threads end; what they are at is finished."""
+        """End the threads after their current work."""
         self._builder.shutdown(wait=False, cancel_futures=True)
         self._quick.shutdown(wait=False, cancel_futures=True)
 
@@ -100,12 +100,12 @@ class _Tree:
     channel: str
     table_hash: str
     nodes: int
-    sent: bytearray  # a byte for each node: 1 where the client has its brick
+    sent: bytearray  # a byte per node: 1 where the client has its brick
 
 
 @dataclass(slots=True)
 class _Running:
-    """A view under way. order: tree's number, node, bytes: int64 (3, n), once it is known."""
+    """A view in progress. order: int64 (3, n): number of the tree, node, bytes; None: not ready."""
 
     id: int
     message: dict[str, Any]
@@ -133,7 +133,7 @@ class BrickSession:
         self._quick = quick
         self._window = WINDOW_BYTES
         self._trees: list[_Tree] = []
-        self._asked = 0  # trees that were asked for
+        self._asked = 0  # trees requested
         self._to_open: asyncio.Queue[dict[str, str]] = asyncio.Queue()
         self._outbox: deque[str | Part] = deque()
         self._view: _Running | None = None
@@ -146,7 +146,7 @@ class BrickSession:
         self._acks = Bucket(ACKS_PER_S)
 
     async def run(self) -> None:
-        """Serve the client. Closes the socket itself, unless the client left."""
+        """Serve the client. Closes the socket, unless the client left."""
         tasks = [asyncio.create_task(work) for work in (self._read(), self._open(), self._send())]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -164,7 +164,7 @@ class BrickSession:
             assert isinstance(error, Refusal)
             try:
                 await self._socket.close(error.code, error.reason)
-            except (WebSocketDisconnect, RuntimeError):  # it left at this moment
+            except (WebSocketDisconnect, RuntimeError):  # the client left at this moment
                 return
             break
 
@@ -337,7 +337,7 @@ class BrickSession:
                     raise Refusal(1012, "the bundle was written anew, connect again")
                 files[number] = file
             found = _find_order(view.message, files)
-            for number, tree in trees.items():  # here, as the event loop must not be held up
+            for number, tree in trees.items():  # here, so that the event loop is not blocked
                 sent = np.frombuffer(tree.sent, np.uint8)
                 here = found[0] == number
                 here[here] = sent[found[1, here]] != 0
@@ -377,7 +377,7 @@ class BrickSession:
 
         data = await self._in(self._quick, work)
         await self._wait_for_room(len(data))
-        if self._view is not view:  # ended meanwhile, and its `done` is on its way
+        if self._view is not view:  # ended meanwhile, and its `done` is queued
             return
         view.at = at
         view.bricks += len(picked)
@@ -423,7 +423,7 @@ class BrickSession:
 
 
 def _find_order(message: dict[str, Any], files: dict[int, BrickFile]) -> NDArray[np.int64]:
-    """Return tree's number, node, bytes of all bricks that a view wants, (3, n), in order."""
+    """Return int64 (3, n): number of the tree, node, bytes of a view's bricks, in order."""
 
     def vector(key: str) -> NDArray[np.float64]:
         return np.array(message[key], dtype=np.float64)

@@ -1,10 +1,10 @@
-"""Close connections on which no request comes: uvicorn itself lets them stand for ever.
+"""Close connections that send no request: uvicorn itself keeps them open for ever.
 
-Its `timeout_keep_alive` begins with the end of an answer and ends with the next byte, whatever that
-is; nothing is counted before the first request, and `limit_concurrency` counts whole requests. So a
-client that connects and is silent, or sends a head (or the body of what was answered) a byte at a
-time, holds a socket for good. Here a head has HEAD_S seconds, from the connection on or from the
-end of the answer before it. (The TLS handshake, which comes first, has as long: serve/lifetime.py.)
+uvicorn's `timeout_keep_alive` begins at the end of an answer and ends with the next byte of any
+kind. It doesn't count before the first request, and `limit_concurrency` counts whole requests. So a
+silent client, or one that sends a head (or an ignored body) byte by byte, holds a socket for good.
+Here a head has HEAD_S seconds, from the start of the connection or the end of the last answer. (The
+TLS handshake before it has the same limit: serve/lifetime.py.)
 """
 
 import asyncio
@@ -16,7 +16,7 @@ from stereocell.serve.limits import HEAD_S
 
 
 class HeadDeadline(H11Protocol):
-    """uvicorn's HTTP protocol, whose client must send its request's head in time."""
+    """uvicorn's HTTP protocol with a deadline for the head of each request."""
 
     head_s = HEAD_S
     _deadline: asyncio.TimerHandle | None = None
@@ -35,11 +35,11 @@ class HeadDeadline(H11Protocol):
 
     def on_response_complete(self) -> None:
         self._await_head()
-        super().on_response_complete()  # a request that came in the meantime begins here
+        super().on_response_complete()  # a request that is already here begins now
         self._stop_if_answering()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        self._stop()  # what follows has limits of its own: serve/limits.py
+        self._stop()  # a websocket has its own limits: serve/limits.py
         super().handle_websocket_upgrade(event)
 
     def _await_head(self) -> None:
@@ -57,6 +57,6 @@ class HeadDeadline(H11Protocol):
 
     def _give_up(self) -> None:
         if self.transport.get_write_buffer_size():
-            self.transport.close()  # the end of an answer is still on its way
+            self.transport.close()  # the end of an answer is still being sent
         else:
             self.transport.abort()  # closing TLS would wait for the client once more

@@ -1,9 +1,12 @@
-"""Headers of every answer that tell a browser what this server's content may not be used for.
+"""Headers of every answer that restrict the use of this server's content in a browser.
 
-The viewer's page brings its own Content-Security-Policy in its <meta>, with the hash of its script;
-the header adds what only a header can say. Scripts get the same: workers take theirs from it. All
-else in a bundle is data: opened by itself (an SVG, say), it runs and loads nothing. There is no
-Cross-Origin-Embedder-Policy: the viewer shares no memory, and may read a bundle of another host.
+The viewer's page has its own Content-Security-Policy in its <meta>, with the hash of its script;
+the header adds the directives that only a header can set. Scripts get the same, since workers take
+their policy from it. All other files of a bundle are data: opened directly (an SVG, say), they run
+and load nothing. There is no Cross-Origin-Embedder-Policy: the viewer shares no memory, and may
+read a bundle of another host.
+
+References: W3C Content Security Policy Level 3.
 """
 
 from collections.abc import Iterable
@@ -22,7 +25,7 @@ RawHeaders = list[tuple[bytes, bytes]]
 
 
 def protect(headers: Iterable[tuple[bytes, bytes]]) -> RawHeaders:
-    """Return an answer's headers, their names in lower case, with those that all answers have."""
+    """Return an answer's headers (names in lower case) with the common ones added."""
     made = list(headers)
     found = {name for name, _ in made}
     for name, value in (_EVERYWHERE | policy("")).items():
@@ -32,6 +35,6 @@ def protect(headers: Iterable[tuple[bytes, bytes]]) -> RawHeaders:
 
 
 def policy(content_type: str) -> dict[str, str]:
-    """Return the policy of a file, which its 304 must repeat: caches take a 304's headers over."""
+    """Return the policy of a file; its 304 must repeat it, since caches take a 304's headers."""
     runs = content_type.partition(";")[0] in _RUN
     return {"Content-Security-Policy": _PAGE if runs else _DATA}

@@ -1,8 +1,9 @@
-"""What serving on the LAN takes: this machine's addresses, a certificate, a QR code to scan.
+"""Serving on the LAN: this machine's addresses, a certificate, a QR code to scan.
 
-WebXR and device orientation need a secure context, hence TLS. The certificate is made on the spot
-by trustme for the addresses at hand and signed by an authority whose key is thrown away at once;
-neither is kept. A phone can't know it and warns: what the person compares is its fingerprint.
+WebXR and device orientation need a secure context, hence TLS. trustme makes the certificate at
+start, for the machine's addresses, and signs it by an authority whose key is discarded at once;
+neither is stored. A phone doesn't know the authority and warns: the person compares the
+fingerprint.
 """
 
 import hashlib
@@ -19,7 +20,7 @@ from stereocell.model.errors import StereoCellError
 
 
 def find_addresses() -> list[str]:
-    """Return this machine's IPv4 addresses on the LAN, the one that leads outside first.
+    """Return this machine's IPv4 addresses on the LAN, the one of the default route first.
 
     Raises StereoCellError where there is none.
     """
@@ -48,7 +49,7 @@ def find_names(addresses: Sequence[str]) -> list[str]:
 
 
 def _can_be_certified(name: str) -> bool:
-    """Return whether a certificate takes it: no host name with an underscore, as Docker's."""
+    """Return whether a certificate can hold the name: not with an underscore, as Docker's hosts."""
     try:
         return bool(idna.encode(name))
     except idna.IDNAError:
@@ -58,7 +59,7 @@ def _can_be_certified(name: str) -> bool:
 def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
     """Return a server's TLS context for these names, and its certificate's SHA-256 fingerprint.
 
-    trustme hands the key to OpenSSL by a file in the temporary folder that it removes at once.
+    trustme passes the key to OpenSSL in a file of the temporary folder, which it removes at once.
     """
     names = [name for name in names if _can_be_certified(name)]
     leaf = trustme.CA(organization_name="StereoCell", organization_unit_name="this run").issue_cert(
@@ -73,8 +74,8 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
 
 
 def draw_qr(address: str, encoding: str = "utf-8") -> str:
-    """Return a QR code for a terminal, of half blocks; of spaces on coloured ground where its
-    encoding has none."""
+    """Return a QR code for a terminal, of half blocks; where its encoding lacks them, of spaces
+    with escape codes for the background."""
     code = segno.make(address, error="l", micro=False)
     text = io.StringIO()
     code.terminal(text, border=2, compact=True)
@@ -87,7 +88,7 @@ def draw_qr(address: str, encoding: str = "utf-8") -> str:
 
 
 def explain(address: str, fingerprint: str, code: str) -> str:
-    """Return what the person at the terminal has to know. The token is in the code alone."""
+    """Return the text for the person at the terminal. Only the code contains the token."""
     return (
         f"{code}\n"
         f"Scan this code with a phone in the same network: it opens {address} with a token\n"

@@ -1,9 +1,9 @@
-"""Begin and end: what runs when the server is stopped may end in STOP_S, and nothing new begins.
+"""Start and end: transfers that run at the stop may finish within STOP_S, and no new one begins.
 
-uvicorn alone gives TLS a minute before the first byte, logs a fault and a traceback for what did
-not end in time, and from Python 3.12 on waits for clients even after the second Ctrl+C. asyncio
-counts a connection with TLS as one only once it has shaken hands: a crowd that keeps silent would
-take all that this process may open.
+uvicorn alone gives TLS a minute before the first byte, logs a fault and a traceback for transfers
+that didn't finish in time, and from Python 3.12 on waits for clients even after the second Ctrl+C.
+asyncio counts a TLS connection only after its handshake: many silent clients would use up all file
+descriptors of this process.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ import uvicorn
 from stereocell.serve.http_protocol import GuardedHttp, State
 from stereocell.serve.limits import HEAD_S, STOP_S
 
-_TICK_S = 0.05
+_TICK_S = 0.05  # s between looks at the running transfers
 
 
 class Lifetime(uvicorn.Server):
@@ -37,7 +37,7 @@ class Lifetime(uvicorn.Server):
         context: ssl.SSLContext | None,
         on_wait: Callable[[int], None],
     ) -> None:
-        """context: for TLS; on_wait: told how many transfers the end waits for."""
+        """context: for TLS; on_wait: called with the number of transfers that the stop awaits."""
         super().__init__(config)
         self.server_state = state = State()
         self._clients = state.clients
@@ -57,7 +57,7 @@ class Lifetime(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Answer SIGTERM, and SIGINT unless it was ignored: so shells start what runs behind."""
+        """Handle SIGTERM, and SIGINT unless it was ignored, as shells do for background jobs."""
         is_ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         with super().capture_signals():
             if is_ignored and threading.current_thread() is threading.main_thread():
@@ -92,7 +92,7 @@ class Lifetime(uvicorn.Server):
                 http = self._make_http()
                 secure.set_protocol(http)
                 http.connection_made(secure)
-                if early.data:  # nothing at all would be the client's end
+                if early.data:  # an empty call would signal the client's end
                     http.data_received(early.data)
 
         task = asyncio.ensure_future(shake())
@@ -116,7 +116,7 @@ class Lifetime(uvicorn.Server):
             await asyncio.sleep(_TICK_S)
         for connection in list(state.connections):
             connection.transport.abort()
-        if state.tasks:  # they hear that their clients left
+        if state.tasks:  # they receive that their clients left
             await asyncio.wait(state.tasks, timeout=1)
         await self.lifespan.shutdown()
 
@@ -133,7 +133,7 @@ class _Door(asyncio.Protocol):
 
 
 class _Early(asyncio.Protocol):
-    """What comes right behind a handshake, before the server knows that it is over."""
+    """Buffers bytes that follow a handshake until the server handles its end."""
 
     def __init__(self) -> None:
         self.data = b""
@@ -147,7 +147,7 @@ class _Early(asyncio.Protocol):
 
 
 def _tell_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Pass on what went wrong, but that no more can be opened: asyncio says so for each try."""
+    """Report faults, except for a lack of file descriptors: asyncio reports that at each try."""
     fault = context.get("exception")
     if not isinstance(fault, OSError) or fault.errno not in (errno.EMFILE, errno.ENFILE):
         loop.default_exception_handler(context)

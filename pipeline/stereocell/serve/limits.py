@@ -1,49 +1,49 @@
-"""What one client may ask for, and how it is told that it asked for too much.
+"""All limits of one client, and how the server refuses a client that exceeds them.
 
-All limits of the server stand here; docs/brick-stream.md has them for people. They are far above
-what a browser that opens a large bundle does (six connections to a host, a request for each file),
-and low enough that a client that means ill leaves memory and file descriptors to the others.
+docs/brick-stream.md lists them for readers. They are far above the needs of a browser that opens a
+large bundle (six connections to a host, a request for each file), and low enough that a malicious
+client leaves memory and file descriptors to the others.
 """
 
 import asyncio
 from dataclasses import dataclass
 
 # A websocket, /bricks
-MESSAGE_BYTES = 1 << 16
-WINDOW_BYTES = 1 << 20
-FRAME_BYTES = 48 << 10  # below the smallest window
-MAX_TREES = 1024
-MAX_CONNECTIONS = 128
-CLIENT_SOCKETS = 64  # of these, from one address
-MESSAGES_PER_S = 100  # but for acks
+MESSAGE_BYTES = 1 << 16  # bytes of a message
+WINDOW_BYTES = 1 << 20  # largest window, bytes
+FRAME_BYTES = 48 << 10  # bytes of a frame; below the smallest window
+MAX_TREES = 1024  # trees of a connection
+MAX_CONNECTIONS = 128  # websockets of all clients
+CLIENT_SOCKETS = 64  # websockets of one address
+MESSAGES_PER_S = 100  # messages other than acks
 ACKS_PER_S = 5000
 CONTROLS_PER_S = 20  # pings and pongs
 MAX_FRAGMENTS = 64  # frames of one message
 FRAGMENTS_S = 10.0  # from a message's first frame to its last
-HELLO_S = 10.0
-ACK_S = 60.0
+HELLO_S = 10.0  # from the connection to its `hello`
+ACK_S = 60.0  # from a full window to the next ack
 _REASON_BYTES = 120  # RFC 6455: a close frame has room for 123
 
 # A request
-TARGET_BYTES = 8 << 10
-HEAD_BYTES = 16 << 10
+TARGET_BYTES = 8 << 10  # bytes of its path
+HEAD_BYTES = 16 << 10  # bytes of its head
 MAX_HEADERS = 100
-HEAD_S = 10.0  # for the head of an HTTP request, and before it the TLS handshake
-STALL_S = 60.0  # in which some of an answer must go out
-LINGER_S = 1.0  # in which a client that was refused may still send, so that it reads the answer
+HEAD_S = 10.0  # for the head of an HTTP request, and before it for the TLS handshake
+STALL_S = 60.0  # longest time in which no byte of an answer is sent
+LINGER_S = 1.0  # time in which a refused client may still send, so that it reads the answer
 
-# A client, which is an address: all of this machine are one, as those behind one router
+# A client, identified by its address: one for this machine, one for all behind the same router
 CONNECTIONS = 400  # of all clients: each may have a file open, and 1024 descriptors are usual
-CLIENT_CONNECTIONS = 200
-REQUESTS_PER_S = 500
-REQUESTS_AT_ONCE = 20_000  # a bundle has thousands of files
+CLIENT_CONNECTIONS = 200  # of one client
+REQUESTS_PER_S = 500  # in the long run
+REQUESTS_AT_ONCE = 20_000  # at once: a bundle has thousands of files
 _KNOWN = 1024  # addresses without a connection whose requests are remembered
 
 STOP_S = 8.0  # for transfers that run when the server is stopped
 
 
 class Refusal(Exception):
-    """The connection is to be closed with this code and reason."""
+    """The connection must be closed with this code and reason."""
 
     def __init__(self, code: int, reason: str) -> None:
         super().__init__(reason)
@@ -52,7 +52,7 @@ class Refusal(Exception):
 
 
 class Bucket:
-    """At most so many a second in the long run, `at_once` (or twice as many) at once."""
+    """A token bucket: `per_s` a second in the long run, `at_once` (default 2 * per_s) at once."""
 
     def __init__(self, per_s: int, at_once: int | None = None) -> None:
         self.per_s = per_s
@@ -61,7 +61,7 @@ class Bucket:
         self._last = asyncio.get_running_loop().time()
 
     def take(self) -> bool:
-        """Return whether one more is allowed, and count it."""
+        """Return whether one more is allowed; count it if so."""
         now = asyncio.get_running_loop().time()
         self._left = min(self._most, self._left + (now - self._last) * self.per_s)
         self._last = now
@@ -85,7 +85,7 @@ class Clients:
         self.connections = 0
 
     def enter(self, address: str) -> bool:
-        """Return whether a client may have one more connection, and count it."""
+        """Return whether a client may have one more connection; count it if so."""
         client = self._find(address)
         if self.connections >= CONNECTIONS or client.connections >= CLIENT_CONNECTIONS:
             return False
@@ -94,12 +94,12 @@ class Clients:
         return True
 
     def leave(self, address: str) -> None:
-        """Count a connection that entered, and ended, no more."""
+        """Remove a connection that entered from the count."""
         self._known[address].connections -= 1
         self.connections -= 1
 
     def ask(self, address: str) -> bool:
-        """Return whether a client may make one more request, and count it."""
+        """Return whether a client may make one more request; count it if so."""
         return self._find(address).requests.take()
 
     def _find(self, address: str) -> _Client:

@@ -1,11 +1,10 @@
 """Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
-The static bundle stands by itself and works on any web host; here it is served with byte ranges,
-and beside it the websocket `/bricks` sends volumes by view (serve/brick_session.py). On localhost,
-or with `--lan` to the network: then by TLS, and to holders of a token only (serve/access.py).
-Nothing is logged but faults of the program itself and of the bundle: no request, so no token, and
-no name that a client sent. What the other modules refuse, and from whom, is listed in
-docs/brick-stream.md.
+A static bundle works on any web host. This server answers byte ranges of its files, and its
+websocket `/bricks` sends volumes by view (serve/brick_session.py). It serves localhost or, with
+`--lan`, the network: then by TLS, and only to holders of a token (serve/access.py). It logs only
+faults of the program and of the bundle: no request, so no token, and no name that a client sent.
+docs/brick-stream.md lists the requests that the other modules refuse.
 """
 
 import json
@@ -37,7 +36,7 @@ from stereocell.serve.static_files import BundleFiles, ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
-_OWN_NAMES = (LOCALHOST, "localhost")  # any port: it may be forwarded
+_OWN_NAMES = (LOCALHOST, "localhost")  # with any port: it may be forwarded
 
 
 def serve(
@@ -45,15 +44,15 @@ def serve(
 ) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
 
-    What a person is told on stdout, a program gets as lines of JSON: first the address, then, with
-    `lan`, an address that lets in one device, anew whenever one has come in.
+    for_program  print lines of JSON in place of texts for a person: first the address, then, with
+                 `lan`, an address that admits one device, a new one after each admission
 
-    Returns when the transfers that run have ended, or STOP_S later. Raises KeyboardInterrupt at
-    once at a second Ctrl+C; StereoCellError if there is no bundle, the port is taken, or there is
-    no network.
+    Returns when the running transfers have finished, or STOP_S later. Raises KeyboardInterrupt at
+    once at a second Ctrl+C; StereoCellError where there is no bundle, the port is taken, or there
+    is no network.
     """
     server = BundleServer(out, port, lan, for_program)
-    # uvicorn ends by it once it runs, and then repeats it
+    # a running uvicorn handles SIGTERM itself: it ends, then raises the signal again
     before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
     try:
         server.introduce()
@@ -74,8 +73,8 @@ def make_app(
     """Return the application: the bundle's files, and `/bricks`.
 
     library  of the bundle; None: there is no `/bricks`
-    names    the hosts that it answers to
-    gate     who may ask on the LAN; None: everybody on this machine
+    names    the hosts that it answers to, in lower case
+    gate     tokens and sessions on the LAN; None: all clients of this machine have access
     """
     files = BundleFiles(bundle, library is not None)
     endpoint = None if library is None else BrickEndpoint(library)
@@ -90,14 +89,14 @@ def make_app(
     if endpoint is not None:
         routes.insert(0, WebSocketRoute("/bricks", endpoint.talk))
     app = Starlette(routes=routes, lifespan=lifespan)
-    app.router.redirect_slashes = False  # where a path has a line break, which no route matches
+    app.router.redirect_slashes = False  # paths with a line break match no route
     return Access(app, names, gate)
 
 
 def _places(out: Path) -> tuple[Path, Path | None]:
-    """Return the folders of a bundle and its trees of bricks: of OUT, or where OUT is a bundle.
+    """Return the folders of a bundle and of its brick trees: below OUT, or where OUT is a bundle.
 
-    None: a bundle by itself, beside which nothing is ours to write.
+    None for the trees: a bundle by itself, beside which nothing may be written.
     """
     if (out / "bundle").exists() or not (out / MANIFEST).is_file():
         return out / "bundle", out / "bricks"
@@ -112,7 +111,7 @@ class BundleServer:
     """A bound server: `address` is where it listens; run() until stop()."""
 
     def __init__(self, out: Path, port: int, lan: bool, for_program: bool = False) -> None:
-        """Raises StereoCellError if there is no bundle, the port is taken, or no network."""
+        """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
         bundle, bricks = _places(out)
         library = None if bricks is None else BrickLibrary(bundle, bricks)
         self.bundle, self.has_bricks = bundle, bricks is not None
@@ -146,14 +145,14 @@ class BundleServer:
             http=GuardedHttp,
             ws=GuardedSocket,
             ws_max_size=MESSAGE_BYTES,
-            ws_per_message_deflate=False,  # bricks are compressed
+            ws_per_message_deflate=False,  # bricks are compressed already
         )
         logging.getLogger("uvicorn.error").addFilter(_is_ours)
         self._server = Lifetime(config, context, self._tell_wait)
 
     @property
     def has_started(self) -> bool:
-        """Whether it answers."""
+        """Whether it answers requests."""
         return self._server.started
 
     @property
@@ -162,7 +161,7 @@ class BundleServer:
         return self._server.force_exit
 
     def introduce(self) -> None:
-        """Print the address, and what is there."""
+        """Print the address, and the bundle's path."""
         if self.for_program:
             about = {"bundle": str(self.bundle), "bricks": self.has_bricks}
             _print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
@@ -171,7 +170,7 @@ class BundleServer:
         print(f"{self.address} shows {self.bundle}{alone}; Ctrl+C ends it", flush=True)
 
     def invite(self) -> None:
-        """Print the QR code for the next device on the LAN, and what to make of its warning."""
+        """Print the QR code for the next device on the LAN, and an explanation of its warning."""
         if self.gate is None:
             return
         invitation = f"{self.address}?token={self.gate.token}"
@@ -190,14 +189,14 @@ class BundleServer:
         )
 
     def run(self) -> None:
-        """Answer until stop(), or a signal in the main thread."""
+        """Answer requests until stop(), or a signal in the main thread."""
         try:
             self._server.run(sockets=[self._socket])
         finally:
             self._socket.close()
 
     def stop(self) -> None:
-        """Have run() end soon; may be called from any thread."""
+        """Make run() end soon; thread-safe."""
         self._server.should_exit = True
 
 
@@ -208,7 +207,7 @@ def _print_json(content: dict[str, object]) -> None:
 def _bind(host: str, port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        if sys.platform != "win32":  # there it would take a port that is in use
+        if sys.platform != "win32":  # Windows would take a port that is in use
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
         listener.listen(128)
@@ -221,9 +220,9 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 def _is_ours(record: logging.LogRecord) -> bool:
-    """Leave out tracebacks of frames that a client got wrong: it was closed with a code.
+    """Drop tracebacks of a client's invalid frames: the client was closed with a code.
 
-    A file that was cut meanwhile is told in a line.
+    A file that shrank while it was sent is logged in one line.
     """
     fault = record.exc_info[1] if record.exc_info else None
     if isinstance(fault, ShrunkError):

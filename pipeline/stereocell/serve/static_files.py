@@ -1,8 +1,10 @@
-"""Serve the files of a bundle: types, byte ranges, 304 for what a browser has, nothing outside.
+"""Serve the files of a bundle: types, byte ranges, 304 for cached files, nothing outside the root.
 
-The viewer fetches single mip levels by ranges (RFC 9110, section 14). A Range header that is
-malformed, in another unit, or asks for several ranges is ignored, as that section allows: the whole
-file is the answer. Everything is `no-cache`: the bundle may be built anew meanwhile.
+The viewer fetches single mip levels by ranges. A Range header that is malformed, in another unit,
+or asks for several ranges is ignored, as the RFC allows: the answer is the whole file. All answers
+are `no-cache`, since the bundle may be built anew meanwhile.
+
+References: RFC 9110, section 14 (range requests).
 """
 
 import os
@@ -18,7 +20,7 @@ from starlette.types import Receive, Scope, Send
 
 from stereocell.serve.headers import policy
 
-BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # tells a page that /bricks is there
+BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # tells a page that /bricks exists
 _HEADERS = {"Cache-Control": "no-cache"}
 _TYPES = {
     ".css": "text/css; charset=utf-8",
@@ -33,7 +35,7 @@ _TYPES = {
     ".webmanifest": "application/manifest+json",
 }
 _RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
-_DIGITS = 18  # of a number in a Range header: no file has more bytes
+_DIGITS = 18  # digits of a number in a Range header: no file has more bytes
 
 
 class ShrunkError(Exception):
@@ -44,12 +46,12 @@ class _SentFile(FileResponse):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
-        except h11.LocalProtocolError as error:  # less than its head had promised
+        except h11.LocalProtocolError as error:  # fewer bytes than its head promised
             raise ShrunkError(f"{self.path}: became shorter while it was sent") from error
 
 
 class BundleFiles:
-    """The folder that is served, and whether pages learn of bricks beside it."""
+    """The served folder, and a header that announces bricks."""
 
     def __init__(self, folder: Path, has_bricks: bool) -> None:
         self._root = folder.resolve()
@@ -72,7 +74,7 @@ class BundleFiles:
         return response
 
     def _find(self, name: str) -> tuple[Path, os.stat_result] | None:
-        """Return the file that a path names; None: there is none inside the root."""
+        """Return the file at a path; None: there is none inside the root."""
         if "\0" in name:
             return None
         try:
@@ -82,15 +84,17 @@ class BundleFiles:
             if not path.is_relative_to(self._root) or not path.is_file():
                 return None
             return path, path.stat()
-        except (OSError, RuntimeError):  # too long a name, a folder without rights, links in a ring
+        except (OSError, RuntimeError):  # too long a name, a folder without rights, a ring of links
             return None
 
 
 def parse_range(header: str, size: int) -> range | None:
     """Return the bytes that a Range header asks for, clipped to a file of `size` bytes.
 
-    An empty range can't be satisfied. None: the header is to be ignored (it is malformed, in
-    another unit, or asks for several ranges, which a server may answer with the whole file).
+    An empty range can't be satisfied. None: ignore the header (it is malformed, in another unit, or
+    asks for several ranges, which a server may answer with the whole file).
+
+        parse_range("bytes=100-199", 150) == range(100, 150)
     """
     match = _RANGE.fullmatch(header.strip())
     if match is None or max(map(len, match.groups())) > _DIGITS:
@@ -106,7 +110,7 @@ def parse_range(header: str, size: int) -> range | None:
 
 
 def _plain_range(request: Request, size: int) -> None:
-    """Leave FileResponse no Range header but one plain range, or none."""
+    """Leave FileResponse one plain Range header, or none."""
     headers = [(key, value) for key, value in request.scope["headers"] if key != b"range"]
     asked = parse_range(request.headers.get("range", ""), size)
     if asked is not None:
@@ -116,9 +120,9 @@ def _plain_range(request: Request, size: int) -> None:
 
 
 def redirect(path: str) -> Response:
-    """Return a redirect to a path of this server, which no cache keeps.
+    """Return a redirect to a path of this server, which no cache stores.
 
-    Its slashes are single ones: a browser takes what stands between two and a third for a host.
+    Repeated slashes become one: a browser takes the part after a leading `//` for a host.
     """
     place = quote(re.sub("/+", "/", f"/{path}"))  # ":" and backslashes are encoded
     return Response(status_code=303, headers={"Location": place, "Cache-Control": "no-store"})

@@ -1,8 +1,10 @@
-"""The websocket's frames: pings, fragments and ends, before a message is one.
+"""The websocket's frames before they form a message: pings, fragments, ends.
 
-uvicorn answers every ping and waits for ever for a message's last fragment; what messages say is
-serve/brick_session.py's. Here both have limits, and whoever is closed is gone soon after, also if
-it reads nothing. When the server ends, its clients are told so: 1001, going away.
+uvicorn answers every ping and waits for ever for a message's last fragment; here both have limits.
+A closed client's connection ends soon after, also if the client reads nothing. When the server
+ends, it closes its clients with 1001, going away. serve/brick_session.py handles the messages.
+
+References: RFC 6455.
 """
 
 import asyncio
@@ -26,7 +28,7 @@ from stereocell.serve.limits import (
     Bucket,
 )
 
-_GONE_S = 5.0  # from the end that we sent to the connection's, whatever the client does
+_GONE_S = 5.0  # from our close frame to the end of the connection, whatever the client does
 
 
 class _Handshake(ServerProtocol):
@@ -42,7 +44,7 @@ class _Handshake(ServerProtocol):
 
 
 class GuardedSocket(WebSocketsSansIOProtocol):
-    """uvicorn's websocket protocol, for clients that may mean ill."""
+    """uvicorn's websocket protocol with limits against malicious clients."""
 
     def __init__(
         self,
@@ -69,7 +71,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         if self._is_refused:
             return
         super().data_received(data)
-        if not self.handshake_initiated:  # what uvicorn hands over is a whole head
+        if not self.handshake_initiated:  # uvicorn passes on a complete head
             self.transport.abort()
         self._end_soon()
 
@@ -102,10 +104,10 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self._refuse(1008, f"more than {CONTROLS_PER_S} pongs a second")
 
     def handle_parser_exception(self) -> None:
-        """Say why, and end our side alone.
+        """Send the reason, and end our side only.
 
-        uvicorn closes at once, and a system that closes with something unread throws away what its
-        client has not read yet: the reason.
+        uvicorn closes at once. A system that closes a socket with unread bytes discards data that
+        its client hasn't read yet: the reason.
         """
         said = self.conn.close_sent
         assert said is not None
@@ -144,7 +146,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self._unfinished = None
 
     def _refuse(self, code: int, reason: str) -> None:
-        """Close with a code; the application hears that its client left."""
+        """Close with a code; to the application the client has left."""
         if not self.close_sent and not self.transport.is_closing():
             self._end_message()
             self.stop_keepalive()
