@@ -104,15 +104,19 @@ class OutFolder:
     # --- results of the units' two passes
 
     def statistics_file(self, channel_id: str, key: str) -> Path:
+        """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
     def iso_file(self, tile_id: str, channel_id: str, key: str) -> Path:
+        """Return the path of one unit's iso-value and curve."""
         return self.out / "units" / tile_id / channel_id / f"iso-{key}.json"
 
     def unit_dir(self, tile_id: str, channel_id: str, key: str) -> Path:
+        """Return the folder of one unit's meshes and volume."""
         return self.out / "units" / tile_id / channel_id / key
 
     def tile_file(self, tile_id: str) -> Path:
+        """Return the path of the record of one tile of the stage."""
         return self.out / "units" / tile_id / "stage.json"
 
     def survey(self) -> dict[str, Any]:

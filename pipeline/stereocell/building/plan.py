@@ -79,6 +79,7 @@ class Channel:
 
     @property
     def id(self) -> str:
+        """The name as an identifier, for paths and prims."""
         return to_identifier(self.name)
 
 
@@ -129,6 +130,7 @@ class Plan:
         return next((other for other in self.channels if other.name == painted), None)
 
     def tile(self, tile_id: str) -> Tile:
+        """Return the tile with this ID; the plan must hold it."""
         return next(tile for tile in self.tiles if tile.id == tile_id)
 
     def position_um(self, index_zyx: Sequence[float]) -> tuple[float, float, float]:

@@ -30,10 +30,12 @@ def run_on_input(
 
 
 def around(field: LatticeField | None, box: Box) -> LatticeField | None:
+    """Return the knots of a field near a box; None where there is no field."""
     return None if field is None else field.around(box)
 
 
 def input_key(plan: Plan, channel: Channel) -> list[Any]:
+    """Return the source's part of the key of a channel's result."""
     if channel.source:
         return [channel.fingerprint, 0, plan.spacing_um, plan.origin_um, 0]
     return [plan.fingerprint, plan.level, plan.spacing_um, plan.origin_um, plan.settings.plan.time]
@@ -45,4 +47,5 @@ def reader_module(plan: Plan, channel: Channel) -> str:
 
 
 def box_to_json(box: Box) -> list[list[int]]:
+    """Return a box as [start, stop], voxels (z, y, x)."""
     return [list(box.start), list(box.stop)]

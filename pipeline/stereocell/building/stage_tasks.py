@@ -42,6 +42,7 @@ class TileTask:
 
     @property
     def folder(self) -> Path:
+        """The folder of the tile in the stage."""
         return self.stage_dir / "tiles" / self.content.id
 
     def is_done(self) -> bool:

@@ -88,6 +88,7 @@ def _as_given(options: argparse.Namespace, text: str) -> str:
 
 
 def settings(options: argparse.Namespace) -> Answer:
+    """Print the settings of a preset and a file as TOML."""
     from stereocell.building import settings as settings_module
 
     found = settings_module.load(options.preset, options.config, flags={})
@@ -109,6 +110,7 @@ def _series(options: argparse.Namespace) -> Answer | None:
 
 
 def plan(options: argparse.Namespace) -> Answer:
+    """Write the plan and print it."""
     if listed := _series(options):
         return listed
     from stereocell.building import phases
@@ -130,6 +132,7 @@ def plan(options: argparse.Namespace) -> Answer:
 
 
 def iso(options: argparse.Namespace) -> Answer:
+    """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
     from stereocell.building import settings as settings_module
@@ -145,6 +148,7 @@ def iso(options: argparse.Namespace) -> Answer:
 
 
 def run_phases(options: argparse.Namespace, *names: str) -> Answer:
+    """Run phases of a build in order and print their times."""
     from stereocell.building import phases
     from stereocell.building.out_folder import OutFolder
     from stereocell.engine.run import Engine
@@ -190,6 +194,7 @@ def one_phase(name: str) -> Handler:
 
 
 def build(options: argparse.Namespace) -> Answer:
+    """Run all phases."""
     if listed := _series(options):
         return listed
     planned = plan(options)
@@ -201,6 +206,7 @@ def build(options: argparse.Namespace) -> Answer:
 
 
 def slices(options: argparse.Namespace) -> Answer:
+    """Write PNG slices of one channel."""
     if listed := _series(options):
         return listed
     from stereocell.building import phases
@@ -216,6 +222,7 @@ def slices(options: argparse.Namespace) -> Answer:
 
 
 def sample(options: argparse.Namespace) -> Answer:
+    """Write a sample."""
     from stereocell import samples
 
     if options.name == "cycif":
@@ -241,6 +248,7 @@ def sample(options: argparse.Namespace) -> Answer:
 
 
 def tissue(options: argparse.Namespace) -> Answer:
+    """Learn tissue classes and build their channels."""
     from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
 
     classes = None if options.classes is None else parse_classes(options.classes)
@@ -250,6 +258,7 @@ def tissue(options: argparse.Namespace) -> Answer:
 
 
 def check(options: argparse.Namespace) -> Answer:
+    """Check the results; the exit code is 1 where a check fails."""
     from stereocell.verify.formats import check as run
 
     lines = []
@@ -274,6 +283,7 @@ def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
 
 
 def doctor(options: argparse.Namespace) -> Answer:
+    """Examine this machine; the exit code is 1 where a needed part is missing."""
     from stereocell.cli.doctor import examine
 
     found = []
@@ -288,11 +298,13 @@ def doctor(options: argparse.Namespace) -> Answer:
 
 
 def view(options: argparse.Namespace) -> Answer:
+    """Serve a bundle and open it in a browser."""
     # on the LAN every browser needs the code that is shown here
     return _serve(options, not (options.no_browser or options.lan))
 
 
 def serve(options: argparse.Namespace) -> Answer:
+    """Serve a bundle."""
     return _serve(options, False)
 
 

@@ -62,5 +62,5 @@ def forget_scratch(client: Any) -> None:
     """Remove the working folders on a cluster's workers."""
     mirror = opened_here()
     if mirror is not None:
-        with suppress(Exception):  # whatever happened to the cluster
+        with suppress(Exception):  # the cluster may be gone
             client.run(forget, mirror.place.root)

@@ -34,7 +34,7 @@ R = TypeVar("R")
 
 _START_S = 300  # s for workers of this machine to start: it may be busy
 _LOOK_S, _LOOKS = 15, 12  # s between looks for workers, and looks until they count as gone
-_POLL_S = 0.05
+_POLL_S = 0.05  # s between looks at finished tasks
 _AHEAD = 64  # tasks that wait for a worker
 _GONE = "its workers are gone and did not come back: the same command goes on from here"
 
@@ -147,7 +147,7 @@ class Engine:
             # distributed drops a killed worker for good where a busy machine needs over 15 s for it
             dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
             with children_ignore_interrupts(), _started_in_time():
-                # units hold arrays of known size; distributed's spilling and pausing is in the way
+                # units hold arrays of known size; distributed needs no spilling
                 self._client = Client(
                     n_workers=self.workers,
                     threads_per_worker=1,
@@ -162,6 +162,7 @@ class Engine:
         return self._client
 
     def close(self) -> None:
+        """Stop the workers of this machine, or leave the cluster; it runs on."""
         if self._client is not None:
             cluster = self._client.cluster  # None for a cluster that was running before: it stays
             if cluster is None:

@@ -1,4 +1,4 @@
-"""A digest that identifies a dataset, whatever its path, date and container.
+"""A digest that identifies a dataset independently of its path, date and container.
 
 It covers the metadata that a build depends on and voxels, at a bounded cost: all voxels where they
 fit the budget, else the coarsest level (an average of the finer ones) and blocks of the finest

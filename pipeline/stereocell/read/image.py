@@ -8,7 +8,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 
 Color = tuple[float, float, float]
-MAX_CHANNELS = 10_000
+MAX_CHANNELS = 10_000  # of a source; more are refused
 
 
 @dataclass(frozen=True, slots=True)

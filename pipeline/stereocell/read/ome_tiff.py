@@ -32,8 +32,8 @@ from stereocell.storage.location import Location, require_own
 
 # Limits of the numbers in OME-XML and tags: the libraries allocate lists of such a length at once.
 _MAX_PLANES = 1_000_000
-_MAX_SIDE = 10_000_000
-_MAX_LEVELS = 64
+_MAX_SIDE = 10_000_000  # voxels along an axis
+_MAX_LEVELS = 64  # of the pyramid
 _SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
 _CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised below

@@ -28,7 +28,7 @@ from stereocell.read.zarr_store import GuardedStore, codec_name
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_MAX_LEVELS = 64
+_MAX_LEVELS = 64  # of the pyramid
 # attribute of a group without an image of its own -> the group's kind, for messages
 _OTHERS = {
     "plate": "a plate",

@@ -36,6 +36,7 @@ class Reader:
     has_series: bool = False
 
     def read_image(self, location: Location, series: int) -> Image:
+        """Return the image of a source; `series` counts where the format has series."""
         # imported on use: each import takes up to 2 s, and a process needs one
         read = import_module(self.module).read_image
         image: Image = read(location, series) if self.has_series else read(location)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_INTEGERS = (np.uint8, np.uint16, np.int16)
+_INTEGERS = (np.uint8, np.uint16, np.int16)  # narrowest first
 
 
 def dtype_for(ranges: Iterable[tuple[float, float, float, float]]) -> np.dtype[Any]:

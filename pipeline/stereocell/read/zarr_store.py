@@ -1,7 +1,7 @@
 """The store that Zarr reads through: it checks paths, file lengths and sizes after decoding.
 
 A chunk's size is known from the array's metadata, but the decoders ignore it: gzip and zstd unpack
-until the stream ends, whatever the memory, and Blosc trusts the length in the chunk's header and
+until the stream ends or memory runs out, and Blosc trusts the length in the chunk's header and
 reads past the end of the buffer, so that a truncated file would be read as noise. For a shard that
 is read whole only the file's size is known here, not the decoded size of its inner chunks.
 """
@@ -56,6 +56,7 @@ class GuardedStore(WrapperStore[Store]):
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
+        """Return the bytes at a key, checked; None: there are none."""
         is_metadata = key.rsplit("/", 1)[-1] in _METADATA
         most = _METADATA_BYTES if is_metadata or self._chunk is None else self._most(2)
         self._require_own(key, most)
@@ -71,6 +72,7 @@ class GuardedStore(WrapperStore[Store]):
         prototype: BufferPrototype,
         key_ranges: Iterable[tuple[str, ByteRequest | None]],
     ) -> list[Buffer | None]:
+        """Return the bytes of each key and range, checked as by `get`."""
         return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]
 
     def _require_own(self, key: str, most: int) -> None:

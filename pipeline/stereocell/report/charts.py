@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from stereocell.model.channel import OpacityPoints
 
 WIDTH, HEIGHT = 320.0, 120.0  # units of the SVG's viewBox
-_BINS = 128
+_BINS = 128  # bars of a drawn histogram
 
 
 def histogram(

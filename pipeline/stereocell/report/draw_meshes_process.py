@@ -22,6 +22,7 @@ _MARGIN = 1.04  # factor by which the view exceeds the frame
 
 
 def main(folder: Path) -> None:
+    """Draw the scenes of `folder`; write the reason where VTK can't."""
     try:
         import pyvista
     except ImportError as error:  # a system library that VTK links to is missing

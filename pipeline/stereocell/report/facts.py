@@ -76,6 +76,7 @@ class UnitFacts:
 
     @property
     def name(self) -> str:
+        """The tile's ID and the channel's name, `<tile>/<channel>`."""
         return f"{self.tile.id}/{self.channel.name}"
 
 

@@ -41,6 +41,7 @@ class Likeness:
 
     @property
     def mean(self) -> float:
+        """The mean over the views."""
         return sum(self.views) / len(self.views)
 
 

@@ -1,7 +1,7 @@
 """The synthetic block's nuclei, tumour cells and vessels: geometry alone, no voxels.
 
-Vessels grow first, as trees that fork. Nuclei are then placed at random, and kept where they touch
-nothing (random sequential packing). Positions are (z, y, x) in um.
+Vessels grow first, as trees that fork. Nuclei are then placed at random, and accepted where they
+touch nothing (random sequential packing). Positions are (z, y, x) in um.
 
 References: Murray, "The physiological principle of minimum work", Proceedings of the National
 Academy of Sciences 12(3), 1926, https://doi.org/10.1073/pnas.12.3.207

@@ -6,7 +6,7 @@ to no volume of the bundle are removed.
 
 The threshold is the largest intensity that the channel's transfer function leaves invisible. The
 function is the one selected in the stage, with which a viewer opens. The lowest threshold of all
-functions would mostly come from one that nobody uses. A viewer that switches to a function that
+functions would mostly come from an unused one. A viewer that switches to a function that
 shows more fetches the volume's KTX2 file instead.
 """
 

@@ -168,7 +168,7 @@ class BrickSession:
                 return
             break
 
-    # --- what comes in
+    # --- incoming messages
 
     async def _read(self) -> None:
         try:
@@ -307,7 +307,7 @@ class BrickSession:
                     part = file.table_bytes[at : at + FRAME_BYTES]
                     self._outbox.append(Part(number, at, part))
 
-    # --- what goes out
+    # --- outgoing messages
 
     async def _send(self) -> None:
         while True:

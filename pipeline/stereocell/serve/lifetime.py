@@ -46,6 +46,7 @@ class Lifetime(uvicorn.Server):
         self._handshakes: set[asyncio.Task[None]] = set()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen on bound sockets."""
         await self.lifespan.startup()
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(_tell_fault)
@@ -100,6 +101,7 @@ class Lifetime(uvicorn.Server):
         task.add_done_callback(self._handshakes.discard)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close the sockets; let running transfers finish within `stop_s`."""
         state, loop = self.server_state, asyncio.get_running_loop()
         for server in self.servers:
             server.close()

@@ -16,7 +16,7 @@ MAX_TREES = 1024  # trees of a connection
 MAX_CONNECTIONS = 128  # websockets of all clients
 CLIENT_SOCKETS = 64  # websockets of one address
 MESSAGES_PER_S = 100  # messages other than acks
-ACKS_PER_S = 5000
+ACKS_PER_S = 5000  # of a connection
 CONTROLS_PER_S = 20  # pings and pongs
 MAX_FRAGMENTS = 64  # frames of one message
 FRAGMENTS_S = 10.0  # from a message's first frame to its last
@@ -27,7 +27,7 @@ _REASON_BYTES = 120  # RFC 6455: a close frame has room for 123
 # A request
 TARGET_BYTES = 8 << 10  # bytes of its path
 HEAD_BYTES = 16 << 10  # bytes of its head
-MAX_HEADERS = 100
+MAX_HEADERS = 100  # of a request
 HEAD_S = 10.0  # for the head of an HTTP request, and before it for the TLS handshake
 STALL_S = 60.0  # longest time in which no byte of an answer is sent
 LINGER_S = 1.0  # time in which a refused client may still send, so that it reads the answer

@@ -20,7 +20,7 @@ from starlette.types import Receive, Scope, Send
 
 from stereocell.serve.headers import policy
 
-BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # tells a page that /bricks exists
+BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # announces /bricks to a page
 _HEADERS = {"Cache-Control": "no-cache"}
 _TYPES = {
     ".css": "text/css; charset=utf-8",

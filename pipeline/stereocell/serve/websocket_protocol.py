@@ -28,7 +28,7 @@ from stereocell.serve.limits import (
     Bucket,
 )
 
-_GONE_S = 5.0  # from our close frame to the end of the connection, whatever the client does
+_GONE_S = 5.0  # from our close frame to the end of the connection, at the latest
 
 
 class _Handshake(ServerProtocol):

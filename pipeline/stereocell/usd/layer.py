@@ -72,6 +72,7 @@ def export(layer: Sdf.Layer, path: Path) -> None:
 def set_attribute(
     prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object, *, custom: bool = False
 ) -> None:
+    """Create an attribute of a prim and set its value at the default time."""
     prim.CreateAttribute(name, kind, custom).Set(value)
 
 
@@ -119,5 +120,6 @@ def move_box(
 
 
 def vec3d(point: ArrayLike) -> Gf.Vec3d:
+    """Return three numbers (x, y, z) as USD's vector of float64."""
     x, y, z = (float(v) for v in np.asarray(point))
     return Gf.Vec3d(x, y, z)

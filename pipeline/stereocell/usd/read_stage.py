@@ -167,6 +167,7 @@ def _named_in(name: str) -> Iterator[tuple[str, str]]:
 
 
 def specimen_name(stage: Usd.Stage) -> str:
+    """Return the display name of /Specimen; without one, the prim's name."""
     root = stage.GetPrimAtPath(ROOT)
     return str(root.GetDisplayName() or root.GetName())
 
@@ -206,7 +207,7 @@ def loaded(
 
     as_written  the lists to compare the tile's files with; None: no comparison
 
-    Its meshes and volumes are both active, whatever was selected. Raises StageError where the
+    Its meshes and volumes are both active, for any selection. Raises StageError where the
     payload can't be composed, or where a layer differs from its list as a damaged one does.
     """
     path = TILES.AppendChild(tile_id)

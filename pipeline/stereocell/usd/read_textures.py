@@ -23,10 +23,12 @@ class ComposedMaps:
 
     @property
     def files(self) -> list[Path]:
+        """The files of the maps that exist."""
         return [file for file in (self.normal, self.occlusion, self.color) if file is not None]
 
     @property
     def any(self) -> bool:
+        """Whether there is any map."""
         return bool(self.files)
 
 

@@ -63,6 +63,7 @@ class TileExtent:
 
     @classmethod
     def of(cls, tile: TileContent) -> "TileExtent":
+        """Return the extent of a tile."""
         return cls(tile.id, tile.first_um, tile.last_um, tile.spacing_um)
 
     @property
@@ -138,7 +139,7 @@ def write_stage(
 def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
     """Return the variants that a tile's own layer selects, (variant set, variant), and all extents.
 
-    The extents (2, 3), um, cover all its prims, whatever is selected.
+    The extents (2, 3), um, cover all its prims, for any selection.
     """
     if not file.is_file():
         return [], []

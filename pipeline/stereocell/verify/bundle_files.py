@@ -17,10 +17,12 @@ COLOR_STEP = 1 / 255 + 1e-6  # largest difference of a colour, 0..1: one step of
 
 
 def read_manifest(bundle: Path) -> dict[str, Any]:
+    """Return the manifest of a bundle. Raises OutputError where it is invalid."""
     return dict(read_json(bundle / MANIFEST, "bundle.schema.json", REMEDY))
 
 
 def read_transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
+    """Return a channel's 2D transfer functions. Raises OutputError where invalid."""
     path = bundle / channel["transfer_functions_2d"]["file"]["path"]
     return dict(read_json(path, "transfer2d.schema.json", REMEDY))
 
@@ -51,6 +53,7 @@ def read_texels(file: Path) -> list[NDArray[np.uint8]]:
 def find_differences(
     name: str, found: dict[str, Any], expected: dict[str, Any], whose: str = "the stage's"
 ) -> Iterator[str]:
+    """Yield a line for each key of `expected` with another value in `found`."""
     for key, value in expected.items():
         if found[key] != value:
             yield f"{name}: {key} is {found[key]!r}, {whose} {value!r}"

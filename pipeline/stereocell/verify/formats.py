@@ -42,7 +42,7 @@ from stereocell.usd.write_usdz import USDZ_NAME
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
 _MOST_SHOWN = 3  # problems printed in one line
-_NODE_TIMEOUT_S = 1200.0
+_NODE_TIMEOUT_S = 1200.0  # s for one script over all files
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
 _RUN_BUNDLE = "run `stereocell bundle OUT`"

@@ -3,7 +3,7 @@
 Decimal strings are rounded, in each slice anew, so pixel spacings and orientations that differ by
 rounding count as equal. They are compared with the group's mean, so that a wobble about it
 keeps the frames together, and the mean is the stack's. A plane is turned into the mean orientation
-about its first pixel, whose place is stated, or about its middle: the pivot that gives the more
+about its first pixel, which has a stated place, or about its middle: the pivot that gives the more
 even steps is taken, since a wobble moves the one and not the other.
 """
 
@@ -44,6 +44,7 @@ class Group:
         return not (_turns(self._mean_directions, _directions(frame)) or self._is_other(frame))
 
     def add(self, frame: Frame) -> None:
+        """Add a frame for which `takes` is true."""
         first = self.frames[0]
         self._is_exact &= (
             frame.along_row == first.along_row
@@ -77,6 +78,7 @@ class Group:
 
     @property
     def along_column(self) -> Vector:
+        """The mean, a unit vector of growing row index."""
         if self._is_exact:
             return self.frames[0].along_column
         return _vector(self._mean_directions[1])

@@ -101,7 +101,7 @@ def read_frames(path: Path, file: int) -> list[Frame]:
 
 
 def _refuse_deflated(path: Path) -> None:
-    """Raise NoPlaneError for a deflated file: it would be unpacked whole, whatever its size."""
+    """Raise NoPlaneError for a deflated file: it would be unpacked whole, at any size."""
     meta = pydicom.filereader.read_file_meta_info(path)
     if meta.get("TransferSyntaxUID") == DeflatedExplicitVRLittleEndian:
         raise NoPlaneError("deflated as a whole, which is not read")
@@ -178,7 +178,7 @@ def _padding(header: Any) -> tuple[int, int] | None:
             ends.append(value)
         elif not ends:
             return None
-    if header.get("PixelRepresentation"):  # whatever sign the VR gave it
+    if header.get("PixelRepresentation"):  # the VR may have given another sign
         ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
     else:
         ends = [end & 0xFFFF for end in ends]

@@ -29,7 +29,7 @@ def is_padding(
     """Return a mask of the pixels that are padding; None: no pixel is.
 
     contained  values with all bits of their containers, integers of any shape
-    stored     the same values of the stored bits alone, inverted if `encoding` says so; same shape
+    stored     the same values of the stored bits alone, inverted as `encoding` states; same shape
     """
     if encoding.padding is None or encoding.bits == 0:
         return None

@@ -42,6 +42,7 @@ class Stack:
 
     @property
     def first(self) -> Frame:
+        """The first frame of the first time point."""
         return self.times[0][0]
 
     @property
