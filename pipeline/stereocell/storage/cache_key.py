@@ -111,18 +111,28 @@ def _code(file: Path) -> str:
 class _Bare(ast.NodeTransformer):
     """Takes from a syntax tree all that changes no result."""
 
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        """Visit a node's own; a body of which nothing is left does nothing."""
+        super().generic_visit(node)
+        if getattr(node, "body", None) == []:
+            node.body = [ast.Pass()]  # type: ignore[attr-defined]
+        return node
+
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
         """Leave out docstrings (any lone constant), prints and log lines."""
         match node.value:
             case ast.Constant():
-                return ast.Pass()
+                return None
             case ast.Call(func=ast.Name(id="print")):
-                return ast.Pass()
+                return None
             case ast.Call(func=ast.Attribute(value=ast.Name(id=owner), attr=method)) if (
                 owner in _LOG_OBJECTS and method in _LOG_METHODS
             ):
-                return ast.Pass()
+                return None
         return self.generic_visit(node)
+
+    def visit_Pass(self, node: ast.Pass) -> None:
+        """Leave out what does nothing."""
 
     def visit_Raise(self, node: ast.Raise) -> ast.AST:
         """Leave out what an error says, not whether and as what it is raised."""
