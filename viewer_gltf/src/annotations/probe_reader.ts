@@ -138,7 +138,7 @@ export class Reading {
     return this.options.manifest.channels.filter(({ id }) => shown.has(id));
   }
 
-  /** null after a fault, which was told. */
+  /** null after a fault, which was reported. */
   private async orReport<T>(promise: Promise<T>): Promise<T | null> {
     try {
       return await promise;

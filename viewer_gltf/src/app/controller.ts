@@ -19,10 +19,10 @@ import { listenForKeys } from "../panel/key_events";
 import { wishOf } from "../panel/keys";
 import { type Facts, layOut } from "../panel/layout";
 import type { Ranges } from "../panel/sections/channels";
-import { told } from "../panel/spoken_feedback";
+import { spokenFeedback } from "../panel/spoken_feedback";
 import { SETTINGS, settingsOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
-import { remarkOn } from "../state/announce_change";
+import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import type { XrSupport } from "../state/stereo";
@@ -93,7 +93,7 @@ export class Controller {
     this.help = new Help(parent, () => {
       if (this.view.isHelpOpen) this.perform({ panel: "help" });
     });
-    viewer.onRemark = (text) => this.say(text);
+    viewer.onAnnounce = (text) => this.say(text);
     listenForKeys((name) => this.press(name), this.disposed.signal);
     // A link to another view of the same bundle: what it leaves out is as the bundle opens.
     addEventListener("hashchange", () => location.reload(), { signal: this.disposed.signal });
@@ -226,13 +226,13 @@ export class Controller {
     const wish = wishOf(name, context);
     if (wish === null) return false;
     this.perform(wish);
-    if (typeof wish !== "string" && "panel" in wish && wish.panel === "grip") {
-      viewer.mean(handleOf(wish.grip));
+    if (typeof wish !== "string" && "panel" in wish && wish.panel === "clip-part") {
+      viewer.mean(handleOf(wish.clipPart));
     }
     const { tiles } = viewer.bundle.manifest;
     const text =
-      remarkOn(context.state, viewer.state, tiles) ??
-      told(wish, context.state, viewer.state, this.ranges);
+      announcementOf(context.state, viewer.state, tiles) ??
+      spokenFeedback(wish, context.state, viewer.state, this.ranges);
     if (text !== "") this.say(text);
     return true;
   }
@@ -259,9 +259,9 @@ export class Controller {
   }
 
   /** A panel in the room has another view. */
-  private factsFor({ isPlaneOpen, picked }: PanelView): Facts {
+  private factsFor({ isHistogramOpen, picked }: PanelView): Facts {
     const { viewer, stereo } = this;
-    const hasPlane = isPlaneOpen && picked !== null && this.ranges.has(picked);
+    const hasHistogram = isHistogramOpen && picked !== null && this.ranges.has(picked);
     const { specimen } = viewer.bundle.manifest;
     const { triangles, volumes, traced, isLoading, gazed, frame_ms, isStereo, settings } =
       viewer.snapshot();
@@ -272,7 +272,7 @@ export class Controller {
       subtitle: this.options.subtitle,
       shown: this.shown,
       ranges: this.ranges,
-      histogram: hasPlane ? viewer.histogram(picked) : null,
+      histogram: hasHistogram ? viewer.histogram(picked) : null,
       gazed,
       isStereo,
       stereo,

@@ -121,12 +121,12 @@ watchWaiting((isWaiting) =>
 ready.catch(() => undefined); // told above; whoever awaits `ready` still sees it
 
 /** Bugs: the console has the details, the page says that something is amiss. */
-function tellBug(error: unknown): void {
+function reportBug(error: unknown): void {
   if (!(error instanceof Error)) return; // such as a ResizeObserver's harmless message
   viewer?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });
 }
-addEventListener("error", (event) => tellBug(event.error));
-addEventListener("unhandledrejection", (event) => tellBug(event.reason));
+addEventListener("error", (event) => reportBug(event.error));
+addEventListener("unhandledrejection", (event) => reportBug(event.reason));
 
 const api: StereoCellApi = {
   apiVersion: 1,

@@ -14,7 +14,7 @@ import { SurfaceLoader } from "../surfaces/gltf_loader";
 import { SurfaceSet } from "../surfaces/surface_set";
 import { BrickService } from "../volumes/bricks/brick_service";
 import type { BrickView } from "../volumes/bricks/protocol";
-import { TransferPlanes } from "../volumes/transfer_functions_loader";
+import { TransferFunctions2dLoader } from "../volumes/transfer_functions_loader";
 import { VolumeSet } from "../volumes/volume_set";
 
 export type ContentsOptions = Readonly<{
@@ -34,7 +34,7 @@ export class Contents {
   /** The same volumes by paths of light, in the mode `traced`. */
   readonly traced: TracedVolume;
   /** Two-dimensional transfer functions. */
-  readonly planes: TransferPlanes;
+  readonly planes: TransferFunctions2dLoader;
   readonly marks: Marks;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
@@ -61,9 +61,9 @@ export class Contents {
     const { bricks } = this;
     this.traced = new TracedVolume(this.volumes, bricks, limits, uSceneDepth, onChange, onError);
     picture.add(this.traced.group);
-    this.planes = new TransferPlanes(
+    this.planes = new TransferFunctions2dLoader(
       bundle,
-      (channel, plane) => options.dispatch({ type: "learn-plane", channel, plane }),
+      (channel, plane) => options.dispatch({ type: "learn-transfer-2d", channel, plane }),
       onChange,
       onError,
     );
@@ -100,12 +100,12 @@ export class Contents {
     );
   }
 
-  follow(state: ViewerState, { nearby, mayRefine }: Hybrid): void {
-    const wanted = this.hasOverview ? wantedTiles(state, nearby) : [];
+  follow(state: ViewerState, { focusTiles, mayRefine }: Hybrid): void {
+    const wanted = this.hasOverview ? wantedTiles(state, focusTiles) : [];
     for (const channel of volumeChannels(state)) if (isTwoD(channel)) this.planes.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);
     this.traced.follow(state);
-    this.surfaces.follow(state, nearby);
+    this.surfaces.follow(state, focusTiles);
     this.marks.follow(state);
   }
 

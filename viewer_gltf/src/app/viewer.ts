@@ -17,7 +17,7 @@ import { place, XR_DISTANCE_M } from "../render/placement";
 import { Room } from "../render/scene";
 import type { Look } from "../share/camera_link";
 import type { Action } from "../state/actions";
-import { remarkOn } from "../state/announce_change";
+import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
@@ -46,7 +46,7 @@ export class Viewer {
   /** What a panel in the room shows; whoever has the panel says. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
   /** What a change has brought besides what it shows; whoever has the page tells it. */
-  onRemark: (text: string) => void = () => undefined;
+  onAnnounce: (text: string) => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;
   private readonly hybrid: Hybrid;
@@ -158,11 +158,11 @@ export class Viewer {
     const next = reduce(this.state, action);
     if (next === this.state) return;
     const notice = newNotice(this.state, next);
-    const remark = remarkOn(this.state, next, this.bundle.manifest.tiles);
+    const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
     this.state = next;
     if (notice !== null) this.stereo.tell(notice);
-    if (remark !== null) this.onRemark(remark);
+    if (announcement !== null) this.onAnnounce(announcement);
     this.follow();
     if (this.lamps.length > before) this.bringLampsInSight();
     this.onState(next);
@@ -244,7 +244,7 @@ export class Viewer {
       volumes: volumes.status(),
       volumeBytes: volumes.bytes,
       traced: this.contents.traced.status(),
-      gazed: this.hybrid.nearby.gazed,
+      gazed: this.hybrid.focusTiles.gazed,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.loop.frame_ms,
       settings: this.loop.settings,

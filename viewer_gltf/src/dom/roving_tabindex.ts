@@ -2,7 +2,7 @@
  * Many buttons, one stop of the Tab key: the arrows go from one to the next, in rows of `columns`
  * (the "roving tabindex" of the ARIA Authoring Practices Guide).
  */
-export class Rove {
+export class RovingTabindex {
   private buttons: readonly HTMLElement[] = [];
   private columns = 1;
 

@@ -2,13 +2,13 @@ import { describe, expect, it } from "vitest";
 import type { Box } from "../math/box";
 import type { Clip } from "../math/clip";
 import {
+  type ClipPart,
+  chosenClipPart,
+  clipPartName,
+  clipPartsOf,
   cutText,
-  type Grip,
-  gripName,
-  gripsOf,
   handleOf,
-  meantGrip,
-  moveGrip,
+  moveClipPart,
 } from "./clip_by_key";
 
 const SHOWN: Box = { min: [0, -20, 0], max: [100, 0, 50] };
@@ -17,25 +17,30 @@ const CLIP: Clip = {
   plane: { normal: [0, 0, 1], offset_um: 25 },
 };
 
-function moved(grip: Grip, steps: number, clip = CLIP, shown = SHOWN): Clip {
-  const action = moveGrip(grip, steps, clip, shown);
+function moved(clipPart: ClipPart, steps: number, clip = CLIP, shown = SHOWN): Clip {
+  const action = moveClipPart(clipPart, steps, clip, shown);
   return action?.type === "set-clip" ? action.clip : clip;
 }
 
 describe("the grips of the cuts", () => {
   it("are those of the cuts that there are, each with a name of its own", () => {
-    expect(gripsOf({ box: null, plane: null })).toEqual([]);
-    expect(gripsOf({ ...CLIP, box: null })).toEqual(["plane-middle", "turn-x", "turn-y", "turn-z"]);
-    const all = gripsOf(CLIP);
-    expect(new Set(all.map(gripName)).size).toBe(10);
+    expect(clipPartsOf({ box: null, plane: null })).toEqual([]);
+    expect(clipPartsOf({ ...CLIP, box: null })).toEqual([
+      "plane-middle",
+      "turn-x",
+      "turn-y",
+      "turn-z",
+    ]);
+    const all = clipPartsOf(CLIP);
+    expect(new Set(all.map(clipPartName)).size).toBe(10);
     expect(handleOf("turn-y")).toBe("plane-tip");
   });
 
   it("are meant as picked, while they are there", () => {
-    expect(meantGrip(CLIP, "y-max")).toBe("y-max");
-    expect(meantGrip(CLIP, null)).toBe("x-min");
-    expect(meantGrip({ ...CLIP, box: null }, "y-max")).toBe("plane-middle");
-    expect(meantGrip({ box: null, plane: null }, "y-max")).toBeUndefined();
+    expect(chosenClipPart(CLIP, "y-max")).toBe("y-max");
+    expect(chosenClipPart(CLIP, null)).toBe("x-min");
+    expect(chosenClipPart({ ...CLIP, box: null }, "y-max")).toBe("plane-middle");
+    expect(chosenClipPart({ box: null, plane: null }, "y-max")).toBeUndefined();
   });
 
   it("move a face by a fiftieth of the edge, and no other", () => {
@@ -60,10 +65,10 @@ describe("the grips of the cuts", () => {
   it("go no further than the handles do", () => {
     const far = moved("x-min", 1000);
     expect(far.box?.min[0]).toBeCloseTo(89);
-    expect(moveGrip("x-min", 1, far, SHOWN)).toBeNull();
+    expect(moveClipPart("x-min", 1, far, SHOWN)).toBeNull();
     expect(moved("plane-middle", 1000).plane?.offset_um).toBe(50);
-    expect(moveGrip("plane-middle", 1, moved("plane-middle", 1000), SHOWN)).toBeNull();
-    expect(moveGrip("x-min", 1, { ...CLIP, box: null }, SHOWN)).toBeNull();
+    expect(moveClipPart("plane-middle", 1, moved("plane-middle", 1000), SHOWN)).toBeNull();
+    expect(moveClipPart("x-min", 1, { ...CLIP, box: null }, SHOWN)).toBeNull();
   });
 
   it("heed the isolated tile", () => {

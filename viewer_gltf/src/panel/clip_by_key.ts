@@ -19,14 +19,14 @@ import type { Action } from "../state/actions";
 const TURNS = ["turn-x", "turn-y", "turn-z"] as const;
 type Turn = (typeof TURNS)[number];
 /** A face of the box, the plane along its normal, or the plane about an axis of the specimen. */
-export type Grip = BoxHandleId | "plane-middle" | Turn;
+export type ClipPart = BoxHandleId | "plane-middle" | Turn;
 
 /** Of the edge of what is shown. */
 const STEP = 0.02;
 const STEP_RAD = Math.PI / 36;
 const AXIS_NAMES = ["x", "y", "z"] as const;
 
-export function gripsOf({ box, plane }: Clip): readonly Grip[] {
+export function clipPartsOf({ box, plane }: Clip): readonly ClipPart[] {
   return [
     ...(box === null ? [] : BOX_HANDLES),
     ...(plane === null ? [] : (["plane-middle", ...TURNS] as const)),
@@ -34,36 +34,41 @@ export function gripsOf({ box, plane }: Clip): readonly Grip[] {
 }
 
 /** The one that is meant: that which was picked, if it is there still, or the first. */
-export function meantGrip(clip: Clip, picked: Grip | null): Grip | undefined {
-  const grips = gripsOf(clip);
-  return grips.find((grip) => grip === picked) ?? grips[0];
+export function chosenClipPart(clip: Clip, picked: ClipPart | null): ClipPart | undefined {
+  const clipParts = clipPartsOf(clip);
+  return clipParts.find((clipPart) => clipPart === picked) ?? clipParts[0];
 }
 
 /** The handle that stands for it in the picture. */
-export function handleOf(grip: Grip): HandleId {
-  return isTurn(grip) ? "plane-tip" : grip;
+export function handleOf(clipPart: ClipPart): HandleId {
+  return isTurn(clipPart) ? "plane-tip" : clipPart;
 }
 
 /** @param steps below zero: the other way. @returns null where it can go no further */
-export function moveGrip(grip: Grip, steps: number, clip: Clip, shown: Box): Action | null {
+export function moveClipPart(
+  clipPart: ClipPart,
+  steps: number,
+  clip: Clip,
+  shown: Box,
+): Action | null {
   const edge = (axis: 0 | 1 | 2) => shown.max[axis] - shown.min[axis];
-  if (isTurn(grip)) {
-    const axis = AXES[TURNS.indexOf(grip)];
+  if (isTurn(clipPart)) {
+    const axis = AXES[TURNS.indexOf(clipPart)];
     return changePlane(clip, (plane) => spinPlane(plane, axis, steps * STEP_RAD, shown));
   }
-  if (grip === "plane-middle") {
+  if (clipPart === "plane-middle") {
     const by_um = steps * STEP * Math.max(...AXES.map(edge));
     return changePlane(clip, (plane) => movePlane(plane, by_um, shown));
   }
-  return changeFace(clip, grip, shown, (seen, face) =>
+  return changeFace(clip, clipPart, shown, (seen, face) =>
     moveFace(seen, face, steps * STEP * edge(face.axis), shown),
   );
 }
 
-export function gripName(grip: Grip): string {
-  if (grip === "plane-middle") return "The plane, along its normal";
-  if (isTurn(grip)) return `The plane, turned about ${grip.at(-1)}`;
-  const { axis, side } = faceOf(grip);
+export function clipPartName(clipPart: ClipPart): string {
+  if (clipPart === "plane-middle") return "The plane, along its normal";
+  if (isTurn(clipPart)) return `The plane, turned about ${clipPart.at(-1)}`;
+  const { axis, side } = faceOf(clipPart);
   return `The box, ${side === "min" ? "lower" : "upper"} end of ${AXIS_NAMES[axis]}`;
 }
 
@@ -74,8 +79,8 @@ export function cutText(before: Clip, after: Clip): string {
     const cuts = [box && "a box", plane && "a plane"].filter(Boolean).join(" and ");
     return cuts === "" ? "Not cut" : `Cut by ${cuts}`;
   }
-  for (const grip of BOX_HANDLES) {
-    const { axis, side } = faceOf(grip);
+  for (const clipPart of BOX_HANDLES) {
+    const { axis, side } = faceOf(clipPart);
     const place = box?.[side][axis];
     if (place === undefined || place === before.box?.[side][axis]) continue;
     return `Box: ${AXIS_NAMES[axis]} ${side === "min" ? "from" : "to"} ${placeText(place)}`;
@@ -91,6 +96,6 @@ function placeText(place_um: number): string {
   return `${place_um < 0 ? "-" : ""}${distanceText(Math.abs(place_um))}`;
 }
 
-function isTurn(grip: Grip): grip is Turn {
-  return grip.startsWith("turn-");
+function isTurn(clipPart: ClipPart): clipPart is Turn {
+  return clipPart.startsWith("turn-");
 }

@@ -8,9 +8,9 @@ import type { Shapes } from "../bundle/transfer_2d";
 import type { Rgb } from "../math/color";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
-import type { PlanePoint } from "../state/transfer_shapes";
+import type { HistogramPoint } from "../state/transfer_shapes";
 import type { Histogram } from "../volumes/transfer_functions_loader";
-import type { Grip } from "./clip_by_key";
+import type { ClipPart } from "./clip_by_key";
 import type { Grasp, Meant } from "./edit_shapes";
 
 /** Of the viewer that a phone is put into: Google's of 2014, of 2015, another. */
@@ -23,11 +23,11 @@ export type PanelChange =
   /** The channel whose card is open, and whom the channel keys mean; null: none. */
   | Readonly<{ panel: "pick"; channel: string | null }>
   /** The part of the cuts that the keys move. */
-  | Readonly<{ panel: "grip"; grip: Grip }>
+  | Readonly<{ panel: "clip-part"; clipPart: ClipPart }>
   /** The number of the light that the keys turn: see state/parameters/light.ts. */
-  | Readonly<{ panel: "dial"; dial: string }>
-  /** Open or close the plane of value and gradient in a channel's card, which it opens. */
-  | Readonly<{ panel: "plane"; channel: string }>
+  | Readonly<{ panel: "parameter"; parameter: string }>
+  /** Open or close the joint histogram in a channel's card, which it opens. */
+  | Readonly<{ panel: "histogram"; channel: string }>
   /** The shape that is meant, and what a pointer has hold of. */
   | Readonly<{ panel: "shape"; shape: Meant | null; grasp: Grasp | null }>
   /** The number of a shape that the keys change: see edit_shapes.ts. */
@@ -47,9 +47,9 @@ export type PanelView = Readonly<{
   /** Of the channels that are not shown. */
   page: number;
   picked: string | null;
-  grip: Grip | null;
-  dial: string | null;
-  isPlaneOpen: boolean;
+  clipPart: ClipPart | null;
+  parameter: string | null;
+  isHistogramOpen: boolean;
   shape: Meant | null;
   grasp: Grasp | null;
   shapeNumber: string | null;
@@ -67,9 +67,9 @@ export const START_VIEW: PanelView = {
   search: "",
   page: 0,
   picked: null,
-  grip: null,
-  dial: null,
-  isPlaneOpen: false,
+  clipPart: null,
+  parameter: null,
+  isHistogramOpen: false,
   shape: null,
   grasp: null,
   shapeNumber: null,
@@ -90,7 +90,7 @@ type Base = Readonly<{
   /** Why it can't be used; "" or absent: it can. */
   refusal?: string;
   /** Whether the refusal is always in view. */
-  tellsWhy?: boolean;
+  showsReason?: boolean;
 }>;
 
 export type Toggle = Base &
@@ -140,7 +140,7 @@ export type MapTile = Readonly<{
   id: string;
   row: number;
   column: number;
-  isGazed: boolean;
+  isFocus: boolean;
   isSelected: boolean;
   isIsolated: boolean;
 }>;
@@ -153,9 +153,9 @@ export type TileMap = Base &
     to: (tile: string) => Wish;
   }>;
 /** Value to the right, gradient up: a histogram, and shapes that can be taken hold of. */
-export type PlaneEditor = Base &
+export type HistogramEditor = Base &
   Readonly<{
-    kind: "plane";
+    kind: "histogram";
     /** null: it has not come. */
     histogram: Histogram | null;
     /** The part of the histogram's values that the plane is as wide as. */
@@ -167,9 +167,9 @@ export type PlaneEditor = Base &
     /** The lower and the upper end of the values, and the steepest gradient. */
     texts: readonly [string, string, string];
     /** @param reach how far off a corner or an edge may be */
-    press: (at: PlanePoint, reach: PlanePoint) => Wish;
+    press: (at: HistogramPoint, reach: HistogramPoint) => Wish;
     /** null: nothing has changed by it. */
-    drag: (at: PlanePoint) => Wish | null;
+    drag: (at: HistogramPoint) => Wish | null;
   }>;
 /** What can only be read. */
 export type Text = Base & Readonly<{ kind: "text"; value: string }>;
@@ -185,7 +185,7 @@ export type Control =
   | Colour
   | Button
   | TileMap
-  | PlaneEditor
+  | HistogramEditor
   | Text
   | Search
   | Link;
@@ -229,14 +229,14 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       return change.page === view.page ? view : { ...view, page: change.page };
     case "pick":
       return change.channel === view.picked ? view : { ...view, picked: change.channel };
-    case "grip":
-      return change.grip === view.grip ? view : { ...view, grip: change.grip };
-    case "dial":
-      return change.dial === view.dial ? view : { ...view, dial: change.dial };
-    case "plane": {
+    case "clip-part":
+      return change.clipPart === view.clipPart ? view : { ...view, clipPart: change.clipPart };
+    case "parameter":
+      return change.parameter === view.parameter ? view : { ...view, parameter: change.parameter };
+    case "histogram": {
       const { channel } = change;
-      const isOpen = view.isPlaneOpen && view.picked === channel;
-      return { ...view, picked: channel, isPlaneOpen: !isOpen, shape: null, grasp: null };
+      const isOpen = view.isHistogramOpen && view.picked === channel;
+      return { ...view, picked: channel, isHistogramOpen: !isOpen, shape: null, grasp: null };
     }
     case "shape":
       return { ...view, shape: change.shape, grasp: change.grasp };

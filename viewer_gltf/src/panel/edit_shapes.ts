@@ -8,11 +8,11 @@ import { toHex } from "../math/color";
 import { editedName, type Functions, isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import {
   addShape,
+  type HistogramPoint,
   hitTest,
   makeShape,
   move,
   type Part,
-  type PlanePoint,
   replaceShape,
   resize,
 } from "../state/transfer_shapes";
@@ -21,10 +21,10 @@ import {
 export type Meant = Readonly<{ index: number; count: number }>;
 
 /** What a pointer has taken hold of, and what it was then. */
-export type Grasp = Readonly<{ index: number; part: Part; from: PlanePoint; shape: Shape }>;
+export type Grasp = Readonly<{ index: number; part: Part; from: HistogramPoint; shape: Shape }>;
 
 /** Less than a finger trembles: a press alone moves nothing. */
-const STILL: PlanePoint = { value: 1 / 255, gradient: 1 / 63 };
+const STILL: HistogramPoint = { value: 1 / 255, gradient: 1 / 63 };
 /** New shapes stand beside each other. */
 const PLACES = [0.3, 0.5, 0.7, 0.4, 0.6];
 
@@ -52,8 +52,8 @@ export function withNewShape(functions: Functions, kind: ShapeKind): Shapes {
 
 export function graspAt(
   shapes: Shapes,
-  at: PlanePoint,
-  reach: PlanePoint,
+  at: HistogramPoint,
+  reach: HistogramPoint,
   meant: number | null,
 ): Grasp | null {
   const hit = hitTest(shapes, at, reach, meant);
@@ -61,7 +61,7 @@ export function graspAt(
 }
 
 /** The shapes after what was taken hold of has been drawn along; null: nothing has changed. */
-export function draggedTo(shapes: Shapes, grasp: Grasp, at: PlanePoint): Shapes | null {
+export function draggedTo(shapes: Shapes, grasp: Grasp, at: HistogramPoint): Shapes | null {
   const { index, part, from, shape } = grasp;
   if (!(index in shapes)) return null;
   const by = { value: at.value - from.value, gradient: at.gradient - from.gradient };
@@ -73,7 +73,7 @@ export function draggedTo(shapes: Shapes, grasp: Grasp, at: PlanePoint): Shapes 
   return replaceShape(shapes, index, resize(shape, part, to));
 }
 
-function placeOf({ values, gradients, tip }: Shape, part: Part): PlanePoint {
+function placeOf({ values, gradients, tip }: Shape, part: Part): HistogramPoint {
   if (part === "tip") return { value: tip, gradient: 0 };
   return {
     value: values[part.endsWith("right") ? 1 : 0],

@@ -11,7 +11,7 @@ import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
 import type { KeyContext } from "./key";
 import { KEYS, wishOf } from "./keys";
-import { told } from "./spoken_feedback";
+import { spokenFeedback } from "./spoken_feedback";
 
 const ALL = KEYS.flatMap(({ keys }) => keys);
 const CONTEXT: KeyContext = {
@@ -26,7 +26,7 @@ const CONTEXT: KeyContext = {
       shapes: [makeShape("rectangle", { value: 0.5, gradient: 0.5 })],
     } as const,
     {
-      type: "learn-plane",
+      type: "learn-transfer-2d",
       channel: "c0",
       plane: { gradient_max: 0.5, functions: {} },
     } as const,
@@ -57,7 +57,7 @@ describe("the keys", () => {
       window: true,
       "choose-transfer-function": true,
       "set-shapes": true,
-      "learn-plane": false, // the bundle's
+      "learn-transfer-2d": false, // the bundle's
       select: true,
       isolate: true,
       "set-clip": true,
@@ -123,9 +123,9 @@ describe("the keys", () => {
     const wanted: Readonly<Record<PanelChange["panel"], boolean>> = {
       page: true,
       pick: true,
-      grip: true,
-      dial: true,
-      plane: true,
+      "clip-part": true,
+      parameter: true,
+      histogram: true,
       shape: true,
       "shape-number": true,
       lenses: true,
@@ -141,15 +141,15 @@ describe("the keys", () => {
   });
 
   it("move the part of the cuts that is meant", () => {
-    expect(wishOf("N", CONTEXT)).toEqual({ panel: "grip", grip: "x-min" });
-    expect(wishOf("B", CONTEXT)).toEqual({ panel: "grip", grip: "z-max" });
+    expect(wishOf("N", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "x-min" });
+    expect(wishOf("B", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "z-max" });
     const { min, max } = SPECIMEN_BOX;
     const cut = (box: typeof SPECIMEN_BOX | object) => ({
       type: "set-clip",
       clip: { box, plane: null },
     });
     expect(wishOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
-    const view = { ...START_VIEW, grip: "y-max" } as const;
+    const view = { ...START_VIEW, clipPart: "y-max" } as const;
     const inside = wishOf(",", { ...CONTEXT, view });
     expect(inside).toEqual(cut({ min, max: [max[0], -0.4, max[2]] }));
     expect(wishOf(".", { ...CONTEXT, view })).toBeNull(); // there the specimen ends
@@ -219,7 +219,7 @@ describe("the keys", () => {
     const after = (name: string) => {
       const wish = wishOf(name, CONTEXT);
       if (wish === null || typeof wish === "string" || "panel" in wish) throw new Error(name);
-      return told(wish, CONTEXT.state, reduce(CONTEXT.state, wish), ranges);
+      return spokenFeedback(wish, CONTEXT.state, reduce(CONTEXT.state, wish), ranges);
     };
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");

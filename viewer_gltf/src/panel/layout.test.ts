@@ -154,9 +154,9 @@ describe("the panel's layout", () => {
     ];
     const map = find(laid(actions.reduce(reduce, start())), "map", "tile-map");
     expect([map.rows, map.columns, map.tiles.length]).toEqual([2, 5, 10]);
-    const marked = (mark: "isGazed" | "isSelected" | "isIsolated") =>
+    const marked = (mark: "isFocus" | "isSelected" | "isIsolated") =>
       map.tiles.filter((tile) => tile[mark]).map(({ row, column }) => [row, column]);
-    expect(marked("isGazed")).toEqual([[1, 2]]);
+    expect(marked("isFocus")).toEqual([[1, 2]]);
     expect(marked("isSelected")).toEqual([[0, 4]]);
     expect(marked("isIsolated")).toEqual([[0, 4]]);
   });

@@ -25,7 +25,7 @@ export type Facts = StereoSupport &
     /** The specimen, or the isolated tile; um, world. */
     shown: Box;
     ranges: Ranges;
-    /** Of the channel whose plane of value and gradient is open, if it has come. */
+    /** Of the channel whose joint histogram is open, if it has come. */
     histogram?: Histogram | null;
     /** The tile that is looked at. */
     gazed: string | null;

@@ -7,14 +7,14 @@ import { LAMP, LIGHT_NUMBERS } from "../state/parameters/light";
 import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 import type { Wish } from "./controls";
-import { told } from "./spoken_feedback";
+import { spokenFeedback } from "./spoken_feedback";
 
 const START = [
   { type: "set", id: "mode", value: "traced" } as const,
   setTo(LAMP[1].isOn, true),
 ].reduce<ViewerState>(reduce, initialState(sampleManifest(2)));
 const after = (action: Action, before = START) =>
-  told(action, before, reduce(before, action), new Map());
+  spokenFeedback(action, before, reduce(before, action), new Map());
 
 describe("what is told of the light", () => {
   it("names the part of a lamp that has changed", () => {
@@ -50,8 +50,8 @@ describe("what is told of the light", () => {
       expect(said).toContain(row.text(high));
       expect(said.toLowerCase()).toContain(row.label.toLowerCase());
       names.add(said.slice(0, said.indexOf(":")));
-      const meant: Wish = { panel: "dial", dial: row.id };
-      expect(told(meant, START, START, new Map()), row.id).toBe(row.told(START));
+      const meant: Wish = { panel: "parameter", parameter: row.id };
+      expect(spokenFeedback(meant, START, START, new Map()), row.id).toBe(row.spoken(START));
     }
     expect(names.size).toBe(LIGHT_NUMBERS.length);
   });
@@ -83,6 +83,6 @@ describe("what is told of the light", () => {
   });
 
   it("is nothing where the picture says it all", () => {
-    expect(told("zoom-in", START, START, new Map())).toBe("");
+    expect(spokenFeedback("zoom-in", START, START, new Map())).toBe("");
   });
 });

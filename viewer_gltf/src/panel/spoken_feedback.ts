@@ -6,7 +6,7 @@ import { channelParameterOf, parameterOf } from "../state/parameters/table";
 import { TOOL } from "../state/parameters/tools";
 import { shapesOf } from "../state/transfer_functions_2d";
 import type { ViewerState } from "../state/viewer_state";
-import { cutText, gripName } from "./clip_by_key";
+import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
 import { measuredText } from "./layout";
@@ -14,15 +14,20 @@ import { intensityText, type Ranges } from "./sections/channels";
 import { LENS_NAMES } from "./sections/stereo";
 
 /** @param state after the wish was granted; "" where the picture says it all */
-export function told(wish: Wish, before: ViewerState, state: ViewerState, ranges: Ranges): string {
+export function spokenFeedback(
+  wish: Wish,
+  before: ViewerState,
+  state: ViewerState,
+  ranges: Ranges,
+): string {
   if (typeof wish === "string") return "";
   if (!("panel" in wish)) {
     if (wish.type === "set-clip") return cutText(before.clip, state.clip);
-    if (wish.type === "set-shapes") return toldShapes(wish.channel, before, state);
-    return toldAction(wish, state, ranges);
+    if (wish.type === "set-shapes") return spokenShapes(wish.channel, before, state);
+    return spokenAction(wish, state, ranges);
   }
-  if (wish.panel === "grip") return gripName(wish.grip);
-  if (wish.panel === "dial") return parameterOf(wish.dial).told(state);
+  if (wish.panel === "clip-part") return clipPartName(wish.clipPart);
+  if (wish.panel === "parameter") return parameterOf(wish.parameter).spoken(state);
   if (wish.panel === "lenses") return `Phone viewer: ${LENS_NAMES[wish.lenses]}`;
   if (wish.panel === "shape") {
     return wish.shape === null ? "" : `Shape ${wish.shape.index + 1} of ${wish.shape.count}`;
@@ -34,7 +39,7 @@ export function told(wish: Wish, before: ViewerState, state: ViewerState, ranges
   return `Channel ${nameOf(wish.channel, state)}`;
 }
 
-function toldShapes(id: string, before: ViewerState, state: ViewerState): string {
+function spokenShapes(id: string, before: ViewerState, state: ViewerState): string {
   const [was, is] = [before, state].map(({ channels }) => channels.find((each) => each.id === id));
   if (was === undefined || is === undefined) return "";
   const text = changeText(shapesOf(was, is.transferFunction), shapesOf(is));
@@ -45,12 +50,12 @@ function nameOf(id: string, { channels }: ViewerState): string {
   return channels.find((channel) => channel.id === id)?.name ?? id;
 }
 
-function toldAction(action: Action, state: ViewerState, ranges: Ranges): string {
-  if ("channel" in action) return toldChannel(action, state, ranges);
+function spokenAction(action: Action, state: ViewerState, ranges: Ranges): string {
+  if ("channel" in action) return spokenChannel(action, state, ranges);
   switch (action.type) {
     case "set":
       if (action.id === TOOL.id && state.tool === "measure") return measuredText(state);
-      return parameterOf(action.id).told(state);
+      return parameterOf(action.id).spoken(state);
     case "select":
       return action.tile === null ? "No tile chosen" : `Tile ${action.tile}`;
     case "isolate":
@@ -64,7 +69,7 @@ function toldAction(action: Action, state: ViewerState, ranges: Ranges): string 
   }
 }
 
-function toldChannel(
+function spokenChannel(
   action: Extract<Action, { channel: string }> | SetAction,
   state: ViewerState,
   ranges: Ranges,
@@ -74,7 +79,7 @@ function toldChannel(
   const { id, name, window } = channel;
   switch (action.type) {
     case "set":
-      return `${name}: ${channelParameterOf(action.id).told(channel)}`;
+      return `${name}: ${channelParameterOf(action.id).spoken(channel)}`;
     case "show":
       return `${name}: ${channel.shown ? "shown" : "hidden"}`;
     case "window": {
@@ -83,7 +88,7 @@ function toldChannel(
     }
     case "choose-transfer-function":
     case "set-shapes":
-    case "learn-plane":
+    case "learn-transfer-2d":
       return `${name}: ${channel.transferFunction}`;
   }
 }

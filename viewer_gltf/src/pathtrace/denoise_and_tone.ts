@@ -22,7 +22,7 @@ import { TRACE_DENOISE, TRACE_MEAN, TRACE_SHOW, TRACE_WARP } from "./shaders/sou
 const DENOISED = 192;
 const DENOISE_GAPS = [1, 2, 4] as const;
 
-export class Developer {
+export class DenoiseAndTone {
   /** Encoded, premultiplied. */
   readonly picture = byteTarget();
   /** Pixels of the picture to one of the frame buffer. */
@@ -74,7 +74,7 @@ export class Developer {
    * @param samples most that a pixel has
    * @param views from where its paths begin
    */
-  develop(
+  denoise(
     renderer: WebGLRenderer,
     eyes: Eyes,
     sums: WebGLRenderTarget,

@@ -4,7 +4,7 @@ import { randomShapes, sampled } from "../../test/support/transfer_2d";
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { Size3 } from "../bundle/ktx2";
 import { brickCounts } from "../volumes/skip_bricks";
-import { planeTable } from "../volumes/transfer_table_2d";
+import { transferTable2d } from "../volumes/transfer_table_2d";
 import { brickRanges } from "./assemble_tiles";
 import { coarserMajorants, majorants, mediumTable } from "./extinction";
 
@@ -32,7 +32,7 @@ describe("a medium's table", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
-      const plane = planeTable(
+      const plane = transferTable2d(
         randomShapes(random),
         { gradient_max: 0.5, functions: {} },
         window,

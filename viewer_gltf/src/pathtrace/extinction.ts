@@ -5,16 +5,16 @@
 import type { Size3 } from "../bundle/ktx2";
 import { ROWS } from "../bundle/transfer_2d";
 import { ENTRIES } from "../volumes/transfer_luts";
-import { envelopeOf, type PlaneTable } from "../volumes/transfer_table_2d";
+import { envelopeOf, type TransferTable2d } from "../volumes/transfer_table_2d";
 
 /** An opacity of 1 would be infinitely dense. */
 const MOST_OPACITY = 0.999;
 
 /** How one channel looks: see `tile_march`. */
-export type MediumLook = Readonly<{
+export type MediumAppearance = Readonly<{
   color: readonly [number, number, number];
   table: Uint8Array;
-  plane?: PlaneTable | null;
+  plane?: TransferTable2d | null;
 }>;
 
 /**
@@ -27,7 +27,7 @@ export type MediumLook = Readonly<{
  * @param density factor to the extinction
  */
 export function mediumTable(
-  looks: readonly MediumLook[],
+  looks: readonly MediumAppearance[],
   voxel_um: number,
   bias: number,
   density: number,
@@ -50,14 +50,14 @@ export function mediumTable(
 }
 
 /** Rows of each channel in `mediumTable`. */
-export function rowsOf(looks: readonly MediumLook[]): number {
+export function rowsOf(looks: readonly MediumAppearance[]): number {
   return looks.some(({ plane }) => plane != null) ? ROWS : 1;
 }
 
 function fillRow(
   row: Float32Array,
   table: Uint8Array,
-  color: MediumLook["color"],
+  color: MediumAppearance["color"],
   voxel_um: number,
   bias: number,
   density: number,

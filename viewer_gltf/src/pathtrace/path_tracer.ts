@@ -24,9 +24,15 @@ import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings
 import { brickCounts } from "../volumes/skip_bricks";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { tablesInto } from "../volumes/transfer_table_2d";
-import { Developer } from "./denoise_and_tone";
+import { DenoiseAndTone } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
-import { coarserMajorants, type MediumLook, majorants, mediumTable, rowsOf } from "./extinction";
+import {
+  coarserMajorants,
+  type MediumAppearance,
+  majorants,
+  mediumTable,
+  rowsOf,
+} from "./extinction";
 import { areNear, areSame, type History, type TraceView, viewOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import { TRACE_FRAGMENT, TRACE_NOISE } from "./shaders/sources";
@@ -71,7 +77,7 @@ export class Tracer {
   rested = 0;
   private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
   private readonly noise = floatTarget(1, FloatType);
-  private readonly developer = new Developer();
+  private readonly denoiseAndTone = new DenoiseAndTone();
   private readonly medium = floatTexture(ENTRIES, 1, RGBAFormat);
   private majorantTexture: Data3DTexture = float3D(new Float32Array(1), [1, 1, 1]);
   private environment: DataTexture = floatTexture(1, 1, RGBAFormat);
@@ -109,12 +115,12 @@ export class Tracer {
 
   /** The picture, encoded and premultiplied. */
   get picture(): WebGLRenderTarget {
-    return this.developer.picture;
+    return this.denoiseAndTone.picture;
   }
 
   /** Pixels of the picture to one of the frame buffer. */
   get scale(): number {
-    return this.developer.scale;
+    return this.denoiseAndTone.scale;
   }
 
   /** Sums of colour and coverage, and of squared luminance, samples, distance and openness. */
@@ -142,11 +148,11 @@ export class Tracer {
     texelsInto(uniforms, texels);
     this.pathPass.define("STREAM_BRICK", texels.index === null ? null : STREAM_BRICK);
     this.pathPass.define("CHANNELS", texels.channels.length);
-    this.developer.expect(uniforms.uSize.value);
+    this.denoiseAndTone.expect(uniforms.uSize.value);
   }
 
   /** @param looks of the channels, in the order of the texture's */
-  dress(looks: readonly MediumLook[], settings: TraceSettings): void {
+  dress(looks: readonly MediumAppearance[], settings: TraceSettings): void {
     if (this.texels === null) return;
     const { frame, bricks, size } = this.texels;
     const voxel = Math.min(...frame.spacing_um);
@@ -245,11 +251,11 @@ export class Tracer {
     const isRound = Math.floor(this.samples) > Math.floor(started);
     const isOther = this.samples >= 1 && (isRound || settings !== this.shownWith);
     if (isOther) {
-      const { developer, gathered, samples } = this;
-      developer.develop(renderer, eyes, gathered, samples, begins, scale, settings);
+      const { denoiseAndTone, gathered, samples } = this;
+      denoiseAndTone.denoise(renderer, eyes, gathered, samples, begins, scale, settings);
       this.shownWith = settings;
     }
-    this.developer.show(renderer, eyes, views, settings, isOther);
+    this.denoiseAndTone.show(renderer, eyes, views, settings, isOther);
   }
 
   private viewsOf(eyes: Eyes, { specimen }: TraceScene): TraceView[] {
@@ -339,7 +345,7 @@ export class Tracer {
     this.texels?.release();
     this.pathPass.dispose();
     this.noisePass.dispose();
-    this.developer.dispose();
+    this.denoiseAndTone.dispose();
   }
 }
 

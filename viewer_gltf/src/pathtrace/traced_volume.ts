@@ -11,7 +11,7 @@ import type { BrickTile } from "../volumes/bricks/brick_atlas";
 import type { BrickService } from "../volumes/bricks/brick_service";
 import type { Look } from "../volumes/tile_raymarch";
 import type { Packed } from "../volumes/tile_texture";
-import type { PlaneTable } from "../volumes/transfer_table_2d";
+import type { TransferTable2d } from "../volumes/transfer_table_2d";
 import { showsBelow } from "../volumes/volume_set";
 import type { VolumeSource } from "../volumes/volume_source";
 import { loadEnvironment, readEnvironment } from "./environment_file";
@@ -55,7 +55,7 @@ export class TracedVolume {
   private packed: Packed | null = null;
   /** What the medium was dressed in. */
   private dressed = "";
-  private planes: readonly (PlaneTable | null)[] = [];
+  private planes: readonly (TransferTable2d | null)[] = [];
   private settings: TraceSettings | null = null;
   private environment = "";
   private isLightComing = false;

@@ -31,12 +31,12 @@ describe("the disc", () => {
 
   it("comes to rest: the budget of a moving picture wants no other tiles than that at rest", () => {
     const { hybrid, look } = standing();
-    const { disc } = hybrid.nearby;
+    const { disc } = hybrid.focusTiles;
     expect(disc).toEqual(["r0_c0", "r0_c1"]);
     for (const share of [0.5, 1, 0.5, 1]) {
       hybrid.radiusShare = share;
       expect(look()).toBe(false);
-      expect(hybrid.nearby.disc).toEqual(disc);
+      expect(hybrid.focusTiles.disc).toEqual(disc);
       expect(hybrid.mayRefine).toBe(true);
     }
   });

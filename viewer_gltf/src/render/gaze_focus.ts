@@ -3,11 +3,11 @@ import { Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import { shownTiles } from "../math/pick";
 import {
-  advanceNearby,
+  advanceFocus,
   discReach,
   FAR_AWAY,
+  type FocusState,
   isWaiting,
-  type NearbyState,
 } from "../state/nearby_tiles";
 import type { ViewerState } from "../state/viewer_state";
 
@@ -21,7 +21,7 @@ const REFINE_S = 0.25;
 const RADIANS = Math.PI / 180;
 
 export class Hybrid {
-  nearby: NearbyState = FAR_AWAY;
+  focusTiles: FocusState = FAR_AWAY;
   /** Share of the set radius that the frame's budget allows, 0..1. */
   radiusShare = 1;
   /** Of the disc, radians: 0 is closed. */
@@ -62,11 +62,11 @@ export class Hybrid {
     this.toSpecimen.copy(specimen).invert();
     this.apex_um.copy(this.apex).applyMatrix4(this.toSpecimen);
     this.axis_um.copy(this.axis).transformDirection(this.toSpecimen);
-    const before = this.nearby;
+    const before = this.focusTiles;
     const couldRefine = this.mayRefine;
     const set_rad = state.discRadius_deg * RADIANS;
     const limit_rad = set_rad * this.radiusShare;
-    this.nearby = advanceNearby(before, {
+    this.focusTiles = advanceFocus(before, {
       gaze: { origin: this.apex_um.toArray(), direction: this.axis_um.toArray() },
       tiles: shownTiles(this.manifest.tiles, state.isolated),
       clip: state.clip,
@@ -75,9 +75,9 @@ export class Hybrid {
       dt_s,
     });
     const isSame =
-      before.gazed === this.nearby.gazed && before.disc.join() === this.nearby.disc.join();
+      before.gazed === this.focusTiles.gazed && before.disc.join() === this.focusTiles.disc.join();
     this.rested_s = isSame ? this.rested_s + dt_s : 0;
-    const reach = Math.min(limit_rad, discReach(this.nearby, set_rad, isReady));
+    const reach = Math.min(limit_rad, discReach(this.focusTiles, set_rad, isReady));
     const opened = this.outer_rad + (limit_rad / OPENING_S) * dt_s;
     this.outer_rad = state.mode === "disc" ? Math.min(reach, opened) : 0;
     this.reach_rad = reach;
@@ -87,6 +87,6 @@ export class Hybrid {
   /** Whether the next frame differs though nothing moves. */
   isChanging(state: ViewerState): boolean {
     const isOpening = state.mode === "disc" && this.outer_rad < this.reach_rad;
-    return isOpening || !this.mayRefine || isWaiting(this.nearby);
+    return isOpening || !this.mayRefine || isWaiting(this.focusTiles);
   }
 }

@@ -1,23 +1,23 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { Action } from "./actions";
-import { remarkOn } from "./announce_change";
+import { announcementOf } from "./announce_change";
 import { initialState } from "./initial_state";
 import { reduce } from "./reduce";
 import type { ViewerState } from "./viewer_state";
 
 const MANIFEST = sampleManifest(6);
 const START = initialState(MANIFEST);
-const remark = (state: ViewerState, action: Action) =>
-  remarkOn(state, reduce(state, action), MANIFEST.tiles);
+const announcement = (state: ViewerState, action: Action) =>
+  announcementOf(state, reduce(state, action), MANIFEST.tiles);
 
 describe("a remark", () => {
   it("says which channel left for another", () => {
     const fifth: Action = { type: "show", channel: "c5", shown: true };
-    expect(remark(START, fifth)).toBe("4 channels show at once: Marker 0 left for Marker 5.");
+    expect(announcement(START, fifth)).toBe("4 channels show at once: Marker 0 left for Marker 5.");
     const room = reduce(START, { type: "show", channel: "c2", shown: false });
-    expect(remark(START, { type: "show", channel: "c2", shown: false })).toBeNull();
-    expect(remark(room, fifth)).toBeNull();
+    expect(announcement(START, { type: "show", channel: "c2", shown: false })).toBeNull();
+    expect(announcement(room, fifth)).toBeNull();
   });
 
   it("says that the cut has taken all of the only tile that is shown", () => {
@@ -26,14 +26,16 @@ describe("a remark", () => {
     const cutTo: Action = { type: "set-clip", clip: { box: bounds_um, plane: null } };
     const cut = reduce(START, cutTo);
     const words = `Only tile ${far}: the cut leaves nothing of it.`;
-    expect(remark(START, cutTo)).toBeNull();
-    expect(remark(cut, { type: "isolate", tile: near })).toBeNull();
-    expect(remark(cut, { type: "isolate", tile: far })).toBe(words);
+    expect(announcement(START, cutTo)).toBeNull();
+    expect(announcement(cut, { type: "isolate", tile: near })).toBeNull();
+    expect(announcement(cut, { type: "isolate", tile: far })).toBe(words);
     const alone = reduce(START, { type: "isolate", tile: far });
-    expect(remark(alone, cutTo)).toBe(words);
+    expect(announcement(alone, cutTo)).toBe(words);
     const empty = reduce(alone, cutTo);
-    expect(remark(empty, { type: "set", id: "opacity", channel: "c0", value: 0.5 })).toBeNull();
-    expect(remark(empty, { type: "set-clip", clip: { ...empty.clip } })).toBeNull(); // it is known
-    expect(remark(empty, { type: "isolate", tile: null })).toBeNull();
+    expect(
+      announcement(empty, { type: "set", id: "opacity", channel: "c0", value: 0.5 }),
+    ).toBeNull();
+    expect(announcement(empty, { type: "set-clip", clip: { ...empty.clip } })).toBeNull(); // it is known
+    expect(announcement(empty, { type: "isolate", tile: null })).toBeNull();
   });
 });

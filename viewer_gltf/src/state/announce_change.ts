@@ -8,7 +8,7 @@ import type { BoxedTile } from "../math/pick";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /** null: nothing. */
-export function remarkOn(
+export function announcementOf(
   before: ViewerState,
   after: ViewerState,
   tiles: readonly BoxedTile[],

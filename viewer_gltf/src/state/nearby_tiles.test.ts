@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { WHOLE } from "../math/clip";
 import {
-  advanceNearby,
+  advanceFocus,
   discReach,
   FAR_AWAY,
   type GazeInput,
@@ -35,10 +35,10 @@ const input = (x: number, y: number, away: number, dt_s = 1): GazeInput => ({
 describe("what is near", () => {
   it("comes at the switch distance, and goes at a tenth more", () => {
     const near = (away: number, before = FAR_AWAY) =>
-      advanceNearby(before, input(5, -5, away)).near.has("r0_c0");
+      advanceFocus(before, input(5, -5, away)).near.has("r0_c0");
     expect(near(20.1)).toBe(false);
     expect(near(19.9)).toBe(true);
-    const there = advanceNearby(FAR_AWAY, input(5, -5, 19.9));
+    const there = advanceFocus(FAR_AWAY, input(5, -5, 19.9));
     expect(near(20 * HYSTERESIS - 0.1, there)).toBe(true);
     expect(near(20 * HYSTERESIS + 0.1, there)).toBe(false);
   });
@@ -48,7 +48,7 @@ describe("what is near", () => {
     let changes = 0;
     for (let i = 0; i < 100; i++) {
       const had = state.near.has("r0_c0");
-      state = advanceNearby(state, input(5, -5, 20 + (i % 2 === 0 ? 0.5 : -0.5)));
+      state = advanceFocus(state, input(5, -5, 20 + (i % 2 === 0 ? 0.5 : -0.5)));
       if (had !== state.near.has("r0_c0")) changes++;
     }
     expect(changes).toBe(1);
@@ -57,27 +57,27 @@ describe("what is near", () => {
 
 describe("the gazed tile", () => {
   it("is the first along the view's centre, once it is near", () => {
-    expect(advanceNearby(FAR_AWAY, input(25, -15, 10)).gazed).toBe("r1_c2");
-    expect(advanceNearby(FAR_AWAY, input(25, -15, 30)).gazed).toBeNull();
-    expect(advanceNearby(FAR_AWAY, input(60, -15, 10)).gazed).toBeNull();
+    expect(advanceFocus(FAR_AWAY, input(25, -15, 10)).gazed).toBe("r1_c2");
+    expect(advanceFocus(FAR_AWAY, input(25, -15, 30)).gazed).toBeNull();
+    expect(advanceFocus(FAR_AWAY, input(60, -15, 10)).gazed).toBeNull();
   });
 
   it("is not one that is cut away where it is looked at", () => {
     const plane = { normal: [0, 0, 1], offset_um: 0 } as const; // all that lies before z = 0
     const cut = { ...input(25, -15, 10), clip: { box: null, plane } };
-    expect(advanceNearby(FAR_AWAY, cut)).toMatchObject({ gazed: null, disc: [] });
+    expect(advanceFocus(FAR_AWAY, cut)).toMatchObject({ gazed: null, disc: [] });
     const left = { ...cut, clip: { box: null, plane: { ...plane, offset_um: 1 } } };
-    expect(advanceNearby(FAR_AWAY, left).gazed).toBe("r1_c2");
+    expect(advanceFocus(FAR_AWAY, left).gazed).toBe("r1_c2");
   });
 
   it("changes only once the gaze has rested on another", () => {
-    const first = advanceNearby(FAR_AWAY, input(5, -5, 10));
-    const glance = advanceNearby(first, input(15, -5, 10, REST_S / 2));
+    const first = advanceFocus(FAR_AWAY, input(5, -5, 10));
+    const glance = advanceFocus(first, input(15, -5, 10, REST_S / 2));
     expect(glance.gazed).toBe("r0_c0");
     expect(isWaiting(glance)).toBe(true);
-    expect(advanceNearby(glance, input(5, -5, 10, REST_S)).gazed).toBe("r0_c0");
+    expect(advanceFocus(glance, input(5, -5, 10, REST_S)).gazed).toBe("r0_c0");
     let state = glance;
-    for (let i = 0; i < 3; i++) state = advanceNearby(state, input(15, -5, 10, REST_S / 2));
+    for (let i = 0; i < 3; i++) state = advanceFocus(state, input(15, -5, 10, REST_S / 2));
     expect(state.gazed).toBe("r0_c1");
     expect(isWaiting(state)).toBe(false);
   });
@@ -85,22 +85,22 @@ describe("the gazed tile", () => {
 
 describe("the disc", () => {
   it("wants the tiles that it covers, the gazed one first", () => {
-    expect(advanceNearby(FAR_AWAY, input(5, -5, 10)).disc).toEqual(["r0_c0"]);
-    const edge = advanceNearby(FAR_AWAY, input(9, -5, 10)).disc;
+    expect(advanceFocus(FAR_AWAY, input(5, -5, 10)).disc).toEqual(["r0_c0"]);
+    const edge = advanceFocus(FAR_AWAY, input(9, -5, 10)).disc;
     expect(edge).toEqual(["r0_c0", "r0_c1"]);
-    const corner = advanceNearby(FAR_AWAY, input(9, -9, 10)).disc;
+    const corner = advanceFocus(FAR_AWAY, input(9, -9, 10)).disc;
     expect(corner[0]).toBe("r0_c0");
     expect([...corner].sort()).toEqual(["r0_c0", "r0_c1", "r1_c0", "r1_c1"]);
   });
 
   it("wants no more than four, and none that is far", () => {
     const wide = { ...input(25, -10.1, 10), discRadius_rad: 1.2 };
-    expect(advanceNearby(FAR_AWAY, wide).disc).toHaveLength(MAX_DISC_TILES);
-    expect(advanceNearby(FAR_AWAY, input(9, -9, 25)).disc).toEqual([]);
+    expect(advanceFocus(FAR_AWAY, wide).disc).toHaveLength(MAX_DISC_TILES);
+    expect(advanceFocus(FAR_AWAY, input(9, -9, 25)).disc).toEqual([]);
   });
 
   it("ends before the first tile whose volume is not there", () => {
-    const state = advanceNearby(FAR_AWAY, input(8, -5, 10));
+    const state = advanceFocus(FAR_AWAY, input(8, -5, 10));
     const radius = Math.atan(4 / 10);
     expect(discReach(state, radius, () => true)).toBe(radius);
     expect(discReach(state, radius, (id) => id === "r0_c1")).toBe(0);

@@ -8,7 +8,7 @@ import { Matrix4, Vector3 } from "three";
 import type { Clip } from "../math/clip";
 import { type BoxedTile, pickTile } from "../math/pick";
 import type { Ray, Vec3 } from "../math/vec3";
-import type { Nearby } from "./representation";
+import type { FocusTiles } from "./representation";
 
 /** A tile is left at so much more than the distance at which it was met. */
 export const HYSTERESIS = 1.1;
@@ -33,7 +33,7 @@ export type GazeInput = Readonly<{
   dt_s: number;
 }>;
 
-export type NearbyState = Nearby &
+export type FocusState = FocusTiles &
   Readonly<{
     /** What is looked at, before it has rested there. */
     glanced: string | null;
@@ -42,7 +42,7 @@ export type NearbyState = Nearby &
     felt: readonly (string | null)[];
   }>;
 
-export const FAR_AWAY: NearbyState = {
+export const FAR_AWAY: FocusState = {
   gazed: null,
   disc: [],
   near: new Set(),
@@ -57,7 +57,7 @@ export function distanceTo(point: Vec3, { min, max }: BoxedTile["bounds_um"]): n
   return Math.hypot(off[0], off[1], off[2]);
 }
 
-export function advanceNearby(before: NearbyState, input: GazeInput): NearbyState {
+export function advanceFocus(before: FocusState, input: GazeInput): FocusState {
   const { gaze, switchDistance_um } = input;
   const near = new Set<string>();
   for (const { id, bounds_um } of input.tiles) {
@@ -75,7 +75,7 @@ export function advanceNearby(before: NearbyState, input: GazeInput): NearbyStat
 }
 
 /** Whether the next frame may differ though nothing moves. */
-export function isWaiting(state: NearbyState): boolean {
+export function isWaiting(state: FocusState): boolean {
   return state.glanced !== state.gazed && state.glanced_s < REST_S && state.near.size > 0;
 }
 
@@ -127,7 +127,7 @@ function discTiles(
  * is not there: a box's edge would show.
  */
 export function discReach(
-  { felt }: NearbyState,
+  { felt }: FocusState,
   discRadius_rad: number,
   isReady: (tile: string) => boolean,
 ): number {

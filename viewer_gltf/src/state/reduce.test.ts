@@ -5,9 +5,9 @@ import { initialState, VOLUME_TILES_AT_START } from "./initial_state";
 import { DISC_RADIUS, SWITCH_DISTANCE } from "./parameters/volumes";
 import { newNotice, reduce } from "./reduce";
 import {
+  type FocusTiles,
   isInDisc,
-  type Nearby,
-  NOTHING_NEAR,
+  NO_FOCUS,
   representationOf,
   takenFrom,
   wantedTiles,
@@ -43,15 +43,15 @@ function withRow(given: Manifest, count: number, representation: Representation 
 }
 
 /** Within the switch distance, the first of them looked at. */
-const near = (...tiles: readonly string[]): Nearby => ({
+const near = (...tiles: readonly string[]): FocusTiles => ({
   gazed: tiles[0],
   disc: tiles,
   near: new Set(tiles),
 });
 
 /** The tiles in which any channel is a volume. */
-function marched(state: ViewerState, nearby: Nearby = NOTHING_NEAR): readonly string[] {
-  return wantedTiles(state, nearby).map(({ tile: id }) => id);
+function marched(state: ViewerState, focusTiles: FocusTiles = NO_FOCUS): readonly string[] {
+  return wantedTiles(state, focusTiles).map(({ tile: id }) => id);
 }
 
 function find(state: ViewerState, channel: string, id: string) {
@@ -62,9 +62,9 @@ function find(state: ViewerState, channel: string, id: string) {
 }
 
 /** How a channel is drawn in a tile once all has arrived. */
-function looks(state: ViewerState, channel: string, id: string, nearby = NOTHING_NEAR): string {
+function looks(state: ViewerState, channel: string, id: string, focusTiles = NO_FOCUS): string {
   const [c, t] = find(state, channel, id);
-  const as = representationOf(state, c, t, nearby);
+  const as = representationOf(state, c, t, focusTiles);
   return as === null ? "" : { mesh: "surface", volume: "volume", both: "surface + volume" }[as];
 }
 
@@ -103,7 +103,7 @@ describe("the viewer's state", () => {
   it("opens channels without a clear surface as volumes in all tiles, and loads no surface", () => {
     const state = initialState(unclear(sampleManifest(3), 0));
     expect(marched(state)).toHaveLength(state.tiles.length);
-    expect(wantedTiles(state, NOTHING_NEAR)[0].channels).toEqual(["c0"]);
+    expect(wantedTiles(state, NO_FOCUS)[0].channels).toEqual(["c0"]);
     expect(wantsSurface(state, state.channels[0])).toBe(false);
     expect(looks(state, "c0", "r0_c0")).toBe("volume");
     expect(isInDisc(state, state.channels[0])).toBe(false);
@@ -157,10 +157,10 @@ describe("the viewer's state", () => {
   });
 
   it("takes from a surface what its volume shows, once that has come", () => {
-    const nearby = near("r0_c1");
+    const focusTiles = near("r0_c1");
     const state = initialState(unclear(sampleManifest(3), 2));
     const taken = (channel: string, id: string, presence: number) =>
-      takenFrom(state, ...find(state, channel, id), nearby, presence);
+      takenFrom(state, ...find(state, channel, id), focusTiles, presence);
     expect(taken("c0", "r0_c1", 0)).toBe(0);
     expect(taken("c0", "r0_c1", 0.4)).toBe(0.4);
     expect(taken("c0", "r0_c0", 0)).toBe(0);
@@ -281,7 +281,7 @@ describe("what the stage draws in a tile", () => {
     const many = unclear(sampleManifest(3), 2);
     const state = initialState(withRow(many, VOLUME_TILES_AT_START + 4, "volume"));
     const tilesOf = (channel: string) =>
-      wantedTiles(state, NOTHING_NEAR).filter(({ channels }) => channels.includes(channel));
+      wantedTiles(state, NO_FOCUS).filter(({ channels }) => channels.includes(channel));
     expect(tilesOf("c0")).toHaveLength(VOLUME_TILES_AT_START);
     expect(tilesOf("c0").map((each) => each.tile)).not.toContain("r1_c0");
     expect(looks(state, "c0", "r1_c0")).toBe("surface");

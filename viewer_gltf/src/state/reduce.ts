@@ -67,7 +67,7 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       );
     case "set-shapes":
       return withChannel(state, action.channel, (c) => withShapes(c, action.name, action.shapes));
-    case "learn-plane":
+    case "learn-transfer-2d":
       return withChannel(state, action.channel, (c) => ({ ...c, plane: action.plane }));
     case "select":
       return withTile(state, "selected", action.tile);

@@ -11,7 +11,7 @@ import {
 } from "./viewer_state";
 
 /** What lies near enough to be drawn as a volume. */
-export type Nearby = Readonly<{
+export type FocusTiles = Readonly<{
   /** The tile that the view's centre looks at. */
   gazed: string | null;
   /** The tiles that the disc round the gaze meets first, the gazed one first. */
@@ -20,7 +20,7 @@ export type Nearby = Readonly<{
   near: ReadonlySet<string>;
 }>;
 
-export const NOTHING_NEAR: Nearby = { gazed: null, disc: [], near: new Set() };
+export const NO_FOCUS: FocusTiles = { gazed: null, disc: [], near: new Set() };
 
 /** A tile whose volume is wanted, with its channels in the bundle's order. */
 export type WantedTile = Readonly<{
@@ -29,8 +29,8 @@ export type WantedTile = Readonly<{
 }>;
 
 /** The tile that volumes follow: the selected one, or the gazed one. */
-export function followedTile(state: ViewerState, nearby: Nearby): string | null {
-  return state.selected ?? nearby.gazed;
+export function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string | null {
+  return state.selected ?? focusTiles.gazed;
 }
 
 /** How a channel is drawn in a tile, once all has arrived; null: not at all. */
@@ -38,23 +38,23 @@ export function representationOf(
   state: ViewerState,
   channel: ChannelState,
   tile: TileState,
-  nearby: Nearby,
+  focusTiles: FocusTiles,
 ): Representation | null {
   if (!channel.shown || (state.isolated !== null && tile.id !== state.isolated)) return null;
   if (!channel.volume || state.mode === "off") return "mesh";
   if (state.mode === "stage" && tile.representation !== "mesh") return tile.representation;
-  if (isTraced(state) || isMarched(state, tile.id, nearby)) return "volume";
+  if (isTraced(state) || isMarched(state, tile.id, focusTiles)) return "volume";
   if (!channel.prefersVolume) return "mesh";
   const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
-  return isSmall || tile.id === (followedTile(state, nearby) ?? state.middle) ? "volume" : null;
+  return isSmall || tile.id === (focusTileOf(state, focusTiles) ?? state.middle) ? "volume" : null;
 }
 
-function isMarched(state: ViewerState, tile: string, nearby: Nearby): boolean {
+function isMarched(state: ViewerState, tile: string, focusTiles: FocusTiles): boolean {
   switch (state.mode) {
     case "tile":
-      return tile === followedTile(state, nearby) && nearby.near.has(tile);
+      return tile === focusTileOf(state, focusTiles) && focusTiles.near.has(tile);
     case "disc":
-      return nearby.disc.includes(tile);
+      return focusTiles.disc.includes(tile);
     case "all":
       return true;
     case "stage":
@@ -70,12 +70,12 @@ export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
 }
 
 /** The tiles that are marched, those in the disc first. */
-export function wantedTiles(state: ViewerState, nearby: Nearby): readonly WantedTile[] {
+export function wantedTiles(state: ViewerState, focusTiles: FocusTiles): readonly WantedTile[] {
   if (isTraced(state)) return [];
   const channels = volumeChannels(state);
   const wanted = state.tiles.flatMap((tile) => {
     const drawn = channels.filter((channel) => {
-      const as = representationOf(state, channel, tile, nearby);
+      const as = representationOf(state, channel, tile, focusTiles);
       return as === "volume" || as === "both";
     });
     if (drawn.length === 0) return [];
@@ -87,8 +87,8 @@ export function wantedTiles(state: ViewerState, nearby: Nearby): readonly Wanted
     ];
   });
   const rank = (id: string) => {
-    const place = nearby.disc.indexOf(id);
-    return place === -1 ? nearby.disc.length : place;
+    const place = focusTiles.disc.indexOf(id);
+    return place === -1 ? focusTiles.disc.length : place;
   };
   return wanted.sort((a, b) => rank(a.tile) - rank(b.tile));
 }
@@ -106,10 +106,10 @@ export function takenFrom(
   state: ViewerState,
   channel: ChannelState,
   tile: TileState,
-  nearby: Nearby,
+  focusTiles: FocusTiles,
   presence: number,
 ): number | null {
-  const as = representationOf(state, channel, tile, nearby);
+  const as = representationOf(state, channel, tile, focusTiles);
   if (as === null || (as === "volume" && (channel.prefersVolume || isTraced(state)))) return null;
   return as === "both" ? 0 : presence;
 }

@@ -31,7 +31,7 @@ const set = (name: string, shapes: readonly Shape[]): Action => ({
   shapes,
 });
 const LEARN: Action = {
-  type: "learn-plane",
+  type: "learn-transfer-2d",
   channel: "c0",
   plane: { gradient_max: 0.4, functions: { soft: [SHAPE] } },
 };

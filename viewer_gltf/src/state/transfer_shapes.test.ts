@@ -2,13 +2,13 @@ import { describe, expect, it } from "vitest";
 import { COLUMNS, faultOf, MAX_SHAPES, ROWS, type Shape } from "../bundle/transfer_2d";
 import {
   addShape,
+  type HistogramPoint,
   hitTest,
   LEAST_HEIGHT,
   LEAST_WIDTH,
   makeShape,
   move,
   outline,
-  type PlanePoint,
   rasterise,
   removeShape,
   replaceShape,
@@ -34,7 +34,7 @@ const TRIANGLE: Shape = {
   softness: 1,
 };
 const REACH = { value: 0.02, gradient: 0.03 };
-const at = (value: number, gradient: number): PlanePoint => ({ value, gradient });
+const at = (value: number, gradient: number): HistogramPoint => ({ value, gradient });
 
 /** One component of a table of 5 x 5 cells, by rows, gradient 0 first. */
 function component(table: Uint8Array, i: number): number[][] {

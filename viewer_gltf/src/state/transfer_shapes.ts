@@ -1,5 +1,5 @@
 /**
- * Two-dimensional transfer functions: shapes in the plane of value and gradient magnitude, the table
+ * Two-dimensional transfer functions: shapes in the joint histogram of value and gradient magnitude, the table
  * that a shader reads, and what an editor does with them. Plain data and pure functions. The table
  * has the bytes that the pipeline's evaluate2d has; docs/transfer-functions.md states the formula.
  */
@@ -18,7 +18,7 @@ export const LEAST_WIDTH = 1 / (COLUMNS - 1);
 export const LEAST_HEIGHT = 1 / (ROWS - 1);
 
 /** A place in the plane: value in the window, gradient magnitude of gradient_max. */
-export type PlanePoint = Readonly<{ value: number; gradient: number }>;
+export type HistogramPoint = Readonly<{ value: number; gradient: number }>;
 
 /** What of a shape is taken hold of. Corners before edges before the body. */
 export type Part =
@@ -114,7 +114,7 @@ export function sidesAt(shape: Shape, gradient: number): Range {
 }
 
 /** Corners in order round the shape, to draw it; a triangle is cut off below its lower gradient. */
-export function outline(shape: Shape): readonly PlanePoint[] {
+export function outline(shape: Shape): readonly HistogramPoint[] {
   const [bottom, top] = shape.gradients;
   const [lowLeft, lowRight] = sidesAt(shape, bottom);
   const [highLeft, highRight] = sidesAt(shape, top);
@@ -135,8 +135,8 @@ export function outline(shape: Shape): readonly PlanePoint[] {
  */
 export function hitTest(
   shapes: Shapes,
-  point: PlanePoint,
-  reach: PlanePoint,
+  point: HistogramPoint,
+  reach: HistogramPoint,
   selected: number | null = null,
 ): Hit | null {
   const order = shapes.map((_, i) => i).reverse();
@@ -148,7 +148,7 @@ export function hitTest(
   return null;
 }
 
-function partAt(shape: Shape, point: PlanePoint, reach: PlanePoint): Part | null {
+function partAt(shape: Shape, point: HistogramPoint, reach: HistogramPoint): Part | null {
   const [bottom, top] = shape.gradients;
   const isNear = (value: number, gradient: number) =>
     Math.abs(point.value - value) <= reach.value &&
@@ -176,7 +176,7 @@ function partAt(shape: Shape, point: PlanePoint, reach: PlanePoint): Part | null
 }
 
 /** The shape moved as a whole, as far as it stays inside the plane; its size stays. */
-export function move(shape: Shape, by: PlanePoint): Shape {
+export function move(shape: Shape, by: HistogramPoint): Shape {
   const [v0, v1] = shape.values;
   const [g0, g1] = shape.gradients;
   const isTriangle = shape.kind === "triangle";
@@ -198,7 +198,7 @@ function shifted(low: number, high: number, by: number): Range {
 }
 
 /** The shape with one part drawn to a point; it stays inside the plane and keeps a least size. */
-export function resize(shape: Shape, part: Part, to: PlanePoint): Shape {
+export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   if (part === "body") return shape;
   if (part === "tip") return { ...shape, tip: clamp(to.value, 0, 1) };
   let [v0, v1] = shape.values;
@@ -212,7 +212,7 @@ export function resize(shape: Shape, part: Part, to: PlanePoint): Shape {
 }
 
 /** A shape of a usual size about a point: a rectangle round it, a triangle's tip below it. */
-export function makeShape(kind: ShapeKind, at: PlanePoint): Shape {
+export function makeShape(kind: ShapeKind, at: HistogramPoint): Shape {
   const [width, height] = [0.2, 0.3];
   const tip = clamp(at.value, 0, 1);
   const [v0, g0] = [

@@ -4,9 +4,9 @@ import type { Bundle } from "../bundle/load";
 import { surfaceColor } from "../math/color";
 import type { ShownSurface } from "../state/on_screen";
 import {
+  type FocusTiles,
   isInDisc,
-  type Nearby,
-  NOTHING_NEAR,
+  NO_FOCUS,
   takenFrom,
   wantsSurface,
 } from "../state/representation";
@@ -24,7 +24,7 @@ export class SurfaceSet {
   readonly group = new Group();
   private readonly tilesets = new Map<string, SurfaceTileset>();
   private state: ViewerState | null = null;
-  private nearby: Nearby = NOTHING_NEAR;
+  private focusTiles: FocusTiles = NO_FOCUS;
   /** Whether the first picture is whole. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
@@ -95,9 +95,9 @@ export class SurfaceSet {
     }
   }
 
-  follow(state: ViewerState, nearby: Nearby): void {
+  follow(state: ViewerState, focusTiles: FocusTiles): void {
     this.state = state;
-    this.nearby = nearby;
+    this.focusTiles = focusTiles;
     for (const channel of state.channels) {
       const isWanted = wantsSurface(state, channel);
       if (isWanted && channel.hasSurface && !this.tilesets.has(channel.id)) this.add(channel.id);
@@ -147,7 +147,7 @@ export class SurfaceSet {
     const tile = state?.tiles.find((each) => each.id === surface.tile);
     if (state === null || channel === undefined || tile === undefined) return;
     const presence = this.presence(tile.id, id);
-    const taken = takenFrom(state, channel, tile, this.nearby, presence);
+    const taken = takenFrom(state, channel, tile, this.focusTiles, presence);
     surface.blend.set({
       opacity: taken === null ? 0 : channel.opacity,
       taken: taken ?? 0,

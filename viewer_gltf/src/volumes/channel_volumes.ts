@@ -41,7 +41,7 @@ export class ChannelLists {
     for (const id of this.failed) if (!but.includes(id)) this.failed.delete(id);
   }
 
-  /** Resolves once the list has come or has failed, which was told. */
+  /** Resolves once the list has come or has failed, which was reported. */
   async load(channel: string): Promise<void> {
     if (this.loaded.has(channel) || this.failed.has(channel)) return;
     let underWay = this.underWay.get(channel);

@@ -1,9 +1,9 @@
 /**
- * Where a ray may leap: for every brick of SKIP_BRICK^3 texels, how far the nearest brick lies in which the
+ * Where a ray may skip: for every brick of SKIP_BRICK^3 texels, how far the nearest brick lies in which the
  * transfer functions show anything. Pure arrays.
  *
  * The distance is Chebyshev's, in bricks, by the two-pass chamfer transform (Rosenfeld & Pfaltz
- * 1968), which is exact for it. The idea of leaping by it: Cohen & Sheffer, "Proximity clouds",
+ * 1968), which is exact for it. The idea of skipping by it: Cohen & Sheffer, "Proximity clouds",
  * The Visual Computer 1994.
  */
 import type { Size3 } from "../bundle/ktx2";
@@ -12,7 +12,7 @@ import type { Size3 } from "../bundle/ktx2";
 const INVISIBLE = 0.5;
 export const FAR = 255;
 
-/** What a table of leaps is made of: entry c of `bricks` and of `alphas` is channel c's. */
+/** What a table of skips is made of: entry c of `bricks` and of `alphas` is channel c's. */
 export type OccupancyRequest = Readonly<{
   /** Smallest and largest intensity of every brick, interleaved. */
   bricks: readonly Uint8Array[];

@@ -1,5 +1,5 @@
 /**
- * Asks the worker for tables of leaps. Dragging a transfer function asks faster than anyone needs
+ * Asks the worker for tables of skips. Dragging a transfer function asks faster than anyone needs
  * the answers, so of each key (a tile) only the latest request counts: the worker has one request
  * at a time, and those that wait are overtaken here.
  */

@@ -1,4 +1,4 @@
-/** Module worker: tables of leaps, off the thread that draws. See `empty_space_client.ts`. */
+/** Module worker: tables of skips, off the thread that draws. See `empty_space_client.ts`. */
 import { type OccupancyRequest, occupancyDistances } from "./empty_space";
 
 self.addEventListener("message", ({ data }: MessageEvent<OccupancyRequest>) => {

@@ -33,7 +33,7 @@ import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
-import { alikeRows, type PlaneTable, tablesInto, tableUniforms } from "./transfer_table_2d";
+import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
 /** Hard limit of a ray, whatever the volume's size and through however many tiles it goes. */
 export const MAX_STEPS = 100;
@@ -81,14 +81,14 @@ export type Look = Readonly<{
   /** 256 RGBA entries, of `lookUpTable`; beside a plane, what of it shows at any gradient. */
   table: Uint8Array;
   /** A two-dimensional transfer function. */
-  plane?: PlaneTable | null;
+  plane?: TransferTable2d | null;
   isInDisc: boolean;
 }>;
 
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
 
-function tableOfLeaps(leaps: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
-  const texture = new Data3DTexture(leaps, ...size);
+function skipTexture(skips: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
+  const texture = new Data3DTexture(skips, ...size);
   texture.format = RedFormat;
   texture.type = UnsignedByteType;
   texture.minFilter = texture.magFilter = NearestFilter;
@@ -97,7 +97,7 @@ function tableOfLeaps(leaps: Uint8Array<ArrayBuffer>, size: readonly [number, nu
   return texture;
 }
 
-function emptyPlanes(channels: number): DataArrayTexture {
+function emptyTables2d(channels: number): DataArrayTexture {
   const texture = new DataArrayTexture(
     new Uint8Array(channels * ROWS * COLUMNS * 4),
     COLUMNS,
@@ -112,8 +112,8 @@ function emptyPlanes(channels: number): DataArrayTexture {
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
-  /** All zero, nothing may be leapt over, until the table has come. */
-  private readonly leaps: Uint8Array<ArrayBuffer>;
+  /** All zero, nothing may be skipped, until the table has come. */
+  private readonly skips: Uint8Array<ArrayBuffer>;
   private readonly occupancy: Data3DTexture;
   private readonly lut: DataTexture;
   /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
@@ -141,8 +141,8 @@ export class TileMarch {
     this.lut = new DataTexture(rows, ENTRIES, channelCount, RGBAFormat, UnsignedByteType);
     this.lut.minFilter = this.lut.magFilter = LinearFilter;
     const bricks = brickCounts(volume.size);
-    this.leaps = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
-    this.occupancy = tableOfLeaps(this.leaps, bricks);
+    this.skips = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
+    this.occupancy = skipTexture(this.skips, bricks);
     const material = new ShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
@@ -182,7 +182,7 @@ export class TileMarch {
         uFresh: { value: 1 },
         uOccupancy: { value: this.occupancy },
         uLut: { value: this.lut },
-        uPlanes: { value: null },
+        uTables2d: { value: null },
         ...tableUniforms(),
       },
     });
@@ -262,20 +262,20 @@ export class TileMarch {
       differs = true;
     });
     if (differs) this.lut.needsUpdate = true;
-    this.dressPlanes(looks);
+    this.fillTables2d(looks);
     uniforms.uAllInDisc.value = looks.every((look) => look.isInDisc);
     this.define("DISC", looks.some((look) => look.isInDisc) ? 1 : null);
     return differs;
   }
 
   /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
-  private dressPlanes(looks: readonly Look[]): void {
+  private fillTables2d(looks: readonly Look[]): void {
     const isTwoD = looks.some(({ plane }) => plane != null);
     this.define("TWO_D", isTwoD ? 1 : null);
     if (!isTwoD) return;
     const { uniforms } = this.mesh.material;
-    this.planes ??= emptyPlanes(this.channelCount);
-    uniforms.uPlanes.value = this.planes;
+    this.planes ??= emptyTables2d(this.channelCount);
+    uniforms.uTables2d.value = this.planes;
     const cells = this.planes.image.data as Uint8Array;
     const { length } = looks[0].table;
     tablesInto(
@@ -297,10 +297,10 @@ export class TileMarch {
     });
   }
 
-  /** Where rays may leap, one byte a brick, of `brickDistances`; null: nowhere, for now. */
-  leapBy(distances: Uint8Array<ArrayBuffer> | null): void {
-    if (distances === null) this.leaps.fill(0);
-    else this.leaps.set(distances);
+  /** Where rays may skip, one byte a brick, of `brickDistances`; null: nowhere, for now. */
+  skipBy(distances: Uint8Array<ArrayBuffer> | null): void {
+    if (distances === null) this.skips.fill(0);
+    else this.skips.set(distances);
     this.occupancy.needsUpdate = true;
   }
 

@@ -34,7 +34,7 @@ export class TileTexture {
   private levels: readonly number[] = [];
   /** That there is room for: what is finer gives way to it. */
   private finest = 0;
-  /** After a fault, which was told, a channel is not tried again until it is turned on anew. */
+  /** After a fault, which was reported, a channel is not tried again until it is turned on anew. */
   private readonly failed = new Set<string>();
   private isDisposed = false;
   /** What is being loaded now; aborted when it is no longer wanted. */
@@ -139,7 +139,7 @@ export class TileTexture {
     return [...this.levels].reverse().find(isHere) ?? this.levels[0] ?? null;
   }
 
-  /** The level of all channels; null if one of them failed, which was told. */
+  /** The level of all channels; null if one of them failed, which was reported. */
   private async load(
     channels: readonly string[],
     level: number,

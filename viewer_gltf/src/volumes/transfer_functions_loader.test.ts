@@ -5,7 +5,7 @@ import { BASE, WorkerStub } from "../../test/support/fixture/unit";
 import type { FileRef } from "../bundle/generated/bundle";
 import type { Transfer2d } from "../bundle/transfer_2d";
 import { makeShape } from "../state/transfer_shapes";
-import { TransferPlanes } from "./transfer_functions_loader";
+import { TransferFunctions2dLoader } from "./transfer_functions_loader";
 
 const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.5 });
 const HISTOGRAM = writeKtx2([256, 64, 1], 1, [new Uint8Array(256 * 64)]).file;
@@ -36,16 +36,21 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
   });
   afterEach(() => vi.unstubAllGlobals());
 
-  function planes(functions: object): TransferPlanes {
+  function planes(functions: object): TransferFunctions2dLoader {
     text = textOf(functions);
     const manifest = sampleManifest(1);
     manifest.channels[0].transfer_functions_2d.file = refOf("transfer2d.json", text);
-    const onPlane = (_: string, plane: Transfer2d) => learned.push(plane);
+    const onFunctions = (_: string, plane: Transfer2d) => learned.push(plane);
     const onError = (error: unknown) => faults.push(error);
-    return new TransferPlanes({ base: BASE, manifest }, onPlane, () => undefined, onError);
+    return new TransferFunctions2dLoader(
+      { base: BASE, manifest },
+      onFunctions,
+      () => undefined,
+      onError,
+    );
   }
 
-  const come = (set: TransferPlanes) => vi.waitUntil(() => !set.isLoading);
+  const come = (set: TransferFunctions2dLoader) => vi.waitUntil(() => !set.isLoading);
 
   it("is fetched once, the histogram only when it is to be seen", async () => {
     const set = planes({ soft: [SHAPE] });

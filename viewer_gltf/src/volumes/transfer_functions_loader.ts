@@ -15,16 +15,16 @@ export type Histogram = Readonly<{
   toJSON: () => string;
 }>;
 
-export class TransferPlanes {
+export class TransferFunctions2dLoader {
   private readonly refs = new Map<string, FileRef>();
   private readonly histograms = new Map<string, Histogram>();
   private readonly underWay = new Set<string>();
-  /** After a fault, which was told, nothing is tried again until that is asked for. */
+  /** After a fault, which was reported, nothing is tried again until that is asked for. */
   private readonly failed = new Set<string>();
 
   constructor(
     private readonly bundle: Bundle,
-    private readonly onPlane: (channel: string, plane: Transfer2d) => void,
+    private readonly onFunctions: (channel: string, plane: Transfer2d) => void,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {}
@@ -40,7 +40,7 @@ export class TransferPlanes {
       const { file } = this.channel(channel).transfer_functions_2d;
       const { histogram, most: _, ...transfer2d } = await loadTransfer2d(this.bundle.base, file);
       this.refs.set(channel, histogram);
-      this.onPlane(channel, transfer2d);
+      this.onFunctions(channel, transfer2d);
     });
   }
 

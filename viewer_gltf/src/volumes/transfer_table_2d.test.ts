@@ -5,14 +5,14 @@ import { COLUMNS, ROWS, type Shape } from "../bundle/transfer_2d";
 import { makeShape } from "../state/transfer_shapes";
 import { opacityRanges } from "./empty_space";
 import { opacities } from "./transfer_luts";
-import { alikeRows, envelopeOf, planeTable } from "./transfer_table_2d";
+import { alikeRows, envelopeOf, transferTable2d } from "./transfer_table_2d";
 
 describe("the table of value and gradient", () => {
   it("never shows what its envelope hides: leaps hold at every gradient", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
-      const plane = planeTable(
+      const plane = transferTable2d(
         randomShapes(random),
         { gradient_max: 0.5, functions: {} },
         window,
@@ -33,8 +33,13 @@ describe("the table of value and gradient", () => {
 
   it("of a narrower window reads further out, by value and by gradient", () => {
     const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), softness: 0 };
-    const whole = planeTable([shape], { gradient_max: 0.8, functions: {} }, [0, 1], 1);
-    const narrow = planeTable([shape], { gradient_max: 0.8, functions: {} }, [0.25, 0.75], 0.5);
+    const whole = transferTable2d([shape], { gradient_max: 0.8, functions: {} }, [0, 1], 1);
+    const narrow = transferTable2d(
+      [shape],
+      { gradient_max: 0.8, functions: {} },
+      [0.25, 0.75],
+      0.5,
+    );
     expect(narrow.gradientMax).toBeCloseTo(0.4, 12);
     for (const value of [0.1, 0.3, 0.44, 0.46, 0.5, 0.56, 0.7, 0.9]) {
       const within = Math.min(1, Math.max(0, (value - 0.25) / 0.5));
@@ -67,7 +72,7 @@ describe("the table of value and gradient", () => {
       softness: 0,
       opacity: 1,
     };
-    const { cells } = planeTable([shape], { gradient_max: 0.5, functions: {} }, [0, 1], 1);
+    const { cells } = transferTable2d([shape], { gradient_max: 0.5, functions: {} }, [0, 1], 1);
     let edges = 0;
     for (let at = 4; at < cells.length - 4; at += 4) {
       const hasNeighbour = cells[at + 7] > 0 || cells[at - 1] > 0;

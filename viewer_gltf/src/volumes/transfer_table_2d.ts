@@ -11,7 +11,7 @@ import { ENTRIES, lookUpTable } from "./transfer_luts";
 
 const ROW = 4 * ENTRIES;
 
-export type PlaneTable = Readonly<{
+export type TransferTable2d = Readonly<{
   /** RGBA, ROWS x ENTRIES, row 0 is gradient 0. */
   cells: Uint8Array<ArrayBuffer>;
   /** The step of intensity that is the last row. */
@@ -30,7 +30,7 @@ export function tableUniforms() {
 /** Set what `tableUniforms` made by the channels' tables; null: a channel has none. */
 export function tablesInto(
   { uGradientMax }: ReturnType<typeof tableUniforms>,
-  tables: readonly (PlaneTable | null | undefined)[],
+  tables: readonly (TransferTable2d | null | undefined)[],
 ): void {
   tables.forEach((table, c) => void uGradientMax.value.setComponent(c, table?.gradientMax ?? 1));
 }
@@ -40,12 +40,12 @@ export function tablesInto(
  *
  * @param opacity factor to the shapes' own
  */
-export function planeTable(
+export function transferTable2d(
   shapes: Shapes,
   { gradient_max }: Transfer2d,
   window: readonly [number, number],
   opacity: number,
-): PlaneTable {
+): TransferTable2d {
   const whole = rasterise(shapes);
   tintEmpty(whole);
   const isWhole = window[0] === 0 && window[1] === 1 && opacity === 1;

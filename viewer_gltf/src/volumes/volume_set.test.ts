@@ -10,7 +10,7 @@ import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
-import { NOTHING_NEAR, wantedTiles } from "../state/representation";
+import { NO_FOCUS, wantedTiles } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import { texels } from "./mip_levels";
 import { makeFrame } from "./tile_raymarch";
@@ -72,7 +72,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
 
   /** Follow until all has come and faded; the most bytes that were taken on the way. */
   async function follow(state: ViewerState, tiles: readonly string[]): Promise<number> {
-    const wanted = wantedTiles(state, { ...NOTHING_NEAR, gazed: tiles[0], near: new Set(tiles) });
+    const wanted = wantedTiles(state, { ...NO_FOCUS, gazed: tiles[0], near: new Set(tiles) });
     set.follow(state, wanted, true);
     let most = set.bytes;
     await vi.waitFor(
@@ -135,7 +135,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
         String(request[0]).includes(part) ? new Response("", { status: 404 }) : fetch(...request),
       );
     const state = opened("all");
-    const [wanted] = wantedTiles(state, NOTHING_NEAR);
+    const [wanted] = wantedTiles(state, NO_FOCUS);
     const follow = () => set.follow(state, [wanted], true);
     const fails = async () => {
       follow();

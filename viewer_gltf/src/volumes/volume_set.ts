@@ -19,17 +19,17 @@ import { brickCounts } from "./skip_bricks";
 import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_raymarch";
 import { type Packed, TileTexture } from "./tile_texture";
 import { lookUpTable, opacities } from "./transfer_luts";
-import { NO_ENTRIES, type PlaneTable, planeTable } from "./transfer_table_2d";
+import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "./transfer_table_2d";
 import type { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
-type MadePlane = Readonly<{
+type MadeTable2d = Readonly<{
   shapes: Shapes;
   plane: Transfer2d;
   window: readonly [number, number];
   opacity: number;
-  table: PlaneTable;
+  table: TransferTable2d;
 }>;
 
 export type VolumeStatus = Readonly<{
@@ -47,13 +47,13 @@ export class VolumeSet {
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
   /** The last table of each channel: all tiles ask for the same. */
-  private readonly planes = new Map<string, MadePlane>();
+  private readonly planes = new Map<string, MadeTable2d>();
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
-  /** Tables of leaps that are being made. */
-  private leapsUnderWay = 0;
-  private hasToldLimit = false;
+  /** Tables of skips that are being made. */
+  private skipsUnderWay = 0;
+  private hasReportedLimit = false;
 
   constructor(
     bundle: Bundle,
@@ -76,7 +76,7 @@ export class VolumeSet {
 
   get isLoading(): boolean {
     return (
-      this.leapsUnderWay > 0 ||
+      this.skipsUnderWay > 0 ||
       this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
@@ -112,13 +112,13 @@ export class VolumeSet {
     return this.channels.get(channel)?.sources.get(tile) ?? null;
   }
 
-  /** All volumes of a channel, by tile; null: its list has not come, which was told. */
+  /** All volumes of a channel, by tile; null: its list has not come, which was reported. */
   async sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null> {
     await this.channels.load(channel);
     return this.channels.get(channel)?.sources ?? null;
   }
 
-  /** The same, once it is known; null also after a fault, which was told. */
+  /** The same, once it is known; null also after a fault, which was reported. */
   async sourceOf(tile: string, channel: string): Promise<VolumeSource | null> {
     await this.channels.load(channel);
     return this.source(tile, channel);
@@ -208,7 +208,7 @@ export class VolumeSet {
     this.residents.want(resident, wanted);
     const [first] = sources.values();
     if (first === undefined) return;
-    this.tellLimit(first);
+    this.reportLimit(first);
     const levels = levelsToFetch(
       first.volume.levels,
       this.share / stride(sources.size),
@@ -219,11 +219,11 @@ export class VolumeSet {
   }
 
   /** Said once: what is drawn is coarser than what there is. */
-  private tellLimit({ volume }: VolumeSource): void {
+  private reportLimit({ volume }: VolumeSource): void {
     const { side } = this.limits;
     const longest = Math.max(...volume.size);
-    if (longest <= side || this.hasToldLimit) return;
-    this.hasToldLimit = true;
+    if (longest <= side || this.hasReportedLimit) return;
+    this.hasReportedLimit = true;
     this.onError(
       new BundleError(
         `This device draws volumes of at most ${side} voxels along an edge: ` +
@@ -293,7 +293,7 @@ export class VolumeSet {
     }
     resident.packed = shown;
     const differs = march.dress(looks);
-    if (differs || isNewSet || march !== before) void this.findLeaps(march, shown, looks);
+    if (differs || isNewSet || march !== before) void this.findSkips(march, shown, looks);
   }
 
   private volumeOf(channel: string, { texture }: Resident) {
@@ -309,7 +309,7 @@ export class VolumeSet {
     if (channel === undefined || volumes === undefined) {
       throw new Error(`channel ${id} has come without a look`);
     }
-    const plane = this.planeOf(channel);
+    const plane = this.table2dOf(channel);
     if (plane !== null) {
       const { color } = channel;
       return { color, table: plane.envelope, plane, isInDisc: isInDisc(state, channel) };
@@ -327,7 +327,7 @@ export class VolumeSet {
   }
 
   /** The table of a two-dimensional function, as soon as its shapes have come. */
-  private planeOf(channel: ChannelState): PlaneTable | null {
+  private table2dOf(channel: ChannelState): TransferTable2d | null {
     const { id, plane, window, opacity } = channel;
     const shapes = shapesOf(channel);
     if (plane === null || shapes.length === 0) return null;
@@ -338,14 +338,14 @@ export class VolumeSet {
       made.window === window &&
       made.opacity === opacity;
     if (isSame) return made.table;
-    const table = planeTable(shapes, plane, window, opacity);
+    const table = transferTable2d(shapes, plane, window, opacity);
     this.planes.set(id, { shapes, plane, window, opacity, table });
     return table;
   }
 
-  private async findLeaps(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
-    march.leapBy(null); // what the old table leaps over may show now
-    this.leapsUnderWay++;
+  private async findSkips(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
+    march.skipBy(null); // what the old table skips over may show now
+    this.skipsUnderWay++;
     const distances = await this.occupancy
       .computeDistances(march.volume.tile, {
         bricks: shown.bricks,
@@ -353,11 +353,11 @@ export class VolumeSet {
         count: brickCounts(march.volume.size),
       })
       .finally(() => {
-        this.leapsUnderWay--;
+        this.skipsUnderWay--;
         this.onChange();
       });
     if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
-    march.leapBy(distances);
+    march.skipBy(distances);
   }
 
   private show({ march, texture, packed, presence }: Resident): void {

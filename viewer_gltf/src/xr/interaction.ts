@@ -80,7 +80,7 @@ export class Hands {
     this.panel = new RoomPanel({
       layOut,
       onLeave,
-      onTell: (text) => this.tell(text),
+      onAnnounce: (text) => this.tell(text),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
         else options.onAction(wish);
@@ -168,12 +168,12 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld;
     const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
-    const isToldAnew = this.notice.update(dt_s, head);
+    const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired !== null) this.choose(fired);
     const hasCarried = this.carry.follow(this.gaze);
-    return this.draw(head) || hasMoved || isRepainted || isToldAnew || hasCarried;
+    return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasCarried;
   }
 
   dispose(): void {

@@ -1,4 +1,4 @@
-/** The panel on a plane in the room: what it shows, what rays do to it, and when it is painted. */
+/** The panel on a canvas in the room: what it shows, what rays do to it, and when it is painted. */
 import { mkdir } from "node:fs/promises";
 import { expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";

@@ -72,11 +72,11 @@ describeInChromium("the path tracer", () => {
 
   /** The same medium told in other ways. */
   const TOLD = [
-    ["by value and gradient", { isPlane: true }],
+    ["by value and gradient", { isTwoD: true }],
     ["in bricks", { isBricked: true }],
-    ["in bricks by value and gradient", { isBricked: true, isPlane: true }],
+    ["in bricks by value and gradient", { isBricked: true, isTwoD: true }],
     ["as four channels", { channels: 4 }],
-    ["as two channels by value and gradient", { channels: 2, isPlane: true }],
+    ["as two channels by value and gradient", { channels: 2, isTwoD: true }],
   ] as const satisfies readonly (readonly [string, Partial<Run>])[];
 
   for (const [name, settings, told] of [

@@ -168,7 +168,7 @@ describeInChromium("surface or volume", () => {
     const requests = stand.host.requests.length;
     const tables = await take();
     expect(tables.length).toBeGreaterThan(0);
-    // rows of the table, and the table of leaps
+    // rows of the table, and the table of skips
     expect(Math.max(...tables)).toBeLessThanOrEqual(4 * 1024);
     await stand.viewer.recolor("Block", "#ff00ff");
     expect((await take()).filter((bytes) => bytes > 0)).toEqual([]);

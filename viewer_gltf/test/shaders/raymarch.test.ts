@@ -52,7 +52,7 @@ describeInChromium("the ray-march", () => {
   it("shows the same with leaps and without, whatever is drawn", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 30; seed++) {
-      const found = await bare.call("compareLeaps", seed);
+      const found = await bare.call("compareSkips", seed);
       expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
       drawn += found.drawn;
     }

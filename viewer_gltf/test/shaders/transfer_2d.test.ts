@@ -58,7 +58,7 @@ describeInChromium("two-dimensional transfer functions", () => {
   it("show the same with leaps and without", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 8; seed++) {
-      const found = await bare.call("compareLeaps2d", seed);
+      const found = await bare.call("compareSkips2d", seed);
       expect(found.apart, `seed ${seed}`).toBeLessThanOrEqual(1);
       drawn += found.drawn;
     }

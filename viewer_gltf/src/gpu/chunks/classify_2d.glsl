@@ -15,7 +15,7 @@ vec4 classify2d(vec4 intensity, vec4 steepness, vec4 voxels) {
   float clear = 1.0;
   for (int c = 0; c < CHANNELS; c++) {
     vec2 at = (vec2(intensity[c], steepness[c]) * vec2(255.0, 63.0) + 0.5) / vec2(256.0, 64.0);
-    vec4 look = texture(uPlanes, vec3(at, float(c)));
+    vec4 look = texture(uTables2d, vec3(at, float(c)));
     float a = 1.0 - pow(1.0 - min(look.a, 0.999), voxels[c]);
     color += look.rgb * uColor[c] * a;
     weight += a;

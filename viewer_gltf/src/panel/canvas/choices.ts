@@ -1,4 +1,4 @@
-/** What the panel on a plane lets choose from: options, colours, tiles. Pure. */
+/** What the panel on a canvas lets choose from: options, colours, tiles. Pure. */
 import type { Choice, Colour, TileMap } from "../controls";
 import { nextColour } from "../palettes";
 import {
@@ -115,7 +115,7 @@ export function mapBlock(map: TileMap, width: number): Block {
   for (const tile of map.tiles) {
     const rect = rectOf(tile.row, tile.column);
     const isChosen = tile.isSelected || tile.isIsolated;
-    marks.push(box(rect, isChosen ? "accent" : "raised", tile.isGazed ? "text" : "line"));
+    marks.push(box(rect, isChosen ? "accent" : "raised", tile.isFocus ? "text" : "line"));
     if (cell >= ROW) {
       const label = tile.isIsolated ? "only" : `${tile.row} ${tile.column}`;
       const tone = isChosen ? "ink" : "dim";
@@ -132,7 +132,7 @@ function asChoice({ id, tiles, refusal, to }: TileMap): Choice {
   const now =
     tiles.find(({ isIsolated }) => isIsolated) ??
     tiles.find(({ isSelected }) => isSelected) ??
-    tiles.find(({ isGazed }) => isGazed);
+    tiles.find(({ isFocus }) => isFocus);
   const options = tiles.map((tile) => ({ value: tile.id, label: tile.id }));
   const value = now?.id ?? "";
   return { kind: "choice", id, label: "Tile", value, options, isInline: false, refusal, to };

@@ -1,12 +1,12 @@
 /**
- * The controls of a layout as rows of the panel on a plane, each tall enough to be gazed at. Pure.
+ * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
 import type { Control, Group, Toggle } from "../controls";
 import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
 import { type Block, box, type Mark, type Rect, type Region, ROW, SMALL, text } from "./draw_list";
 import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
 import { sliderRow, windowRow } from "./sliders";
-import { planeBlock } from "./transfer_function_2d";
+import { histogramBlock } from "./transfer_function_2d";
 
 /** What has no use in a headset: there is no keyboard, no clipboard, and stereo has begun. */
 const ELSEWHERE: ReadonlySet<string> = new Set([
@@ -48,8 +48,8 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
       return item.palettes.length === 0 ? [nextSwatch(item, row)] : palettes(item, width);
     case "map":
       return [mapBlock(item, width)];
-    case "plane":
-      return [planeBlock(item, width)];
+    case "histogram":
+      return [histogramBlock(item, width)];
     case "text":
       return item.value === "" ? [] : [textBlock(item.label, item.value, width)];
     case "search":

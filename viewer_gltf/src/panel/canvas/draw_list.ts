@@ -1,4 +1,4 @@
-/** What the panel on a plane is made of: marks to paint and regions to point at. Pixels. Pure. */
+/** What the panel on a canvas is made of: marks to paint and regions to point at. Pixels. Pure. */
 
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import type { Wish } from "../controls";
@@ -40,15 +40,15 @@ export type Mark =
     }>;
 
 /** What the plane keeps for itself, since it shows one section at a time, and a page of it. */
-export type PlaneChange =
-  | Readonly<{ plane: "tab"; section: string }>
-  | Readonly<{ plane: "page"; page: number }>
+export type CanvasChange =
+  | Readonly<{ canvas: "tab"; section: string }>
+  | Readonly<{ canvas: "page"; page: number }>
   /** Say why what was asked for can't be done. */
-  | Readonly<{ plane: "tell"; text: string }>
-  | Readonly<{ plane: "close" }>
-  | Readonly<{ plane: "leave" }>;
+  | Readonly<{ canvas: "announce"; text: string }>
+  | Readonly<{ canvas: "close" }>
+  | Readonly<{ canvas: "leave" }>;
 
-export type PlaneWish = Wish | PlaneChange;
+export type CanvasWish = Wish | CanvasChange;
 
 /**
  * Where a ray does something. `to` gets where in the region it is, 0..1 from its left edge and from
@@ -60,9 +60,9 @@ export type Region = Readonly<{
   label: string;
   rect: Rect;
   isSlide: boolean;
-  to: (across: number, down?: number) => PlaneWish | null;
+  to: (across: number, down?: number) => CanvasWish | null;
   /** What taking hold of it does, where that is something else than to drag it. */
-  press?: (across: number, down: number) => PlaneWish;
+  press?: (across: number, down: number) => CanvasWish;
 }>;
 
 /** A row, or what must not be broken; its upper left corner is 0, 0. */

@@ -44,7 +44,12 @@ function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly P
       const made = pageOf(laidOut(state, view), { tab, page });
       pages.push(made);
       const more = made.regions.find(({ id }) => id === "more")?.to(0);
-      if (typeof more !== "object" || more === null || !("plane" in more) || more.plane !== "page")
+      if (
+        typeof more !== "object" ||
+        more === null ||
+        !("canvas" in more) ||
+        more.canvas !== "page"
+      )
         break;
       if (more.page === 0) break;
     }
@@ -63,7 +68,7 @@ const overlap = (a: Rect, b: Rect) =>
   Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y) > 1e-6;
 
 describe("the panel on a plane", () => {
-  const pages = allPages(start(), { picked: "c2", isPlaneOpen: true });
+  const pages = allPages(start(), { picked: "c2", isHistogramOpen: true });
 
   it("gives every control at least 1.2 degrees either way at 1.2 m", () => {
     const degrees = (px: number) => (2 * Math.atan(px / PX_PER_M / 2 / 1.2) * 180) / Math.PI;
@@ -93,7 +98,7 @@ describe("the panel on a plane", () => {
 
   it("leaves out no control that can be used in a headset", () => {
     const ids = new Set(pages.flatMap(({ regions }) => regions.map(({ id }) => id.split("=")[0])));
-    for (const { items } of laidOut(start(), { picked: "c2", isPlaneOpen: true }).sections) {
+    for (const { items } of laidOut(start(), { picked: "c2", isHistogramOpen: true }).sections) {
       for (const item of items) {
         const inRow = item.kind === "group" ? item.controls : [item];
         const isOpen = item.kind === "group" && item.isOpen;
@@ -114,7 +119,7 @@ describe("the panel on a plane", () => {
     const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
     const radius = find(page, "disc-radius");
     expect(radius.isSlide).toBe(false);
-    expect(radius.to(0.3)).toEqual({ plane: "tell", text: "Only the mode Disc has one." });
+    expect(radius.to(0.3)).toEqual({ canvas: "announce", text: "Only the mode Disc has one." });
     expect(find(page, "mode=disc").to(0)).toEqual({ type: "set", id: "mode", value: "disc" });
   });
 });
@@ -188,7 +193,7 @@ describe("its pages", () => {
       id: `r${Math.floor(i / 20)}_c${i % 20}`,
       row: Math.floor(i / 20),
       column: i % 20,
-      isGazed: i === 45,
+      isFocus: i === 45,
       isSelected: false,
       isIsolated: false,
     }));

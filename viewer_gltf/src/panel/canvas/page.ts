@@ -1,5 +1,5 @@
 /**
- * The panel on a plane: the same layout as in HTML, one section at a time, so that every row is
+ * The panel on a canvas: the same layout as in HTML, one section at a time, so that every row is
  * large enough for the gaze. Pure.
  */
 import type { Layout, Section } from "../controls";
@@ -34,8 +34,8 @@ const CONTENT: Rect = {
 };
 
 /** What the plane remembers: which section, and which page of it. */
-export type PlaneView = Readonly<{ tab: string; page: number }>;
-export const START_PLANE: PlaneView = { tab: "channels", page: 0 };
+export type CanvasView = Readonly<{ tab: string; page: number }>;
+export const START_CANVAS: CanvasView = { tab: "channels", page: 0 };
 
 export type Page = Readonly<{ marks: readonly Mark[]; regions: readonly Region[] }>;
 
@@ -65,7 +65,7 @@ export function paginate(blocks: readonly Block[], height: number): readonly (re
   return pages;
 }
 
-export function pageOf(layout: Layout, view: PlaneView): Page {
+export function pageOf(layout: Layout, view: CanvasView): Page {
   const marks: Mark[] = [
     {
       kind: "box",
@@ -130,9 +130,9 @@ function header({ title, status }: Layout): Block {
         label: "Leave stereo",
         rect: leave,
         isSlide: false,
-        to: () => ({ plane: "leave" }),
+        to: () => ({ canvas: "leave" }),
       },
-      { id: "close", label: "Close", rect: close, isSlide: false, to: () => ({ plane: "close" }) },
+      { id: "close", label: "Close", rect: close, isSlide: false, to: () => ({ canvas: "close" }) },
     ],
   };
 }
@@ -150,7 +150,7 @@ function tabs(sections: readonly Section[], open: string): Block {
       label,
       rect,
       isSlide: false,
-      to: () => ({ plane: "tab", section: id }),
+      to: () => ({ canvas: "tab", section: id }),
     });
   });
   return { height: sections.length * height, marks, regions };
@@ -170,7 +170,7 @@ function pager(page: number, count: number): Block {
         label: "More",
         rect,
         isSlide: false,
-        to: () => ({ plane: "page", page: (page + 1) % count }),
+        to: () => ({ canvas: "page", page: (page + 1) % count }),
       },
     ],
   };

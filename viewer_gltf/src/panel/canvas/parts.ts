@@ -27,7 +27,7 @@ export function unlessRefused(
   regions: readonly Region[],
 ): readonly Region[] {
   if (!refusal) return regions;
-  const to = () => ({ plane: "tell", text: refusal }) as const;
+  const to = () => ({ canvas: "announce", text: refusal }) as const;
   return regions.map(({ press: _, ...each }) => ({ ...each, isSlide: false, to }));
 }
 

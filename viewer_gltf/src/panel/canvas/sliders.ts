@@ -1,4 +1,4 @@
-/** Sliders of the panel on a plane. Pure. */
+/** Sliders of the panel on a canvas. Pure. */
 import type { Slider, Window, Wish } from "../controls";
 import { type Block, type Mark, type Rect, ROW, SMALL, text } from "./draw_list";
 import { LABEL, one, region, toneOf, unlessRefused } from "./parts";

@@ -1,9 +1,9 @@
-/** The plane of value and gradient with its shapes, on a page's canvas and on the panel's plane. Pure. */
+/** The joint histogram with its shapes, on a page's canvas and on the panel's plane. Pure. */
 
 import type { Shape } from "../../bundle/transfer_2d";
 import { type Rgb, toHex } from "../../math/color";
-import { outline, type PlanePoint } from "../../state/transfer_shapes";
-import type { PlaneEditor } from "../controls";
+import { type HistogramPoint, outline } from "../../state/transfer_shapes";
+import type { HistogramEditor } from "../controls";
 import { type Block, type Mark, type Rect, SMALL, text } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";
 
@@ -16,7 +16,7 @@ const REACH = 26;
 const HANDLE = 22;
 
 /** The corners that are drawn to be taken hold of. */
-function handlesOf(shape: Shape): readonly PlanePoint[] {
+function handlesOf(shape: Shape): readonly HistogramPoint[] {
   const corners = outline(shape);
   if (shape.kind === "rectangle") return corners;
   const [bottom, top] = shape.gradients;
@@ -37,11 +37,15 @@ function toneOf(shape: Shape, color: Rgb): `#${string}` {
 }
 
 /** @param handle the edge of a handle */
-export function planeMarks(editor: PlaneEditor, rect: Rect, handle: number): readonly Mark[] {
+export function histogramMarks(
+  editor: HistogramEditor,
+  rect: Rect,
+  handle: number,
+): readonly Mark[] {
   const { histogram, shapes, selected, color, window } = editor;
   const marks: Mark[] = [{ kind: "box", rect, fill: "ink", stroke: "line", radius: 0 }];
   if (histogram !== null) marks.push({ kind: "histogram", rect, histogram, window });
-  const place = ({ value, gradient }: PlanePoint) => ({
+  const place = ({ value, gradient }: HistogramPoint) => ({
     x: rect.x + value * rect.width,
     y: rect.y + (1 - gradient) * rect.height,
   });
@@ -64,18 +68,21 @@ export function planeMarks(editor: PlaneEditor, rect: Rect, handle: number): rea
   return marks;
 }
 
-export function planeBlock(editor: PlaneEditor, width: number): Block {
+export function histogramBlock(editor: HistogramEditor, width: number): Block {
   const rect: Rect = { x: REACH, y: 0, width: width - 2 * REACH, height: HEIGHT };
   const below: Rect = { ...rect, y: HEIGHT, height: AXIS };
   const [low, high, steepest] = editor.texts;
   const look = { size: SMALL - 2, tone: "dim" } as const;
   const marks = [
-    ...planeMarks(editor, rect, HANDLE),
+    ...histogramMarks(editor, rect, HANDLE),
     text(below, low, look),
     text(below, high, { ...look, align: "right" }),
     text({ ...rect, height: AXIS + 8 }, steepest, look),
   ];
-  const pointAt = (across: number, down = 0): PlanePoint => ({ value: across, gradient: 1 - down });
+  const pointAt = (across: number, down = 0): HistogramPoint => ({
+    value: across,
+    gradient: 1 - down,
+  });
   const reach = { value: REACH / rect.width, gradient: REACH / rect.height };
   const held = {
     ...region(

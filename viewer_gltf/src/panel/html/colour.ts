@@ -1,7 +1,7 @@
 /** A colour: any (the browser's own picker), or one of the palettes. */
 
 import { element } from "../../dom/element";
-import { Rove } from "../../dom/roving_tabindex";
+import { RovingTabindex } from "../../dom/roving_tabindex";
 import type { Colour } from "../controls";
 import { hooks, type Send, type Widget } from "./widget";
 
@@ -61,7 +61,7 @@ function makeSwatches(first: Colour, send: Send): Widget<Colour> {
       element("div", { className: "swatches" }, {}, ...row),
     );
   }
-  const rove = new Rove(root);
+  const rove = new RovingTabindex(root);
   rove.follow(buttons, SWATCHES_A_ROW);
   return {
     root,

@@ -32,7 +32,7 @@ export class ProgressBar {
 export class Notices {
   readonly root = element("div", { className: "notices", role: "status" }, { notices: "" });
 
-  private told: readonly string[] = [];
+  private drawn: readonly string[] = [];
   private readonly retry = element(
     "button",
     { textContent: "Try again", onclick: () => this.onRetry() },
@@ -45,8 +45,8 @@ export class Notices {
   ) {}
 
   update({ notices, mendable }: Pick<ViewerState, "notices" | "mendable">): void {
-    if (notices === this.told) return; // what is written anew is read out anew
-    this.told = notices;
+    if (notices === this.drawn) return; // what is written anew is read out anew
+    this.drawn = notices;
     // A broken host fails for every file: the newest few say what is wrong.
     const shown = notices.slice(-3);
     const hidden = notices.length - shown.length;

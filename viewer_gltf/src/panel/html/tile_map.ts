@@ -1,12 +1,12 @@
 /** The tiles by row and column; the gazed, the chosen and the isolated one are marked. */
 
 import { element } from "../../dom/element";
-import { Rove } from "../../dom/roving_tabindex";
+import { RovingTabindex } from "../../dom/roving_tabindex";
 import type { MapTile, TileMap } from "../controls";
 import { hooks, type Send, type Widget } from "./widget";
 
-function nameOf({ id, isGazed, isSelected, isIsolated }: MapTile): string {
-  const marks = [isIsolated && "shown alone", isSelected && "chosen", isGazed && "looked at"];
+function nameOf({ id, isFocus, isSelected, isIsolated }: MapTile): string {
+  const marks = [isIsolated && "shown alone", isSelected && "chosen", isFocus && "looked at"];
   return [`Tile ${id}`, ...marks.filter(Boolean)].join(", ");
 }
 
@@ -26,7 +26,7 @@ export function makeMap(first: TileMap, send: Send): Widget<TileMap> {
     buttons.set(tile.id, button);
     root.append(button);
   }
-  new Rove(root).follow([...buttons.values()], first.columns);
+  new RovingTabindex(root).follow([...buttons.values()], first.columns);
   let marked = "";
   return {
     root,
@@ -40,7 +40,7 @@ export function makeMap(first: TileMap, send: Send): Widget<TileMap> {
         if (button === undefined) return;
         button.ariaLabel = names[i];
         button.ariaPressed = String(tile.isSelected || tile.isIsolated);
-        button.classList.toggle("gazed", tile.isGazed);
+        button.classList.toggle("gazed", tile.isFocus);
         button.classList.toggle("isolated", tile.isIsolated);
       });
     },

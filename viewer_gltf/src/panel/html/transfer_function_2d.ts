@@ -1,14 +1,14 @@
 /**
- * The plane of value and gradient: shapes are taken hold of by mouse or finger; with the keyboard
+ * The joint histogram: shapes are taken hold of by mouse or finger; with the keyboard
  * on it the arrows move the shape that is meant.
  */
 
 import { element, setText } from "../../dom/element";
-import type { PlanePoint } from "../../state/transfer_shapes";
+import type { HistogramPoint } from "../../state/transfer_shapes";
 import type { Mark, Rect } from "../canvas/draw_list";
 import { paint } from "../canvas/paint";
-import { planeMarks } from "../canvas/transfer_function_2d";
-import type { PlaneEditor } from "../controls";
+import { histogramMarks } from "../canvas/transfer_function_2d";
+import type { HistogramEditor } from "../controls";
 import { shapeText } from "../edit_shapes";
 import { hooks, type Send, type Widget } from "./widget";
 
@@ -23,20 +23,20 @@ const PLANE: Rect = { x: PAD, y: PAD, width: WIDTH - 2 * PAD, height: HEIGHT - 2
 const MOUSE_REACH = 8;
 const FINGER_REACH = 22;
 /** One step of an arrow, in cells of the table. */
-const ARROWS: Readonly<Record<string, PlanePoint>> = {
+const ARROWS: Readonly<Record<string, HistogramPoint>> = {
   ArrowLeft: { value: -2 / 255, gradient: 0 },
   ArrowRight: { value: 2 / 255, gradient: 0 },
   ArrowUp: { value: 0, gradient: 1.01 / 63 },
   ArrowDown: { value: 0, gradient: -1.01 / 63 },
 };
 
-export function makePlane(first: PlaneEditor, send: Send): Widget<PlaneEditor> {
+export function makeHistogram(first: HistogramEditor, send: Send): Widget<HistogramEditor> {
   let now = first;
   let painted = "";
   const canvas = element("canvas", { width: WIDTH, height: HEIGHT, tabIndex: 0 }, hooks(first.id));
   canvas.setAttribute("role", "application");
   const context = canvas.getContext("2d");
-  const pointOf = ({ clientX, clientY }: MouseEvent): PlanePoint => {
+  const pointOf = ({ clientX, clientY }: MouseEvent): HistogramPoint => {
     const { left, top, width, height } = canvas.getBoundingClientRect();
     const inside = (x: number) => Math.min(1, Math.max(0, x));
     const x = ((clientX - left) / width) * WIDTH;
@@ -46,7 +46,7 @@ export function makePlane(first: PlaneEditor, send: Send): Widget<PlaneEditor> {
       gradient: inside(1 - (y - PLANE.y) / PLANE.height),
     };
   };
-  const drag = (at: PlanePoint) => {
+  const drag = (at: HistogramPoint) => {
     const wish = now.refusal ? null : now.drag(at);
     if (wish !== null) send(wish);
   };
@@ -88,7 +88,7 @@ export function makePlane(first: PlaneEditor, send: Send): Widget<PlaneEditor> {
       setText(low, control.texts[0]);
       setText(high, control.texts[1]);
       setText(steepest, control.texts[2]);
-      const marks: readonly Mark[] = planeMarks(control, PLANE, HANDLE);
+      const marks: readonly Mark[] = histogramMarks(control, PLANE, HANDLE);
       const text = JSON.stringify(marks);
       if (context === null || text === painted) return;
       painted = text;

@@ -8,7 +8,7 @@ import type { Button, Choice, Control, Link, Search, Slider, Text, Toggle } from
 import { makeColour } from "./colour";
 import { makeWindow } from "./range";
 import { makeMap } from "./tile_map";
-import { makePlane } from "./transfer_function_2d";
+import { makeHistogram } from "./transfer_function_2d";
 import { hooks, type Send, type Widget } from "./widget";
 
 type Maker<C> = (first: C, send: Send) => Widget<C>;
@@ -23,7 +23,7 @@ const MAKERS: Readonly<{
   colour: makeColour,
   button: makeButton,
   map: makeMap,
-  plane: makePlane,
+  histogram: makeHistogram,
   text: makeText,
   search: makeSearch,
   link: makeLink,
@@ -186,10 +186,10 @@ function makeButton(first: Button, send: Send): Widget<Button> {
     },
     { ...hooks(first.id), action: first.id },
   );
-  const data = first.tellsWhy ? { [`${camel(first.id)}Reason`]: "" } : {};
+  const data = first.showsReason ? { [`${camel(first.id)}Reason`]: "" } : {};
   const reason = element("p", { className: "hint" }, data);
   return {
-    root: first.tellsWhy ? element("div", { className: "told" }, {}, button, reason) : button,
+    root: first.showsReason ? element("div", { className: "told" }, {}, button, reason) : button,
     update(control) {
       now = control;
       refuse(button, control.refusal);

@@ -10,7 +10,7 @@ import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import { controlOf, paletteOf } from "../control_templates";
 import type { Control, Group, PanelView, Section } from "../controls";
-import { planeItems } from "./transfer_function_2d";
+import { transferFunction2dItems } from "./transfer_function_2d";
 
 /** Channels of a page that are not shown; fewer need no search. */
 export const PAGE = 6;
@@ -94,7 +94,7 @@ function cardOf(
         to: toWindow,
       },
       paletteOf(COLOR, channel, `${id}/palette`, id),
-      ...planeItems(channel, view, histogram, (share) => intensityText(share, range)),
+      ...transferFunction2dItems(channel, view, histogram, (share) => intensityText(share, range)),
     ],
   };
 }

@@ -17,14 +17,14 @@ const LAMP_KEYS: readonly string[] = ["!", "@", "#"];
 function nextNumber(by: number): Key["to"] {
   return ({ view }) => {
     const ids = LIGHT_NUMBERS.map(({ id }) => id);
-    const dial = neighbour(ids, view.dial ?? undefined, by);
-    return dial === null ? null : { panel: "dial", dial };
+    const parameter = neighbour(ids, view.parameter ?? undefined, by);
+    return parameter === null ? null : { panel: "parameter", parameter };
   };
 }
 
 function turn(steps: number): Key["to"] {
   return ({ state, view }) => {
-    const row = LIGHT_NUMBERS.find(({ id }) => id === view.dial) ?? LIGHT_NUMBERS[0];
+    const row = LIGHT_NUMBERS.find(({ id }) => id === view.parameter) ?? LIGHT_NUMBERS[0];
     const at = shareOf(row, row.get(state)) + (2 * steps) / row.steps;
     return setTo(row, valueAtShare(row, Math.min(1, Math.max(0, at))));
   };

@@ -13,8 +13,8 @@ export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
 };
 export const LENSES = ["v1", "v2", "own"] as const;
 
-function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "tellsWhy"> {
-  return { refusal: isAvailable ? "" : reason || "It can't be had here.", tellsWhy: true };
+function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "showsReason"> {
+  return { refusal: isAvailable ? "" : reason || "It can't be had here.", showsReason: true };
 }
 
 export function stereoItems(

@@ -40,7 +40,7 @@ export function tileItems(state: ViewerState, gazed: string | null): readonly Co
       columns: grid.columns,
       tiles: grid.cells.map((cell) => ({
         ...cell,
-        isGazed: cell.id === gazed,
+        isFocus: cell.id === gazed,
         isSelected: cell.id === selected,
         isIsolated: cell.id === isolated,
       })),

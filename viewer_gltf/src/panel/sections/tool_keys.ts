@@ -1,20 +1,20 @@
 /** The keys of measuring, cutting open, sharing and of the panel itself. Pure. */
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
-import { gripsOf, meantGrip, moveGrip } from "../clip_by_key";
+import { chosenClipPart, clipPartsOf, moveClipPart } from "../clip_by_key";
 import { type Key, key, keysOf, neighbour } from "../key";
 import { middleBox, middlePlane } from "../layout";
 
-function nextGrip(by: number): Key["to"] {
+function nextClipPart(by: number): Key["to"] {
   return ({ state: { clip }, view }) => {
-    const grip = neighbour(gripsOf(clip), view.grip ?? undefined, by);
-    return grip === null ? null : { panel: "grip", grip };
+    const clipPart = neighbour(clipPartsOf(clip), view.clipPart ?? undefined, by);
+    return clipPart === null ? null : { panel: "clip-part", clipPart };
   };
 }
 
 function push(steps: number): Key["to"] {
   return ({ state: { clip }, view, shown }) => {
-    const grip = meantGrip(clip, view.grip);
-    return grip === undefined ? null : moveGrip(grip, steps, clip, shown);
+    const clipPart = chosenClipPart(clip, view.clipPart);
+    return clipPart === undefined ? null : moveClipPart(clipPart, steps, clip, shown);
   };
 }
 
@@ -32,8 +32,8 @@ export const TOOL_KEYS: readonly Key[] = [
     type: "set-clip",
     clip: { ...clip, plane: clip.plane === null ? middlePlane(shown) : null },
   })),
-  key("N", "Next part of the cuts: a face, the plane, its turn", nextGrip(1)),
-  key("B", "The part before", nextGrip(-1)),
+  key("N", "Next part of the cuts: a face, the plane, its turn", nextClipPart(1)),
+  key("B", "The part before", nextClipPart(-1)),
   key(",", "Move or turn that part back", push(-1)),
   key(".", "Move or turn that part on", push(1)),
   key("l", "Copy a link to this view", "share"),

@@ -8,10 +8,16 @@ import { OWN, shapesOf } from "../../state/transfer_functions_2d";
 import { makeShape } from "../../state/transfer_shapes";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import { blocksOf } from "../canvas/controls";
-import { changePanel, type PanelView, type PlaneEditor, START_VIEW, type Wish } from "../controls";
+import {
+  changePanel,
+  type HistogramEditor,
+  type PanelView,
+  START_VIEW,
+  type Wish,
+} from "../controls";
 import { wishOf } from "../keys";
-import { told } from "../spoken_feedback";
-import { planeItems } from "./transfer_function_2d";
+import { spokenFeedback } from "../spoken_feedback";
+import { transferFunction2dItems } from "./transfer_function_2d";
 
 const RECTANGLE = makeShape("rectangle", { value: 0.5, gradient: 0.5 });
 const TRIANGLE = makeShape("triangle", { value: 0.2, gradient: 0.5 });
@@ -20,7 +26,7 @@ const REACH = { value: 0.03, gradient: 0.05 };
 /** A panel and a state that wishes change, as who has them does. */
 class Desk {
   state: ViewerState = initialState(sampleManifest(3));
-  view: PanelView = changePanel(START_VIEW, { panel: "plane", channel: "c0" });
+  view: PanelView = changePanel(START_VIEW, { panel: "histogram", channel: "c0" });
 
   constructor(...shapes: (typeof RECTANGLE)[]) {
     if (shapes.length > 0) {
@@ -43,7 +49,7 @@ class Desk {
   }
 
   items() {
-    return planeItems(this.channel, this.view, null, String);
+    return transferFunction2dItems(this.channel, this.view, null, String);
   }
 
   item(part: string) {
@@ -52,9 +58,9 @@ class Desk {
     return found;
   }
 
-  get editor(): PlaneEditor {
+  get editor(): HistogramEditor {
     const item = this.item("shapes");
-    if (item.kind !== "plane") throw new Error(item.kind);
+    if (item.kind !== "histogram") throw new Error(item.kind);
     return item;
   }
 
@@ -84,9 +90,9 @@ describe("the editor of value and gradient", () => {
     desk.click("add-triangle");
     expect(ids()).toContain("shape-tip");
     expect(desk.channel.transferFunction).toBe(OWN);
-    desk.grant({ panel: "plane", channel: "c0" });
+    desk.grant({ panel: "histogram", channel: "c0" });
     expect(ids()).toEqual(["plane"]);
-    desk.grant({ panel: "plane", channel: "c1" });
+    desk.grant({ panel: "histogram", channel: "c1" });
     expect([desk.view.picked, ids()]).toEqual(["c1", ["plane"]]);
   });
 
@@ -136,7 +142,8 @@ describe("the editor of value and gradient", () => {
       transferFunctions2d: ["soft"],
       transferFunction: "soft",
     };
-    const items = (channel: ChannelState) => planeItems(channel, desk.view, null, String);
+    const items = (channel: ChannelState) =>
+      transferFunction2dItems(channel, desk.view, null, String);
     expect(items(unknown)[1].refusal).toBe("Its shapes have not come.");
     const known = { ...unknown, plane: { gradient_max: 0.5, functions: { soft: [TRIANGLE] } } };
     expect(items(known)[1]).toMatchObject({ refusal: "", shapes: [TRIANGLE] });
@@ -147,7 +154,7 @@ describe("the editor of value and gradient", () => {
     const before = desk.state;
     desk.press("Q");
     expect(
-      told(
+      spokenFeedback(
         { type: "set-shapes", channel: "c0", name: OWN, shapes: [] },
         before,
         desk.state,
@@ -171,7 +178,7 @@ describe("the editor of value and gradient", () => {
     desk.press("Shift+Delete");
     expect(desk.shapes.map(({ kind }) => kind)).toEqual(["triangle"]);
     desk.press("H");
-    expect(desk.view.isPlaneOpen).toBe(false);
+    expect(desk.view.isHistogramOpen).toBe(false);
   });
 });
 
@@ -196,6 +203,6 @@ describe("its block on the panel in the room", () => {
     const desk = new Desk(RECTANGLE);
     const [{ regions }] = blocksOf({ ...desk.editor, refusal: "Not now." }, 760);
     expect(regions[0].press).toBeUndefined();
-    expect(regions[0].to(0.5)).toEqual({ plane: "tell", text: "Not now." });
+    expect(regions[0].to(0.5)).toEqual({ canvas: "announce", text: "Not now." });
   });
 });

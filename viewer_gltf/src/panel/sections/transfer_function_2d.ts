@@ -37,21 +37,21 @@ export function refusalOf(channel: ChannelState): string {
 /**
  * @param valueText of 0 and 1 of the window, as the source counts intensities
  */
-export function planeItems(
+export function transferFunction2dItems(
   channel: ChannelState,
   view: PanelView,
   histogram: Histogram | null,
   valueText: (share: number) => string,
 ): readonly Control[] {
   const { id, name, plane, window } = channel;
-  const isOpen = view.isPlaneOpen && view.picked === id;
+  const isOpen = view.isHistogramOpen && view.picked === id;
   const toggle: Control = {
     kind: "toggle",
     id: `${id}/plane`,
     label: "Value and gradient",
     name: `Shapes of ${name} by value and gradient`,
     value: isOpen,
-    to: () => ({ panel: "plane", channel: id }),
+    to: () => ({ panel: "histogram", channel: id }),
   };
   if (!isOpen) return [toggle];
   const shapes = editedShapes(channel);
@@ -73,7 +73,7 @@ export function planeItems(
   return [
     toggle,
     {
-      kind: "plane",
+      kind: "histogram",
       id: `${id}/shapes`,
       label: "Value and gradient",
       name: `Value and gradient of ${name}`,

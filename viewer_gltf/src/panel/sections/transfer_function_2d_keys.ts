@@ -50,7 +50,7 @@ function changeNumber(steps: number) {
 
 export const SHAPE_KEYS: readonly Key[] = [
   ofChannel("H", "Plane of value and gradient: open or close", ({ id }) => ({
-    panel: "plane",
+    panel: "histogram",
     channel: id,
   })),
   ofChannel("Q", "Add a rectangle", addShapeOf("rectangle")),

@@ -30,7 +30,7 @@ export const COLOR: ColourParameter<Channel> = {
   name: ({ name }) => `Colour of ${name}`,
   link: "c",
   ...lens("color"),
-  told: () => "another colour",
+  spoken: () => "another colour",
 };
 
 export const OPACITY: NumberParameter<Channel> = {
@@ -49,7 +49,7 @@ export const OPACITY: NumberParameter<Channel> = {
     more: ["O", "More opacity"],
     next: (value, direction) => Math.round(100 * (value + 0.05 * direction)) / 100,
   },
-  told: ({ opacity }) => `opacity ${percent(opacity)}`,
+  spoken: ({ opacity }) => `opacity ${percent(opacity)}`,
 };
 
 export const VOLUME: SwitchParameter<Channel> = {
@@ -60,7 +60,7 @@ export const VOLUME: SwitchParameter<Channel> = {
   link: "n",
   ...lens("volume"),
   key: ["v", "Volume on or off"],
-  told: ({ volume }) => `volume ${volume ? "on" : "off"}`,
+  spoken: ({ volume }) => `volume ${volume ? "on" : "off"}`,
 };
 
 export const CHANNEL: readonly Parameter<Channel>[] = [COLOR, OPACITY, VOLUME];

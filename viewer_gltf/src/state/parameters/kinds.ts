@@ -24,7 +24,7 @@ type Row<On, T extends Value> = Readonly<{
   isShown?: (on: On) => boolean;
   get: (on: On) => T;
   /** What is said once a key has set it. */
-  told: (on: On) => string;
+  spoken: (on: On) => string;
 }> & {
   /** @param value one that `accepted` gives back */
   set<S extends On>(on: S, value: T): S;

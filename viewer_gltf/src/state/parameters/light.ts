@@ -91,7 +91,7 @@ function numbersOf<K extends string & keyof TraceSettings>(
       ...numbers[name],
       get,
       set,
-      told: (on) => `${label}: ${text(get(on))}`,
+      spoken: (on) => `${label}: ${text(get(on))}`,
     };
   });
 }
@@ -103,7 +103,7 @@ const MULTIPLE: SwitchParameter<Light> = {
   link: "many",
   ...ofTrace("isMultiple"),
   key: ["M", "Scattered once or many times"],
-  told: ({ trace }) => `Scattered ${trace.isMultiple ? "many times" : "once"}`,
+  spoken: ({ trace }) => `Scattered ${trace.isMultiple ? "many times" : "once"}`,
 };
 
 export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
@@ -118,7 +118,7 @@ export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
     ENVIRONMENTS.filter((name) => name !== "own" || trace.environment === "own"),
   ownValue: "own",
   key: ["I", "Next room"],
-  told: ({ trace }) => `Room: ${trace.environment}`,
+  spoken: ({ trace }) => `Room: ${trace.environment}`,
 };
 
 export const LAMPS_SHOWN: SwitchParameter<Light> = {
@@ -130,7 +130,7 @@ export const LAMPS_SHOWN: SwitchParameter<Light> = {
   ...lens("areLampsShown"),
   isShown: isTraced,
   key: ["$", "Show or hide the lamps, to be dragged"],
-  told: ({ areLampsShown, trace }) => {
+  spoken: ({ areLampsShown, trace }) => {
     if (!areLampsShown) return "Lamps hidden";
     return trace.lamps.some(({ isOn }) => isOn) ? "Lamps shown: drag them" : "No lamp is on";
   },
@@ -144,7 +144,7 @@ const POST: SwitchParameter<Light> = {
   link: "after",
   ...ofTrace("isPostOn"),
   key: ["Z", "Before or after what comes after the light"],
-  told: ({ trace }) => (trace.isPostOn ? "After" : "Before"),
+  spoken: ({ trace }) => (trace.isPostOn ? "After" : "Before"),
 };
 
 const TONE_MAP: ChoiceParameter<Light, TraceSettings["toneMap"]> = {
@@ -155,7 +155,7 @@ const TONE_MAP: ChoiceParameter<Light, TraceSettings["toneMap"]> = {
   ...ofTrace("toneMap"),
   values: TONE_MAPS,
   names: { filmic: "Film", none: "None" },
-  told: ({ trace }) => `Tone map: ${trace.toneMap}`,
+  spoken: ({ trace }) => `Tone map: ${trace.toneMap}`,
 };
 
 export type LampParameters = Readonly<{
@@ -183,7 +183,7 @@ function lampOf(lamp: number): LampParameters {
       ...LAMP_NUMBERS[name],
       get,
       set,
-      told: (on) => `${title}, ${label.toLowerCase()}: ${text(get(on))}`,
+      spoken: (on) => `${title}, ${label.toLowerCase()}: ${text(get(on))}`,
     };
   });
   return {
@@ -196,7 +196,7 @@ function lampOf(lamp: number): LampParameters {
       name: () => `${title} on`,
       link: id,
       ...ofLamp(lamp, "isOn"),
-      told: ({ trace }) => `${title}: ${trace.lamps[lamp].isOn ? "on" : "off"}`,
+      spoken: ({ trace }) => `${title}: ${trace.lamps[lamp].isOn ? "on" : "off"}`,
     },
     color: {
       kind: "colour",
@@ -205,7 +205,7 @@ function lampOf(lamp: number): LampParameters {
       name: () => `Colour of ${title}`,
       link: `${id}/color`,
       ...ofLamp(lamp, "color"),
-      told: () => `${title}: another colour`,
+      spoken: () => `${title}: another colour`,
     },
     place: numbers.slice(0, 3),
     numbers,

@@ -28,7 +28,7 @@ export const TOOL: ChoiceParameter<ToolSettings, Tool> = {
   values: TOOLS,
   names: { select: "Select", measure: "Measure" },
   key: ["p", "A tap selects or measures"],
-  told: ({ tool }) => `A tap ${tool}s`,
+  spoken: ({ tool }) => `A tap ${tool}s`,
 };
 
 export const DWELL: SwitchParameter<ToolSettings> = {
@@ -38,7 +38,7 @@ export const DWELL: SwitchParameter<ToolSettings> = {
   link: "dwell",
   ...lens("isDwellOn"),
   key: ["j", "Choosing by gaze on or off"],
-  told: ({ isDwellOn }) => `Choosing by gaze: ${isDwellOn ? "on" : "off"}`,
+  spoken: ({ isDwellOn }) => `Choosing by gaze: ${isDwellOn ? "on" : "off"}`,
 };
 
 export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
@@ -50,7 +50,7 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   values: QUALITY_LEVELS,
   names: { auto: "Auto", low: "Low", high: "High" },
   key: ["q", "Next quality"],
-  told: ({ quality }) => `Quality: ${quality}`,
+  spoken: ({ quality }) => `Quality: ${quality}`,
 };
 
 /** By the panel's section that lists them. */

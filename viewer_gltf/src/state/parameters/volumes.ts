@@ -54,7 +54,7 @@ export const MODE: ChoiceParameter<Volumes, Mode> = {
   options: modesOf,
   fault: ({ canTrace }, mode) => (mode === "traced" && !canTrace ? NO_FLOATS : null),
   key: ["m", "Next mode: where volumes show"],
-  told: ({ mode }) => `Volumes: ${mode}`,
+  spoken: ({ mode }) => `Volumes: ${mode}`,
 };
 
 const metres = (value: number) => `${value.toPrecision(2)} m`;
@@ -78,7 +78,7 @@ export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
     more: ["S", "Larger switch distance"],
     next: (value, direction) => Number((value * DISTANCE_FACTOR ** direction).toPrecision(3)),
   },
-  told: ({ switchDistance_m }) => `Volumes within ${metres(switchDistance_m)}`,
+  spoken: ({ switchDistance_m }) => `Volumes within ${metres(switchDistance_m)}`,
 };
 
 const degrees = (value: number) => `${Number(value.toFixed(1))}°`;
@@ -99,7 +99,7 @@ export const DISC_RADIUS: NumberParameter<Volumes> = {
     more: ["D", "Larger disc"],
     next: (value, direction) => value + direction,
   },
-  told: ({ discRadius_deg }) => `Disc ${degrees(discRadius_deg)}`,
+  spoken: ({ discRadius_deg }) => `Disc ${degrees(discRadius_deg)}`,
 };
 
 /** In the panel's order. */

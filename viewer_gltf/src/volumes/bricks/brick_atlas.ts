@@ -19,7 +19,7 @@ import { drawnNodes, NOTHING, rangesOf, STORED, STORED_BYTES, type Table } from 
 
 /** Slots along an edge of an atlas: a byte tells one. */
 const MOST_SLOTS = 254;
-/** What came is shown so often: tables of leaps are made anew each time. */
+/** What came is shown so often: tables of skips are made anew each time. */
 const SHOW_EVERY_MS = 250;
 /** A cell that is the same throughout. */
 const UNIFORM = 255;

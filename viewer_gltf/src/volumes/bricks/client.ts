@@ -8,7 +8,7 @@ export type LinkAsk =
   | Readonly<{ type: "open"; tile: string; channel: string; source: string }>
   | (Readonly<{ type: "view"; texel_px: number; budget: number }> & BrickView);
 
-export type LinkTold =
+export type LinkMessage =
   | Readonly<{ type: "tree"; tile: string; channel: string; table: Uint8Array<ArrayBuffer> }>
   | Readonly<{
       type: "bricks";
@@ -57,7 +57,9 @@ export class BrickLink {
     private readonly onError: (error: unknown) => void,
   ) {
     this.worker = new Worker(new URL("./client_worker.ts", import.meta.url), { type: "module" });
-    this.worker.addEventListener("message", ({ data }: MessageEvent<LinkTold>) => this.hear(data));
+    this.worker.addEventListener("message", ({ data }: MessageEvent<LinkMessage>) =>
+      this.hear(data),
+    );
     this.post({ type: "connect", address });
   }
 
@@ -85,7 +87,7 @@ export class BrickLink {
     this.post({ type: "view", texel_px: TEXEL_PX, budget: BUDGET_BYTES, ...view });
   }
 
-  private hear(told: LinkTold): void {
+  private hear(told: LinkMessage): void {
     switch (told.type) {
       case "tree": {
         const name = `${told.tile}/${told.channel}`;

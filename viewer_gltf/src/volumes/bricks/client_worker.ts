@@ -4,7 +4,7 @@
  */
 import { ZSTDDecoder } from "zstddec";
 import { BrickCache, type KeptBrick } from "./cache";
-import type { LinkAsk, LinkTold } from "./client";
+import type { LinkAsk, LinkMessage } from "./client";
 import { BRICKS_FRAME, type Frame, parseFrame, type ServerMessage, TABLE_FRAME } from "./protocol";
 import { haveBits, hexOf, parseTable, STORED_BYTES, type Table } from "./tree";
 
@@ -45,7 +45,7 @@ let viewId = 0;
 /** Answers are taken one after the other. */
 let turn: Promise<void> = decoder.init();
 
-function tell(told: LinkTold, transfer: Transferable[] = []): void {
+function tell(told: LinkMessage, transfer: Transferable[] = []): void {
   self.postMessage(told, { transfer });
 }
 

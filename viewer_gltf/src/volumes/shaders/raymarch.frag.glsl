@@ -39,7 +39,7 @@ uniform float uFresh;  // 0..1: share of the new one
 uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
 uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
 #ifdef TWO_D
-uniform sampler2DArray uPlanes;  // 256 x 64 x CHANNELS: the same by value and steepness
+uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by value and steepness
 #endif
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
@@ -127,13 +127,13 @@ void main() {
   for (; i < steps && t < end && sum.a < OPAQUE; i++) {
     // What remains of the ray over what remains of the budget: it always reaches the end.
     float dt = max(uMinStep, (end - t) / float(steps - i));
-    // A loop of its own: rays beside each other then sample together, whatever they leapt over.
+    // A loop of its own: rays beside each other then sample together, whatever they skipped.
     while (t >= exit) {
       vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-      // By whole steps, so that samples lie where they would without leaps.
-      float leap = block.y * floor((block.x - t) / dt) * dt;
-      exit = leap > 0.0 ? t + leap : block.x;
-      if (leap <= 0.0) break;
+      // By whole steps, so that samples lie where they would without skips.
+      float skip = block.y * floor((block.x - t) / dt) * dt;
+      exit = skip > 0.0 ? t + skip : block.x;
+      if (skip <= 0.0) break;
       t = exit;
       if (++i >= steps || t >= end) break;
       dt = max(uMinStep, (end - t) / float(steps - i));

@@ -34,7 +34,7 @@ export class Plane {
   private readonly texture: CanvasTexture;
   private readonly context: CanvasRenderingContext2D;
   private painted = "";
-  private readonly toPlane = new Matrix4();
+  private readonly toQuad = new Matrix4();
 
   constructor(
     readonly width: number,
@@ -93,9 +93,9 @@ export class Plane {
   /** Where a ray meets its front; null: not at all, or it is not shown. */
   meet({ origin, direction }: RoomRay): Spot | null {
     if (!this.mesh.visible) return null;
-    this.toPlane.copy(this.mesh.matrixWorld).invert();
-    const from = origin.clone().applyMatrix4(this.toPlane);
-    const to = direction.clone().transformDirection(this.toPlane);
+    this.toQuad.copy(this.mesh.matrixWorld).invert();
+    const from = origin.clone().applyMatrix4(this.toQuad);
+    const to = direction.clone().transformDirection(this.toQuad);
     if (from.z <= 0 || to.z >= 0) return null;
     const distance_m = -from.z / to.z; // the plane is not scaled
     const x = (from.x + distance_m * to.x) * PX_PER_M + this.width / 2;

@@ -5,15 +5,15 @@
 import { type Matrix4, Vector3 } from "three";
 import { Plane } from "./canvas_plane";
 import {
-  advanceTelling,
-  NOTHING_TOLD,
-  type Telling,
-  TOLD_HEIGHT,
-  TOLD_WIDTH,
+  type Announcements,
+  advanceAnnouncements,
+  NO_ANNOUNCEMENTS,
+  NOTICE_HEIGHT,
+  NOTICE_WIDTH,
+  noticeMarks,
   tell,
-  toldMarks,
 } from "./notice_queue";
-import { headBearing, pointAt, toldBearing } from "./placement";
+import { headBearing, noticeBearing, pointAt } from "./placement";
 
 /** Nearer than the specimen mostly is, and not so near that eyes have to cross. */
 const DISTANCE_M = 0.9;
@@ -21,8 +21,8 @@ const DISTANCE_M = 0.9;
 const RENDER_ORDER = 1900;
 
 export class RoomNotice {
-  private readonly plane = new Plane(TOLD_WIDTH, TOLD_HEIGHT);
-  private telling: Telling = NOTHING_TOLD;
+  private readonly plane = new Plane(NOTICE_WIDTH, NOTICE_HEIGHT);
+  private announcements: Announcements = NO_ANNOUNCEMENTS;
   /** It comes with the next frame, which knows where the head looks. */
   private wantsPlace = false;
 
@@ -40,16 +40,16 @@ export class RoomNotice {
 
   /** What can be read now. */
   get texts(): readonly string[] {
-    return this.telling.texts;
+    return this.announcements.texts;
   }
 
   tell(text: string): void {
-    this.telling = tell(this.telling, text);
+    this.announcements = tell(this.announcements, text);
     this.wantsPlace = true;
   }
 
   clear(): void {
-    this.telling = NOTHING_TOLD;
+    this.announcements = NO_ANNOUNCEMENTS;
     this.wantsPlace = false;
     this.mesh.visible = false;
   }
@@ -60,11 +60,11 @@ export class RoomNotice {
     if (this.wantsPlace) {
       this.wantsPlace = false;
       const eye = new Vector3().setFromMatrixPosition(head);
-      this.plane.place(pointAt(toldBearing(headBearing(head)), eye, DISTANCE_M), eye);
-    } else this.telling = advanceTelling(this.telling, dt_s);
+      this.plane.place(pointAt(noticeBearing(headBearing(head)), eye, DISTANCE_M), eye);
+    } else this.announcements = advanceAnnouncements(this.announcements, dt_s);
     this.mesh.visible = this.texts.length > 0;
     if (!this.mesh.visible) return wasShown;
-    return this.plane.show(toldMarks(this.texts)) || !wasShown;
+    return this.plane.show(noticeMarks(this.texts)) || !wasShown;
   }
 
   dispose(): void {

@@ -5,50 +5,50 @@
 import { type Mark, type Rect, TEXT, text } from "../../panel/canvas/draw_list";
 
 /** The oldest has been read by then; the next one has as long from then on. */
-export const TOLD_S = 6;
+export const ANNOUNCED_S = 6;
 const MOST = 3;
 
-export type Telling = Readonly<{
+export type Announcements = Readonly<{
   texts: readonly string[];
   /** How long the oldest has been the oldest. */
   elapsed_s: number;
 }>;
-export const NOTHING_TOLD: Telling = { texts: [], elapsed_s: 0 };
+export const NO_ANNOUNCEMENTS: Announcements = { texts: [], elapsed_s: 0 };
 
 /** What is told again is the newest again. */
-export function tell({ texts, elapsed_s }: Telling, newest: string): Telling {
+export function tell({ texts, elapsed_s }: Announcements, newest: string): Announcements {
   const others = texts.filter((each) => each !== newest).slice(1 - MOST);
   return { texts: [...others, newest], elapsed_s: others[0] === texts[0] ? elapsed_s : 0 };
 }
 
 /** Returns the same object while nothing is told. */
-export function advanceTelling(telling: Telling, dt_s: number): Telling {
-  const { texts } = telling;
-  if (texts.length === 0) return telling;
-  const elapsed_s = telling.elapsed_s + dt_s;
-  if (elapsed_s < TOLD_S) return { texts, elapsed_s };
-  return texts.length === 1 ? NOTHING_TOLD : { texts: texts.slice(1), elapsed_s: 0 };
+export function advanceAnnouncements(announcements: Announcements, dt_s: number): Announcements {
+  const { texts } = announcements;
+  if (texts.length === 0) return announcements;
+  const elapsed_s = announcements.elapsed_s + dt_s;
+  if (elapsed_s < ANNOUNCED_S) return { texts, elapsed_s };
+  return texts.length === 1 ? NO_ANNOUNCEMENTS : { texts: texts.slice(1), elapsed_s: 0 };
 }
 
 /** px: as wide as half of what a Cardboard shows, 0.9 m away. */
-export const TOLD_WIDTH = 840;
+export const NOTICE_WIDTH = 840;
 const PAD = 16;
 const LINE = Math.ceil(1.15 * TEXT);
 /** Letters are about half as wide as they are high, words break early. */
-const LETTERS = Math.floor((TOLD_WIDTH - 4 * PAD) / (0.58 * TEXT));
+const LETTERS = Math.floor((NOTICE_WIDTH - 4 * PAD) / (0.58 * TEXT));
 const MOST_LINES = 4;
-export const TOLD_HEIGHT = MOST * (MOST_LINES * LINE + 3 * PAD);
+export const NOTICE_HEIGHT = MOST * (MOST_LINES * LINE + 3 * PAD);
 
 /** From the top of the plane; what is not covered stays clear. */
-export function toldMarks(texts: readonly string[]): readonly Mark[] {
+export function noticeMarks(texts: readonly string[]): readonly Mark[] {
   let y = 0;
   return texts.flatMap((words): Mark[] => {
     const lines = Math.min(MOST_LINES, Math.ceil(words.length / LETTERS));
-    const rect: Rect = { x: 0, y, width: TOLD_WIDTH, height: lines * LINE + 2 * PAD };
+    const rect: Rect = { x: 0, y, width: NOTICE_WIDTH, height: lines * LINE + 2 * PAD };
     y += rect.height + PAD;
     return [
       { kind: "box", rect, fill: "back", stroke: "line", radius: PAD },
-      text({ ...rect, x: PAD, width: TOLD_WIDTH - 2 * PAD }, words, { lines }),
+      text({ ...rect, x: PAD, width: NOTICE_WIDTH - 2 * PAD }, words, { lines }),
     ];
   });
 }

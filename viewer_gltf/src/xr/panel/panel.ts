@@ -4,14 +4,14 @@
  */
 import { Group, type Matrix4, Vector3 } from "three";
 import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
-import { holds, type PlaneWish, type Rect, type Region, text } from "../../panel/canvas/draw_list";
+import { type CanvasWish, holds, type Rect, type Region, text } from "../../panel/canvas/draw_list";
 import {
+  type CanvasView,
   HEIGHT,
   type Page,
-  type PlaneView,
   PX_PER_M,
   pageOf,
-  START_PLANE,
+  START_CANVAS,
   WIDTH,
 } from "../../panel/canvas/page";
 import { changePanel, type Layout, type PanelView, START_VIEW } from "../../panel/controls";
@@ -39,7 +39,7 @@ export type RoomPanelOptions = Readonly<{
   onWish: (wish: Action | Command) => void;
   onLeave: () => void;
   /** What was asked for can't be done: why. */
-  onTell: (text: string) => void;
+  onAnnounce: (text: string) => void;
 }>;
 
 export class RoomPanel {
@@ -50,7 +50,7 @@ export class RoomPanel {
   readonly targets: readonly Target[];
   private page: Page = { marks: [], regions: [] };
   private view: PanelView = START_VIEW;
-  private section: PlaneView = START_PLANE;
+  private section: CanvasView = START_CANVAS;
   private state: ViewerState | null = null;
   private isStale = true;
   private rested_s = 0;
@@ -226,7 +226,7 @@ export class RoomPanel {
   }
 
   /** Beyond a region's ends is at its ends: a slider is dragged past them. */
-  private wishAt(key: string, ray: RoomRay, isPress: boolean): PlaneWish | null {
+  private wishAt(key: string, ray: RoomRay, isPress: boolean): CanvasWish | null {
     const region = this.page.regions.find(({ id }) => PANEL + id === key);
     const spot = this.plane.meet(ray);
     if (region === undefined || spot === null) return null;
@@ -236,15 +236,15 @@ export class RoomPanel {
     return isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
   }
 
-  private grant(wish: PlaneWish): void {
+  private grant(wish: CanvasWish): void {
     this.isStale = true;
     if (typeof wish === "string") this.options.onWish(wish);
     else if ("panel" in wish) this.view = changePanel(this.view, wish);
     else if ("type" in wish) this.options.onWish(wish);
-    else if (wish.plane === "tab") this.section = { tab: wish.section, page: 0 };
-    else if (wish.plane === "page") this.section = { ...this.section, page: wish.page };
-    else if (wish.plane === "tell") this.options.onTell(wish.text);
-    else if (wish.plane === "close") this.close();
+    else if (wish.canvas === "tab") this.section = { tab: wish.section, page: 0 };
+    else if (wish.canvas === "page") this.section = { ...this.section, page: wish.page };
+    else if (wish.canvas === "announce") this.options.onAnnounce(wish.text);
+    else if (wish.canvas === "close") this.close();
     else this.options.onLeave();
   }
 }

@@ -1,6 +1,6 @@
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { bearingOf, extentOf, followHead, placePanel, pointAt, toldBearing } from "./placement";
+import { bearingOf, extentOf, followHead, noticeBearing, placePanel, pointAt } from "./placement";
 
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.3, 1.6, -0.2);
@@ -49,12 +49,12 @@ describe("the panel's place", () => {
 
 describe("what is told", () => {
   it("is under the gaze, but for one at the floor", () => {
-    expect(toldBearing({ yaw: 1, pitch: 0.2 })).toEqual({
+    expect(noticeBearing({ yaw: 1, pitch: 0.2 })).toEqual({
       yaw: 1,
       pitch: expect.closeTo(0.2 - 20 * DEG, 12),
     });
-    expect(toldBearing({ yaw: 0, pitch: -50 * DEG }).pitch).toBeCloseTo(-60 * DEG);
-    expect(toldBearing({ yaw: 0, pitch: -80 * DEG }).pitch).toBeCloseTo(-80 * DEG);
+    expect(noticeBearing({ yaw: 0, pitch: -50 * DEG }).pitch).toBeCloseTo(-60 * DEG);
+    expect(noticeBearing({ yaw: 0, pitch: -80 * DEG }).pitch).toBeCloseTo(-80 * DEG);
   });
 });
 

@@ -26,12 +26,12 @@ const LOOKING_DOWN = -20 * DEG;
 const FOLLOW_PER_S = 4;
 
 /** So far under the gaze is the middle of what is told: it covers nothing that is looked at. */
-const TOLD_BELOW = 20 * DEG;
+const NOTICE_BELOW = 20 * DEG;
 /** Whoever looks at the floor reads it there. */
-const TOLD_LOWEST = -60 * DEG;
+const NOTICE_LOWEST = -60 * DEG;
 
-export function toldBearing({ yaw, pitch }: Bearing): Bearing {
-  return { yaw, pitch: Math.max(pitch - TOLD_BELOW, Math.min(pitch, TOLD_LOWEST)) };
+export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
+  return { yaw, pitch: Math.max(pitch - NOTICE_BELOW, Math.min(pitch, NOTICE_LOWEST)) };
 }
 
 export function bearingOf(direction: Vector3): Bearing {

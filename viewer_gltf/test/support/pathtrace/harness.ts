@@ -52,7 +52,7 @@ export type Run = Readonly<{
   share?: number;
   /** How the same medium is told: as so many alike channels, by value and gradient, in bricks. */
   channels?: 1 | 2 | 4;
-  isPlane?: boolean;
+  isTwoD?: boolean;
   isBricked?: boolean;
   /** As while the picture moves. */
   isDraft?: boolean;
@@ -137,7 +137,7 @@ function looksOf(run: Run) {
   run.opacities.forEach((opacity, i) => {
     table[4 * i + 3] = Math.round(255 * (1 - (1 - opacity / 255) ** (1 / count)));
   });
-  const plane = run.isPlane ? { cells: alikeRows(table), gradientMax: 0.5, envelope: table } : null;
+  const plane = run.isTwoD ? { cells: alikeRows(table), gradientMax: 0.5, envelope: table } : null;
   return Array.from({ length: count }, () => ({ color: run.color, table, plane }));
 }
 

@@ -19,7 +19,7 @@ import { occupancyDistances } from "../../../src/volumes/empty_space";
 import { brickCounts } from "../../../src/volumes/skip_bricks";
 import { makeFrame, TileMarch } from "../../../src/volumes/tile_raymarch";
 import { opacities } from "../../../src/volumes/transfer_luts";
-import type { PlaneTable } from "../../../src/volumes/transfer_table_2d";
+import type { TransferTable2d } from "../../../src/volumes/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
 
@@ -70,9 +70,9 @@ export function marchOf(
   texels: Uint8Array<ArrayBuffer>,
   bricks: Uint8Array,
   table: Uint8Array,
-  hasLeaps: boolean,
+  hasSkips: boolean,
   depth: DepthPass,
-  plane: PlaneTable | null = null,
+  plane: TransferTable2d | null = null,
 ): TileMarch {
   const [side] = volume.size;
   const frame = makeFrame(depth.texture);
@@ -83,8 +83,8 @@ export function marchOf(
   march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
   march.dress([{ color: [1, 1, 1], table, plane, isInDisc: false }]);
   const count = brickCounts(volume.size);
-  const leaps = { bricks: [bricks], alphas: [opacities(table)], count };
-  if (hasLeaps) march.leapBy(occupancyDistances(leaps));
+  const skips = { bricks: [bricks], alphas: [opacities(table)], count };
+  if (hasSkips) march.skipBy(occupancyDistances(skips));
   return march;
 }
 
@@ -211,15 +211,15 @@ export function randomScene(seed: number, side: number) {
   return { texels, table, bricks };
 }
 
-/** The picture of a random scene with leaps and without: the largest difference, and what shows. */
-function compareLeaps(seed: number): Readonly<{ apart: number; drawn: number }> {
+/** The picture of a random scene with skips and without: the largest difference, and what shows. */
+function compareSkips(seed: number): Readonly<{ apart: number; drawn: number }> {
   const side = 51; // shorter rays than steps: then samples lie at whole voxels
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
   const { texels, table, bricks } = randomScene(seed, side);
-  const [leaping, plain] = [true, false].map((hasLeaps) =>
+  const [skipping, plain] = [true, false].map((hasSkips) =>
     draw(
-      [marchOf(cube(side), texels, bricks, table, hasLeaps, depth)],
+      [marchOf(cube(side), texels, bricks, table, hasSkips, depth)],
       diagonalCamera(side - 3),
       depth,
       renderer,
@@ -227,7 +227,7 @@ function compareLeaps(seed: number): Readonly<{ apart: number; drawn: number }> 
   );
   renderer.dispose();
   const drawn = plain.filter((v, i) => i % 4 === 3 && v > 0).length;
-  return { apart: Math.max(...plain.map((v, i) => Math.abs(v - leaping[i]))), drawn };
+  return { apart: Math.max(...plain.map((v, i) => Math.abs(v - skipping[i]))), drawn };
 }
 
 /** Intensities of a cube from 0 to 255 along x, or 255 everywhere. */
@@ -259,7 +259,7 @@ function meanOpacity(filling: Filling, side: number, opacity: number): number {
   return inner.reduce((a, b) => a + b, 0) / inner.length;
 }
 
-const harness = { countSteps, countThrough, compareLeaps, meanOpacity };
+const harness = { countSteps, countThrough, compareSkips, meanOpacity };
 export type Harness = typeof harness;
 
 Object.assign(window, { harness });

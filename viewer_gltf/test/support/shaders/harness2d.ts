@@ -4,7 +4,11 @@ import type { Range } from "../../../src/bundle/transfer_2d";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { DepthPass } from "../../../src/render/depth_pass";
 import { makeShape } from "../../../src/state/transfer_shapes";
-import { alikeRows, type PlaneTable, planeTable } from "../../../src/volumes/transfer_table_2d";
+import {
+  alikeRows,
+  type TransferTable2d,
+  transferTable2d,
+} from "../../../src/volumes/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
 import { cube, diagonalCamera, draw, marchOf, PIXELS, randomScene } from "./harness";
@@ -15,9 +19,9 @@ const EDGE = SIDE - 3;
 const SLOPE = { from: 20, length: 8 };
 
 /** A plane of one shape with hard edges. */
-function onePlane(values: Range, gradients: Range, opacity: number): PlaneTable {
+function oneTable2d(values: Range, gradients: Range, opacity: number): TransferTable2d {
   const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), values, gradients };
-  return planeTable(
+  return transferTable2d(
     [{ ...shape, softness: 0, opacity }],
     { gradient_max: 0.5, functions: {} },
     [0, 1],
@@ -39,7 +43,7 @@ function showSlope(values: Range, gradients: Range, opacity: number): number[] {
     texels[i] = Math.round(255 * Math.min(1, Math.max(0, x)));
   }
   const bricks = makeBricks({ size: [SIDE, SIDE, SIDE], texels }).texels;
-  const plane = onePlane(values, gradients, opacity);
+  const plane = oneTable2d(values, gradients, opacity);
   const march = marchOf(cube(SIDE), texels, bricks, plane.envelope, true, depth, plane);
   const away = 300;
   const fov_deg = (2 * Math.atan(0.5 / away) * 180) / Math.PI;
@@ -77,8 +81,8 @@ function compareAlike(seed: number): Apart {
   return compare(flat, plane);
 }
 
-/** The picture of random shapes with leaps and without. */
-function compareLeaps2d(seed: number): Apart {
+/** The picture of random shapes with skips and without. */
+function compareSkips2d(seed: number): Apart {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
   const { texels, bricks } = randomScene(seed, SIDE);
@@ -87,20 +91,20 @@ function compareLeaps2d(seed: number): Apart {
     ...makeShape(i % 2 ? "rectangle" : "triangle", { value: random(), gradient: random() }),
     opacity: random(),
   }));
-  const plane = planeTable(shapes, { gradient_max: 0.2, functions: {} }, [0, 1], 1);
-  const [leaping, plain] = [true, false].map((hasLeaps) =>
+  const plane = transferTable2d(shapes, { gradient_max: 0.2, functions: {} }, [0, 1], 1);
+  const [skipping, plain] = [true, false].map((hasSkips) =>
     draw(
-      [marchOf(cube(SIDE), texels, bricks, plane.envelope, hasLeaps, depth, plane)],
+      [marchOf(cube(SIDE), texels, bricks, plane.envelope, hasSkips, depth, plane)],
       diagonalCamera(EDGE),
       depth,
       renderer,
     ),
   );
   renderer.dispose();
-  return compare(plain, leaping);
+  return compare(plain, skipping);
 }
 
-const harness = { showSlope, compareAlike, compareLeaps2d };
+const harness = { showSlope, compareAlike, compareSkips2d };
 export type Harness2d = typeof harness;
 
 Object.assign(window, { harness });
