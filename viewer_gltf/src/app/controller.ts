@@ -140,9 +140,9 @@ export class Controller {
   followAddress(search: string, hash: string): void {
     const { viewer } = this;
     const { bounds_um } = viewer.bundle.manifest.specimen;
-    const { actions, look } = readLink(hash, viewer.state, bounds_um);
+    const { actions, camera } = readLink(hash, viewer.state, bounds_um);
     for (const action of [...settingsOf(search), ...actions]) viewer.dispatch(action);
-    if (look !== null) viewer.lookFrom(look);
+    if (camera !== null) viewer.lookFrom(camera);
   }
 
   private run(command: Command): void {
@@ -166,7 +166,7 @@ export class Controller {
   /** On the page, and in stereo before the eyes, which don't see the page. */
   private say(text: string): void {
     this.said.say(text);
-    this.viewer.stereo.tell(text);
+    this.viewer.stereo.announce(text);
   }
 
   private unfold(section: string): void {
@@ -221,7 +221,7 @@ export class Controller {
       state: viewer.state,
       view,
       shown: this.shown,
-      gazed: viewer.snapshot().gazed,
+      focusTile: viewer.snapshot().gazed,
     };
     const wish = wishOf(name, context);
     if (wish === null) return false;
@@ -243,7 +243,7 @@ export class Controller {
     const address = new URL(location.href);
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
-    address.hash = writeLink(viewer.state, start, viewer.look);
+    address.hash = writeLink(viewer.state, start, viewer.cameraView);
     history.replaceState(history.state, "", address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
@@ -263,8 +263,16 @@ export class Controller {
     const { viewer, stereo } = this;
     const hasHistogram = isHistogramOpen && picked !== null && this.ranges.has(picked);
     const { specimen } = viewer.bundle.manifest;
-    const { triangles, volumes, traced, isLoading, gazed, frame_ms, isStereo, settings } =
-      viewer.snapshot();
+    const {
+      triangles,
+      volumes,
+      traced,
+      isLoading,
+      gazed: focusTile,
+      frame_ms,
+      isStereo,
+      settings,
+    } = viewer.snapshot();
     const drawn = [...volumes, traced];
     const levels = drawn.flatMap(({ level }) => (level === null ? [] : [level]));
     return {
@@ -273,7 +281,7 @@ export class Controller {
       shown: this.shown,
       ranges: this.ranges,
       histogram: hasHistogram ? viewer.histogram(picked) : null,
-      gazed,
+      focusTile,
       isStereo,
       stereo,
       split: SPLIT,

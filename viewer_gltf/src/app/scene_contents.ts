@@ -34,7 +34,7 @@ export class Contents {
   /** The same volumes by paths of light, in the mode `traced`. */
   readonly traced: TracedVolume;
   /** Two-dimensional transfer functions. */
-  readonly planes: TransferFunctions2dLoader;
+  readonly transferFunctions2d: TransferFunctions2dLoader;
   readonly marks: Marks;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
@@ -61,9 +61,9 @@ export class Contents {
     const { bricks } = this;
     this.traced = new TracedVolume(this.volumes, bricks, limits, uSceneDepth, onChange, onError);
     picture.add(this.traced.group);
-    this.planes = new TransferFunctions2dLoader(
+    this.transferFunctions2d = new TransferFunctions2dLoader(
       bundle,
-      (channel, plane) => options.dispatch({ type: "learn-transfer-2d", channel, plane }),
+      (channel, transfer2d) => options.dispatch({ type: "learn-transfer-2d", channel, transfer2d }),
       onChange,
       onError,
     );
@@ -95,14 +95,15 @@ export class Contents {
       this.surfaces.isLoading ||
       this.volumes.isLoading ||
       this.traced.isLoading ||
-      this.planes.isLoading ||
+      this.transferFunctions2d.isLoading ||
       !this.surfaces.overview.isComplete
     );
   }
 
   follow(state: ViewerState, { focusTiles, mayRefine }: Hybrid): void {
     const wanted = this.hasOverview ? wantedTiles(state, focusTiles) : [];
-    for (const channel of volumeChannels(state)) if (isTwoD(channel)) this.planes.want(channel.id);
+    for (const channel of volumeChannels(state))
+      if (isTwoD(channel)) this.transferFunctions2d.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);
     this.traced.follow(state);
     this.surfaces.follow(state, focusTiles);
@@ -114,7 +115,7 @@ export class Contents {
     this.surfaces.retryFailed();
     this.volumes.retryFailed();
     this.traced.retryFailed();
-    this.planes.retryFailed();
+    this.transferFunctions2d.retryFailed();
     this.marks.readAnew();
   }
 

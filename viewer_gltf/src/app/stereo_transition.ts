@@ -8,7 +8,7 @@ import type { HandPose, SpecimenPose } from "../math/grab";
 import { XR_DISTANCE_M } from "../render/placement";
 import { intoRoom, ontoScreen } from "../render/screen_to_room";
 import type { Specimen } from "../render/specimen_pose";
-import type { Look } from "../share/camera_link";
+import type { CameraView } from "../share/camera_link";
 
 export class StereoTransition {
   /** In stereo: where the specimen was when it began, in the room and on the screen. */
@@ -41,7 +41,7 @@ export class StereoTransition {
   }
 
   /** From where the specimen is seen; null: as it opens. */
-  get look(): Look | null {
+  get cameraView(): CameraView | null {
     const { navigation, poseOnScreen: pose } = this;
     const eye = pose === null ? navigation.look : navigation.lookNow;
     if (eye === null || pose === null) return eye && { ...eye, specimen: null };
@@ -50,7 +50,7 @@ export class StereoTransition {
     return { ...eye, specimen };
   }
 
-  lookFrom({ position, target, specimen }: Look): void {
+  lookFrom({ position, target, specimen }: CameraView): void {
     this.navigation.lookFrom({ position, target });
     if (specimen === null) return;
     const pose = {

@@ -15,7 +15,7 @@ import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
 import { place, XR_DISTANCE_M } from "../render/placement";
 import { Room } from "../render/scene";
-import type { Look } from "../share/camera_link";
+import type { CameraView } from "../share/camera_link";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
@@ -110,7 +110,7 @@ export class Viewer {
       layOut: (view) => this.layOut(view),
       onAction: (action) => this.dispatch(action),
       onCommand: (command) => {
-        if (!this.run(command)) this.stereo.tell(CANT);
+        if (!this.run(command)) this.stereo.announce(CANT);
       },
       onChoose: (ray, tile) => this.choose(ray, tile),
       onStart: () => this.enterStereo(),
@@ -161,7 +161,7 @@ export class Viewer {
     const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
     this.state = next;
-    if (notice !== null) this.stereo.tell(notice);
+    if (notice !== null) this.stereo.announce(notice);
     if (announcement !== null) this.onAnnounce(announcement);
     this.follow();
     if (this.lamps.length > before) this.bringLampsInSight();
@@ -224,12 +224,12 @@ export class Viewer {
   }
 
   /** From where the specimen is seen; null: as it opens. */
-  get look(): Look | null {
-    return this.transition.look;
+  get cameraView(): CameraView | null {
+    return this.transition.cameraView;
   }
 
-  lookFrom(look: Look): void {
-    this.transition.lookFrom(look);
+  lookFrom(view: CameraView): void {
+    this.transition.lookFrom(view);
     this.loop.change();
   }
 
@@ -244,7 +244,7 @@ export class Viewer {
       volumes: volumes.status(),
       volumeBytes: volumes.bytes,
       traced: this.contents.traced.status(),
-      gazed: this.hybrid.focusTiles.gazed,
+      gazed: this.hybrid.focusTiles.focusTile,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
       frame_ms: this.loop.frame_ms,
       settings: this.loop.settings,
@@ -280,7 +280,7 @@ export class Viewer {
 
   /** Voxels of a channel by value and gradient; null: not yet, it is being fetched. */
   histogram(channel: string): Histogram | null {
-    return this.contents.planes.histogram(channel);
+    return this.contents.transferFunctions2d.histogram(channel);
   }
 
   /** Ask again for all that has failed. */

@@ -28,15 +28,15 @@ describe("a job that may be tried again", () => {
   });
 
   it("is told once as waiting, and once as done, however many wait", async () => {
-    const told: boolean[] = [];
-    watchWaiting((isWaiting) => told.push(isWaiting));
+    const reported: boolean[] = [];
+    watchWaiting((isWaiting) => reported.push(isWaiting));
     const jobs = [1, 2, 3].map((n) => failing(n, new TemporaryError("busy")));
     await Promise.all(jobs.map((job) => withRetries(job, null, [5, 5, 5])));
-    expect(told).toEqual([true, false]);
+    expect(reported).toEqual([true, false]);
     await expect(withRetries(failing(9, new TemporaryError("busy")), null, [0])).rejects.toThrow();
-    expect(told).toEqual([true, false, true, false]);
+    expect(reported).toEqual([true, false, true, false]);
     await withRetries(async () => 1, null, [0]);
-    expect(told).toHaveLength(4);
+    expect(reported).toHaveLength(4);
   });
 
   it("stops at once when it is no longer wanted while it rests", async () => {

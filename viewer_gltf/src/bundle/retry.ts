@@ -12,8 +12,8 @@ export type WaitListener = (isWaiting: boolean) => void;
 let listener: WaitListener = () => undefined;
 let waiting = 0;
 
-export function watchWaiting(told: WaitListener): void {
-  listener = told;
+export function watchWaiting(onWaiting: WaitListener): void {
+  listener = onWaiting;
 }
 
 function count(change: 1 | -1): void {

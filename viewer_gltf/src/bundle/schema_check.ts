@@ -17,9 +17,9 @@ function checkSchema(schema: object, value: unknown, path: string): void {
   if (result.valid) return;
   // The innermost error says most; after a wrong tuple the validator adds a bare "false".
   const depth = (unit: OutputUnit) => unit.instanceLocation.split("/").length;
-  const told = result.errors.filter((unit) => unit.keyword !== "false");
-  const { instanceLocation, error } = (told.length > 0 ? told : result.errors).reduce((a, b) =>
-    depth(b) >= depth(a) ? b : a,
+  const specific = result.errors.filter((unit) => unit.keyword !== "false");
+  const { instanceLocation, error } = (specific.length > 0 ? specific : result.errors).reduce(
+    (a, b) => (depth(b) >= depth(a) ? b : a),
   );
   const field = instanceLocation.replace(/^#\/?/, "").replaceAll("/", ".");
   throw new BundleError(`${path}: ${field === "" ? "" : `${field}: `}${error}`);

@@ -1,19 +1,19 @@
 import { describe, expect, it } from "vitest";
 import { memoryBudget } from "./memory_budget";
 
-const DESK = "Mozilla/5.0 (X11; Linux x86_64) Chrome/140.0";
+const DESKTOP = "Mozilla/5.0 (X11; Linux x86_64) Chrome/140.0";
 const MIB = 1024 * 1024;
 
 describe("the memory that a device is asked for", () => {
   it("is 128 MiB of volumes on a phone, or where there is little", () => {
-    const phone = memoryBudget({ userAgent: `${DESK} Mobile (Linux; Android 13)` });
+    const phone = memoryBudget({ userAgent: `${DESKTOP} Mobile (Linux; Android 13)` });
     expect(phone.volumes).toBe(128 * MIB);
-    expect(memoryBudget({ userAgent: DESK, deviceMemory: 4 })).toEqual(phone);
+    expect(memoryBudget({ userAgent: DESKTOP, deviceMemory: 4 })).toEqual(phone);
   });
 
   it("is more on a computer", () => {
-    const desk = memoryBudget({ userAgent: DESK, deviceMemory: 8 });
-    expect(desk.volumes).toBeGreaterThan(128 * MIB);
-    expect(memoryBudget({ userAgent: DESK })).toEqual(desk);
+    const desktop = memoryBudget({ userAgent: DESKTOP, deviceMemory: 8 });
+    expect(desktop.volumes).toBeGreaterThan(128 * MIB);
+    expect(memoryBudget({ userAgent: DESKTOP })).toEqual(desktop);
   });
 });

@@ -35,13 +35,13 @@ export class Store {
 
   static async open(name: string, ledgerKey: string, limit_bytes = LIMIT_BYTES): Promise<Store> {
     const cache = await caches.open(name);
-    const told = fromText((await (await cache.match(ledgerKey))?.text()) ?? "");
+    const stored = fromText((await (await cache.match(ledgerKey))?.text()) ?? "");
     const ledger = new Map<string, Use>();
     for (const { url } of await cache.keys()) {
       if (url === ledgerKey) continue;
       // An entry that the ledger lost counts as old; its size is in its own headers.
-      const bytes = told.has(url) ? 0 : await sizeOf(cache, url);
-      ledger.set(url, told.get(url) ?? { bytes, used_ms: 0 });
+      const bytes = stored.has(url) ? 0 : await sizeOf(cache, url);
+      ledger.set(url, stored.get(url) ?? { bytes, used_ms: 0 });
     }
     return new Store(cache, ledgerKey, ledger, limit_bytes);
   }

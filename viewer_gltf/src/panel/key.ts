@@ -9,7 +9,7 @@ export type KeyContext = Readonly<{
   view: PanelView;
   /** The specimen, or the isolated tile; um, world. */
   shown: Box;
-  gazed: string | null;
+  focusTile: string | null;
 }>;
 
 export type Key = Readonly<{

@@ -28,13 +28,13 @@ const CONTEXT: KeyContext = {
     {
       type: "learn-transfer-2d",
       channel: "c0",
-      plane: { gradient_max: 0.5, functions: {} },
+      transfer2d: { gradient_max: 0.5, functions: {} },
     } as const,
     { type: "set", id: "mode", value: "traced" } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,
   shown: SPECIMEN_BOX,
-  gazed: "r0_c2",
+  focusTile: "r0_c2",
 };
 
 describe("the keys", () => {
@@ -194,7 +194,7 @@ describe("the keys", () => {
   it("do nothing where there is nothing to do", () => {
     expect(wishOf("0", CONTEXT)).toBeNull();
     expect(wishOf("F12", CONTEXT)).toBeNull();
-    expect(wishOf("g", { ...CONTEXT, gazed: null })).toBeNull();
+    expect(wishOf("g", { ...CONTEXT, focusTile: null })).toBeNull();
   });
 
   it("go to the next tile, also of those that are shown alone", () => {

@@ -23,7 +23,7 @@ const FACTS: Facts = {
   subtitle: "",
   shown: SPECIMEN_BOX,
   ranges: new Map([["c0", [100, 1120]]]),
-  gazed: "r1_c2",
+  focusTile: "r1_c2",
   isStereo: false,
   stereo: { isAvailable: false, reason: "No headset was found." },
   split: null,
@@ -192,11 +192,11 @@ describe("the panel's layout", () => {
 
   it("offers in stereo to try again what another try may mend, as long as it is told", () => {
     const facts = { ...FACTS, isStereo: true };
-    const tell = (isMendable: boolean) =>
+    const withNotice = (isMendable: boolean) =>
       reduce(start(), { type: "notify", text: "a fault", isMendable });
-    const retry = find(laid(tell(true), START_VIEW, facts), "button", "retry");
+    const retry = find(laid(withNotice(true), START_VIEW, facts), "button", "retry");
     expect(retry.to()).toBe("retry");
-    const others = controlsOf(laid(tell(false), START_VIEW, facts)).map(({ id }) => id);
+    const others = controlsOf(laid(withNotice(false), START_VIEW, facts)).map(({ id }) => id);
     expect(others).toContain("dismiss-0");
     expect(others).not.toContain("retry");
   });

@@ -28,7 +28,7 @@ export type Facts = StereoSupport &
     /** Of the channel whose joint histogram is open, if it has come. */
     histogram?: Histogram | null;
     /** The tile that is looked at. */
-    gazed: string | null;
+    focusTile: string | null;
     isStereo: boolean;
     /** null: not known yet. */
     frame_ms: number | null;
@@ -81,7 +81,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
       section("volumes", "Volumes", controlsOf(VOLUMES, state)),
       section("light", "Light", lightItems(state, view, facts.isStereo)),
-      section("tiles", "Tiles", tileItems(state, facts.gazed)),
+      section("tiles", "Tiles", tileItems(state, facts.focusTile)),
       section("view", "View", [
         command("front", "Front"),
         command("side", "Side"),

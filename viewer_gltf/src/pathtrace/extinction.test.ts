@@ -32,13 +32,13 @@ describe("a medium's table", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
-      const plane = transferTable2d(
+      const table2d = transferTable2d(
         randomShapes(random),
         { gradient_max: 0.5, functions: {} },
         window,
         random(),
       );
-      const medium = mediumTable([{ color: WHITE, table: plane.envelope, plane }], 0.5, 0, 2);
+      const medium = mediumTable([{ color: WHITE, table: table2d.envelope, table2d }], 0.5, 0, 2);
       const low = Math.floor(256 * random());
       const high = low + Math.floor((256 - low) * random());
       const [largest] = majorants(medium, [Uint8Array.of(low, high)]);
@@ -74,11 +74,11 @@ describe("a medium's table", () => {
   });
 
   it("has each channel's colour, by the channel's own table", () => {
-    const looks = [
+    const appearances = [
       { color: [0.2, 0.4, 0.6], table: tableOf(() => 10) },
       { color: [1, 0.5, 0], table: tableOf(() => 20, [255, 51, 0]) },
     ] as const;
-    const made = mediumTable(looks, 1, 0, 1);
+    const made = mediumTable(appearances, 1, 0, 1);
     expect(made).toHaveLength(2 * 256 * 4);
     [0.2, 0.4, 0.6].forEach((v, k) => {
       expect(made[k]).toBeCloseTo(v, 5);
@@ -98,11 +98,11 @@ describe("majorants", () => {
   );
   const block = { size, stride, texels };
   // neither rises all along
-  const looks = [
+  const appearances = [
     { color: WHITE, table: tableOf((i) => 100 + 90 * Math.sin(i / 9)) },
     { color: WHITE, table: tableOf((i) => (i % 50 === 7 ? 200 : 3)) },
   ];
-  const table = mediumTable(looks, 1, 0.1, 2);
+  const table = mediumTable(appearances, 1, 0.1, 2);
   const fine = majorants(table, [brickRanges(block, 0), brickRanges(block, 1)]);
 
   /** As the GPU samples: linear between texels, then between the table's entries. */

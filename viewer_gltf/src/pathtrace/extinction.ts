@@ -14,7 +14,7 @@ const MOST_OPACITY = 0.999;
 export type MediumAppearance = Readonly<{
   color: readonly [number, number, number];
   table: Uint8Array;
-  plane?: TransferTable2d | null;
+  table2d?: TransferTable2d | null;
 }>;
 
 /**
@@ -27,22 +27,22 @@ export type MediumAppearance = Readonly<{
  * @param density factor to the extinction
  */
 export function mediumTable(
-  looks: readonly MediumAppearance[],
+  appearances: readonly MediumAppearance[],
   voxel_um: number,
   bias: number,
   density: number,
 ): Float32Array<ArrayBuffer> {
-  const count = rowsOf(looks);
+  const count = rowsOf(appearances);
   const length = 4 * ENTRIES;
-  const rows = new Float32Array(looks.length * count * length);
-  looks.forEach(({ color, table, plane }, c) => {
+  const rows = new Float32Array(appearances.length * count * length);
+  appearances.forEach(({ color, table, table2d }, c) => {
     for (let j = 0; j < count; j++) {
       const to = (c * count + j) * length;
-      if (plane == null && j > 0) {
+      if (table2d == null && j > 0) {
         rows.copyWithin(to, c * count * length, (c * count + 1) * length);
         continue;
       }
-      const row = plane?.cells.subarray(j * length, (j + 1) * length) ?? table;
+      const row = table2d?.cells.subarray(j * length, (j + 1) * length) ?? table;
       fillRow(rows.subarray(to, to + length), row, color, voxel_um, bias, density);
     }
   });
@@ -50,8 +50,8 @@ export function mediumTable(
 }
 
 /** Rows of each channel in `mediumTable`. */
-export function rowsOf(looks: readonly MediumAppearance[]): number {
-  return looks.some(({ plane }) => plane != null) ? ROWS : 1;
+export function rowsOf(appearances: readonly MediumAppearance[]): number {
+  return appearances.some(({ table2d }) => table2d != null) ? ROWS : 1;
 }
 
 function fillRow(

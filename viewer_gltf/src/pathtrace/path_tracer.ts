@@ -152,14 +152,14 @@ export class Tracer {
   }
 
   /** @param looks of the channels, in the order of the texture's */
-  dress(looks: readonly MediumAppearance[], settings: TraceSettings): void {
+  setAppearances(appearances: readonly MediumAppearance[], settings: TraceSettings): void {
     if (this.texels === null) return;
     const { frame, bricks, size } = this.texels;
     const voxel = Math.min(...frame.spacing_um);
-    const table = mediumTable(looks, voxel, settings.bias, settings.density);
+    const table = mediumTable(appearances, voxel, settings.bias, settings.density);
     this.medium.dispose();
-    const rows = rowsOf(looks);
-    this.medium.image = { data: table, width: ENTRIES, height: rows * looks.length };
+    const rows = rowsOf(appearances);
+    this.medium.image = { data: table, width: ENTRIES, height: rows * appearances.length };
     this.medium.needsUpdate = true;
     this.majorantTexture.dispose();
     const fine = majorants(table, bricks);
@@ -169,7 +169,7 @@ export class Tracer {
     this.pathPass.define("TWO_D", rows === 1 ? null : 1);
     tablesInto(
       uniforms,
-      looks.map(({ plane }) => plane),
+      appearances.map(({ table2d }) => table2d),
     );
     uniforms.uMedium.value = this.medium;
     uniforms.uMajorants.value = this.majorantTexture;

@@ -9,7 +9,7 @@ import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "../state/path_t
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickTile } from "../volumes/bricks/brick_atlas";
 import type { BrickService } from "../volumes/bricks/brick_service";
-import type { Look } from "../volumes/tile_raymarch";
+import type { Appearance } from "../volumes/tile_raymarch";
 import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
 import { showsBelow } from "../volumes/volume_set";
@@ -30,7 +30,7 @@ const MOST_MOVING_PIXELS = 160_000;
 /** What of the volumes is used. */
 export type Volumes = Readonly<{
   sourcesOf: (channel: string) => Promise<ReadonlyMap<string, VolumeSource> | null>;
-  look: (state: ViewerState, channel: string) => Look;
+  appearance: (state: ViewerState, channel: string) => Appearance;
 }>;
 
 export class TracedVolume {
@@ -55,7 +55,7 @@ export class TracedVolume {
   private packed: Packed | null = null;
   /** What the medium was dressed in. */
   private dressed = "";
-  private planes: readonly (TransferTable2d | null)[] = [];
+  private tables2d: readonly (TransferTable2d | null)[] = [];
   private settings: TraceSettings | null = null;
   private environment = "";
   private isLightComing = false;
@@ -102,7 +102,7 @@ export class TracedVolume {
     const { state } = this;
     if (state === null || !this.isShown) return [];
     return this.sources.flatMap(({ id, tiles }) => {
-      const { table } = this.volumes.look(state, id);
+      const { table } = this.volumes.appearance(state, id);
       return [...tiles].flatMap(([tile, source]) => {
         const isHidden = state.isolated !== null && tile !== state.isolated;
         return isHidden ? [] : [{ tile, channel: id, source, table, isInDisc: false }];
@@ -131,7 +131,7 @@ export class TracedVolume {
     if (state.trace.environment !== "own" && state.trace.environment !== this.environment) {
       void this.light(state.trace.environment);
     }
-    this.dress();
+    this.setAppearances();
   }
 
   /** Light by a file of the user's; the state then has to say "own". */
@@ -253,7 +253,7 @@ export class TracedVolume {
           this.texels = texels;
           this.dressed = "";
           this.tracer?.fill(texels);
-          this.dress();
+          this.setAppearances();
           this.onChange();
         });
       }
@@ -300,7 +300,7 @@ export class TracedVolume {
       this.texels = { channels, frame, level, size: frame.size, texture, index, bricks, release };
       this.dressed = "";
       this.tracer?.fill(this.texels);
-      this.dress();
+      this.setAppearances();
     }
     this.onChange();
   }
@@ -332,26 +332,27 @@ export class TracedVolume {
   }
 
   /** The medium in the colours and functions of the state, if they differ. */
-  private dress(): void {
+  private setAppearances(): void {
     const { state, texels } = this;
     if (state === null || texels === null) return;
-    const looks = texels.channels.map((id) => this.volumes.look(state, id));
+    const appearances = texels.channels.map((id) => this.volumes.appearance(state, id));
     const { bias, density } = state.trace;
     const { brickTile } = this;
-    if (brickTile !== null && (bias !== 0 || showsBelow(brickTile, looks))) {
+    if (brickTile !== null && (bias !== 0 || showsBelow(brickTile, appearances))) {
       this.loadFiles(); // what bricks leave out may show
       return;
     }
-    const dressed = JSON.stringify([looks.map(({ color }) => color), bias, density]);
-    const tables = looks.map(({ table }) => table.join()).join();
-    const planes = looks.map(({ plane }) => plane ?? null);
-    const isSame = planes.every((plane, c) => plane === (this.planes[c] ?? null));
-    if (dressed + tables !== this.dressed || !isSame) this.tracer?.dress(looks, state.trace);
+    const dressed = JSON.stringify([appearances.map(({ color }) => color), bias, density]);
+    const tables = appearances.map(({ table }) => table.join()).join();
+    const tables2d = appearances.map(({ table2d }) => table2d ?? null);
+    const isSame = tables2d.every((table2d, c) => table2d === (this.tables2d[c] ?? null));
+    if (dressed + tables !== this.dressed || !isSame)
+      this.tracer?.setAppearances(appearances, state.trace);
     else if (this.settings === null || gathersAnew(this.settings, state.trace)) {
       this.tracer?.restart();
     }
     this.dressed = dressed + tables;
-    this.planes = planes;
+    this.tables2d = tables2d;
     this.settings = state.trace;
   }
 

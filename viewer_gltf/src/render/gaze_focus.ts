@@ -75,7 +75,8 @@ export class Hybrid {
       dt_s,
     });
     const isSame =
-      before.gazed === this.focusTiles.gazed && before.disc.join() === this.focusTiles.disc.join();
+      before.focusTile === this.focusTiles.focusTile &&
+      before.disc.join() === this.focusTiles.disc.join();
     this.rested_s = isSame ? this.rested_s + dt_s : 0;
     const reach = Math.min(limit_rad, discReach(this.focusTiles, set_rad, isReady));
     const opened = this.outer_rad + (limit_rad / OPENING_S) * dt_s;

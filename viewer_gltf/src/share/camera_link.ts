@@ -11,7 +11,7 @@ export type SpecimenLook = Readonly<{
   scale: number;
 }>;
 
-export type Look = Readonly<{
+export type CameraView = Readonly<{
   /** The camera, and the point that it is turned about. */
   position: Vec3;
   target: Vec3;
@@ -25,7 +25,7 @@ const FARTHEST_M = 100;
 const NEAREST_M = 1e-4;
 
 /** `eye`, and `pose` where the specimen was moved. */
-export function writeLook({ position, target, specimen }: Look): Record<string, string> {
+export function writeLook({ position, target, specimen }: CameraView): Record<string, string> {
   const eye = written([...position, ...target]);
   if (specimen === null) return { eye };
   const pose = written([...specimen.position, ...specimen.orientation, specimen.scale]);
@@ -33,7 +33,7 @@ export function writeLook({ position, target, specimen }: Look): Record<string, 
 }
 
 /** null: there is none, or none that shows anything. */
-export function readLook(eye: string, pose: string | null): Look | null {
+export function readLook(eye: string, pose: string | null): CameraView | null {
   const camera = readNumbers(eye, 6);
   const specimen = pose === null ? null : readSpecimen(pose);
   if (camera === null || (pose !== null && specimen === null)) return null;

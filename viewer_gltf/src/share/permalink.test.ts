@@ -6,7 +6,7 @@ import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
-import type { Look } from "./camera_link";
+import type { CameraView } from "./camera_link";
 import { readLink, writeLink } from "./permalink";
 
 const start = (channels = 6) => initialState(sampleManifest(channels));
@@ -48,7 +48,7 @@ const CHANGES: readonly Action[] = [
   { type: "set", id: "quality", value: "low" },
   { type: "set", id: "trace/lamps", value: true },
 ];
-const LOOK: Look = {
+const CAMERA: CameraView = {
   position: [0.5, -0.25, 1.75],
   target: [0.1, 0, -0.05],
   specimen: { position: [0, 0, -1.5], orientation: [0, 0.6, 0, 0.8], scale: 2.5 },
@@ -63,14 +63,14 @@ const viewOf = (state: ViewerState) => ({
 describe("a link to a view", () => {
   it("brings back the whole state and the look", () => {
     const state = after(start(), CHANGES);
-    const hash = writeLink(state, start(), LOOK);
+    const hash = writeLink(state, start(), CAMERA);
     expect(viewOf(opened(hash))).toEqual(viewOf(state));
-    const look = read(hash).look;
-    expect(look?.position).toEqual(LOOK.position);
-    expect(look?.target).toEqual(LOOK.target);
-    expect(look?.specimen?.scale).toBe(2.5);
-    look?.specimen?.orientation.forEach((part, i) => {
-      expect(part).toBeCloseTo(LOOK.specimen?.orientation[i] ?? Number.NaN, 6);
+    const camera = read(hash).camera;
+    expect(camera?.position).toEqual(CAMERA.position);
+    expect(camera?.target).toEqual(CAMERA.target);
+    expect(camera?.specimen?.scale).toBe(2.5);
+    camera?.specimen?.orientation.forEach((part, i) => {
+      expect(part).toBeCloseTo(CAMERA.specimen?.orientation[i] ?? Number.NaN, 6);
     });
   });
 
@@ -84,13 +84,13 @@ describe("a link to a view", () => {
 
   it("leaves out what is as it opens, and is short", () => {
     expect(writeLink(start(), start(), null)).toBe("#v=1");
-    const eye = { ...LOOK, specimen: null };
+    const eye = { ...CAMERA, specimen: null };
     expect(writeLink(start(), start(), eye)).toBe("#v=1&eye=0.5,-0.25,1.75,0.1,0,-0.05");
-    expect(writeLink(after(start(), CHANGES), start(), LOOK).length).toBeLessThan(400);
+    expect(writeLink(after(start(), CHANGES), start(), CAMERA).length).toBeLessThan(400);
   });
 
   it("needs no escaping: a URL keeps it as it is", () => {
-    const hash = writeLink(after(start(), CHANGES), start(), LOOK);
+    const hash = writeLink(after(start(), CHANGES), start(), CAMERA);
     const url = new URL("https://example.org/view/?bundle=x");
     url.hash = hash;
     expect(url.hash).toBe(hash);
@@ -126,8 +126,8 @@ describe("a link to a view", () => {
     expect(noticesOf("#v=2&disc=20")).toEqual(["Link: this viewer reads version 1, found 2."]);
     expect(noticesOf("#section-3")).toHaveLength(1);
     expect(opened("#v=2&disc=20").discRadius_deg).toBe(start().discRadius_deg);
-    expect(read("")).toEqual({ actions: [], look: null });
-    expect(read("#")).toEqual({ actions: [], look: null });
+    expect(read("")).toEqual({ actions: [], camera: null });
+    expect(read("#")).toEqual({ actions: [], camera: null });
   });
 
   it("shows no more channels than fit", () => {
@@ -187,7 +187,7 @@ describe("a link to a view", () => {
   });
 
   it("cut short anywhere still opens", () => {
-    const hash = writeLink(after(start(), CHANGES), start(), LOOK);
+    const hash = writeLink(after(start(), CHANGES), start(), CAMERA);
     for (let length = 0; length < hash.length; length++) {
       const state = opened(hash.slice(0, length));
       expect(state.channels.some(({ opacity }) => !Number.isFinite(opacity))).toBe(false);

@@ -25,7 +25,7 @@ import { PARAMETERS } from "../state/parameters/table";
 import { VOLUMES } from "../state/parameters/volumes";
 import { OWN } from "../state/transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
-import { type Look, readLook, writeLook } from "./camera_link";
+import { type CameraView, readLook, writeLook } from "./camera_link";
 import { readNumbers, written } from "./numbers";
 import { readWord, type SwitchWords, writeWords } from "./parameter_words";
 import { readLight, writeLight } from "./path_trace_link";
@@ -41,14 +41,18 @@ const NAMED_APART: ReadonlySet<Parameter<ViewerState>> = new Set([...VOLUMES, ..
 /** Besides where volumes show, and the light, which has a part of its own. */
 const OTHERS = PARAMETERS.filter((row) => !NAMED_APART.has(row));
 
-export type Shared = Readonly<{ actions: readonly Action[]; look: Look | null }>;
+export type Shared = Readonly<{ actions: readonly Action[]; camera: CameraView | null }>;
 
 /**
  * @param start the state in which the bundle opens
  * @param look null: as the bundle opens
  */
-export function writeLink(state: ViewerState, start: ViewerState, look: Look | null): string {
-  const links = [isAnything, isChosen, isShown].map((has) => linkOf(state, start, look, has));
+export function writeLink(
+  state: ViewerState,
+  start: ViewerState,
+  camera: CameraView | null,
+): string {
+  const links = [isAnything, isChosen, isShown].map((has) => linkOf(state, start, camera, has));
   return links.find(({ length }) => length <= LONGEST) ?? links[links.length - 1];
 }
 
@@ -58,7 +62,12 @@ const isAnything: HasShapes = () => true;
 const isChosen: HasShapes = ({ transferFunction }, name) => name === transferFunction;
 const isShown: HasShapes = (channel, name) => channel.shown && isChosen(channel, name);
 
-function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: HasShapes): string {
+function linkOf(
+  state: ViewerState,
+  start: ViewerState,
+  camera: CameraView | null,
+  has: HasShapes,
+): string {
   const parts: Record<string, string> = { v: VERSION };
   const shownOf = ({ channels }: ViewerState) =>
     channels
@@ -66,10 +75,10 @@ function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: 
       .map(({ id }) => encodeURIComponent(id))
       .join(",");
   if (shownOf(state) !== shownOf(start)) parts.c = shownOf(state);
-  const looks = state.channels.flatMap((channel, i) =>
+  const cameras = state.channels.flatMap((channel, i) =>
     writeChannel(channel, start.channels[i], has),
   );
-  if (looks.length > 0) parts.l = looks.join(",");
+  if (cameras.length > 0) parts.l = cameras.join(",");
   Object.assign(parts, Object.fromEntries(writeWords(VOLUMES, state, start, WORDS)));
   if (state.selected !== null) parts.tile = encodeURIComponent(state.selected);
   if (state.isolated !== null) parts.only = encodeURIComponent(state.isolated);
@@ -80,7 +89,7 @@ function linkOf(state: ViewerState, start: ViewerState, look: Look | null, has: 
   Object.assign(parts, Object.fromEntries(writeWords(OTHERS, state, start, WORDS)));
   const light = writeLight(state, start);
   if (light !== "") parts.light = light;
-  Object.assign(parts, look === null ? {} : writeLook(look));
+  Object.assign(parts, camera === null ? {} : writeLook(camera));
   return `#${Object.entries(parts)
     .map(([name, text]) => `${name}=${text}`)
     .join("&")}`;
@@ -117,12 +126,12 @@ function writeChannel(
  */
 export function readLink(hash: string, state: ViewerState, specimen: Box): Shared {
   const text = hash.replace(/^#/, "");
-  const told = (what: string): Shared => ({
+  const refused = (what: string): Shared => ({
     actions: [{ type: "notify", text: `Link: ${what}` }],
-    look: null,
+    camera: null,
   });
-  if (text === "") return { actions: [], look: null };
-  if (text.length > LONGEST) return told("it is too long to be one of this viewer's.");
+  if (text === "") return { actions: [], camera: null };
+  if (text.length > LONGEST) return refused("it is too long to be one of this viewer's.");
   const parts = new Map(
     text.split("&").map((part) => {
       const at = part.indexOf("=");
@@ -130,9 +139,9 @@ export function readLink(hash: string, state: ViewerState, specimen: Box): Share
     }),
   );
   const version = parts.get("v");
-  if (version === undefined) return told("what follows the # is no view of this viewer.");
+  if (version === undefined) return refused("what follows the # is no view of this viewer.");
   if (version !== VERSION) {
-    return told(`this viewer reads version ${VERSION}, found ${shortened(version)}.`);
+    return refused(`this viewer reads version ${VERSION}, found ${shortened(version)}.`);
   }
   return new LinkReader(parts, state, specimen).read();
 }
@@ -174,14 +183,14 @@ class LinkReader {
     this.readParameters(OTHERS);
     this.readLight();
     const eye = this.parts.get("eye");
-    const look = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
-    if (eye !== undefined && look === null) this.unread.push("eye");
-    this.tell("this bundle has no", this.unknown);
-    this.tell("left out what can't be read:", this.unread);
-    return { actions: this.actions, look };
+    const camera = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
+    if (eye !== undefined && camera === null) this.unread.push("eye");
+    this.report("this bundle has no", this.unknown);
+    this.report("left out what can't be read:", this.unread);
+    return { actions: this.actions, camera };
   }
 
-  private tell(what: string, names: readonly string[]): void {
+  private report(what: string, names: readonly string[]): void {
     if (names.length === 0) return;
     const listed = names.slice(0, 5).join(", ");
     const more = names.length > 5 ? ` and ${names.length - 5} more` : "";
@@ -225,12 +234,12 @@ class LinkReader {
     const text = this.parts.get("l");
     if (text === undefined) return;
     for (const entry of text.split(",")) {
-      const [id, ...looks] = entry.split(":");
+      const [id, ...cameras] = entry.split(":");
       const channel = this.channel(id);
       if (channel === null) continue;
-      for (const look of looks) {
-        const action = lookAction(channel, look);
-        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${look}`)}`);
+      for (const camera of cameras) {
+        const action = lookAction(channel, camera);
+        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${camera}`)}`);
         else this.actions.push(action);
       }
     }
@@ -303,8 +312,8 @@ class LinkReader {
   }
 }
 
-function lookAction({ id, transferFunctions }: ChannelState, look: string): Action | null {
-  const [letter, value] = [look.slice(0, 1), look.slice(1)];
+function lookAction({ id, transferFunctions }: ChannelState, camera: string): Action | null {
+  const [letter, value] = [camera.slice(0, 1), camera.slice(1)];
   const row = CHANNEL.find(({ link }) => link === letter);
   if (row !== undefined) return readWord(row, value, CHANNEL_WORDS, id);
   switch (letter) {

@@ -14,7 +14,7 @@ export type Action =
   /** Other shapes for a transfer function, which is chosen by that; `own` may be a new one. */
   | Readonly<{ type: "set-shapes"; channel: string; name: string; shapes: Shapes }>
   /** What the bundle has of a channel's two-dimensional functions has come. */
-  | Readonly<{ type: "learn-transfer-2d"; channel: string; plane: Transfer2d }>
+  | Readonly<{ type: "learn-transfer-2d"; channel: string; transfer2d: Transfer2d }>
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "set-clip"; clip: Clip }>

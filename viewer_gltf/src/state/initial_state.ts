@@ -46,7 +46,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       transferFunction: channel.transfer_function,
       transferFunctions: channel.transfer_functions,
       transferFunctions2d: channel.transfer_functions_2d.names,
-      plane: null,
+      transfer2d: null,
       shapes: {},
       hasSurface: channel.tileset !== null,
       prefersVolume: channel.surface === "unclear",

@@ -57,28 +57,28 @@ describe("what is near", () => {
 
 describe("the gazed tile", () => {
   it("is the first along the view's centre, once it is near", () => {
-    expect(advanceFocus(FAR_AWAY, input(25, -15, 10)).gazed).toBe("r1_c2");
-    expect(advanceFocus(FAR_AWAY, input(25, -15, 30)).gazed).toBeNull();
-    expect(advanceFocus(FAR_AWAY, input(60, -15, 10)).gazed).toBeNull();
+    expect(advanceFocus(FAR_AWAY, input(25, -15, 10)).focusTile).toBe("r1_c2");
+    expect(advanceFocus(FAR_AWAY, input(25, -15, 30)).focusTile).toBeNull();
+    expect(advanceFocus(FAR_AWAY, input(60, -15, 10)).focusTile).toBeNull();
   });
 
   it("is not one that is cut away where it is looked at", () => {
     const plane = { normal: [0, 0, 1], offset_um: 0 } as const; // all that lies before z = 0
     const cut = { ...input(25, -15, 10), clip: { box: null, plane } };
-    expect(advanceFocus(FAR_AWAY, cut)).toMatchObject({ gazed: null, disc: [] });
+    expect(advanceFocus(FAR_AWAY, cut)).toMatchObject({ focusTile: null, disc: [] });
     const left = { ...cut, clip: { box: null, plane: { ...plane, offset_um: 1 } } };
-    expect(advanceFocus(FAR_AWAY, left).gazed).toBe("r1_c2");
+    expect(advanceFocus(FAR_AWAY, left).focusTile).toBe("r1_c2");
   });
 
   it("changes only once the gaze has rested on another", () => {
     const first = advanceFocus(FAR_AWAY, input(5, -5, 10));
     const glance = advanceFocus(first, input(15, -5, 10, REST_S / 2));
-    expect(glance.gazed).toBe("r0_c0");
+    expect(glance.focusTile).toBe("r0_c0");
     expect(isWaiting(glance)).toBe(true);
-    expect(advanceFocus(glance, input(5, -5, 10, REST_S)).gazed).toBe("r0_c0");
+    expect(advanceFocus(glance, input(5, -5, 10, REST_S)).focusTile).toBe("r0_c0");
     let state = glance;
     for (let i = 0; i < 3; i++) state = advanceFocus(state, input(15, -5, 10, REST_S / 2));
-    expect(state.gazed).toBe("r0_c1");
+    expect(state.focusTile).toBe("r0_c1");
     expect(isWaiting(state)).toBe(false);
   });
 });

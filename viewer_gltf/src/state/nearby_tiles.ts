@@ -43,7 +43,7 @@ export type FocusState = FocusTiles &
   }>;
 
 export const FAR_AWAY: FocusState = {
-  gazed: null,
+  focusTile: null,
   disc: [],
   near: new Set(),
   glanced: null,
@@ -66,17 +66,17 @@ export function advanceFocus(before: FocusState, input: GazeInput): FocusState {
   }
   const glanced = pickTile(gaze, input.tiles, input.clip)?.id ?? null;
   const glanced_s = glanced === before.glanced ? before.glanced_s + input.dt_s : 0;
-  const isFirst = before.gazed === null || !near.has(before.gazed);
-  const settled = glanced_s >= REST_S || (isFirst && glanced !== null) ? glanced : before.gazed;
-  const gazed = settled !== null && near.has(settled) ? settled : null;
+  const isFirst = before.focusTile === null || !near.has(before.focusTile);
+  const settled = glanced_s >= REST_S || (isFirst && glanced !== null) ? glanced : before.focusTile;
+  const focusTile = settled !== null && near.has(settled) ? settled : null;
   const felt = near.size === 0 ? [] : feel(input);
-  const disc = discTiles(felt, gazed, before.disc, near);
-  return { gazed, disc, near, glanced, glanced_s, felt };
+  const disc = discTiles(felt, focusTile, before.disc, near);
+  return { focusTile, disc, near, glanced, glanced_s, felt };
 }
 
 /** Whether the next frame may differ though nothing moves. */
 export function isWaiting(state: FocusState): boolean {
-  return state.glanced !== state.gazed && state.glanced_s < REST_S && state.near.size > 0;
+  return state.glanced !== state.focusTile && state.glanced_s < REST_S && state.near.size > 0;
 }
 
 const ORIGIN = new Vector3();
@@ -107,11 +107,11 @@ function feel({ gaze, tiles, clip, discRadius_rad }: GazeInput): (string | null)
 /** The tiles that the rays meet, the innermost first; a tile that was there goes before a new one. */
 function discTiles(
   felt: readonly (string | null)[],
-  gazed: string | null,
+  focusTile: string | null,
   before: readonly string[],
   near: ReadonlySet<string>,
 ): readonly string[] {
-  const rings = new Map<string, number>(gazed === null ? [] : [[gazed, 0]]);
+  const rings = new Map<string, number>(focusTile === null ? [] : [[focusTile, 0]]);
   felt.forEach((id, i) => {
     if (id === null || rings.has(id) || !near.has(id)) return;
     rings.set(id, 1 + Math.floor(i / SPOKES) - (before.includes(id) ? 1.5 : 0));

@@ -44,7 +44,7 @@ function withRow(given: Manifest, count: number, representation: Representation 
 
 /** Within the switch distance, the first of them looked at. */
 const near = (...tiles: readonly string[]): FocusTiles => ({
-  gazed: tiles[0],
+  focusTile: tiles[0],
   disc: tiles,
   near: new Set(tiles),
 });

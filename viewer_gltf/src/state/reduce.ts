@@ -68,7 +68,7 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "set-shapes":
       return withChannel(state, action.channel, (c) => withShapes(c, action.name, action.shapes));
     case "learn-transfer-2d":
-      return withChannel(state, action.channel, (c) => ({ ...c, plane: action.plane }));
+      return withChannel(state, action.channel, (c) => ({ ...c, transfer2d: action.transfer2d }));
     case "select":
       return withTile(state, "selected", action.tile);
     case "isolate":

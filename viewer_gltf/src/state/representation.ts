@@ -13,14 +13,14 @@ import {
 /** What lies near enough to be drawn as a volume. */
 export type FocusTiles = Readonly<{
   /** The tile that the view's centre looks at. */
-  gazed: string | null;
+  focusTile: string | null;
   /** The tiles that the disc round the gaze meets first, the gazed one first. */
   disc: readonly string[];
   /** All tiles within the switch distance. */
   near: ReadonlySet<string>;
 }>;
 
-export const NO_FOCUS: FocusTiles = { gazed: null, disc: [], near: new Set() };
+export const NO_FOCUS: FocusTiles = { focusTile: null, disc: [], near: new Set() };
 
 /** A tile whose volume is wanted, with its channels in the bundle's order. */
 export type WantedTile = Readonly<{
@@ -30,7 +30,7 @@ export type WantedTile = Readonly<{
 
 /** The tile that volumes follow: the selected one, or the gazed one. */
 export function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string | null {
-  return state.selected ?? focusTiles.gazed;
+  return state.selected ?? focusTiles.focusTile;
 }
 
 /** How a channel is drawn in a tile, once all has arrived; null: not at all. */

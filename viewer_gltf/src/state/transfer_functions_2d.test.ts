@@ -33,7 +33,7 @@ const set = (name: string, shapes: readonly Shape[]): Action => ({
 const LEARN: Action = {
   type: "learn-transfer-2d",
   channel: "c0",
-  plane: { gradient_max: 0.4, functions: { soft: [SHAPE] } },
+  transfer2d: { gradient_max: 0.4, functions: { soft: [SHAPE] } },
 };
 
 describe("the two-dimensional functions of a channel", () => {

@@ -17,7 +17,7 @@ import { LEAST_HEIGHT, LEAST_WIDTH } from "./transfer_shapes";
 /** The function that a user's shapes make of a channel that is shown by a one-dimensional one. */
 export const OWN = "own";
 /**
- * Places in the plane, opacities and softness are whole multiples of one part of so many, so that a
+ * Places in the joint histogram, opacities and softness are whole multiples of one part of so many, so that a
  * link says them exactly: a quarter of the table's columns, two characters of base 36.
  */
 export const STEPS = 1020;
@@ -28,7 +28,7 @@ export type Functions = Readonly<{
   /** Of these, the bundle's two-dimensional ones. */
   transferFunctions2d: readonly string[];
   /** null: it has not come, as it is asked for only when something needs it. */
-  plane: Transfer2d | null;
+  transfer2d: Transfer2d | null;
   /** What the user has made of functions, by name. */
   shapes: Readonly<Record<string, Shapes>>;
 }>;
@@ -39,8 +39,10 @@ function own<T>(record: Readonly<Record<string, T>>, name: string): T | undefine
 
 /** The shapes of a function; none: it is one-dimensional, or the bundle's have not come. */
 export function shapesOf(functions: Functions, name = functions.transferFunction): Shapes {
-  const { shapes, plane } = functions;
-  return own(shapes, name) ?? (plane === null ? undefined : own(plane.functions, name)) ?? [];
+  const { shapes, transfer2d } = functions;
+  return (
+    own(shapes, name) ?? (transfer2d === null ? undefined : own(transfer2d.functions, name)) ?? []
+  );
 }
 
 /** Whether a function has shapes, also such as have not come. */

@@ -76,12 +76,12 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
 }
 
 /** How one channel of a tile looks. */
-export type Look = Readonly<{
+export type Appearance = Readonly<{
   color: Rgb;
-  /** 256 RGBA entries, of `lookUpTable`; beside a plane, what of it shows at any gradient. */
+  /** 256 RGBA entries, of `lookUpTable`; beside a 2D table, what of it shows at any gradient. */
   table: Uint8Array;
   /** A two-dimensional transfer function. */
-  plane?: TransferTable2d | null;
+  table2d?: TransferTable2d | null;
   isInDisc: boolean;
 }>;
 
@@ -117,7 +117,7 @@ export class TileMarch {
   private readonly occupancy: Data3DTexture;
   private readonly lut: DataTexture;
   /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
-  private planes: DataArrayTexture | null = null;
+  private tables2d: DataArrayTexture | null = null;
   /** What each layer holds; null: a table that knows no gradients. */
   private readonly layers: (Uint8Array | null)[] = [];
   private readonly low: Vector3;
@@ -248,11 +248,11 @@ export class TileMarch {
   }
 
   /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
-  dress(looks: readonly Look[]): boolean {
+  setAppearances(appearances: readonly Appearance[]): boolean {
     const { uniforms } = this.mesh.material;
     const rows = this.lut.image.data as Uint8Array;
     let differs = false;
-    looks.forEach(({ color, table, isInDisc }, c) => {
+    appearances.forEach(({ color, table, isInDisc }, c) => {
       (uniforms.uColor.value as Vector3[])[c].set(...color);
       uniforms.uInDisc.value[c] = isInDisc;
       uniforms.uFloor.value.setComponent(c, floorOf(table));
@@ -262,38 +262,38 @@ export class TileMarch {
       differs = true;
     });
     if (differs) this.lut.needsUpdate = true;
-    this.fillTables2d(looks);
-    uniforms.uAllInDisc.value = looks.every((look) => look.isInDisc);
-    this.define("DISC", looks.some((look) => look.isInDisc) ? 1 : null);
+    this.fillTables2d(appearances);
+    uniforms.uAllInDisc.value = appearances.every((appearance) => appearance.isInDisc);
+    this.define("DISC", appearances.some((appearance) => appearance.isInDisc) ? 1 : null);
     return differs;
   }
 
   /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
-  private fillTables2d(looks: readonly Look[]): void {
-    const isTwoD = looks.some(({ plane }) => plane != null);
+  private fillTables2d(appearances: readonly Appearance[]): void {
+    const isTwoD = appearances.some(({ table2d }) => table2d != null);
     this.define("TWO_D", isTwoD ? 1 : null);
     if (!isTwoD) return;
     const { uniforms } = this.mesh.material;
-    this.planes ??= emptyTables2d(this.channelCount);
-    uniforms.uTables2d.value = this.planes;
-    const cells = this.planes.image.data as Uint8Array;
-    const { length } = looks[0].table;
+    this.tables2d ??= emptyTables2d(this.channelCount);
+    uniforms.uTables2d.value = this.tables2d;
+    const cells = this.tables2d.image.data as Uint8Array;
+    const { length } = appearances[0].table;
     tablesInto(
       uniforms as ReturnType<typeof tableUniforms>,
-      looks.map(({ plane }) => plane),
+      appearances.map(({ table2d }) => table2d),
     );
-    looks.forEach(({ table, plane }, c) => {
+    appearances.forEach(({ table, table2d }, c) => {
       const at = c * ROWS * length;
       const isThere =
-        plane != null
-          ? this.layers[c] === plane.cells
+        table2d != null
+          ? this.layers[c] === table2d.cells
           : this.layers[c] === null && table.every((value, i) => value === cells[at + i]);
       if (isThere) return;
-      cells.set(plane?.cells ?? alikeRows(table), at);
-      this.layers[c] = plane?.cells ?? null;
-      if (this.planes === null) return;
-      this.planes.addLayerUpdate(c); // the others stay as they are on the GPU
-      this.planes.needsUpdate = true;
+      cells.set(table2d?.cells ?? alikeRows(table), at);
+      this.layers[c] = table2d?.cells ?? null;
+      if (this.tables2d === null) return;
+      this.tables2d.addLayerUpdate(c); // the others stay as they are on the GPU
+      this.tables2d.needsUpdate = true;
     });
   }
 
@@ -316,7 +316,7 @@ export class TileMarch {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
     this.lut.dispose();
-    this.planes?.dispose();
+    this.tables2d?.dispose();
     this.occupancy.dispose();
   }
 }

@@ -36,11 +36,11 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
   });
   afterEach(() => vi.unstubAllGlobals());
 
-  function planes(functions: object): TransferFunctions2dLoader {
+  function loader(functions: object): TransferFunctions2dLoader {
     text = textOf(functions);
     const manifest = sampleManifest(1);
     manifest.channels[0].transfer_functions_2d.file = refOf("transfer2d.json", text);
-    const onFunctions = (_: string, plane: Transfer2d) => learned.push(plane);
+    const onFunctions = (_: string, transfer2d: Transfer2d) => learned.push(transfer2d);
     const onError = (error: unknown) => faults.push(error);
     return new TransferFunctions2dLoader(
       { base: BASE, manifest },
@@ -53,7 +53,7 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
   const come = (set: TransferFunctions2dLoader) => vi.waitUntil(() => !set.isLoading);
 
   it("is fetched once, the histogram only when it is to be seen", async () => {
-    const set = planes({ soft: [SHAPE] });
+    const set = loader({ soft: [SHAPE] });
     for (let i = 0; i < 3; i++) set.want("c0");
     expect(set.isLoading).toBe(true);
     await come(set);
@@ -75,7 +75,7 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
     ] as const;
     for (const [shape, words] of wrong) {
       faults.length = 0;
-      const set = planes({ soft: [shape] });
+      const set = loader({ soft: [shape] });
       set.want("c0");
       await come(set);
       set.want("c0");
@@ -86,7 +86,7 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
       await come(set);
       expect(faults).toHaveLength(2);
     }
-    const many = planes({ soft: Array.from({ length: 33 }, () => SHAPE) });
+    const many = loader({ soft: Array.from({ length: 33 }, () => SHAPE) });
     many.want("c0");
     await come(many);
     expect(String(faults.at(-1))).toContain("expected at most 32 shapes, found 33");

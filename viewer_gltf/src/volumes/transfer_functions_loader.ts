@@ -24,7 +24,7 @@ export class TransferFunctions2dLoader {
 
   constructor(
     private readonly bundle: Bundle,
-    private readonly onFunctions: (channel: string, plane: Transfer2d) => void,
+    private readonly onFunctions: (channel: string, transfer2d: Transfer2d) => void,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {}

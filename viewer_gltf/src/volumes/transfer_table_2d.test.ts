@@ -12,19 +12,19 @@ describe("the table of value and gradient", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
-      const plane = transferTable2d(
+      const table2d = transferTable2d(
         randomShapes(random),
         { gradient_max: 0.5, functions: {} },
         window,
         random(),
       );
-      const table = { alpha: opacityRanges(opacities(plane.envelope)) };
+      const table = { alpha: opacityRanges(opacities(table2d.envelope)) };
       const low = Math.floor(256 * random());
       const high = low + Math.floor((256 - low) * random());
       for (let i = 0; i < 40; i++) {
         const value = (low + (high - low) * random()) / 255;
         const gradient = random();
-        expect(sampled(plane.cells, value, gradient, 3)).toBeLessThanOrEqual(
+        expect(sampled(table2d.cells, value, gradient, 3)).toBeLessThanOrEqual(
           table.alpha[256 * low + high] + 1e-9,
         );
       }

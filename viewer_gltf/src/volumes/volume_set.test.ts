@@ -72,7 +72,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
 
   /** Follow until all has come and faded; the most bytes that were taken on the way. */
   async function follow(state: ViewerState, tiles: readonly string[]): Promise<number> {
-    const wanted = wantedTiles(state, { ...NO_FOCUS, gazed: tiles[0], near: new Set(tiles) });
+    const wanted = wantedTiles(state, { ...NO_FOCUS, focusTile: tiles[0], near: new Set(tiles) });
     set.follow(state, wanted, true);
     let most = set.bytes;
     await vi.waitFor(

@@ -16,7 +16,7 @@ import { LoadQueue } from "./load_queue";
 import { levelsToFetch } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
 import { brickCounts } from "./skip_bricks";
-import { floorOf, type Look, type MarchFrame, TileMarch } from "./tile_raymarch";
+import { type Appearance, floorOf, type MarchFrame, TileMarch } from "./tile_raymarch";
 import { type Packed, TileTexture } from "./tile_texture";
 import { lookUpTable, opacities } from "./transfer_luts";
 import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "./transfer_table_2d";
@@ -26,7 +26,7 @@ import { stride } from "./volume_texture";
 const PARALLEL_LOADS = 4;
 type MadeTable2d = Readonly<{
   shapes: Shapes;
-  plane: Transfer2d;
+  transfer2d: Transfer2d;
   window: readonly [number, number];
   opacity: number;
   table: TransferTable2d;
@@ -47,7 +47,7 @@ export class VolumeSet {
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
   /** The last table of each channel: all tiles ask for the same. */
-  private readonly planes = new Map<string, MadeTable2d>();
+  private readonly tables2d = new Map<string, MadeTable2d>();
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
@@ -132,7 +132,7 @@ export class VolumeSet {
       return packed.channels.flatMap((channel) => {
         const source = texture.kept.get(channel);
         if (source === undefined) return [];
-        const { table, isInDisc } = this.look(state, channel);
+        const { table, isInDisc } = this.appearance(state, channel);
         return [{ tile, channel, source, table, isInDisc }];
       });
     });
@@ -184,7 +184,7 @@ export class VolumeSet {
     for (const each of wanted) this.want(each);
     this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
     this.residents.evict();
-    for (const resident of this.residents.all) this.dress(resident);
+    for (const resident of this.residents.all) this.setAppearances(resident);
   }
 
   /** With the next `follow`, what has failed is loaded anew. */
@@ -235,7 +235,7 @@ export class VolumeSet {
   private addTile(tile: string): Resident {
     const onChange = () => {
       const resident = this.residents.get(tile);
-      if (resident !== undefined) this.dress(resident);
+      if (resident !== undefined) this.setAppearances(resident);
       this.onChange();
     };
     const limits = { bytes: this.share, side: this.limits.side };
@@ -265,7 +265,7 @@ export class VolumeSet {
   }
 
   /** A march for what has come, in the colours of the state. */
-  private dress(resident: Resident): void {
+  private setAppearances(resident: Resident): void {
     const { state } = this;
     const { shown } = resident.texture;
     if (state === null) return;
@@ -275,8 +275,8 @@ export class VolumeSet {
       resident.packed = null;
       return;
     }
-    const looks = shown.channels.map((id) => this.look(state, id));
-    if (showsBelow(resident.texture, looks)) {
+    const appearances = shown.channels.map((id) => this.appearance(state, id));
+    if (showsBelow(resident.texture, appearances)) {
       const [{ tile }] = [...resident.texture.kept.values()].map(({ volume }) => volume);
       this.replace(tile);
       return;
@@ -292,8 +292,8 @@ export class VolumeSet {
       this.group.add(march.mesh);
     }
     resident.packed = shown;
-    const differs = march.dress(looks);
-    if (differs || isNewSet || march !== before) void this.findSkips(march, shown, looks);
+    const differs = march.setAppearances(appearances);
+    if (differs || isNewSet || march !== before) void this.findSkips(march, shown, appearances);
   }
 
   private volumeOf(channel: string, { texture }: Resident) {
@@ -303,16 +303,16 @@ export class VolumeSet {
   }
 
   /** How a channel whose list has come is to look. */
-  look(state: ViewerState, id: string): Look {
+  appearance(state: ViewerState, id: string): Appearance {
     const channel = state.channels.find((c) => c.id === id);
     const volumes = this.channels.get(id);
     if (channel === undefined || volumes === undefined) {
       throw new Error(`channel ${id} has come without a look`);
     }
-    const plane = this.table2dOf(channel);
-    if (plane !== null) {
+    const table2d = this.table2dOf(channel);
+    if (table2d !== null) {
       const { color } = channel;
-      return { color, table: plane.envelope, plane, isInDisc: isInDisc(state, channel) };
+      return { color, table: table2d.envelope, table2d, isInDisc: isInDisc(state, channel) };
     }
     const { transferFunction: name } = channel;
     // one's own function has no one-dimensional one that stands for it
@@ -328,28 +328,32 @@ export class VolumeSet {
 
   /** The table of a two-dimensional function, as soon as its shapes have come. */
   private table2dOf(channel: ChannelState): TransferTable2d | null {
-    const { id, plane, window, opacity } = channel;
+    const { id, transfer2d, window, opacity } = channel;
     const shapes = shapesOf(channel);
-    if (plane === null || shapes.length === 0) return null;
-    const made = this.planes.get(id);
+    if (transfer2d === null || shapes.length === 0) return null;
+    const made = this.tables2d.get(id);
     const isSame =
       made?.shapes === shapes &&
-      made.plane === plane &&
+      made.transfer2d === transfer2d &&
       made.window === window &&
       made.opacity === opacity;
     if (isSame) return made.table;
-    const table = transferTable2d(shapes, plane, window, opacity);
-    this.planes.set(id, { shapes, plane, window, opacity, table });
+    const table = transferTable2d(shapes, transfer2d, window, opacity);
+    this.tables2d.set(id, { shapes, transfer2d, window, opacity, table });
     return table;
   }
 
-  private async findSkips(march: TileMarch, shown: Packed, looks: readonly Look[]): Promise<void> {
+  private async findSkips(
+    march: TileMarch,
+    shown: Packed,
+    appearances: readonly Appearance[],
+  ): Promise<void> {
     march.skipBy(null); // what the old table skips over may show now
     this.skipsUnderWay++;
     const distances = await this.occupancy
       .computeDistances(march.volume.tile, {
         bricks: shown.bricks,
-        alphas: looks.map(({ table }) => opacities(table)),
+        alphas: appearances.map(({ table }) => opacities(table)),
         count: brickCounts(march.volume.size),
       })
       .finally(() => {
@@ -382,10 +386,13 @@ export class VolumeSet {
 }
 
 /** Whether functions show what bricks leave out. */
-export function showsBelow(texture: TileTexture | BrickTile, looks: readonly Look[]): boolean {
+export function showsBelow(
+  texture: TileTexture | BrickTile,
+  appearances: readonly Appearance[],
+): boolean {
   if (!(texture instanceof BrickTile)) return false;
   const { thresholds } = texture;
-  return looks.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
+  return appearances.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
 }
 
 /** The box round several marched tiles, um, world. */

@@ -80,7 +80,7 @@ export class Hands {
     this.panel = new RoomPanel({
       layOut,
       onLeave,
-      onAnnounce: (text) => this.tell(text),
+      onAnnounce: (text) => this.announce(text),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
         else options.onAction(wish);
@@ -141,8 +141,8 @@ export class Hands {
   }
 
   /** Say something where the head looks. */
-  tell(text: string): void {
-    if (this.isRunning) this.notice.tell(text);
+  announce(text: string): void {
+    if (this.isRunning) this.notice.announce(text);
   }
 
   /** What would move the camera of a flat screen; false: the command is another's. */

@@ -140,8 +140,8 @@ export class Stereo {
   }
 
   /** Say something before the eyes; nothing where there is no stereo. */
-  tell(text: string): void {
-    this.hands.tell(text);
+  announce(text: string): void {
+    this.hands.announce(text);
   }
 
   /** Open or close the panel in the room; false: no stereo. */

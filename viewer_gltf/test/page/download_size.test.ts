@@ -119,11 +119,11 @@ describeInChromium("the first picture", () => {
   it("comes after at most 300 kB of the bundle, all channels included", async () => {
     const isBundle = ({ path }: Sent) => path.startsWith("/bundle/");
     const first = (await sentBefore("first", stand)).filter(isBundle);
-    const told = `${sum(first)} bytes: ${table(first)}`;
-    expect(first.length, told).toBeGreaterThan(1);
-    expect(sum(first), told).toBeLessThanOrEqual(FIRST_PICTURE_BYTES);
+    const report = `${sum(first)} bytes: ${table(first)}`;
+    expect(first.length, report).toBeGreaterThan(1);
+    expect(sum(first), report).toBeLessThanOrEqual(FIRST_PICTURE_BYTES);
     const whole = (await sentBefore("whole", stand)).filter(isBundle);
-    process.stdout.write(`first picture after ${told}\nall channels: ${sum(whole)} bytes\n`);
+    process.stdout.write(`first picture after ${report}\nall channels: ${sum(whole)} bytes\n`);
     expect(sum(whole)).toBeGreaterThan(sum(first));
     expect(sum(whole)).toBeLessThanOrEqual(FIRST_PICTURE_BYTES);
   });

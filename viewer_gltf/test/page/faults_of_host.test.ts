@@ -45,9 +45,9 @@ describeInChromium("a fault on the way", () => {
     await stand.viewer.page.route("**/meshopt_worker*", (route) => route.abort());
     await stand.open("&mode=off");
     await stand.viewer.settled();
-    const told = await notices();
-    expect(told.length).toBeGreaterThan(1); // what comes after the first is told too
-    for (const text of told) expect(text).toMatch(/\.glb: the surface can't be read: meshopt: /);
+    const report = await notices();
+    expect(report.length).toBeGreaterThan(1); // what comes after the first is told too
+    for (const text of report) expect(text).toMatch(/\.glb: the surface can't be read: meshopt: /);
     expect((await stand.viewer.snapshot()).triangles).toBe(0);
   });
 

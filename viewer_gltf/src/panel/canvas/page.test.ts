@@ -14,7 +14,7 @@ const FACTS: Facts = {
   subtitle: "",
   shown: SPECIMEN_BOX,
   ranges: new Map(),
-  gazed: "r1_c2",
+  focusTile: "r1_c2",
   isStereo: true,
   stereo: { isAvailable: true, reason: "" },
   split: null,

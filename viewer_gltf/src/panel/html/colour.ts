@@ -61,8 +61,8 @@ function makeSwatches(first: Colour, send: Send): Widget<Colour> {
       element("div", { className: "swatches" }, {}, ...row),
     );
   }
-  const rove = new RovingTabindex(root);
-  rove.follow(buttons, SWATCHES_A_ROW);
+  const tabindex = new RovingTabindex(root);
+  tabindex.follow(buttons, SWATCHES_A_ROW);
   return {
     root,
     update(control) {

@@ -15,13 +15,13 @@ export const TILE_KEYS: readonly Key[] = [
   key("t", "Next tile", nextTile(1)),
   key("T", "Previous tile", nextTile(-1)),
   key("i", "Show only the tile that is chosen or looked at; again: all", (context) => {
-    const { state, gazed } = context;
+    const { state, focusTile } = context;
     if (state.isolated !== null) return { type: "isolate", tile: null };
-    const tile = state.selected ?? gazed;
+    const tile = state.selected ?? focusTile;
     return tile === null ? null : { type: "isolate", tile };
   }),
-  key("g", "Choose the tile that is looked at", ({ state, gazed }) =>
-    gazed === null ? null : chosenTile(state, gazed),
+  key("g", "Choose the tile that is looked at", ({ state, focusTile }) =>
+    focusTile === null ? null : chosenTile(state, focusTile),
   ),
   key(["Escape", "Backspace"], "Back: all tiles, then none chosen", "back"),
 ];

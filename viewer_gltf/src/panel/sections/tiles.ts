@@ -11,7 +11,7 @@ export function chosenTile({ selected, isolated }: ViewerState, tile: string) {
   return { type: "select", tile } as const;
 }
 
-export function tileItems(state: ViewerState, gazed: string | null): readonly Control[] {
+export function tileItems(state: ViewerState, focusTile: string | null): readonly Control[] {
   const { selected, isolated } = state;
   const grid = tileGrid(state.tiles.map(({ id }) => id));
   const items: Control[] = [];
@@ -25,7 +25,7 @@ export function tileItems(state: ViewerState, gazed: string | null): readonly Co
         { value: "", label: "by gaze" },
         ...state.tiles.map(({ id }) => ({
           value: id,
-          label: id === gazed ? `${id} (gazed at)` : id,
+          label: id === focusTile ? `${id} (gazed at)` : id,
         })),
       ],
       isInline: false,
@@ -40,14 +40,14 @@ export function tileItems(state: ViewerState, gazed: string | null): readonly Co
       columns: grid.columns,
       tiles: grid.cells.map((cell) => ({
         ...cell,
-        isFocus: cell.id === gazed,
+        isFocus: cell.id === focusTile,
         isSelected: cell.id === selected,
         isIsolated: cell.id === isolated,
       })),
       to: (id) => chosenTile(state, id),
     });
   }
-  const alone = isolated ?? selected ?? gazed;
+  const alone = isolated ?? selected ?? focusTile;
   items.push(
     {
       kind: "toggle",

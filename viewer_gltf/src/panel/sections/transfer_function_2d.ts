@@ -31,7 +31,7 @@ export function refusalOf(channel: ChannelState): string {
   const name = editedName(channel);
   const isOfBundle =
     channel.transferFunctions2d.includes(name) && !Object.hasOwn(channel.shapes, name);
-  return channel.plane === null && isOfBundle ? "Its shapes have not come." : "";
+  return channel.transfer2d === null && isOfBundle ? "Its shapes have not come." : "";
 }
 
 /**
@@ -43,7 +43,7 @@ export function transferFunction2dItems(
   histogram: Histogram | null,
   valueText: (share: number) => string,
 ): readonly Control[] {
-  const { id, name, plane, window } = channel;
+  const { id, name, transfer2d, window } = channel;
   const isOpen = view.isHistogramOpen && view.picked === id;
   const toggle: Control = {
     kind: "toggle",
@@ -60,7 +60,8 @@ export function transferFunction2dItems(
   const full = shapes.length >= MAX_SHAPES ? `There are ${MAX_SHAPES} shapes: no more.` : "";
   const count = shapes.length;
   const set = (changed: Shapes) => setShapes(channel, changed);
-  const most = plane === null ? "" : percent(plane.gradient_max * (window[1] - window[0]));
+  const most =
+    transfer2d === null ? "" : percent(transfer2d.gradient_max * (window[1] - window[0]));
   const steepest = most === "" ? "" : `gradient ${most}`;
   const add = (kind: Shape["kind"]): Control => ({
     kind: "button",

@@ -58,7 +58,7 @@ export class BrickLink {
   ) {
     this.worker = new Worker(new URL("./client_worker.ts", import.meta.url), { type: "module" });
     this.worker.addEventListener("message", ({ data }: MessageEvent<LinkMessage>) =>
-      this.hear(data),
+      this.receive(data),
     );
     this.post({ type: "connect", address });
   }
@@ -87,19 +87,19 @@ export class BrickLink {
     this.post({ type: "view", texel_px: TEXEL_PX, budget: BUDGET_BYTES, ...view });
   }
 
-  private hear(told: LinkMessage): void {
-    switch (told.type) {
+  private receive(message: LinkMessage): void {
+    switch (message.type) {
       case "tree": {
-        const name = `${told.tile}/${told.channel}`;
-        this.takers.get(name)?.onTable(parseTable(told.table, `/bricks: ${name}`));
+        const name = `${message.tile}/${message.channel}`;
+        this.takers.get(name)?.onTable(parseTable(message.table, `/bricks: ${name}`));
         break;
       }
       case "bricks": {
-        const bricks = Array.from(told.nodes, (node, i) => ({
+        const bricks = Array.from(message.nodes, (node, i) => ({
           node,
-          texels: told.texels.subarray(i * STORED_BYTES, (i + 1) * STORED_BYTES),
+          texels: message.texels.subarray(i * STORED_BYTES, (i + 1) * STORED_BYTES),
         }));
-        this.takers.get(`${told.tile}/${told.channel}`)?.onBricks(bricks);
+        this.takers.get(`${message.tile}/${message.channel}`)?.onBricks(bricks);
         break;
       }
       case "done":
@@ -107,10 +107,10 @@ export class BrickLink {
         this.onDone();
         break;
       case "refused":
-        this.takers.get(`${told.tile}/${told.channel}`)?.onRefused(told.text);
+        this.takers.get(`${message.tile}/${message.channel}`)?.onRefused(message.text);
         break;
       case "fault":
-        this.onError(new TemporaryError(told.text, { notice: told.text }));
+        this.onError(new TemporaryError(message.text, { notice: message.text }));
         break;
       case "lost":
         this.isOpen = this.isBusy = false;

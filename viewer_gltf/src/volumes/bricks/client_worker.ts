@@ -45,8 +45,8 @@ let viewId = 0;
 /** Answers are taken one after the other. */
 let turn: Promise<void> = decoder.init();
 
-function tell(told: LinkMessage, transfer: Transferable[] = []): void {
-  self.postMessage(told, { transfer });
+function post(message: LinkMessage, transfer: Transferable[] = []): void {
+  self.postMessage(message, { transfer });
 }
 
 function say(message: object): void {
@@ -68,13 +68,13 @@ function connect(): void {
     askedFor.clear();
     // a host that never answered has no bricks after all
     const wait = hasOpened || tries === 0 ? RETRY_MS[tries++] : undefined;
-    if (wait === undefined) tell({ type: "lost", reason });
+    if (wait === undefined) post({ type: "lost", reason });
     else setTimeout(connect, wait);
   };
 }
 
 function fail(error: unknown): void {
-  tell({ type: "fault", text: error instanceof Error ? error.message : String(error) });
+  post({ type: "fault", text: error instanceof Error ? error.message : String(error) });
   socket?.close();
 }
 
@@ -119,13 +119,13 @@ async function hear(message: ServerMessage): Promise<void> {
   } else if (message.type === "error") {
     const { tile, channel } = message;
     volumes.delete(`${tile}/${channel}`);
-    tell({ type: "refused", tile, channel, text: message.message });
+    post({ type: "refused", tile, channel, text: message.message });
   } else if (message.type === "done") {
     for (const tree of trees.values()) await flush(tree);
     if (message.view !== viewId || message.reason === "cancelled") return;
     if (message.reason === "budget")
       ask(); // the same view goes on
-    else if (readyTrees().length >= volumes.size) tell({ type: "done" });
+    else if (readyTrees().length >= volumes.size) post({ type: "done" });
   }
 }
 
@@ -156,7 +156,7 @@ async function begin(number: number, tree: Tree): Promise<void> {
   const table = parseTable(tree.raw, tree.name);
   tree.table = table;
   tree.present.bits = new Uint8Array(table.nodes.length);
-  tell({ type: "tree", tile: tree.tile, channel: tree.channel, table: tree.raw.slice() });
+  post({ type: "tree", tile: tree.tile, channel: tree.channel, table: tree.raw.slice() });
   const byHash = new Map<string, Uint8Array<ArrayBuffer>>();
   for (const { hash, bytes } of await (await cache).bricks(tree.hash)) byHash.set(hash, bytes);
   const wasOpen = tree.isBegun;
@@ -187,7 +187,7 @@ function handOver({ tile, channel, name }: Tree, bricks: readonly Kept[]): void 
     nodes[i] = node;
     texels.set(unpacked, i * STORED_BYTES);
   });
-  tell({ type: "bricks", tile, channel, nodes, texels }, [nodes.buffer, texels.buffer]);
+  post({ type: "bricks", tile, channel, nodes, texels }, [nodes.buffer, texels.buffer]);
 }
 
 async function takeBricks({ parts }: Frame): Promise<void> {

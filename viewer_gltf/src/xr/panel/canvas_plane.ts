@@ -18,15 +18,15 @@ import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
 const LIT_OPACITY = 0.14;
-/** Before the plane by so much. */
+/** Before the quad by so much. */
 const LIT_M = 0.001;
 /** Text is looked at aslant. */
 const ANISOTROPY = 4;
 
-/** px on the plane. */
+/** px on the quad. */
 export type Spot = Readonly<{ x: number; y: number; distance_m: number }>;
 
-export class Plane {
+export class CanvasQuad {
   readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
   /** How often it was painted. */
   paints = 0;
@@ -97,7 +97,7 @@ export class Plane {
     const from = origin.clone().applyMatrix4(this.toQuad);
     const to = direction.clone().transformDirection(this.toQuad);
     if (from.z <= 0 || to.z >= 0) return null;
-    const distance_m = -from.z / to.z; // the plane is not scaled
+    const distance_m = -from.z / to.z; // the quad is not scaled
     const x = (from.x + distance_m * to.x) * PX_PER_M + this.width / 2;
     const y = this.height / 2 - (from.y + distance_m * to.y) * PX_PER_M;
     const whole: Rect = { x: 0, y: 0, width: this.width, height: this.height };

@@ -3,15 +3,15 @@
  * there in the room, since what moves with the head makes sick, and goes by itself.
  */
 import { type Matrix4, Vector3 } from "three";
-import { Plane } from "./canvas_plane";
+import { CanvasQuad } from "./canvas_plane";
 import {
   type Announcements,
   advanceAnnouncements,
+  announce,
   NO_ANNOUNCEMENTS,
   NOTICE_HEIGHT,
   NOTICE_WIDTH,
   noticeMarks,
-  tell,
 } from "./notice_queue";
 import { headBearing, noticeBearing, pointAt } from "./placement";
 
@@ -21,21 +21,21 @@ const DISTANCE_M = 0.9;
 const RENDER_ORDER = 1900;
 
 export class RoomNotice {
-  private readonly plane = new Plane(NOTICE_WIDTH, NOTICE_HEIGHT);
+  private readonly quad = new CanvasQuad(NOTICE_WIDTH, NOTICE_HEIGHT);
   private announcements: Announcements = NO_ANNOUNCEMENTS;
   /** It comes with the next frame, which knows where the head looks. */
   private wantsPlace = false;
 
   constructor() {
-    const { material } = this.plane.mesh;
+    const { material } = this.quad.mesh;
     material.transparent = true;
     material.depthTest = material.depthWrite = false;
-    this.plane.mesh.renderOrder = RENDER_ORDER;
-    this.plane.mesh.name = "notice";
+    this.quad.mesh.renderOrder = RENDER_ORDER;
+    this.quad.mesh.name = "notice";
   }
 
   get mesh() {
-    return this.plane.mesh;
+    return this.quad.mesh;
   }
 
   /** What can be read now. */
@@ -43,8 +43,8 @@ export class RoomNotice {
     return this.announcements.texts;
   }
 
-  tell(text: string): void {
-    this.announcements = tell(this.announcements, text);
+  announce(text: string): void {
+    this.announcements = announce(this.announcements, text);
     this.wantsPlace = true;
   }
 
@@ -60,14 +60,14 @@ export class RoomNotice {
     if (this.wantsPlace) {
       this.wantsPlace = false;
       const eye = new Vector3().setFromMatrixPosition(head);
-      this.plane.place(pointAt(noticeBearing(headBearing(head)), eye, DISTANCE_M), eye);
+      this.quad.place(pointAt(noticeBearing(headBearing(head)), eye, DISTANCE_M), eye);
     } else this.announcements = advanceAnnouncements(this.announcements, dt_s);
     this.mesh.visible = this.texts.length > 0;
     if (!this.mesh.visible) return wasShown;
-    return this.plane.show(noticeMarks(this.texts)) || !wasShown;
+    return this.quad.show(noticeMarks(this.texts)) || !wasShown;
   }
 
   dispose(): void {
-    this.plane.dispose();
+    this.quad.dispose();
   }
 }

@@ -4,14 +4,14 @@ import {
   ANNOUNCED_S,
   type Announcements,
   advanceAnnouncements,
+  announce,
   NO_ANNOUNCEMENTS,
   NOTICE_HEIGHT,
   NOTICE_WIDTH,
   noticeMarks,
-  tell,
 } from "./notice_queue";
 
-const told = (...texts: readonly string[]) => texts.reduce(tell, NO_ANNOUNCEMENTS);
+const announced = (...texts: readonly string[]) => texts.reduce(announce, NO_ANNOUNCEMENTS);
 function after(announcements: Announcements, seconds: number): readonly string[] {
   let now = announcements;
   for (let t = 0; t < seconds; t += 0.125) now = advanceAnnouncements(now, 0.125);
@@ -20,23 +20,23 @@ function after(announcements: Announcements, seconds: number): readonly string[]
 
 describe("what is told in stereo", () => {
   it("goes by itself after six seconds", () => {
-    expect(after(told("a"), ANNOUNCED_S - 0.25)).toEqual(["a"]);
-    expect(after(told("a"), ANNOUNCED_S)).toEqual([]);
+    expect(after(announced("a"), ANNOUNCED_S - 0.25)).toEqual(["a"]);
+    expect(after(announced("a"), ANNOUNCED_S)).toEqual([]);
     expect(advanceAnnouncements(NO_ANNOUNCEMENTS, 1)).toBe(NO_ANNOUNCEMENTS);
   });
 
   it("is read one after the other, the newest at once", () => {
-    expect(told("a", "b").texts).toEqual(["a", "b"]);
-    expect(after(told("a", "b"), ANNOUNCED_S)).toEqual(["b"]);
-    expect(after(told("a", "b"), 2 * ANNOUNCED_S)).toEqual([]);
+    expect(announced("a", "b").texts).toEqual(["a", "b"]);
+    expect(after(announced("a", "b"), ANNOUNCED_S)).toEqual(["b"]);
+    expect(after(announced("a", "b"), 2 * ANNOUNCED_S)).toEqual([]);
   });
 
   it("is the newest three, each once", () => {
-    expect(told("a", "b", "c", "d").texts).toEqual(["b", "c", "d"]);
-    expect(told("a", "b", "a").texts).toEqual(["b", "a"]);
-    const again = tell(advanceAnnouncements(told("a"), 5), "a");
+    expect(announced("a", "b", "c", "d").texts).toEqual(["b", "c", "d"]);
+    expect(announced("a", "b", "a").texts).toEqual(["b", "a"]);
+    const again = announce(advanceAnnouncements(announced("a"), 5), "a");
     expect(after(again, ANNOUNCED_S - 0.25)).toEqual(["a"]);
-    const third = tell(advanceAnnouncements(told("a", "b"), 5), "c");
+    const third = announce(advanceAnnouncements(announced("a", "b"), 5), "c");
     expect(after(third, 1)).toEqual(["b", "c"]);
   });
 

@@ -16,7 +16,7 @@ export type Announcements = Readonly<{
 export const NO_ANNOUNCEMENTS: Announcements = { texts: [], elapsed_s: 0 };
 
 /** What is told again is the newest again. */
-export function tell({ texts, elapsed_s }: Announcements, newest: string): Announcements {
+export function announce({ texts, elapsed_s }: Announcements, newest: string): Announcements {
   const others = texts.filter((each) => each !== newest).slice(1 - MOST);
   return { texts: [...others, newest], elapsed_s: others[0] === texts[0] ? elapsed_s : 0 };
 }

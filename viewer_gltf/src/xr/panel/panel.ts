@@ -1,5 +1,5 @@
 /**
- * The panel in the room: a plane with one section of the layout at a time, and a button under all
+ * The panel in the room: a quad with one section of the layout at a time, and a button under all
  * that is looked at, which opens and closes it. It opens beside the specimen, never before it.
  */
 import { Group, type Matrix4, Vector3 } from "three";
@@ -18,7 +18,7 @@ import { changePanel, type Layout, type PanelView, START_VIEW } from "../../pane
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
-import { Plane, type Spot } from "./canvas_plane";
+import { CanvasQuad, type Spot } from "./canvas_plane";
 import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } from "./placement";
 
 const DISTANCE_M = 1.2;
@@ -44,8 +44,8 @@ export type RoomPanelOptions = Readonly<{
 
 export class RoomPanel {
   readonly group = new Group();
-  readonly plane = new Plane(WIDTH, HEIGHT);
-  private readonly opener = new Plane(OPENER.width, OPENER.height);
+  readonly quad = new CanvasQuad(WIDTH, HEIGHT);
+  private readonly opener = new CanvasQuad(OPENER.width, OPENER.height);
   /** In the order in which rays meet them. */
   readonly targets: readonly Target[];
   private page: Page = { marks: [], regions: [] };
@@ -64,7 +64,7 @@ export class RoomPanel {
   constructor(private readonly options: RoomPanelOptions) {
     this.group.name = "panel";
     this.group.visible = false;
-    this.group.add(this.plane.mesh, this.opener.mesh);
+    this.group.add(this.quad.mesh, this.opener.mesh);
     this.opener.mesh.visible = true;
     this.targets = [
       {
@@ -83,7 +83,7 @@ export class RoomPanel {
   }
 
   get isOpen(): boolean {
-    return this.plane.mesh.visible;
+    return this.quad.mesh.visible;
   }
 
   /** What can be pointed at now, for tests and for whoever reads it aloud. */
@@ -99,7 +99,7 @@ export class RoomPanel {
   }
 
   close(): void {
-    this.plane.mesh.visible = false;
+    this.quad.mesh.visible = false;
     this.paintOpener();
   }
 
@@ -141,7 +141,7 @@ export class RoomPanel {
   /** Light up what is pointed at. */
   light(key: string | null): void {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
-    this.plane.light(this.page.regions.find((region) => region.id === id)?.rect ?? null);
+    this.quad.light(this.page.regions.find((region) => region.id === id)?.rect ?? null);
     this.opener.light(key === OPENER_KEY ? OPENER : null);
   }
 
@@ -151,7 +151,7 @@ export class RoomPanel {
     if (id === OPENER_KEY) return this.opener.mesh.getWorldPosition(new Vector3());
     if (region === undefined) return null;
     const { x, y, width, height } = region.rect;
-    return this.plane.mesh.localToWorld(
+    return this.quad.mesh.localToWorld(
       new Vector3(
         (x + across * width - WIDTH / 2) / PX_PER_M,
         (HEIGHT / 2 - y - down * height) / PX_PER_M,
@@ -161,15 +161,15 @@ export class RoomPanel {
   }
 
   dispose(): void {
-    this.plane.dispose();
+    this.quad.dispose();
     this.opener.dispose();
   }
 
   private open(eye: Vector3, yaw: number, around: readonly Vector3[]): void {
     const aside = placePanel(extentOf(around, eye, yaw), HALF);
     const bearing = { yaw: yaw + aside.yaw, pitch: aside.pitch };
-    this.plane.place(pointAt(bearing, eye, DISTANCE_M), eye);
-    this.plane.mesh.visible = true;
+    this.quad.place(pointAt(bearing, eye, DISTANCE_M), eye);
+    this.quad.mesh.visible = true;
     this.isStale = true;
     this.paintOpener();
   }
@@ -178,7 +178,7 @@ export class RoomPanel {
     this.isStale = false;
     this.rested_s = 0;
     this.page = pageOf(this.options.layOut(this.view), this.section);
-    return this.plane.show(this.page.marks);
+    return this.quad.show(this.page.marks);
   }
 
   private paintOpener(): void {
@@ -194,7 +194,7 @@ export class RoomPanel {
   }
 
   private meet(ray: RoomRay): Hit | null {
-    const spot = this.plane.meet(ray);
+    const spot = this.quad.meet(ray);
     if (spot === null) return null;
     const region = this.regionAt(spot);
     const key = region && PANEL + region.id;
@@ -228,7 +228,7 @@ export class RoomPanel {
   /** Beyond a region's ends is at its ends: a slider is dragged past them. */
   private wishAt(key: string, ray: RoomRay, isPress: boolean): CanvasWish | null {
     const region = this.page.regions.find(({ id }) => PANEL + id === key);
-    const spot = this.plane.meet(ray);
+    const spot = this.quad.meet(ray);
     if (region === undefined || spot === null) return null;
     const { x, y, width, height } = region.rect;
     const inside = (share: number) => Math.min(1, Math.max(0, share));

@@ -131,14 +131,16 @@ function inBricks(size: Run["size"], texels: Uint8Array) {
 }
 
 /** Alike channels share the opacity. */
-function looksOf(run: Run) {
+function appearancesOf(run: Run) {
   const count = run.channels ?? 1;
   const table = new Uint8Array(1024).fill(255);
   run.opacities.forEach((opacity, i) => {
     table[4 * i + 3] = Math.round(255 * (1 - (1 - opacity / 255) ** (1 / count)));
   });
-  const plane = run.isTwoD ? { cells: alikeRows(table), gradientMax: 0.5, envelope: table } : null;
-  return Array.from({ length: count }, () => ({ color: run.color, table, plane }));
+  const table2d = run.isTwoD
+    ? { cells: alikeRows(table), gradientMax: 0.5, envelope: table }
+    : null;
+  return Array.from({ length: count }, () => ({ color: run.color, table, table2d }));
 }
 
 // One for all runs, and no tracer of it is disposed: what one has compiled does for the next
@@ -159,7 +161,7 @@ function gather(run: Run): Gathered {
   };
   const bounds = { min: texels.frame.min, max: texels.frame.max };
   tracer.fill(texels);
-  tracer.dress(looksOf(run), settings);
+  tracer.setAppearances(appearancesOf(run), settings);
   tracer.lightBy(
     environmentTables({ ...run.environment, rgb: Float32Array.from(run.environment.rgb) }),
   );

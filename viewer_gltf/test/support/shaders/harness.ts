@@ -72,7 +72,7 @@ export function marchOf(
   table: Uint8Array,
   hasSkips: boolean,
   depth: DepthPass,
-  plane: TransferTable2d | null = null,
+  table2d: TransferTable2d | null = null,
 ): TileMarch {
   const [side] = volume.size;
   const frame = makeFrame(depth.texture);
@@ -81,7 +81,7 @@ export function marchOf(
   const march = new TileMarch(volume, 1, frame);
   const texture = texture3D(texels, side);
   march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
-  march.dress([{ color: [1, 1, 1], table, plane, isInDisc: false }]);
+  march.setAppearances([{ color: [1, 1, 1], table, table2d, isInDisc: false }]);
   const count = brickCounts(volume.size);
   const skips = { bricks: [bricks], alphas: [opacities(table)], count };
   if (hasSkips) march.skipBy(occupancyDistances(skips));

@@ -18,7 +18,7 @@ const EDGE = SIDE - 3;
 /** The slope between 0 and 255: from here, and so long, voxels. */
 const SLOPE = { from: 20, length: 8 };
 
-/** A plane of one shape with hard edges. */
+/** A table of one shape with hard edges. */
 function oneTable2d(values: Range, gradients: Range, opacity: number): TransferTable2d {
   const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), values, gradients };
   return transferTable2d(
@@ -43,8 +43,8 @@ function showSlope(values: Range, gradients: Range, opacity: number): number[] {
     texels[i] = Math.round(255 * Math.min(1, Math.max(0, x)));
   }
   const bricks = makeBricks({ size: [SIDE, SIDE, SIDE], texels }).texels;
-  const plane = oneTable2d(values, gradients, opacity);
-  const march = marchOf(cube(SIDE), texels, bricks, plane.envelope, true, depth, plane);
+  const table2d = oneTable2d(values, gradients, opacity);
+  const march = marchOf(cube(SIDE), texels, bricks, table2d.envelope, true, depth, table2d);
   const away = 300;
   const fov_deg = (2 * Math.atan(0.5 / away) * 180) / Math.PI;
   const camera = new PerspectiveCamera(fov_deg, 1, EDGE, EDGE * 1000);
@@ -69,7 +69,7 @@ function compareAlike(seed: number): Apart {
   const depth = new DepthPass(new Cuts());
   const { texels, table, bricks } = randomScene(seed, SIDE);
   const alike = { cells: alikeRows(table), gradientMax: 0.3, envelope: table };
-  const [flat, plane] = [null, alike].map((each) =>
+  const [flat, table2d] = [null, alike].map((each) =>
     draw(
       [marchOf(cube(SIDE), texels, bricks, table, true, depth, each)],
       diagonalCamera(EDGE),
@@ -78,7 +78,7 @@ function compareAlike(seed: number): Apart {
     ),
   );
   renderer.dispose();
-  return compare(flat, plane);
+  return compare(flat, table2d);
 }
 
 /** The picture of random shapes with skips and without. */
@@ -91,10 +91,10 @@ function compareSkips2d(seed: number): Apart {
     ...makeShape(i % 2 ? "rectangle" : "triangle", { value: random(), gradient: random() }),
     opacity: random(),
   }));
-  const plane = transferTable2d(shapes, { gradient_max: 0.2, functions: {} }, [0, 1], 1);
+  const table2d = transferTable2d(shapes, { gradient_max: 0.2, functions: {} }, [0, 1], 1);
   const [skipping, plain] = [true, false].map((hasSkips) =>
     draw(
-      [marchOf(cube(SIDE), texels, bricks, plane.envelope, hasSkips, depth, plane)],
+      [marchOf(cube(SIDE), texels, bricks, table2d.envelope, hasSkips, depth, table2d)],
       diagonalCamera(EDGE),
       depth,
       renderer,

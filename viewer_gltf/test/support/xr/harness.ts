@@ -39,7 +39,7 @@ const FACTS: Facts = {
   subtitle: "",
   shown: SPECIMEN_BOX,
   ranges: new Map([["c0", [100, 1120]]]),
-  gazed: null,
+  focusTile: null,
   isStereo: true,
   stereo: { isAvailable: true, reason: "" },
   split: null,
@@ -218,7 +218,7 @@ class Stand {
   }
 
   tell(text: string): Promise<void> {
-    this.hands.tell(text);
+    this.hands.announce(text);
     return this.step([0]);
   }
 
@@ -249,7 +249,7 @@ class Stand {
       progress,
       isRingShown: ring.isShown,
       isOpen: panel.isOpen,
-      paints: panel.plane.paints,
+      paints: panel.quad.paints,
       position: position.toArray(),
       scale,
       regions: panel.regions.map(({ id }) => id),
