@@ -8,7 +8,7 @@ import {
   FAR_AWAY,
   type FocusState,
   isWaiting,
-} from "../state/nearby_tiles";
+} from "../state/focus_tiles";
 import type { ViewerState } from "../state/viewer_state";
 
 /** The disc opens in this time once its volumes are there. */

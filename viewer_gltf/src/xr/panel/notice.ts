@@ -3,7 +3,7 @@
  * there in the room, since what moves with the head makes sick, and goes by itself.
  */
 import { type Matrix4, Vector3 } from "three";
-import { CanvasQuad } from "./canvas_plane";
+import { CanvasQuad } from "./canvas_quad";
 import {
   type Announcements,
   advanceAnnouncements,

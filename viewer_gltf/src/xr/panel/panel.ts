@@ -18,7 +18,7 @@ import { changePanel, type Layout, type PanelView, START_VIEW } from "../../pane
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
-import { CanvasQuad, type Spot } from "./canvas_plane";
+import { CanvasQuad, type Spot } from "./canvas_quad";
 import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } from "./placement";
 
 const DISTANCE_M = 1.2;

@@ -9,7 +9,7 @@ import {
   isWaiting,
   MAX_DISC_TILES,
   REST_S,
-} from "./nearby_tiles";
+} from "./focus_tiles";
 
 /** Two rows of five tiles, 10 um each and 5 um deep, as seen from the front. */
 const TILES = Array.from({ length: 10 }, (_, i) => {
