@@ -14,7 +14,7 @@ import { Cuts } from "viewer/gpu/clip_planes";
 import { DepthPass } from "viewer/render/depth_pass";
 import { Eyes } from "viewer/gpu/eyes";
 import { MarchPass } from "viewer/render/raymarch_pass";
-import { brickCounts } from "viewer/volumes/bricks8";
+import { brickCounts } from "viewer/volumes/skip_bricks";
 import { opacities } from "viewer/volumes/transfer_luts";
 import { occupancyDistances } from "viewer/volumes/empty_space";
 import { makeFrame, TileMarch } from "viewer/volumes/tile_raymarch";
@@ -110,9 +110,9 @@ function marchOf({ about, voxels, bricks }: Scene, frame: ReturnType<typeof make
   texture.needsUpdate = true;
   const march = new TileMarch(volume, 1, frame);
   march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
-  march.dress([{ color: about.color, table, isInDisc: false }]);
+  march.setAppearances([{ color: about.color, table, isInDisc: false }]);
   const count = brickCounts(volume.size);
-  march.leapBy(occupancyDistances({ bricks: [bricks], alphas: [opacities(table)], count }));
+  march.skipBy(occupancyDistances({ bricks: [bricks], alphas: [opacities(table)], count }));
   return march;
 }
 

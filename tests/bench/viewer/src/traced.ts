@@ -81,7 +81,7 @@ class Traced implements Renderer {
       bricks: [bricks],
       release: () => texture.dispose(),
     });
-    this.tracer.dress([{ color: about.color, table: Uint8Array.from(about.table) }], this.settings);
+    this.tracer.setAppearances([{ color: about.color, table: Uint8Array.from(about.table) }], this.settings);
     this.tracer.lightBy(environmentTables(WHITE));
     this.room.add(this.overlay.mesh);
     const away = Math.hypot(...camera.eye_um.map((v, i) => v - camera.target_um[i]));
