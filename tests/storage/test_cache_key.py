@@ -155,6 +155,8 @@ def test_comments_and_docstrings_change_no_key(copy: Path) -> None:
     ("old", "new"),
     [
         ("", ""),
+        ("def f(): return 1", 'def f():\n    """Say one."""\n    return 1'),
+        ("class A:\n    pass", 'class A:\n    """Nothing."""'),
         ('raise ValueError(f"{a}: found {b}")', 'raise ValueError(f"{a}: not {b:.2f}, " "other")'),
         ('raise Error("words") from None', 'raise Error("other words") from None'),
         ('console.print("done")', 'console.print(f"{a} is done")'),
