@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from malformed import trial  # noqa: E402
 from malformed.base import BUILD, write_base  # noqa: E402
 from malformed.cases import Case  # noqa: E402
-from malformed.corpus import all_cases, sample  # noqa: E402
+from malformed.corpus import all_cases, one_of_each_kind, sample  # noqa: E402
 
 
 def main() -> int:
@@ -24,11 +24,14 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="how many at a time")
     parser.add_argument("--only", default="", help="cases whose `kind: name` holds this")
     parser.add_argument("--sample", type=int, default=0, help="so many, spread evenly")
+    parser.add_argument("--each-kind", action="store_true", help="one of each kind")
     parser.add_argument("--json", type=Path, help="write each case's fault there")
     parser.add_argument("--keep", type=Path, help="work in this new folder, and leave it")
     parser.add_argument("--show", action="store_true", help="print how each case ended")
     options = parser.parse_args()
     cases = [c for c in all_cases() if options.only in f"{c.kind}: {c.name}"]
+    if options.each_kind:
+        cases = one_of_each_kind(cases)
     if options.sample:
         cases = sample(cases, options.sample)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as temporary:

@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 
 from stereocell.serve.limits import MESSAGE_BYTES
 from stereocell.serve.server import BundleServer
+from support.exhaustive import examples
 from support.server.brick_bundles import phantom, write_out
 from support.server.brick_client import BrickClient, look_at
 from support.server.timeouts import PATIENCE_S, connect
@@ -53,7 +54,7 @@ PROBE = json.dumps({"type": "open", "volumes": [{"tile": "probe", "channel": "pr
 CODES = {1003, 1007, 1008, 1009}
 
 
-def texts(count=170):
+def texts(count):
     """Return text messages: valid ones with a part spoilt, and noise."""
     rng = random.Random(7)
     found = [
@@ -112,7 +113,7 @@ def raw_frames():
     found += [frame(8, struct.pack(">H", 1005)), frame(8, b"\x03\xe8\xff"), frame(2, b"")]
     found += [frame(1, b"x" * 40000, fin=False) + frame(0, b"x" * 40000)]
     found += [frame(1, b"{}", length=100)]  # and then silence
-    found += [rng.randbytes(rng.randrange(1, 200)) for _ in range(30)]
+    found += [rng.randbytes(rng.randrange(1, 200)) for _ in range(examples(30, 6))]
     return found
 
 
@@ -167,14 +168,15 @@ def fate(port, message, hello):
 
 def test_every_malformed_message_is_closed_with_a_reason_or_ignored(port, capfd, caplog):
     fates = []
-    for i, text in enumerate(texts()):
+    count = examples(170, 60)
+    for i, text in enumerate(texts(count)):
         fates.append(fate(port, text, hello=i % 8 > 0))
     rng = random.Random(9)
-    for i in range(40):
+    for i in range(examples(40, 8)):
         found = fate(port, rng.randbytes(rng.randrange(100)), hello=i % 4 > 0)
         assert found == (1003, "binary frames go to the client only")
     closed = [found for found in fates if found is not None]
-    assert len(closed) > 100
+    assert len(closed) / count > 100 / 170
     for code, reason in closed:
         assert code in CODES
         assert 0 < len(reason.encode()) <= 123 or code == 1009

@@ -70,9 +70,10 @@ def _forget() -> None:
     cache_key._modules.cache_clear()
 
 
-def changed(checkout: Path, file: str, change: Callable[[str], str]) -> set[str]:
-    """The makers whose key follows a change of one file."""
-    before = keys(checkout)
+def changed(
+    before: dict[str, str], checkout: Path, file: str, change: Callable[[str], str]
+) -> set[str]:
+    """The makers whose key follows a change of one file; `before` are the keys without it."""
     path = checkout / file
     content = path.read_text()
     path.write_text(change(content))
@@ -121,9 +122,9 @@ PACKAGE = "pipeline/stereocell"
     ],
 )
 def test_a_constant_changes_the_keys_of_what_it_makes(
-    copy: Path, file: str, reached: set[str]
+    copy: Path, before: dict[str, str], file: str, reached: set[str]
 ) -> None:
-    assert changed(copy, f"{PACKAGE}/{file}", change_a_number) == reached
+    assert changed(before, copy, f"{PACKAGE}/{file}", change_a_number) == reached
 
 
 @pytest.mark.parametrize(
@@ -131,14 +132,13 @@ def test_a_constant_changes_the_keys_of_what_it_makes(
     [("usd_assets/lights.usda", {"stage"}), ("schemas/usd/schema.usda", {"stage", "bundle"})],
 )
 def test_an_asset_changes_the_keys_of_what_is_made_of_it(
-    copy: Path, file: str, reached: set[str]
+    copy: Path, before: dict[str, str], file: str, reached: set[str]
 ) -> None:
-    assert changed(copy, file, lambda text: f"{text}\n# changed\n") == reached
+    assert changed(before, copy, file, lambda text: f"{text}\n# changed\n") == reached
 
 
-def test_comments_and_docstrings_change_no_key(copy: Path) -> None:
+def test_comments_and_docstrings_change_no_key(copy: Path, before: dict[str, str]) -> None:
     """In all modules at once: a comment above, one in each body, another docstring."""
-    before = keys(copy)
     for file in (copy / PACKAGE).rglob("*.py"):
         text = file.read_text()
         if text.startswith('"""'):

@@ -1,4 +1,4 @@
-"""A sample of the malformed inputs in malformed/, spread evenly; `make torture` runs them all.
+"""The malformed inputs in malformed/, one of each kind, or more; `make torture` runs them all.
 
 In a process of their own: each case is a fork, and what forks has to have no threads.
 """
@@ -10,22 +10,27 @@ from pathlib import Path
 
 import pytest
 
+from malformed.corpus import all_cases, one_of_each_kind
+from support.exhaustive import sweep
+
 SAMPLE = 24
+OF_EACH_KIND = ("--each-kind", len(one_of_each_kind(all_cases())))
 
 
 @pytest.mark.slow
-def test_each_ends_in_a_sound_result_or_one_clear_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("words", "count"),
+    sweep([OF_EACH_KIND, (f"--sample={SAMPLE}", SAMPLE)], kept=[OF_EACH_KIND]),
+)
+def test_each_ends_in_a_sound_result_or_one_clear_line(
+    tmp_path: Path, words: str, count: int
+) -> None:
     answer = tmp_path / "faults.json"
-    command = [
-        sys.executable,
-        str(Path(__file__).parents[1] / "malformed"),
-        "--sample",
-        str(SAMPLE),
-    ]
+    command = [sys.executable, str(Path(__file__).parents[1] / "malformed"), words]
     run = subprocess.run(
         [*command, "--json", str(answer)], capture_output=True, text=True, timeout=900, check=False
     )
     assert answer.exists(), run.stdout + run.stderr
     faults = json.loads(answer.read_text())
-    assert len(faults) == SAMPLE
+    assert len(faults) == count > 10
     assert {name: fault for name, fault in faults.items() if fault} == {}
