@@ -70,7 +70,12 @@ export default defineConfig({
     projects: [
       {
         extends: true,
-        test: { name: "unit", include: ["{src,scripts}/**/*.test.ts"], environment: "node" },
+        test: {
+          name: "unit",
+          include: ["{src,scripts}/**/*.test.ts"],
+          environment: "node",
+          isolate: false, // modules are read once for all files, which is most of what they take
+        },
       },
       {
         extends: true,
@@ -82,7 +87,8 @@ export default defineConfig({
           testTimeout: 180_000,
           hookTimeout: 180_000,
           expect: { poll: { timeout: 20_000 } }, // its usual second is short for a busy machine
-          fileParallelism: false, // one software-rendering browser at a time
+          fileParallelism: false, // one software-rendering page at a time
+          isolate: false,
           // where others have the cores a browser may miss a moment; what is wrong is wrong twice
           retry: process.env.CI === undefined ? 0 : 1,
         },

@@ -15,7 +15,7 @@
  *     --page                 the bundle's own index.html instead of dist/
  */
 import { parseArgs } from "node:util";
-import { addHeadset, launch } from "../test/support/browser/chromium";
+import { addHeadset, enter, serveChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 import { ViewerPage } from "../test/support/browser/page";
 
@@ -44,7 +44,11 @@ if (bundle === undefined || out === undefined) {
 const [width, height] = values.phone ? [390, 780] : values.size.split("x").map(Number);
 const dist = new URL("../dist/", import.meta.url).pathname;
 const host = await Host.start({ "/": values.page ? bundle : dist, "/bundle/": bundle });
-const browser = await launch({ width, height }, { hasTouch: values.phone });
+const server = await serveChromium();
+const browser = await enter(server.wsEndpoint(), {
+  viewport: { width, height },
+  hasTouch: values.phone,
+});
 try {
   const page = await browser.context.newPage();
   page.on("pageerror", (error) => process.stderr.write(`page: ${error.message}\n`));
@@ -83,5 +87,6 @@ try {
   );
 } finally {
   await browser.close();
+  await server.close();
   await host.stop();
 }

@@ -5,7 +5,8 @@ import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
 import { LABEL_HEIGHT, LABEL_PX } from "../../src/annotations/style";
 import type { Vec3 } from "../../src/math/vec3";
 import { bundled } from "../support/browser/bundled";
-import { type Browser, launch } from "../support/browser/chromium";
+import type { Browser } from "../support/browser/chromium";
+import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 
 const WIDTH = 720;
@@ -19,7 +20,7 @@ describeInChromium("marks", () => {
   let script: string;
 
   beforeAll(async () => {
-    browser = await launch({ width: WIDTH, height: HEIGHT });
+    browser = await openBrowser({ viewport: { width: WIDTH, height: HEIGHT } });
     const built = await bundled(new URL("../support/annotations/harness.ts", import.meta.url));
     script = built.replaceAll("{}.url", "location.href"); // a classic script has no import.meta
   });

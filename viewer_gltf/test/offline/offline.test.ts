@@ -4,10 +4,11 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
-import { type Browser, launch } from "../support/browser/chromium";
+import type { Browser } from "../support/browser/chromium";
 import { Host } from "../support/browser/host";
 import { ViewerPage } from "../support/browser/page";
 import { difference, isBackground, takePicture } from "../support/browser/picture";
+import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
 import { writeFixture } from "../support/fixture/bundle";
@@ -51,7 +52,7 @@ describeInChromium("without a network", () => {
   });
 
   beforeEach(async () => {
-    browser = await launch({ width: 400, height: 300 }); // in a profile of its own: nothing kept
+    browser = await openBrowser({ viewport: { width: 400, height: 300 } }); // in a profile of its own: nothing kept
     viewer = new ViewerPage(await browser.context.newPage());
   });
 

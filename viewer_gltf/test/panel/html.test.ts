@@ -3,17 +3,18 @@
  * windows. STEREOCELL_SHOTS names a folder to leave pictures of it in.
  */
 import { join } from "node:path";
-import { beforeEach, describe, expect, it } from "vitest";
+import { beforeAll, beforeEach, describe, expect, it } from "vitest";
 import type { ViewerState } from "../../src/state/viewer_state";
 import { addHeadset } from "../support/browser/chromium";
 import { describeInChromium } from "../support/browser/skip";
-import { prepareStand } from "../support/browser/stand";
+import { prepareStand, type Stand } from "../support/browser/stand";
 
 const SHOTS = process.env.STEREOCELL_SHOTS;
+const SCREEN = { viewport: { width: 640, height: 480 }, pixelRatio: 0.5 };
 const [FIRST, SECOND] = ["F_x20_body", "Balls"];
 
-describeInChromium("the panel", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 480 }, pixelRatio: 0.5 });
+/** The panel of a page that is open or will be. */
+function panelOf(stand: Stand) {
   const page = () => stand.viewer.page;
   const control = (id: string) => page().locator(`[data-control="${id}"]`);
   const state = async (): Promise<ViewerState> => (await stand.viewer.snapshot()).state;
@@ -21,17 +22,24 @@ describeInChromium("the panel", () => {
   const focused = () =>
     page().evaluate(() => (document.activeElement as HTMLElement | null)?.dataset.control ?? null);
 
-  beforeEach(async () => {
-    await stand.open();
-    await stand.viewer.settled();
-  });
-
   async function openAll(): Promise<void> {
     for (const section of ["measure", "cut", "quality", "share"]) {
       await stand.viewer.unfold(section);
     }
     await stand.viewer.openCard(FIRST);
   }
+
+  return { page, control, state, first, focused, openAll };
+}
+
+describeInChromium("the panel", () => {
+  const stand = prepareStand(SCREEN);
+  const { page, control, state, first, focused, openAll } = panelOf(stand);
+
+  beforeEach(async () => {
+    await stand.open();
+    await stand.viewer.settled();
+  });
 
   it("changes the state by pointer, control by control", async () => {
     await openAll();
@@ -178,22 +186,6 @@ describeInChromium("the panel", () => {
     expect(await axes()).not.toBe(from);
   });
 
-  it("leaves a field at Escape, also that of the link", async () => {
-    await page().addInitScript(() => {
-      Object.defineProperty(navigator, "clipboard", { value: undefined });
-    });
-    await stand.open();
-    const press = (key: string) => page().keyboard.press(key);
-    await press("l");
-    await expect.poll(focused).toBe("link");
-    await press("o"); // is the field's
-    expect((await first()).opacity).toBe(1);
-    await press("Escape");
-    expect(await focused()).toBeNull();
-    await press("o");
-    expect((await first()).opacity).toBeCloseTo(0.95, 5);
-  });
-
   it("cuts the only tile that is shown at its own middle, and says where a cut left nothing", async () => {
     await stand.viewer.unfold("cut");
     const said = () => page().locator("[data-said]").textContent();
@@ -212,17 +204,6 @@ describeInChromium("the panel", () => {
     await alone(other.id);
     expect((await state()).isolated).toBe(other.id);
     expect(await said()).toBe(`Only tile ${other.id}: the cut leaves nothing of it.`);
-  });
-
-  it("says the same before the eyes in stereo", async () => {
-    await addHeadset(page());
-    await stand.open("&mode=off");
-    await stand.viewer.enterStereo();
-    for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
-    const { isolated } = await state();
-    const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toBe(`Only tile ${isolated}: the cut leaves nothing of it.`);
-    expect((await state()).notices).toEqual([]);
   });
 
   it("lists all keys in a dialog that keeps the focus until Escape", async () => {
@@ -249,6 +230,38 @@ describeInChromium("the panel", () => {
       await page().keyboard.press("?");
       expect(await dialog.isVisible()).toBe(isOpen);
     }
+  });
+});
+
+describeInChromium("the panel of a page that opens in its own way", () => {
+  const stand = prepareStand(SCREEN);
+  const { page, control, state, first, focused } = panelOf(stand);
+
+  it("leaves a field at Escape, also that of the link", async () => {
+    await page().addInitScript(() => {
+      Object.defineProperty(navigator, "clipboard", { value: undefined });
+    });
+    await stand.open();
+    const press = (key: string) => page().keyboard.press(key);
+    await press("l");
+    await expect.poll(focused).toBe("link");
+    await press("o"); // is the field's
+    expect((await first()).opacity).toBe(1);
+    await press("Escape");
+    expect(await focused()).toBeNull();
+    await press("o");
+    expect((await first()).opacity).toBeCloseTo(0.95, 5);
+  });
+
+  it("says the same before the eyes in stereo", async () => {
+    await addHeadset(page());
+    await stand.open("&mode=off");
+    await stand.viewer.enterStereo();
+    for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
+    const { isolated } = await state();
+    const { told } = await stand.viewer.snapshot();
+    expect(told.at(-1)).toBe(`Only tile ${isolated}: the cut leaves nothing of it.`);
+    expect((await state()).notices).toEqual([]);
   });
 
   it("finds one of seventy channels, and says which leaves for a fifth", async () => {
@@ -280,6 +293,16 @@ describeInChromium("the panel", () => {
       .poll(() => page().locator("[data-said]").textContent(), { timeout: 8000 })
       .toBe("");
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "channels-70.png") });
+  });
+});
+
+describeInChromium("the panel as it lies there", () => {
+  const stand = prepareStand({ ...SCREEN, sharesPage: true });
+  const { page, control, openAll } = panelOf(stand);
+
+  beforeAll(async () => {
+    await stand.open();
+    await stand.viewer.settled();
   });
 
   it("names every control for a screen reader", async () => {

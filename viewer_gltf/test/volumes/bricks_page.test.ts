@@ -13,10 +13,11 @@ import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { Shape } from "../../src/bundle/transfer_2d";
 import { writeShapes } from "../../src/share/shapes_link";
 import { makeShape } from "../../src/state/transfer_shapes";
-import { type Browser, launch } from "../support/browser/chromium";
+import type { Browser } from "../support/browser/chromium";
 import { Host } from "../support/browser/host";
 import { ViewerPage } from "../support/browser/page";
 import { difference, type Picture, type Pixel, takePicture } from "../support/browser/picture";
+import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
 import { writeFixture } from "../support/fixture/bundle";
@@ -94,7 +95,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       await cp(DIST, bundle, { recursive: true });
       server = await serve(out);
       host = await Host.start({ "/": bundle });
-      browser = await launch(VIEWPORT, { serviceWorkers: "block" });
+      browser = await openBrowser({ viewport: VIEWPORT, serviceWorkers: "block" });
     });
     afterAll(async () => {
       await browser?.close();

@@ -2,7 +2,8 @@
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
 import { bundled } from "../support/browser/bundled";
-import { type Browser, launch } from "../support/browser/chromium";
+import type { Browser } from "../support/browser/chromium";
+import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import type { Spot } from "../support/xr/cardboard_harness";
 
@@ -27,7 +28,7 @@ describeInChromium("stereo without WebXR", () => {
 
   beforeAll(async () => {
     script = await bundled(new URL("../support/xr/cardboard_harness.ts", import.meta.url));
-    browser = await launch({ width: WIDTH, height: HEIGHT });
+    browser = await openBrowser({ viewport: { width: WIDTH, height: HEIGHT } });
     page = await browser.context.newPage();
     await page.route(`${ADDRESS}*`, (route) =>
       route.fulfill({ body: PAGE, contentType: "text/html" }),

@@ -3,7 +3,8 @@ import type { Page } from "playwright-core";
 import { afterAll, beforeAll } from "vitest";
 import { readChunks, runProgram, type Texture } from "../shaders/chunk";
 import { bundled } from "./bundled";
-import { type Browser, launch } from "./chromium";
+import type { Browser } from "./chromium";
+import { openBrowser } from "./shared_browser";
 
 type Calls = Readonly<Record<string, (...given: never[]) => unknown>>;
 
@@ -33,7 +34,7 @@ export function prepareBarePage<H extends Calls>(harness?: URL): BarePage<H> {
   let page: Page;
 
   beforeAll(async () => {
-    browser = await launch({ width: 64, height: 64 });
+    browser = await openBrowser({ viewport: { width: 64, height: 64 } });
     page = await browser.context.newPage();
     if (harness !== undefined) await page.addScriptTag({ content: await bundled(harness) });
   });

@@ -1,9 +1,7 @@
-/** Headless Chromium with software WebGL, in a profile of its own that goes when it closes. */
+/** Headless Chromium with software WebGL. */
 import { existsSync } from "node:fs";
-import { mkdtemp, readFile, rm } from "node:fs/promises";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { type BrowserContext, chromium, type Page } from "playwright-core";
+import { readFile } from "node:fs/promises";
+import { type BrowserContext, type BrowserServer, chromium, type Page } from "playwright-core";
 
 export const CHROMIUM = process.env.CHROMIUM || "/usr/bin/chromium";
 export const HOW_TO_GET = `no Chromium at ${CHROMIUM}: apt-get install chromium, or set CHROMIUM to its path`;
@@ -29,34 +27,38 @@ export function hasChromium(): boolean {
 
 export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<void> }>;
 
-/** @param viewport CSS pixels; small ones, since software draws them */
-export async function launch(
-  viewport: { width: number; height: number },
-  {
-    pixelRatio = 1,
-    hasTouch = false,
-    flags = [] as readonly string[],
-    serviceWorkers = "allow" as "allow" | "block",
-  } = {},
-): Promise<Browser> {
+/** What a page finds: CSS pixels, small ones, since software draws them; and what a device has. */
+export type Surroundings = Readonly<{
+  viewport: { width: number; height: number };
+  /** Of the device to one of CSS. */
+  pixelRatio?: number;
+  hasTouch?: boolean;
+  serviceWorkers?: "allow" | "block";
+}>;
+
+/** Start the browser, in a profile that goes when it closes. */
+export function serveChromium(): Promise<BrowserServer> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
-  const profile = await mkdtemp(join(tmpdir(), "stereocell-chromium-"));
-  const context = await chromium.launchPersistentContext(profile, {
+  return chromium.launchServer({
     executablePath: CHROMIUM,
     headless: false, // playwright's own switch is the old mode; the flag below is the new one
-    args: ["--headless=new", ...FLAGS, ...flags],
+    args: ["--headless=new", ...FLAGS],
+  });
+}
+
+/** Pages of their own in the browser at an address: nothing is kept of others, or for them. */
+export async function enter(
+  endpoint: string,
+  { viewport, pixelRatio = 1, hasTouch = false, serviceWorkers = "allow" }: Surroundings,
+): Promise<Browser> {
+  const browser = await chromium.connect(endpoint);
+  const context = await browser.newContext({
     viewport,
     deviceScaleFactor: pixelRatio,
     hasTouch,
     serviceWorkers,
   });
-  return {
-    context,
-    close: async () => {
-      await context.close();
-      await rm(profile, { recursive: true, force: true });
-    },
-  };
+  return { context, close: () => browser.close() };
 }
 
 /**

@@ -5,9 +5,10 @@ import { join } from "node:path";
 import { afterAll, afterEach, beforeAll, beforeEach, inject } from "vitest";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { type FixtureOptions, writeFixture } from "../fixture/bundle";
-import { type Browser, launch } from "./chromium";
+import type { Browser } from "./chromium";
 import { Host } from "./host";
 import { ViewerPage } from "./page";
+import { openBrowser } from "./shared_browser";
 
 export const DIST = new URL("../../../dist/", import.meta.url).pathname;
 /** The bundle that `make test` built of the demo, if it did. */
@@ -18,7 +19,7 @@ export type Stand = Readonly<{
   bundle: string;
   manifest: Manifest;
   host: Host;
-  /** A page of its own for each test, not opened yet. */
+  /** A page, by itself one for each test, not opened yet. */
   viewer: ViewerPage;
   /** Open the bundle in it; `query` goes behind the bundle's address. */
   open: (query?: string) => Promise<void>;
@@ -34,6 +35,8 @@ export type StandOptions = Readonly<{
   /** Of the device to one of CSS; less where no picture is looked at. */
   pixelRatio?: number;
   hasTouch?: boolean;
+  /** One page for all tests of the `describe`, none of which disturbs another. */
+  sharesPage?: boolean;
   /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
   mounts?: (bundle: string) => Readonly<Record<string, string>>;
 }>;
@@ -41,6 +44,7 @@ export type StandOptions = Readonly<{
 /** Set up and cleared away around the tests of one `describe`; to be used inside them. */
 export function prepareStand(options: StandOptions): Stand {
   const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
+  const { sharesPage = false } = options;
   let folder: string | undefined;
   let bundle: string;
   let manifest: Manifest;
@@ -57,7 +61,8 @@ export function prepareStand(options: StandOptions): Stand {
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
     // its own requests would be counted with the page's
-    browser = await launch(viewport, { pixelRatio, hasTouch, serviceWorkers: "block" });
+    browser = await openBrowser({ viewport, pixelRatio, hasTouch, serviceWorkers: "block" });
+    if (sharesPage) await openPage();
   });
 
   afterAll(async () => {
@@ -66,13 +71,17 @@ export function prepareStand(options: StandOptions): Stand {
     if (folder !== undefined) await rm(folder, { recursive: true, force: true });
   });
 
-  beforeEach(async () => {
+  const openPage = async () => {
     viewer = new ViewerPage(await browser.context.newPage());
+  };
+
+  beforeEach(async () => {
+    if (!sharesPage) await openPage();
   });
 
   afterEach(async () => {
     host.reset();
-    await viewer.page.close();
+    if (!sharesPage) await viewer.page.close();
   });
 
   return {

@@ -2,7 +2,8 @@
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach } from "vitest";
 import { bundled } from "../browser/bundled";
-import { type Browser, launch } from "../browser/chromium";
+import type { Browser } from "../browser/chromium";
+import { openBrowser } from "../browser/shared_browser";
 
 const ADDRESS = "http://localhost/hands";
 const PAGE = `<!doctype html><style>
@@ -64,7 +65,7 @@ export function prepareHands(viewport = { width: 640, height: 320 }): () => Hand
 
   beforeAll(async () => {
     script = await bundled(new URL("./harness.ts", import.meta.url));
-    browser = await launch(viewport);
+    browser = await openBrowser({ viewport });
     const page = await browser.context.newPage();
     await page.route(ADDRESS, (route) => route.fulfill({ body: PAGE, contentType: "text/html" }));
     stand = new HandsStand(page);
