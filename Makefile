@@ -155,9 +155,9 @@ PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
 SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
 VITEST := cd $(VIEWER) && npm run --silent types && npm exec --silent -- vitest run
 
-test-here: setup ## The tests of one package:  T=meshes, or of a folder of the viewer: T=panel
+test-here: setup ## A package's tests, not the slow ones:  T=meshes; of the viewer: T=panel
 	@found=; \
-	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; $(PYTEST) "tests/$$T" || exit; fi; \
+	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; $(PYTEST) -m "not slow" "tests/$$T" || exit; fi; \
 	if [ -n "$$T" ] && [ -e "$(VIEWER)/src/$$T" ]; then found=1; $(VITEST) --project unit "src/$$T" || exit; fi; \
 	[ -n "$$found" ] || { printf 'T is %s, expected a folder of tests or of %s, as T=meshes\n' "$$T" $(VIEWER)/src >&2; exit 2; }
 

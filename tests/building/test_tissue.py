@@ -20,6 +20,8 @@ from stereocell.verify.formats import check
 from support.bundles import channel, load
 from support.onnx_models import write_model
 
+pytestmark = pytest.mark.slow
+
 SHAPE = (48, 40, 44)
 HEAD = ["CSF", "grey matter", "white matter"]
 QUICK = """
@@ -140,7 +142,6 @@ def test_wrong_use_is_said_in_a_line(planned: Path, capsys: pytest.CaptureFixtur
         assert error.count("\n") == 1
 
 
-@pytest.mark.slow
 def test_a_build_gains_the_classes_and_keeps_what_was_built(planned: Path, tmp_path: Path) -> None:
     (tmp_path / "quick.toml").write_text(QUICK)
     out, source = tmp_path / "out", planned.parent / "head"

@@ -32,6 +32,8 @@ from stereocell.verify import formats as check_module
 from support import phantoms
 from support.onnx_models import write_model
 
+pytestmark = pytest.mark.slow
+
 Kill = Callable[[Path, list[str], tuple[str, str]], None]
 TESTS = Path(__file__).parents[1]
 REPORT = report.run_report
@@ -220,7 +222,6 @@ def kill() -> Iterator[Kill]:
         yield run
 
 
-@pytest.mark.slow
 def test_killed_anywhere_it_goes_on_to_the_same_bytes(
     built: Path, undisturbed: Path, tmp_path: Path, kill: Kill
 ) -> None:
@@ -244,7 +245,6 @@ def test_killed_anywhere_it_goes_on_to_the_same_bytes(
     assert faults(out) == []
 
 
-@pytest.mark.slow
 def test_killed_while_classes_are_replaced_it_goes_on_either_way(
     undisturbed: Path, tmp_path: Path, kill: Kill
 ) -> None:
@@ -269,7 +269,6 @@ def test_killed_while_classes_are_replaced_it_goes_on_either_way(
     assert remains(first) == []
 
 
-@pytest.mark.slow
 def test_full_disk_is_one_line_and_what_was_there_stays(
     built: Path, undisturbed: Path, small_disk: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -312,7 +311,6 @@ def flip(file: Path) -> None:
     file.write_bytes(content)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "damage"),
     [

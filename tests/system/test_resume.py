@@ -16,6 +16,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import main
 from support import ctrl_c, phantoms
 from support.digests import digests_of
+from support.exhaustive import sweep
 from support.server.timeouts import PATIENCE_S
 
 BUILD = ["--workers", "0", "--grid", "2x1"]
@@ -79,20 +80,30 @@ def test_lost_files_are_made_again(out: Path, built: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "stage/stage.usda",
-        "stage/looks/channels.usda",
-        "stage/tiles/r0_c1/tile.usdc",
-        "stage/tiles/r0_c0/F_x20_body.vdb",
-        "stage/tiles/r0_c0/F_x20_body.exr",
-        "bundle/manifest.json",
-        "bundle/files.json",
-        "bundle/channels/F_x20_body/r0_c0/lod0.glb",
-        "report/index.html",
-        "UNIT/lod0.npz",
-        "UNIT/volume.npy",
-        "UNIT/unit.json",
-    ],
+    sweep(
+        [
+            "stage/stage.usda",
+            "stage/looks/channels.usda",
+            "stage/tiles/r0_c1/tile.usdc",
+            "stage/tiles/r0_c0/F_x20_body.vdb",
+            "stage/tiles/r0_c0/F_x20_body.exr",
+            "bundle/manifest.json",
+            "bundle/files.json",
+            "bundle/channels/F_x20_body/r0_c0/lod0.glb",
+            "report/index.html",
+            "UNIT/lod0.npz",
+            "UNIT/volume.npy",
+            "UNIT/unit.json",
+        ],
+        kept=[
+            "stage/tiles/r0_c1/tile.usdc",
+            "stage/tiles/r0_c0/F_x20_body.exr",
+            "bundle/manifest.json",
+            "bundle/channels/F_x20_body/r0_c0/lod0.glb",
+            "report/index.html",
+            "UNIT/volume.npy",
+        ],
+    ),
 )
 def test_cut_file_is_made_again(out: Path, built: Path, name: str) -> None:
     file = _unit(out) / Path(name).name if name.startswith("UNIT") else out / name
@@ -263,7 +274,7 @@ sys.exit(main(["bundle", str(out), "--workers", "2"]))
     ("start", "kind", "code"),
     [
         (ctrl_c.heeded, "SIGINT", 130),
-        (ctrl_c.heeded, "SIGTERM", 143),
+        pytest.param(ctrl_c.heeded, "SIGTERM", 143, marks=pytest.mark.exhaustive),
         (ctrl_c.ignored, "SIGINT, then SIGTERM", 143),  # in the background it stays ignored
     ],
 )

@@ -1,4 +1,4 @@
-"""A little of what `make torture` does: two kills, in phases whose results are put together last.
+"""A little of what `make torture` does: a kill or two, in phases whose results come together last.
 
 Of the command alone tells test_resume.py too, of a worker engine/test_run.py.
 """
@@ -7,19 +7,25 @@ from pathlib import Path
 
 import pytest
 
+from support.exhaustive import sweep
 from support.torture import KINDS, PHASES, Folder, Torture, kills_of
 
-KILLS = {"session": "stage", "scheduler": "bundle"}
+SESSION = {"session": "stage"}
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_a_build_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "kills", sweep([SESSION, SESSION | {"scheduler": "bundle"}], kept=[SESSION])
+)
+def test_killed_at_any_moment_a_build_goes_on_to_the_same_bytes(
+    tmp_path: Path, kills: dict[str, str]
+) -> None:
     torture = Torture(tmp_path, Folder(tmp_path / "out"), seed=3)
-    for kind, phase in KILLS.items():
+    for kind, phase in kills.items():
         torture.kill_in(kind, phase)
     torture.end()
-    assert all(torture.outcomes[kind] for kind in KILLS)
-    assert all(torture.phases[phase] for phase in KILLS.values())
+    assert all(torture.outcomes[kind] for kind in kills)
+    assert all(torture.phases[phase] for phase in kills.values())
     assert torture.outcomes["ended"] >= 1
 
 

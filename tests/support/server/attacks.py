@@ -1,6 +1,6 @@
 """Attacks on the server, by raw sockets, and the answers that are right.
 
-    .venv/bin/python tests/support/server/attacks.py
+    PYTHONPATH=tests .venv/bin/python -m support.server.attacks
 
 serves a made-up bundle, runs all of them, prints a Markdown table of what was sent and what came,
 and exits with 1 if one was not refused, or the server wrote a line, or serves no more.

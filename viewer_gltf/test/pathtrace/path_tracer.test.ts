@@ -8,6 +8,7 @@ import { describe, expect, it } from "vitest";
 import { SKIP_BRICK } from "../../src/bundle/generated/constants";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
+import { sweep } from "../support/exhaustive";
 import type { Gathered, Harness, Run } from "../support/pathtrace/harness";
 import { BASE, opacityRamp, SIZE } from "../support/pathtrace/phantom";
 import { askPython, hasPython } from "../support/python";
@@ -398,7 +399,7 @@ describeInChromium("the path tracer", () => {
         ],
       },
     };
-    for (const [name, settings] of [
+    const scattered = [
       ["many times", lit.settings],
       ["once", { ...lit.settings, isMultiple: false, anisotropy: -0.3, surface: 0.9 }],
       [
@@ -416,7 +417,8 @@ describeInChromium("the path tracer", () => {
           ],
         },
       ],
-    ] as const) {
+    ] as const;
+    for (const [name, settings] of sweep(scattered, ([name]) => name === "many times")) {
       it(`gathers the same light, scattered ${name}`, async () => {
         const run = { ...lit, settings };
         const [{ batches }, theirs] = await Promise.all([gather(run), reference(run, PATHS)]);
