@@ -157,6 +157,19 @@ def test_the_demo_and_its_workers_too(checkout: Path, make: Make, name: str) -> 
     assert not (checkout / "pwned").exists()
 
 
+@pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
+def test_what_is_to_be_tested_is_a_folder_of_tests(checkout: Path, make: Make, name: str) -> None:
+    (checkout / "tests" / name).mkdir(parents=True)
+    made = make("test-here", T=name, PYTEST="./fake")
+    assert (made.returncode, made.stderr) == (0, "")
+    assert calls(checkout) == [["-m", "not slow", f"tests/{name}"]]
+    refused = make("test-here", T=f"no {name}", PYTEST="./fake")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(f"T is no {name}, expected a folder of tests or of viewer")
+    assert calls(checkout) == []
+    assert not list(checkout.parent.rglob("pwned"))
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
