@@ -104,12 +104,16 @@ def _check_files(location: Location, tiff: TiffFile) -> None:
     if not location.is_local or not tiff.ome_metadata:
         return
     root = ElementTree.fromstring(tiff.ome_metadata)
-    for element in root.iter():
-        name = element.get("FileName")
-        is_other = element.tag.endswith("UUID") and element.text != root.get("UUID", "")
-        if name is not None and is_other:
+    names = {  # each once: there may be one for each plane
+        element.get("FileName"): None
+        for element in root.iter()
+        if element.tag.endswith("UUID") and element.text != root.get("UUID", "")
+    }
+    folder = location.folder
+    for name in names:
+        if name is not None:
             named = f"{location.shown}: OME-XML: UUID FileName {name!r:.200}"
-            require_own(os.path.join(tiff.filehandle.dirname, name), [location.folder], named=named)
+            require_own(os.path.join(tiff.filehandle.dirname, name), [folder], named=named)
 
 
 def _image(
