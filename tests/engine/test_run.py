@@ -1,10 +1,15 @@
 """The engine runs everything, in order of the tasks, whatever fails."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import dask
 import pytest
 
 from stereocell.engine.cluster import ClusterError
 from stereocell.engine.run import _AHEAD, Engine, TasksFailedError, _outcome_of
+from support.server.timeouts import PATIENCE_S
 from support.worker_tasks import die, double
 
 
@@ -93,3 +98,47 @@ def test_workers_that_do_not_answer_are_said_in_words(monkeypatch: pytest.Monkey
     monkeypatch.setattr("distributed.Client", never)
     with pytest.raises(ClusterError, match="--workers: the processes did not answer within 300 s"):
         Engine(2).run("slow", double, [("a", 1), ("b", 2)])
+
+
+# A main thread that fails, and SIGTERM while it ends its workers
+_STOPPED_AT_ITS_END = """
+import asyncio, os, signal, sys
+from distributed import Client
+from stereocell.engine.interrupts import answering_sigterm
+from stereocell.engine.run import Engine
+
+closed, left = Client._close, [signal.SIGTERM]
+
+async def close(self, *given, **named):
+    while left:
+        os.kill(os.getpid(), left.pop())
+        await asyncio.sleep(0.5)
+    await closed(self, *given, **named)
+
+Client._close = close
+
+def work():
+    engine = Engine(1)
+    try:
+        engine.run("numbers", abs, [("a", 1), ("b", -2)])
+        raise TypeError("of the main thread")
+    finally:
+        engine.close()
+
+if __name__ == "__main__":
+    try:
+        with answering_sigterm():
+            work()
+    except KeyboardInterrupt:
+        sys.exit(143)
+"""
+
+
+@pytest.mark.slow
+def test_a_command_that_is_stopped_while_it_ends_its_workers_comes_to_an_end(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "stopped.py").write_text(_STOPPED_AT_ITS_END)
+    command = [sys.executable, str(tmp_path / "stopped.py")]
+    ended = subprocess.run(command, timeout=PATIENCE_S, check=False, capture_output=True, text=True)
+    assert ended.returncode == 143, ended.stderr

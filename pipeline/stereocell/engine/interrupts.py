@@ -32,6 +32,27 @@ def _stop(*_: object) -> None:
 
 
 @contextmanager
+def interrupts_put_off() -> Iterator[None]:
+    """Within, Ctrl-C and SIGTERM wait: what must not be left half done is short, and ends itself.
+
+    The last that came is raised at the end.
+    """
+    came: list[int] = []
+    before = {}
+    if threading.current_thread() is threading.main_thread():  # only it can ask for that
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(number)):  # neither ignored nor the system's
+                before[number] = signal.signal(number, lambda found, _: came.append(found))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[-1])
+
+
+@contextmanager
 def children_ignore_interrupts() -> Iterator[None]:
     """Inside the block, start processes and threads that SIGINT doesn't reach (inherited mask).
 

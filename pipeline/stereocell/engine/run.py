@@ -24,7 +24,7 @@ from rich.progress import (
 )
 
 from stereocell.engine.cluster import ClusterError, able, join
-from stereocell.engine.interrupts import children_ignore_interrupts
+from stereocell.engine.interrupts import children_ignore_interrupts, interrupts_put_off
 from stereocell.engine.object_store_tasks import carried, forget_scratch
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.processes import shortage
@@ -33,6 +33,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _START_S = 300  # s for workers of this machine to start: it may be busy
+_END_S = 30  # s for workers to end
 _LOOK_S, _LOOKS = 15, 12  # s between looks for workers, and looks until they count as gone
 _POLL_S = 0.05  # s between looks at finished tasks
 _AHEAD = 64  # tasks that wait for a worker
@@ -162,15 +163,25 @@ class Engine:
         return self._client
 
     def close(self) -> None:
-        """Stop the workers of this machine, or leave the cluster; it runs on."""
-        if self._client is not None:
-            cluster = self._client.cluster  # None for a cluster that was running before: it stays
+        """Stop the workers of this machine, or leave the cluster, which runs on.
+
+        A Ctrl-C or SIGTERM meanwhile is raised afterwards. A client that is only half closed would
+        close itself as Python ends, and wait for ten minutes for a thread that has ended.
+        """
+        client, self._client = self._client, None
+        if client is None:
+            return
+        cluster = client.cluster  # None for a cluster that was running before: it stays
+        try:
             if cluster is None:
-                forget_scratch(self._client)
-            self._client.close()
-            if cluster is not None:
-                cluster.close()
-            self._client = None
+                forget_scratch(client)
+        finally:
+            with interrupts_put_off():
+                for one in (client, cluster):
+                    if one is not None:
+                        with suppress(TimeoutError):
+                            one.close(timeout=_END_S)
+                client.status = "closed"
 
 
 @contextmanager
