@@ -1,7 +1,11 @@
-"""The first paper's wrap, over triangles instead of voxels: slower by far, kept to compare with.
+"""The first paper's wrap, over triangles instead of voxels: much slower, kept for comparison.
 
-An alpha wrap (Portaneri et al. 2022, as MeshLab has CGAL's) closes each tile by itself, so that its
-mesh meets no neighbour's: it is for builds of a single tile.
+An alpha wrap, as MeshLab has CGAL's, closes each tile by itself, so that its mesh meets no
+neighbour's: it is for builds of a single tile.
+
+References
+C. Portaneri, M. Rouxel-Labbe, M. Hemmer, D. Cohen-Steiner & P. Alliez, "Alpha wrapping with an
+offset", ACM Trans. Graphics 41(4), 2022. doi:10.1145/3528223.3530152
 """
 
 from importlib import import_module
@@ -12,12 +16,12 @@ import numpy as np
 from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
 
-# by name: who hasn't got it, and gets it later, need not build anything else anew
+# imported by name: a user who installs it later need not rebuild other results
 LIBRARY = "pymeshlab"
 
 
 def find_wrapper() -> str:
-    """Return the version of the package that wraps. Raises UsageError if it isn't installed."""
+    """Return the version of the wrapping package. Raises UsageError if it isn't installed."""
     try:
         import_module(LIBRARY)
         return version(LIBRARY)
@@ -29,7 +33,12 @@ def find_wrapper() -> str:
 
 
 def alpha_wrap(mesh: Mesh, alpha_um: float, offset_um: float) -> Mesh:
-    """Return a closed mesh `offset_um` away from the triangles, gaps below alpha bridged."""
+    """Return a closed mesh `offset_um` outside the triangles.
+
+    mesh       positions float32 (n, 3) in um, triangles uint32 (m, 3)
+    alpha_um   smaller gaps are bridged
+    offset_um  distance of the result from the triangles
+    """
     pymeshlab = import_module(LIBRARY)
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(mesh.positions.astype(np.float64), mesh.triangles))

@@ -1,4 +1,4 @@
-"""How far two meshes are apart, measured both ways."""
+"""Distances between two meshes, measured both ways."""
 
 import igl
 import numpy as np
@@ -6,14 +6,16 @@ from numpy.typing import NDArray
 
 from stereocell.model.mesh import Mesh, Spread
 
-PERCENTILE = 99.0  # a sliver that vanishes, less than 1 % of the area, does not count
-ON_UM = 1e-6  # what float32 positions leave of a point on the surface
+PERCENTILE = 99.0  # percent; a sliver that vanishes, less than 1 % of the area, does not count
+ON_UM = 1e-6  # um; a point on the surface is this far off, after rounding to float32
 
 
 class Nearest:
     """Distances to the nearest point of a mesh; its search tree is built once.
 
-    points  `samples` points (n, 3) spread evenly over the mesh's area
+    points     float64 (samples, 3), um, spread evenly over the mesh's area
+    vertices   float64 (n, 3), um
+    triangles  int64 (m, 3)
     """
 
     def __init__(self, mesh: Mesh, samples: int) -> None:
@@ -24,12 +26,12 @@ class Nearest:
         self._tree.init(self.vertices, self.triangles)
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the distance in um from each of the points (n, 3)."""
+        """Return the distance in um from each of the points, float64 (n,); points (n, 3) in um."""
         squares, _, _ = self._tree.squared_distance(self.vertices, self.triangles, points)
         return np.sqrt(np.asarray(squares).ravel())
 
     def nearest_triangles(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the index of the triangle that is nearest to each of the points (n, 3)."""
+        """Return the number of the triangle nearest to each point (n, 3), int64 (n,)."""
         _, indices, _ = self._tree.squared_distance(self.vertices, self.triangles, points)
         return np.asarray(indices, np.int64).ravel()
 
@@ -37,7 +39,9 @@ class Nearest:
 def measure_enclosure(source: Nearest, target: Nearest) -> float:
     """Return the share of the source's area that lies inside the target or on it, 0..1.
 
-    By the target's pseudonormals (Baerentzen & Aanaes 2005, as libigl has it).
+    References
+    J. A. Baerentzen & H. Aanaes, "Signed distance computation using the angle weighted
+    pseudonormal", IEEE TVCG 11(3), 2005. doi:10.1109/TVCG.2005.49. As libigl has it.
     """
     signed, _, _, _ = igl.signed_distance(
         source.points,
@@ -49,7 +53,7 @@ def measure_enclosure(source: Nearest, target: Nearest) -> float:
 
 
 def measure_distance(a: Nearest, b: Nearest) -> float:
-    """Return the distance in um between two meshes: the 99th percentile, the larger of both ways.
+    """Return the distance in um between two meshes: the larger of both ways' 99th percentiles.
 
     Points spread evenly over the area of each mesh go to the nearest point of the other.
     """
@@ -60,7 +64,7 @@ def measure_distance(a: Nearest, b: Nearest) -> float:
 def measure_spread(source: Nearest, target: Nearest) -> Spread:
     """Return the distances in um from one mesh to the other.
 
-    Mean and 95th percentile over the source's area; the largest also over all its vertices.
+    Mean and 95th percentile are over the source's area; the maximum is over its vertices too.
     """
     sampled = target.distances(source.points)
     at_vertices = target.distances(source.vertices)
@@ -69,11 +73,15 @@ def measure_spread(source: Nearest, target: Nearest) -> Spread:
 
 
 def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
-    """Return `count` points (n, 3) spread evenly over the mesh's area, the same every time."""
+    """Return points spread evenly over the mesh's area, float64 (count, 3), um.
+
+    The same mesh gives the same points.
+    """
     along = np.cumsum(_doubled_areas(mesh))
     place = np.arange(count)
     chosen = np.searchsorted(along, (place + 0.5) / count * along[-1], side="right")
-    # inside the triangles: Roberts' R2 sequence (2018), folded over the diagonal
+    # inside the triangles: the R2 sequence (M. Roberts, "The unreasonable effectiveness of
+    # quasirandom sequences", 2018), folded over the diagonal
     u, v = (0.5 + place * 0.7548776662466927) % 1, (0.5 + place * 0.5698402909980532) % 1
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     corners = mesh.triangles[np.minimum(chosen, len(mesh.triangles) - 1)]
@@ -81,11 +89,11 @@ def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
     return a + u[:, None] * (b - a) + v[:, None] * (c - a)
 
 
-_BLOCK = 100_000
+_BLOCK = 100_000  # triangles at once
 
 
 def _doubled_areas(mesh: Mesh) -> NDArray[np.float64]:
-    """Return twice each triangle's area, in blocks: millions of corners in float64 take a GB."""
+    """Return twice each triangle's area (m,), in blocks: corners in float64 take a GB."""
     areas = np.empty(len(mesh.triangles))
     for start in range(0, len(areas), _BLOCK):
         part = slice(start, start + _BLOCK)

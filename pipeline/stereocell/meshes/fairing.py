@@ -1,11 +1,17 @@
-"""Make triangles less sharp: slide vertices along the surface, turn and split edges. Borders stay.
+"""Make triangles less sharp: slide vertices, flip and split edges. Boundary edges stay.
 
-A corner of a sharp triangle goes half-way to the centre of area of the triangles round it, along
-its tangent plane (Botsch & Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004),
-and never further than a bound from where it was. Then the diagonal of two neighbouring triangles
-is turned where that makes their smallest angle larger (Lawson 1972) and moves the surface by less
-than a bound. What is still sharp lies along thin tubes and at rims, where few vertices are: their
-long edges are split (see `splitting`), so that slides and turns have a vertex to work with.
+A corner of a sharp triangle slides half-way to the centroid of the triangles around it, along its
+tangent plane (Botsch & Kobbelt), and never farther than a bound from its start. Then the diagonal
+of two neighbouring triangles is flipped where that makes their smallest angle larger (Lawson) and
+moves the surface by less than a bound. The triangles that are still sharp lie along thin tubes and
+at boundary edges, where vertices are few: their long edges are split (meshes/split_edges.py), so
+that slides and flips have a vertex to work with.
+
+References
+M. Botsch & L. Kobbelt, "A remeshing approach to multiresolution modeling", Symposium on Geometry
+Processing 2004. doi:10.1145/1057432.1057457
+C. L. Lawson, "Transforming triangulations", Discrete Mathematics 3, 1972.
+doi:10.1016/0012-365X(72)90093-3
 """
 
 from dataclasses import replace
@@ -18,16 +24,16 @@ from stereocell.meshes.validity import border, find_defects, match_edges
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
-SLIDES = 3  # rounds; more make no triangle better and cross more of them
-STEP = 0.5  # of the way to the centre
-SLIDE_DEG = 15.0  # smallest angle of triangles whose corners slide: a slide costs accuracy
-TURN_DEG = 20.0  # and of those whose edges turn
-TURNS = 8
-TRIES = 6
-SPLITS = 2  # rounds; of triangles that are sharper than this smallest angle
-SPLIT_DEG = 11.0
-GAIN = 1.02  # of the smallest angle: less is not worth a turn
-COSINE = 0.7  # between the new triangles and the old two's mean: no folds
+SLIDES = 3  # rounds of slides; more rounds make no triangle better and more triangles cross
+STEP = 0.5  # share of the way to the centroid
+SLIDE_DEG = 15.0  # degrees; corners of triangles with a smaller angle slide; a slide costs accuracy
+TURN_DEG = 20.0  # degrees; edges of triangles with a smaller angle flip
+TURNS = 8  # most rounds of flips
+TRIES = 6  # attempts, each with more vertices held
+SPLITS = 2  # rounds of splits
+SPLIT_DEG = 11.0  # degrees; triangles with a smaller angle are split
+GAIN = 1.02  # least factor by which a flip must enlarge the smallest angle
+COSINE = 0.7  # least cosine of a new triangle's normal to the old two's mean: no folds
 
 Points = NDArray[np.float64]
 Triangles = NDArray[np.int64]
@@ -36,11 +42,14 @@ Triangles = NDArray[np.int64]
 def make_fair(
     mesh: Mesh, planes: tuple[Plane, ...], *, max_slide_um: float, max_turn_um: float
 ) -> Mesh:
-    """Return the mesh with fairer triangles; where that made a defect, it is done again without.
+    """Return the mesh with fairer triangles and without new defects.
 
-    `planes` are where the mesh may be open. Vertices slide by `max_slide_um` at most, and edges
-    turn and split where the surface moves by less than `max_turn_um`. New vertices come last, and
-    the mesh is as it was if the last of TRIES still makes faults.
+    planes        the cut planes, where the mesh may be open
+    max_slide_um  largest distance by which a vertex slides
+    max_turn_um   largest distance by which a flip or a split moves the surface
+
+    Where the result has a defect, its vertices are held, and the work is repeated. If the last of
+    TRIES still has defects, the mesh is returned as it was. New vertices come last.
     """
     count = len(mesh.positions)
     held = np.zeros(count, bool)
@@ -51,9 +60,9 @@ def make_fair(
             return fair
         defective = np.zeros(len(fair.positions), bool)
         defective[defects.vertices(fair.triangles)] = True
-        # their neighbours too: a vertex that stays may be crossed by one that slides
+        # their neighbours too: a neighbour that slides may cross a vertex that stays
         defective[fair.triangles[_any(defective[fair.triangles])]] = True
-        for _ in range(SPLITS):  # instead of new vertices the ends of their edges, maybe new too
+        for _ in range(SPLITS):  # for a new vertex, the ends of its edge; they may be new too
             defective[ends[defective[count:]]] = True
         held |= defective[:count]
     return mesh
@@ -78,7 +87,7 @@ def _fair(
         _slide(positions, normals, triangles, fixed, start, max_slide_um)
         positions[near] = start[near]
         _turn_edges(positions, triangles, held, max_turn_um)
-    fixed[:] = True  # from here on only new vertices slide: the others have, as far as it pays
+    fixed[:] = True  # from here on only new vertices slide
     ends = np.zeros((0, 2), np.int64)
     for _ in range(SPLITS):
         sharp = _angle(*positions[triangles].transpose(1, 0, 2)) < np.radians(SPLIT_DEG)
@@ -111,8 +120,10 @@ def _fair(
 def _find_near(
     positions: Points, planes: tuple[Plane, ...], max_slide_um: float
 ) -> NDArray[np.bool_]:
-    """Return which coordinates (n, 3) stay: no vertex may come to a plane, beyond which lies the
-    neighbour's mesh."""
+    """Return which coordinates (n, 3) stay: those close to a cut plane.
+
+    The neighbour's mesh lies beyond the plane, so no vertex may reach it.
+    """
     near = np.zeros(positions.shape, bool)
     for column, value in planes:
         near[:, column] |= np.abs(positions[:, column] - value) <= 1.01 * max_slide_um
@@ -127,7 +138,7 @@ def _slide(
     start: Points,
     max_slide_um: float,
 ) -> None:
-    """Move the corners of sharp triangles, in place, and turn their normals as those around."""
+    """Move the corners of sharp triangles, in place, and turn their normals with the surface."""
     triangles = triangles[_any(~held[triangles])]
     corners = positions[triangles]
     a, b, c = corners.transpose(1, 0, 2)
@@ -144,7 +155,7 @@ def _slide(
     moved = positions + STEP * way - start
     length = np.linalg.norm(moved, axis=1, keepdims=True)
     moved *= np.minimum(1, max_slide_um / np.maximum(length, 1e-30))
-    # inside the box that the mesh fills: caps at the data's end have sharp rims
+    # inside the mesh's bounding box: caps at the data's end have sharp edges
     positions[free] = np.clip(start + moved, start.min(axis=0), start.max(axis=0))[free]
     normals[free] = _unit((1 - STEP) * normals + STEP * around / total)[free]
 
@@ -159,7 +170,7 @@ def _sum_round(triangles: Triangles, values: Points, count: int) -> Points:
 def _turn_edges(
     positions: Points, triangles: Triangles, held: NDArray[np.bool_], max_move_um: float
 ) -> None:
-    """Turn edges, in place, until none is left that is worth it, or for TURNS rounds."""
+    """Flip edges, in place, until no flip is worth it, or for TURNS rounds."""
     for _ in range(TURNS):
         if not _turn(positions, triangles, held, max_move_um):
             break
@@ -168,14 +179,14 @@ def _turn_edges(
 def _turn(
     positions: Points, triangles: Triangles, held: NDArray[np.bool_], max_move_um: float
 ) -> bool:
-    """Turn edges, in place, that have no neighbour of larger gain; return whether there were any.
+    """Flip edges of sharp triangles, in place; return whether any was flipped.
 
-    Only edges of sharp triangles, and of none with a vertex that is held.
+    An edge is flipped if no neighbour gains more, and if no triangle has a held vertex.
     """
     sharp = _angle(*positions[triangles].transpose(1, 0, 2)) < np.radians(TURN_DEG)
     corner = np.zeros(len(positions), bool)
     corner[triangles[sharp]] = True
-    # all that share a corner with them: no others hold their edges, nor what these are turned to
+    # all triangles that share a corner: no other triangle has their edges, before or after a flip
     part = np.flatnonzero(_any(corner[triangles]))
     everything, triangles, sharp = triangles, triangles[part], sharp[part]
     free = ~_any(held[triangles])
@@ -209,7 +220,7 @@ def _turn(
     )
     place = np.minimum(np.searchsorted(wanted_keys, known), len(wanted_keys) - 1)
     there = known[wanted_keys[place] == known]
-    chosen = chosen[~np.isin(key[chosen], there)]  # such an edge is elsewhere on the surface
+    chosen = chosen[~np.isin(key[chosen], there)]  # the surface has such an edge elsewhere
     chosen = chosen[np.argsort((before - after)[chosen], kind="stable")]
     rank = np.arange(len(chosen))
     first = np.full(len(triangles), len(chosen))
@@ -225,12 +236,12 @@ def _turn(
 
 
 def _any(corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which rows (n, 3) have any; numpy's own is slow over three columns."""
+    """Return which rows (n, 3) have any True; numpy's own `any` is slow over three columns."""
     return corners[:, 0] | corners[:, 1] | corners[:, 2]
 
 
 def _angle(a: Points, b: Points, c: Points) -> NDArray[np.float64]:
-    """Return the smallest angle of each triangle, across from its shortest side."""
+    """Return the smallest angle of each triangle in radians; it is opposite the shortest side."""
     # the sides' squares; no sort, which is slow over three
     x, y, z = (np.einsum("ij,ij->i", side, side) for side in (b - c, c - a, a - b))
     shortest = np.minimum(np.minimum(x, y), z)

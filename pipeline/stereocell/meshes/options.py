@@ -8,7 +8,10 @@ from stereocell.model.settings import setting
 
 @dataclass(frozen=True, slots=True)
 class LodOptions:
-    """How levels of detail are made."""
+    """How levels of detail are made.
+
+    Raises UsageError unless the errors are positive and rise, and samples are at least 1.
+    """
 
     errors: tuple[float, ...] = setting(
         (0.1, 0.5, 0.8, 4.0),

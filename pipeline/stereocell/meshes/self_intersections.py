@@ -1,9 +1,15 @@
-"""Where a mesh meets itself: pairs of triangles that share a point which is no common corner.
+"""Self-intersections of a mesh: pairs of triangles that share a point beside common corners.
 
-All decisions are signs of determinants, exact for float64 coordinates (Shewchuk 1997, as libigl has
-it). Pairs without a common corner: libigl's search tree and test (Guigue & Devillers 2003). Pairs
-with one are tested here, as libigl decides those by tolerances and does not see edges that lie on
-each other.
+All decisions are signs of determinants, exact for float64 coordinates, as libigl has them
+(Shewchuk). Pairs without a common corner go to libigl's search tree and test (Guigue & Devillers).
+Pairs with a common corner are tested here: libigl decides those by tolerances, and misses edges
+that lie on each other.
+
+References
+J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
+predicates", Discrete & Computational Geometry 18, 1997. doi:10.1007/PL00009321
+P. Guigue & O. Devillers, "Fast and robust triangle-triangle overlap test using orientation
+predicates", Journal of Graphics Tools 8(1), 2003. doi:10.1080/10867651.2003.10487580
 """
 
 from collections.abc import Iterable, Iterator
@@ -15,9 +21,9 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _BLOCK = 400_000  # pairs at a time
-MARGIN = 1e-6
-TINY = 1e-300  # corners on no line can have an area that floats take for zero
-ERROR_BOUND = (7 + 56 * 2.0**-53) * 2.0**-53
+MARGIN = 1e-6  # smaller cosines and mean normals are in doubt; float64 rounds far below it
+TINY = 1e-300  # least length: corners on no line can have an area that rounds to zero
+ERROR_BOUND = (7 + 56 * 2.0**-53) * 2.0**-53  # of orient3d, relative: Shewchuk's bound A
 
 
 def find_crossings(
@@ -27,12 +33,14 @@ def find_crossings(
     one_fan: NDArray[np.bool_] | None = None,
     fresh: NDArray[np.bool_] | None = None,
 ) -> Indices:
-    """Return the pairs (n, 2) of triangles that meet beside their common corners, sorted.
+    """Return the pairs of triangles that meet beside their common corners, int64 (n, 2), sorted.
 
-    positions (n, 3) float64, triangles (m, 3) int64, each with three different corners on no line:
-    others make no plane, and are not to be handed in. `one_fan`: vertices (n,) known to have one
-    closed fan of triangles, wound alike; most of these need no exact test. `fresh`: triangles (m,)
-    of which one at least is in each pair that is asked for; all, if it isn't given.
+    positions  float64 (n, 3)
+    triangles  int64 (m, 3), each with three different corners on no line: others have no plane,
+               and the caller leaves them out
+    one_fan    bool (n,), vertices known to have one closed fan of triangles, wound alike; most of
+               them need no exact test
+    fresh      bool (m,); each pair has at least one such triangle. All triangles, if not given
     """
     if fresh is None:
         fresh = np.ones(len(triangles), bool)
@@ -41,7 +49,7 @@ def find_crossings(
     doubtful = np.zeros(len(positions), bool)
     doubtful[triangles[fresh]] = True
     if one_fan is not None:
-        whole = doubtful[triangles].any(axis=1)  # all triangles round these vertices
+        whole = doubtful[triangles].any(axis=1)  # all triangles around these vertices
         doubtful &= ~(one_fan & _spread_out(positions, triangles[whole]))
     near = [
         _meet(positions, triangles, pairs[fresh[pairs].any(axis=1)])
@@ -52,7 +60,7 @@ def find_crossings(
 
 
 def _apart(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> Indices:
-    """Return the pairs (n, 2) without common corners that meet, a fresh triangle in each."""
+    """Return the pairs (n, 2) without common corners that meet, each with a fresh triangle."""
     positions = np.ascontiguousarray(positions)
     new, old = np.flatnonzero(fresh), np.flatnonzero(~fresh)
     _, found, _ = predicates.find_self_intersections(
@@ -71,8 +79,8 @@ def _apart(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> I
 def _spread_out(positions: Points, triangles: Indices) -> NDArray[np.bool_]:
     """Return the vertices whose fan, seen along the mean normal, turns one way, and once.
 
-    Then its triangles lie beside each other as seen, and meet nowhere but in their common corners.
-    Floats suffice, as a doubt of MARGIN, far above their rounding, counts as a no.
+    Then its triangles lie beside each other in that view, and meet only in their common corners.
+    Floats suffice: a value within MARGIN, far above their rounding, counts as a no.
     """
     corners = positions[triangles]
     a, b, c = corners.transpose(1, 0, 2)
@@ -97,10 +105,10 @@ def _spread_out(positions: Points, triangles: Indices) -> NDArray[np.bool_]:
 
 
 def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
-    """Return the exact sign (n,) of the volume of a, b, c, d, for each row of points (n, 3).
+    """Return the exact sign of the volume of a, b, c, d, int32 (n,); points float64 (n, 3).
 
-    Floats decide where the determinant is larger than its error can be (Shewchuk 1997, bound A of
-    orient3d), exact arithmetic where it is not: few, and every call of it starts threads.
+    Floats decide where the determinant is larger than its error can be (bound A of Shewchuk's
+    orient3d), exact arithmetic elsewhere: those are few, and each call of it starts threads.
     """
     u, v, w = a - d, b - d, c - d
     first, second = (
@@ -118,14 +126,17 @@ def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
 
 
 def orient_2d(a: Points, b: Points, c: Points) -> NDArray[np.int32]:
-    """Return the exact sign (n,) of the area of a, b, c, for each row of points (n, 2)."""
-    # libigl takes arrays in 3D only: the tetrahedron over the triangle has the same sign
+    """Return the exact sign of the area of a, b, c, int32 (n,); points float64 (n, 2)."""
+    # libigl takes arrays in 3D only: a tetrahedron over the triangle has the same sign
     a, b, c = (np.pad(x, ((0, 0), (0, 1))) for x in (a, b, c))
     return orient_3d(a, b, c, np.broadcast_to([0.0, 0.0, -1.0], (len(a), 3)))
 
 
 def are_collinear(a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
-    """Return whether three points (n, 3) lie on a line, exactly: in all three projections."""
+    """Return whether a, b, c lie on a line, exactly, bool (n,); points float64 (n, 3).
+
+    They do if they lie on a line in all three projections.
+    """
     flat = np.ones(len(a), bool)
     for axes in ([0, 1], [1, 2], [0, 2]):
         left = np.flatnonzero(flat)
@@ -139,9 +150,9 @@ def _share_corners(triangles: Indices, pairs: Indices) -> NDArray[np.bool_]:
 
 
 def _neighbours(triangles: Indices, vertices: NDArray[np.bool_]) -> Iterator[Indices]:
-    """Yield all pairs (n, 2) of triangles round each of the vertices, in blocks.
+    """Yield all pairs (n, 2) of triangles around each of the vertices, in blocks.
 
-    A pair that shares an edge may come up at both of its ends.
+    A pair that shares an edge may be yielded at both of its ends.
     """
     corners = np.flatnonzero(vertices[triangles])
     place = triangles.ravel()[corners]
@@ -159,7 +170,7 @@ def _neighbours(triangles: Indices, vertices: NDArray[np.bool_]) -> Iterator[Ind
 
 
 def _gathered(blocks: Iterable[Indices]) -> Iterator[Indices]:
-    """Yield the same pairs in few blocks: each exact test starts threads, whatever its length."""
+    """Yield the same pairs in few blocks: each exact test starts threads, even for few pairs."""
     held: list[Indices] = []
     for block in blocks:
         held.append(block)
@@ -171,7 +182,7 @@ def _gathered(blocks: Iterable[Indices]) -> Iterator[Indices]:
 
 
 def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
-    """Return those of the pairs, with one or two common corners, that meet elsewhere too."""
+    """Return the pairs, of those with common corners, that meet elsewhere too."""
     same = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
     common = same.sum(axis=(1, 2))
     by_edge = pairs[common == 2]
@@ -195,7 +206,7 @@ def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
 def _folded(
     positions: Points, triangles: Indices, pairs: Indices, same: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return which pairs with a common edge lie on each other: coplanar, on its same side."""
+    """Return which pairs with a common edge overlap: coplanar, on the same side of it."""
     rows = np.arange(len(pairs))
     own, other = (~same.any(axis=2)).argmax(axis=1), (~same.any(axis=1)).argmax(axis=1)
     first, second = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
@@ -212,8 +223,8 @@ def _folded(
 def _fans_meet(v: Points, a: Points, b: Points, c: Points, d: Points) -> NDArray[np.bool_]:
     """Return which triangles (v, a, b) and (v, c, d) meet beside v.
 
-    A common point beside v lies on a ray from v that leaves one of them, through the side across
-    from v, while it is still in the other: so that side meets the other triangle.
+    A common point beside v lies on a ray from v. The ray leaves one triangle, through the side
+    opposite v, while it is still in the other: so that side meets the other triangle.
     """
     of_a, of_b = orient_3d(v, c, d, a), orient_3d(v, c, d, b)
     meet = np.zeros(len(v), bool)
@@ -240,7 +251,7 @@ def _fans_meet(v: Points, a: Points, b: Points, c: Points, d: Points) -> NDArray
 
 
 def _side_meets(p: Points, q: Points, u: Points, v: Points, w: Points) -> NDArray[np.bool_]:
-    """Return where the segment pq, which lies not in its plane, meets the triangle uvw."""
+    """Return where the segment pq, which is not in its plane, meets the triangle uvw."""
     straddles = orient_3d(u, v, w, p) * orient_3d(u, v, w, q) <= 0
     signs = np.stack([orient_3d(p, q, u, v), orient_3d(p, q, v, w), orient_3d(p, q, w, u)])
     outside = (signs > 0).any(axis=0) & (signs < 0).any(axis=0)
@@ -254,7 +265,7 @@ def _in_cone(v: Points, a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
 
 
 def _projection(a: Points, b: Points, c: Points) -> Indices:
-    """Return, for each triangle, the two axes (n, 2) on which its projection has area, exactly."""
+    """Return, for each triangle, two axes (n, 2) on which its projection has area, exactly."""
     axes = np.zeros((len(a), 2), np.int64)
     left = np.arange(len(a))
     for pair in ([0, 1], [1, 2], [0, 2]):

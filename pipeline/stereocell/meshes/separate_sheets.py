@@ -1,11 +1,11 @@
-"""Part a surface where simplification has drawn two of its sheets together.
+"""Separate a surface where simplification has drawn two of its sheets together.
 
-Simplification lets the ring of edges round a neck, or inside a tunnel, collapse: it leaves edges
-of four triangles, and vertices with two fans. Here the surface is cut in such places, as if the
-neck had been cut or the tunnel filled, at the cost of a vertex. With all that lies round them
-locked instead, walls full of small tunnels kept 1.4 times as many triangles.
+Simplification may collapse the ring of edges around a neck, or inside a tunnel. It leaves edges of
+four triangles, and vertices with two fans. Here the surface is cut in such places, as if the neck
+had been cut or the tunnel filled, at the cost of a vertex. The alternative, to lock all vertices
+around them, kept 1.4 times as many triangles on walls full of small tunnels.
 
-What comes out is not certified: sheets may still meet, and some stay as they are.
+The result may still have defects: sheets may meet, and some non-manifold places stay.
 """
 
 import numpy as np
@@ -16,17 +16,21 @@ from scipy.sparse.csgraph import connected_components
 from stereocell.meshes.validity import find_non_manifold_vertices, match_edges
 from stereocell.model.mesh import Mesh
 
-APART = 0.2  # of the way to its neighbours, how far the vertex of a fan is drawn from the other's
-TINY = 1e-30
+APART = 0.2  # share of the way to its neighbours by which a fan's vertex is moved off the other fan
+TINY = 1e-30  # least length that is divided by
 
 Indices = NDArray[np.int64]
 Triangles = NDArray[np.uint32]
 
 
 def separate_sheets(mesh: Mesh, triangles: Triangles) -> tuple[Mesh, Triangles, Indices]:
-    """Return the mesh with vertices added at its end, the triangles parted by them, their sources.
+    """Return the mesh with new vertices at its end, the separated triangles, the vertices' sources.
 
-    `triangles` are any by the mesh's vertices; the mesh's own stay. Vertices of a border stay too.
+    triangles  uint32 (m, 3), by the mesh's vertices; they may differ from the mesh's own
+    result     a mesh with its own triangles; the separated ones, uint32 (m, 3); int64 (k,), for
+               each new vertex the number of the vertex that it was split from
+
+    Vertices on boundary edges stay.
     """
     corners = triangles.astype(np.int64)
     edges, twins, is_non_manifold = match_edges(corners)
@@ -40,7 +44,7 @@ def separate_sheets(mesh: Mesh, triangles: Triangles) -> tuple[Mesh, Triangles, 
     if not len(at):
         return mesh, triangles, at
     fan = _label_fans(at, twins)
-    # wound alike, from either pair: the same fans at both ends are the same edge once more
+    # both pairs can have the same fans at both ends: then they still share one edge
     one, other = quads[:, 0], quads[:, 2]
     stuck = (fan[one] == fan[other]) & (fan[_onward(one)] == fan[_onward(other)])
     if stuck.any():
@@ -57,10 +61,11 @@ def _onward(corner: Indices) -> Indices:
 def _find_quads(
     positions: NDArray[np.float32], edges: Indices, is_non_manifold: NDArray[np.bool_]
 ) -> Indices:
-    """Return non-manifold edges, four (n, 4) at a time that lie on each other, wound in turns.
+    """Return non-manifold edges that coincide, four (n, 4) at a time, wound in turns.
 
-    In their order round the edge, so that no sheets cross if neighbours are paired, and from one on
-    with which the wider of the two wedges is the narrower: two sheets, bent away from each other.
+    They come in their order around the edge, so that no sheets cross if neighbours are paired. The
+    first is chosen so that the wider of the two wedges is as narrow as possible: two sheets that
+    are bent away from each other.
     """
     at = np.flatnonzero(is_non_manifold)
     low, high = edges[at].min(axis=1), edges[at].max(axis=1)
@@ -82,7 +87,7 @@ def _find_quads(
 def _angles(
     positions: NDArray[np.float32], start: Indices, end: Indices, seen: Indices
 ) -> NDArray[np.float64]:
-    """Return the angles (n, 4) at which vertices (n, 4) are seen from edges, from the first on."""
+    """Return the angles (n, 4) of vertices (n, 4) around edges, from the first on, in radians."""
     origin = positions[start].astype(np.float64)
     axis = positions[end] - origin
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), TINY)
@@ -93,7 +98,7 @@ def _angles(
 
 
 def _pair(twins: Indices, quads: Indices) -> None:
-    """Make the first two of each four edges twins, and the last two."""
+    """Make twins of the first two of each four edges, and of the last two."""
     one, other = quads.reshape(-1, 2).T
     twins[one], twins[other] = other, one
 
@@ -111,7 +116,7 @@ def _label_fans(at: Indices, twins: Indices) -> Indices:
 def _draw_apart(
     mesh: Mesh, corners: Indices, at: Indices, fan: Indices
 ) -> tuple[Mesh, Triangles, Indices]:
-    """Give each fan of a vertex that has several one of its own; the rest as `separate_sheets`."""
+    """Give each fan of a vertex with several fans its own one; results as `separate_sheets`."""
     vertex = corners.ravel()[at]
     source = np.zeros(fan.max() + 1, np.int64)
     source[fan] = vertex

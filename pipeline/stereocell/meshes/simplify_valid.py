@@ -1,12 +1,12 @@
-"""Simplify a mesh so that it stays sound: check exactly, lock what went wrong, simplify again.
+"""Simplify a mesh so that it stays valid: check exactly, lock the defects, simplify again.
 
-Simplification knows of no neighbours: it lets walls cross, and pinches bodies. Pinched sheets are
-parted; round each fault that is left the vertices of the surface before are locked, wider with
-every try, and the bodies at fault are simplified anew. A body that still has faults after ROUNDS
-keeps the surface it had before.
+Simplification does not see neighbours: it lets walls cross, and pinches bodies. Pinched sheets are
+separated. Around each remaining defect the vertices of the given surface are locked, in a ball that
+grows with every try, and the bodies with defects are simplified again. A body that still has
+defects after ROUNDS keeps the surface it had before.
 
-Its error is a mean over planes, and says little of a thin process that it cuts off: vertices that
-would be left too far away are locked as well.
+Simplification's error is a mean over planes, and can be small although it cuts off a thin process:
+vertices that would be too far from the result are locked as well.
 """
 
 from dataclasses import dataclass, replace
@@ -24,11 +24,11 @@ from stereocell.meshes.validity import Defects, border, find_defects, label_comp
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
-ROUNDS = 14
-FAR_ROUNDS = 4  # in which vertices too far away are looked for: each lock may make another stray
-GROWTH = 2.0  # of the balls in which vertices are locked, with each try in a place
+ROUNDS = 14  # most rounds in which defective bodies are simplified again
+FAR_ROUNDS = 4  # rounds that look for vertices too far away: each lock may make another one stray
+GROWTH = 2.0  # factor by which the ball of locked vertices grows with each try in a place
 
-# large and odd, one for each corner: sums of multiples, modulo 2^64, tell triangles apart
+# large odd factors, one for each corner: sums modulo 2^64 distinguish triangles
 MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 Triangles = NDArray[np.uint32]
@@ -36,7 +36,7 @@ Triangles = NDArray[np.uint32]
 
 @dataclass(frozen=True, slots=True)
 class Simplified:
-    """`simplified_again`: bodies; `fallbacks`: bodies that stayed as they were."""
+    """The result, and how many bodies were simplified again, and how many stayed as they were."""
 
     mesh: Mesh
     simplified_again: int
@@ -46,14 +46,18 @@ class Simplified:
 def simplify_without_defects(
     mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float, max_away_um: float = np.inf
 ) -> Simplified:
-    """Return the mesh simplified and without defects, its borders as they are.
+    """Return the mesh simplified and without defects; its boundary edges stay.
 
-    `planes` are where it may be open. A mesh that has faults itself keeps bodies with faults.
-    Vertices that would lie further than `max_away_um` from what is returned stay, but for a few in
-    bodies that still have such after FAR_ROUNDS.
+    mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
+    planes        the cut planes, where the mesh may be open
+    max_error_um  largest quadric error
+    max_away_um   vertices that would be farther from the result stay, but for a few in bodies that
+                  still have such vertices after FAR_ROUNDS
+
+    A mesh that has defects itself keeps the bodies with defects.
     """
     draft = _Draft(mesh, planes)
-    body = draft.body  # of the mesh's own vertices
+    body = draft.body  # bodies of the mesh's own vertices
     tries = np.zeros(len(mesh.positions), np.int64)
     tree: cKDTree | None = None
     triangles = draft.separate(
@@ -69,7 +73,7 @@ def simplify_without_defects(
         far = _strays(
             draft, triangles, body, chosen, max_away_um if number < FAR_ROUNDS else np.inf
         )
-        if kept.issuperset(worst.tolist()) and not len(far):  # no defects but the given mesh's own
+        if kept.issuperset(worst.tolist()) and not len(far):  # only given defects are left
             break
         defective.update(worst.tolist())
         tries[far] += 1
@@ -92,15 +96,16 @@ def simplify_without_defects(
 
 
 class _Draft:
-    """One simplification of a mesh after another, and their defects.
+    """A series of simplifications of one mesh, and their defects.
 
-    mesh          the mesh, and after its own the vertices by which sheets were parted
-    body          which body of the mesh each of the vertices belongs to
+    mesh          the mesh, with the vertices that separated sheets at its end
+    body          the body of the mesh that each vertex belongs to
     border_edges  of the mesh
-    triangles     what was checked last, and `crossings` the pairs of these that meet
+    triangles     the triangles of the last check
+    crossings     the pairs of these that meet
 
-    Vertices never move, so that two triangles of before meet now if they met then: crossings are
-    looked for among pairs with a fresh triangle only; `find_defects` finds the same ones.
+    Vertices never move, so that two old triangles meet now if they met before: crossings are
+    looked for only in pairs with a fresh triangle. `find_defects` finds the same ones.
     """
 
     def __init__(self, mesh: Mesh, planes: tuple[Plane, ...]) -> None:
@@ -111,15 +116,15 @@ class _Draft:
         self.crossings = np.zeros((0, 2), np.int64)
 
     def separate(self, triangles: Triangles) -> Triangles:
-        """Return the triangles with sheets parted, by vertices that the mesh gets for it."""
+        """Return the triangles with sheets separated; the mesh gets the vertices for it."""
         self.mesh, parted, source = separate_sheets(self.mesh, triangles)
         self.body = np.concatenate([self.body, self.body[source]])
         return parted
 
     def defects(self, triangles: Triangles, changed: set[int] | None) -> Defects:
-        """Return the defects by numbers of these triangles; a border that changed counts as open.
+        """Return the defects by numbers of these triangles; a changed boundary edge counts as open.
 
-        With `changed`, bodies whose boxes lie clear of these bodies' are as sound as they were.
+        changed  bodies that changed; others whose boxes don't touch theirs are not checked again
         """
         mesh, body, border_edges = self.mesh, self.body, self.border_edges
         part, past = np.arange(len(triangles)), np.arange(len(self.triangles))
@@ -139,7 +144,7 @@ class _Draft:
         now = np.full(len(self.triangles), -1, np.int64)
         stayed = before >= 0
         now[past[before[stayed]]] = part[stayed]
-        # what crossed is near: its bodies are among those that changed
+        # old crossings are near: their bodies are among those that changed
         old = now[self.crossings]
         both = np.concatenate([old[(old >= 0).all(axis=1)], part[found.crossings]])
         self.triangles, self.crossings = triangles, np.unique(np.sort(both, axis=1), axis=0)
@@ -161,9 +166,9 @@ class _Draft:
 
 
 def _find(triangles: Triangles, among: Triangles) -> NDArray[np.int64]:
-    """Return where each of the triangles is among the others; -1 for none, and for repeated ones.
+    """Return the index of each triangle among the others; -1 for none, and for repeated ones.
 
-    By a sum that different triangles may share: of two that do, one counts as not found.
+    It compares sums. Different triangles may share a sum: then one of them counts as not found.
     """
     if not len(among):
         return np.full(len(triangles), -1, np.int64)
@@ -182,9 +187,9 @@ def _strays(
     chosen: NDArray[np.bool_],
     limit_um: float,
 ) -> NDArray[np.int64]:
-    """Return the vertices of the chosen bodies that are further than the limit from them.
+    """Return the vertices of the chosen bodies that are farther than the limit from the result.
 
-    `body`: of the vertices (n,) that are looked at.
+    body  body of each vertex (n,) that is checked
     """
     if limit_um == np.inf:
         return np.zeros(0, np.int64)
@@ -214,7 +219,7 @@ def _near(
 def _around(
     tree: cKDTree, mesh: Mesh, triangles: Triangles, defects: Defects, tries: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the vertices in balls round the defects, larger by GROWTH for each of the tries."""
+    """Return the vertices in balls around the defects; a ball grows by GROWTH with each try."""
     corners = mesh.positions[triangles].astype(np.float64)
     low, high = corners.min(axis=1), corners.max(axis=1)
     first, second = defects.crossings.T
@@ -231,7 +236,7 @@ def _around(
     least = float(np.median(np.linalg.norm(sides, axis=2))) / 4
     size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, least)
     away, nearest = tree.query((start + end) / 2)
-    # one vertex at least, or the next try would be as this one
+    # at least one vertex, or the next try would equal this one
     radius = np.maximum(size * GROWTH ** tries[nearest], (1 + MARGIN) * away)
     found = tree.query_ball_point((start + end) / 2, radius)
     return np.unique(np.concatenate([np.asarray(each, np.int64) for each in found]))

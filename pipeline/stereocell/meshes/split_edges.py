@@ -1,8 +1,14 @@
 """Split the longest edges of sharp triangles at a point of the surface between their ends.
 
-Edges are turned afterwards: bisection of the longest edge (Rivara 1984) makes no angle larger by
-itself, but gives turns a vertex near. The point is that of a PN triangle (Vlachos et al., "Curved
-PN triangles", I3D 2001): the middle, lifted by what the normals at the ends say.
+Bisection of the longest edge (Rivara) makes no angle larger by itself, but gives the edge flips
+that follow a vertex nearby. The new point is that of a PN triangle (Vlachos et al.): the midpoint,
+lifted according to the normals at the ends.
+
+References
+M.-C. Rivara, "Algorithms for refining triangular grids suitable for adaptive and multigrid
+techniques", Int. Journal for Numerical Methods in Engineering 20, 1984. doi:10.1002/nme.1620200412
+A. Vlachos, J. Peters, C. Boyd & J. L. Mitchell, "Curved PN triangles", Symposium on Interactive 3D
+Graphics 2001. doi:10.1145/364338.364387
 """
 
 import numpy as np
@@ -11,7 +17,7 @@ from numpy.typing import NDArray
 from stereocell.meshes.validity import match_edges
 from stereocell.model.lattice import Plane
 
-COSINE = 0.7  # between the halves of a triangle and the whole
+COSINE = 0.7  # least cosine between the halves of a triangle and the whole
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -26,12 +32,17 @@ def split_edges(
     planes: tuple[Plane, ...],
     max_lift_um: float,
 ) -> tuple[Points, Points, Indices, Indices]:
-    """Return new positions, normals and triangles, and the ends (k, 2) of the edges split.
+    """Return new positions, normals and triangles, and the ends of the edges split, int64 (k, 2).
 
-    `wanted` (m,): triangles whose longest edge is split, but not an edge of the border, nor two of
-    one triangle, of which the longer one is. New vertices come last, in the order of the ends, and
-    new triangles too. The surface moves by `max_lift_um` at most, and no new vertex is within that
-    of a plane, unless an end is nearer.
+    positions    float64 (n, 3), um
+    normals      float64 (n, 3), unit length
+    triangles    int64 (m, 3)
+    wanted       bool (m,): triangles whose longest edge is split. Boundary edges are not split; of
+                 two edges of one triangle the longer one is
+    planes       the cut planes: a new vertex keeps `max_lift_um` from them, unless an end is nearer
+    max_lift_um  largest distance by which the surface moves
+
+    New vertices come last, in the order of the ends, and new triangles too.
     """
     corners = positions[triangles]
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -46,7 +57,7 @@ def split_edges(
     b = triangles[right, (far - 3 * right + 2) % 3]
     middle, normal = _between(positions, normals, u, v)
     lift = np.linalg.norm(middle - (positions[u] + positions[v]) / 2, axis=1)
-    # caps at the data's end have sharp rims
+    # caps at the data's end have sharp edges
     middle = np.clip(middle, positions.min(axis=0), positions.max(axis=0))
     splits = lift <= max_lift_um
     splits &= _clear(middle, positions[u], positions[v], planes, max_lift_um)
@@ -76,8 +87,8 @@ def split_edges(
 def _between(positions: Points, normals: Points, u: Indices, v: Indices) -> tuple[Points, Points]:
     """Return points of the surface between u and v, and their normals.
 
-    Where the ends disagree on the lift the smaller one counts, and none if one is up and one down:
-    at sharp rims normals say nothing of the faces.
+    The lift is the smaller of the ends' lifts, and 0 if one is up and the other down: at sharp
+    edges normals don't describe the faces.
     """
     along = positions[v] - positions[u]
     rise = -(along * normals[u]).sum(axis=1), (along * normals[v]).sum(axis=1)
@@ -90,7 +101,7 @@ def _between(positions: Points, normals: Points, u: Indices, v: Indices) -> tupl
 def _clear(
     middle: Points, p: Points, q: Points, planes: tuple[Plane, ...], margin_um: float
 ) -> NDArray[np.bool_]:
-    """Return which points stay off the planes, by more than the margin or than one of the ends."""
+    """Return which points keep off the planes, farther than the margin or than one of the ends."""
     clear = np.ones(len(middle), bool)
     for column, value in planes:
         ends = np.stack([p[:, column], q[:, column]]) - value
@@ -101,7 +112,7 @@ def _clear(
 
 
 def _lies_flat(middle: Points, u: Points, v: Points, a: Points) -> NDArray[np.bool_]:
-    """Return for which triangles (u, v, a) both halves face where the whole does: no folds."""
+    """Return which triangles (u, v, a) have both halves facing as the whole does: no folds."""
     whole = _unit(np.cross(v - u, a - u))
     halves = np.cross(middle - u, a - u), np.cross(v - middle, a - middle)
     one, other = ((_unit(half) * whole).sum(axis=1) > COSINE for half in halves)

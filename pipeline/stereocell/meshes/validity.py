@@ -1,9 +1,10 @@
-"""The promise that every mesh keeps before it is written, checked exactly.
+"""The exact check that every mesh passes before it is written.
 
-Closed but where another tile follows, without a wall there, 2-manifold edges and vertices, wound
-consistently and outward, nowhere touching itself. Topology is counted, and geometry decided by the
-signs of determinants (see `crossings`), without tolerances; only which way round a whole body is
-wound is the sign of a sum in float64, its volume.
+A valid mesh is closed except where another tile follows, without a wall there. Its edges and
+vertices are 2-manifold, its triangles are wound consistently and outward, and it nowhere touches
+itself. Topology is counted. Geometry is decided by the signs of determinants, without tolerances
+(meshes/self_intersections.py). Only the winding of a whole body is the sign of a float64 sum, its
+volume.
 """
 
 from dataclasses import dataclass, fields
@@ -22,7 +23,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Defects:
-    """What keeps a mesh from being sound; all arrays empty if nothing does.
+    """The defects of a mesh; all arrays, int64, are empty for a valid one.
 
     degenerate             triangles (n,) with two equal corners, or all three on a line
     open                   edges (n, 2), by vertices, of one triangle only, that lie on no cut plane
@@ -30,7 +31,7 @@ class Defects:
     non_manifold_vertices  vertices (n,) whose triangles make more than one fan
     inside_out             one triangle (n,) of each body that is wound inwards
     crossings              pairs (n, 2) of triangles that meet beside their common corners
-    walls                  triangles (n,) in a cut plane, where the neighbour's may lie as well
+    walls                  triangles (n,) in a cut plane, where the neighbour may have one as well
     """
 
     degenerate: Indices
@@ -43,7 +44,7 @@ class Defects:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return how many there are of each kind."""
+        """Return the number of defects of each kind."""
         return {field.name: len(getattr(self, field.name)) for field in fields(self)}
 
     @property
@@ -51,7 +52,7 @@ class Defects:
         return sum(self.counts.values())
 
     def vertices(self, triangles: NDArray[np.integer]) -> Indices:
-        """Return the vertices (n,) of all that is at fault, sorted."""
+        """Return the vertices of all defects, int64 (n,), sorted; triangles (m, 3): the mesh's."""
         whole = (self.degenerate, self.inside_out, self.walls, self.crossings.ravel())
         at = np.concatenate(whole)
         corners = triangles[at].astype(np.int64).ravel()
@@ -69,9 +70,19 @@ def find_defects(
 ) -> Defects:
     """Return the mesh's defects; it may be open on the planes and nowhere else.
 
-    A body's winding is the sign of the volume inside it and the planes that cut it; a negative one
-    is a cavity, if it lies in the box of a solid. `fresh`: triangles of which one at least is in
-    each of the crossings that are looked for; all, if it isn't given.
+    mesh    positions float32 (n, 3), triangles uint32 (m, 3)
+    planes  the cut planes: axis (0 x, 1 y, 2 z) and value in um
+    fresh   bool (m,): crossings are looked for only in pairs with such a triangle; None: in all
+
+    A body's winding is the sign of the volume that it encloses with the planes that cut it. A body
+    of negative volume is a cavity, if it lies in the box of a solid.
+
+    >>> corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> faces = np.uint32([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> find_defects(Mesh(corners, faces, corners)).total
+    0
+    >>> {k: n for k, n in find_defects(Mesh(corners, faces[:3], corners)).counts.items() if n}
+    {'open': 3}
     """
     triangles = mesh.triangles.astype(np.int64)
     repeated = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
@@ -104,7 +115,11 @@ def find_defects(
 
 
 def label_components(triangles: NDArray[np.integer], vertices: int) -> NDArray[np.int32]:
-    """Return the number of the connected body that each of the vertices belongs to."""
+    """Return the number of the connected body of each vertex, int32 (n,).
+
+    triangles  (m, 3)
+    vertices   number of vertices, n
+    """
     a, b, c = triangles.astype(np.int64).T
     rows, columns = np.concatenate([a, b]), np.concatenate([b, c])
     edges = coo_matrix((np.ones(len(rows), bool), (rows, columns)), shape=(vertices, vertices))
@@ -112,7 +127,10 @@ def label_components(triangles: NDArray[np.integer], vertices: int) -> NDArray[n
 
 
 def border(triangles: NDArray[np.integer]) -> Indices:
-    """Return the directed edges (n, 2) that have no triangle on their other side, sorted."""
+    """Return the directed boundary edges, int64 (n, 2), sorted: they have no triangle beyond.
+
+    triangles  (m, 3)
+    """
     start = triangles.astype(np.int64)
     end = np.roll(start, -1, axis=1)
     # an edge and its twin differ in the last bit: sorted, they follow each other
@@ -132,7 +150,9 @@ def border(triangles: NDArray[np.integer]) -> Indices:
 
 
 def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
-    """Return the directed edges (3 m, 2), the twin of each or -1, and which are non-manifold.
+    """Return the directed edges int64 (3 m, 2), the twin of each or -1, and which are non-manifold.
+
+    triangles  int64 (m, 3)
 
     Edge 3 t + k goes from corner k of triangle t to the next one.
     """
@@ -165,13 +185,19 @@ def _on_planes(
 
 
 def find_non_manifold_vertices(triangles: Indices, twins: Indices, vertices: int) -> Indices:
-    """Return the vertices whose triangles don't make one fan: walk round each, and count."""
+    """Return the vertices whose triangles don't make one fan, int64 (n,).
+
+    triangles, twins  int64 (m, 3) and (3 m,), as of `match_edges`
+    vertices          number of vertices
+
+    It walks around each vertex and counts the triangles.
+    """
     corners = triangles.ravel()
     valence = np.bincount(corners, minlength=vertices)
     index = np.arange(len(corners))
-    # to the next triangle round the vertex, over the edge that comes in: twin starts at the vertex
+    # to the next triangle around the vertex, over the incoming edge: its twin starts at the vertex
     onward = twins[index - index % 3 + (index + 2) % 3]
-    # a fan with a border is walked from its first triangle: no one comes over the edge that leaves
+    # a fan with a boundary is walked from its first triangle, whose outgoing edge has no twin
     begins = np.flatnonzero(twins < 0)
     start = np.full(vertices, -1, np.int64)
     start[corners] = index
@@ -196,18 +222,18 @@ def _inside_out(
     lone: Indices,
     planes: tuple[Plane, ...],
 ) -> Indices:
-    """Return one triangle of each body that is wound inwards. `lone`: edges of its border."""
+    """Return one triangle of each body that is wound inwards. `lone`: its boundary edges."""
     if not len(mesh.triangles):
         return np.zeros(0, np.int64)
     labels = label_components(mesh.triangles, len(mesh.positions))[mesh.triangles[:, 0]]
     names, first, body = np.unique(labels, return_index=True, return_inverse=True)
     a, b, c = corners.transpose(1, 0, 2)
     area = np.cross(b - a, c - a)
-    # the normals' say, for a body that reaches from plane to plane along all three axes
+    # by its normals, for a body that reaches from plane to plane along all three axes
     size = np.bincount(body, (area * mesh.normals[mesh.triangles].sum(axis=1)).sum(axis=1))
     known = np.zeros(len(names), bool)
     for axis in range(3):
-        # Gauss: the integral of x n_x. Caps across other axes add nothing, nor one at x = 0
+        # Gauss: the integral of x n_x. Caps across other axes add nothing, nor does one at x = 0
         zero, cuts = corners[first, 0, axis], np.zeros(len(names), int)
         for column, value in planes:
             if column == axis:
