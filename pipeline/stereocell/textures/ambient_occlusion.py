@@ -1,9 +1,9 @@
-"""Ambient occlusion: how much of the sky above a surface its own body and its neighbours hide.
+"""Ambient occlusion: the part of the sky above a surface that its own body and its neighbours hide.
 
-Rays are cast from points of the surface through the repaired field that the surface was taken
-from, not through its triangles. The field reaches past the tile into its halo, so that neighbours
-find about the same on both sides of a cut; a mesh ends there. And all rays of one direction step
-together, so that no ray tracer is needed: libigl's, the one at hand, knows no radius.
+Rays start at points of the surface and run through the repaired field that the surface was
+extracted from, not through its triangles. The field reaches past the tile into its halo, while a
+mesh ends at the cut: so neighbours find nearly the same values on both sides of a cut. All rays of
+one direction step together, so that no ray tracer is needed: libigl's has no radius.
 
 The directions are the same for every point and every tile: no noise, and the same bytes each time.
 """
@@ -16,9 +16,9 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import xyz_to_zyx
 
-DIRECTIONS = 48  # over the whole sphere; half of them rise above a surface
-STEP = 0.75  # of a ray, in coarsest voxel spacings
-NEIGHBOURS = 4  # points with a value of their own that others take the mean of
+DIRECTIONS = 48  # rays over the whole sphere; half of them rise above a surface
+STEP = 0.75  # step along a ray, in coarsest voxel spacings
+NEIGHBOURS = 4  # points with a value, of which others take the mean
 
 
 def find_ambient_visibility(
@@ -28,12 +28,12 @@ def find_ambient_visibility(
 
     It is 1 - ambient occlusion: 1 is open, as in glTF's occlusion texture.
 
-    solid  bool (z, y, x), covers `lattice.window`
-    mesh   positions and unit normals in world um (x, y, z); its triangles are not looked at
+    solid      bool (z, y, x), covers `lattice.window`
+    mesh       positions and unit normals in world space, um (x, y, z); triangles are not used
+    radius_um  a hit counts less the farther it is, and nothing at this distance
 
-    Directions count by the cosine to the normal; what is hit farther off counts less, at
-    `radius_um` nothing. Rays start a STEP above the surface, so that it is not hidden by its own
-    voxels.
+    A direction's weight is the cosine to the normal. Rays start a STEP above the surface, so that
+    its own voxels don't hide it.
     """
     points = mesh.positions
     if radius_um <= 0 or not len(points):
@@ -44,7 +44,11 @@ def find_ambient_visibility(
 
 
 def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
-    """Return the first point of each block of space that has any; blocks lie on one world grid."""
+    """Return the number of the first point in each occupied block of space, int64 (k,), rising.
+
+    points   float32 (n, 3), um
+    edge_um  edge of a block; blocks lie on one grid in world space
+    """
     blocks = np.floor(points / edge_um).astype(np.int64)
     blocks -= blocks.min(axis=0)
     size = blocks.max(axis=0) + 1
@@ -55,7 +59,12 @@ def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
 def spread(
     known: NDArray[np.float32], values: NDArray[np.float32], points: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return the values at the points: of the nearest that are known, the mean by closeness."""
+    """Return values at the points, float32 (n,): the mean of the nearest known ones, by closeness.
+
+    known   float32 (k, 3), um, where values are known
+    values  float32 (k,)
+    points  float32 (n, 3), um
+    """
     tree = cKDTree(known, balanced_tree=False, compact_nodes=False)
     distance, nearest = tree.query(points, k=list(range(1, min(NEIGHBOURS, len(known)) + 1)))
     weights = 1 / (np.asarray(distance) + 1e-6)
@@ -73,14 +82,14 @@ def _cast(
     spacing, origin = np.asarray(lattice.spacing_um), np.asarray(lattice.origin_um)
     offset = step = STEP * max(lattice.spacing_um)
     distances = np.arange(offset, radius_um + offset, step)
-    # empty all round, so that no ray leaves the array
+    # an empty margin on all sides, so that no ray leaves the array
     margin = np.ceil((distances[-1] + offset) / spacing).astype(int) + 2
     padded = np.pad(solid, [(m, m) for m in margin])
     strides = np.array([padded.shape[1] * padded.shape[2], padded.shape[2], 1])
     padded = padded.ravel()
     up = xyz_to_zyx(normals.astype(np.float64))
     start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin) / spacing
-    start += margin - np.asarray(lattice.window.start) + 0.5  # truncated, the nearest voxel
+    start += margin - np.asarray(lattice.window.start) + 0.5  # + 0.5: truncated, the nearest voxel
     start, up = start.astype(np.float32), up.astype(np.float32)
 
     whole, hidden = np.zeros(len(points), np.float32), np.zeros(len(points), np.float32)
@@ -100,7 +109,7 @@ def _cast(
 
 
 def sphere(count: int) -> NDArray[np.float64]:
-    """Return `count` directions, evenly over the sphere, (count, 3): Fibonacci's spiral."""
+    """Return unit vectors spread evenly over the sphere, float64 (count, 3): Fibonacci's spiral."""
     place = np.arange(count) + 0.5
     height = 1 - 2 * place / count
     turn = np.pi * (1 + np.sqrt(5)) * place

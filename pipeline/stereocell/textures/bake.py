@@ -1,8 +1,8 @@
-"""What the fine surface tells a coarser level: its normals, how open it lies, what is on it.
+"""Bake the fine surface into a coarser level: normals, ambient occlusion, the sampled channel.
 
-A place on the level goes to the nearest point of the fine surface's triangles, whose corners'
-values are interpolated there. The fine surface reaches past the tile's cut: a texel's centre does
-too, by half a texel, and neighbours must shade the same on both sides.
+A point of the level takes the values of the nearest point on the fine surface's triangles,
+interpolated between the triangle's corners. The fine surface reaches past the tile's cut: the
+centres of a texel do too, by half a texel, and neighbours must shade the same on both sides.
 """
 
 from dataclasses import dataclass
@@ -17,17 +17,17 @@ from stereocell.model.mesh import Mesh
 from stereocell.textures.rasterize import find_texels
 from stereocell.textures.seam_padding import find_chart_edges, fit_seam_texels
 
-NEIGHBOURS = 8  # fine vertices looked at where the nearest point is on another wall
-REACH = 1.5  # texels beyond a chart's edge whose values are found, not copied: bilinear lookups'
-LOWEST = 0.05  # of a map's normals along the mesh's: a map can't bend one below its surface
+NEIGHBOURS = 8  # fine vertices searched where the nearest point is on another wall
+REACH = 1.5  # texels outside a chart that get values of their own, for bilinear lookups
+LOWEST = 0.05  # least cosine of a map's normal to the mesh's: no map points below the surface
 
 
 @dataclass(frozen=True, slots=True)
 class FineSurface:
     """The finest surface, some voxels past the tile's cut, with values at its vertices.
 
-    openness  float32 (n,) 0..1: see `occlusion`
-    paint     float32 (n,) 0..1: another channel's intensity; None: nothing is painted
+    openness  float32 (n,) 0..1: 1 - ambient occlusion, see textures/ambient_occlusion.py
+    paint     float32 (n,) 0..1: intensity of the sampled channel; None: there is none
     """
 
     mesh: Mesh
@@ -36,12 +36,18 @@ class FineSurface:
 
     @classmethod
     def bare(cls, mesh: Mesh) -> "FineSurface":
+        """Return the surface without ambient occlusion and without a sampled channel."""
         return cls(mesh, np.ones(len(mesh.positions), np.float32))
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What the fine surface says at n places: unit normals (n, 3), openness and paint (n,)."""
+    """Values of the fine surface at n points.
+
+    normals   float64 (n, 3), unit length
+    openness  float64 (n,), 0..1: 1 - ambient occlusion
+    paint     float64 (n,), 0..1: intensity of the sampled channel, or None
+    """
 
     normals: NDArray[np.float64]
     openness: NDArray[np.float64]
@@ -50,11 +56,11 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Maps:
-    """Images of a level, row 0 at v = 1; texels between charts repeat the nearest inside.
+    """Images of a level, row 0 at v = 1; texels between charts repeat the nearest one inside.
 
     normals   uint8 (h, w, 3), tangent space
-    openness  uint8 (h, w); 255: all of the sky is seen
-    paint     uint8 (h, w) or None
+    openness  uint8 (h, w); 255: no ambient occlusion
+    paint     uint8 (h, w), or None
     """
 
     normals: NDArray[np.uint8]
@@ -63,7 +69,7 @@ class Maps:
 
 
 class Baker:
-    """Looks up the fine surface; its search trees are built once."""
+    """Looks up values of the fine surface; its search trees are built once."""
 
     def __init__(self, fine: FineSurface) -> None:
         self._fine = fine
@@ -74,9 +80,13 @@ class Baker:
         self._corners: cKDTree | None = None
 
     def look_up(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> Found:
-        """Return what lies nearest to the points (n, 3) and faces as the normals (n, 3) do.
+        """Return the values at the nearest points of the fine surface that face the same way.
 
-        The other wall of a thin shell may be nearer: then the vertices around are asked.
+        points   float64 (n, 3), um, world space (x, y, z)
+        normals  float64 (n, 3), unit length, of the coarse surface
+
+        The other wall of a thin shell may be nearer. Then vertices nearby that face the same way
+        are used instead.
         """
         fine = self._fine
         _, nearest, place = self._tree.squared_distance(self._vertices, self._triangles, points)
@@ -102,8 +112,10 @@ class Baker:
     def _around(
         self, points: NDArray[np.float64], normals: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Return near vertices, their shares (by closeness, of those that face the same way), and
-        whether none does."""
+        """Return near vertices, their weights, and whether none of them faces the same way.
+
+        A weight follows from closeness; it is 0 for vertices that face away.
+        """
         if self._corners is None:
             self._corners = cKDTree(self._vertices, balanced_tree=False, compact_nodes=False)
         # a list of k asks for k columns, even for one
@@ -117,7 +129,11 @@ class Baker:
 
 
 def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
-    """Return the maps of a mesh with UVs and tangents, `size` (height, width) texels."""
+    """Return the maps of a level.
+
+    coarse  a mesh with UVs and tangents
+    size    (height, width), texels
+    """
     assert coarse.uvs is not None
     texel, triangle, weights, outside = find_texels(coarse.uvs, coarse.triangles, size, REACH)
     values = _compute_texels(coarse, triangle, weights, baker)
@@ -141,9 +157,9 @@ def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
 def _compute_texels(
     coarse: Mesh, triangle: NDArray[np.int64], weights: NDArray[np.float64], baker: Baker
 ) -> NDArray[np.float64]:
-    """Return what maps hold at places of triangles: normal (3), openness and, if any, paint; 0..1.
+    """Return the content of maps at points of triangles: normal (3), openness, paint if any; 0..1.
 
-    `weights` (n, 3): barycentric, and below 0 or above 1 for places outside the triangle.
+    weights  (n, 3), barycentric; below 0 or above 1 for points outside the triangle
     """
     assert coarse.tangents is not None
     corners = coarse.triangles[triangle]
@@ -169,9 +185,10 @@ def _in_frame(
     bitangent: NDArray[np.float64],
     normal: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the factors of the three axes that add up to the vectors: what a renderer undoes.
+    """Return the factors of the three axes that add up to the vectors, (n, 3).
 
-    Between vertices the axes are not at right angles any more; a renderer takes them as they are.
+    A renderer multiplies by the same axes. Between vertices they are not at right angles any more;
+    a renderer uses them as they are.
     """
     # Cramer's rule: the axes of the inverse are cross products
     rows = np.cross(bitangent, normal), np.cross(normal, tangent), np.cross(tangent, bitangent)
@@ -183,7 +200,12 @@ def _in_frame(
 def fill(
     values: NDArray[np.float64], texel: NDArray[np.int64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return an image (h, w, k) of the values (n, k) of texels; others repeat the nearest."""
+    """Return an image (h, w, k) of the values of texels; other texels repeat the nearest one.
+
+    values  float64 (n, k)
+    texel   int64 (n,), row * w + column
+    size    (height, width), texels
+    """
     height, width = size
     image = np.zeros((height * width, values.shape[1]))
     image[texel] = values
@@ -196,7 +218,7 @@ def fill(
 
 
 def _barycentric(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights (n, 3) of points in their triangles (n, 3, 3), 0..1, of sum 1."""
+    """Return the weights (n, 3) of points (n, 3) in their triangles (n, 3, 3), 0..1, of sum 1."""
     a, b, c = corners.transpose(1, 0, 2)
     parts = [np.cross(c - b, points - b), np.cross(a - c, points - c), np.cross(b - a, points - a)]
     facing = np.cross(b - a, c - a)

@@ -1,4 +1,4 @@
-"""All levels of detail of one unit, from its fine surface; each certified, each measured."""
+"""Make all levels of detail of one unit from its fine surface; each is validated and measured."""
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from stereocell.textures.bake import Baker, FineSurface
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.texture_lod import texture_lod
 
-STRAY = 3.0  # errors: how far a vertex may lie from the next level; about .1 % would be further
-SLIDE = 0.5  # finest voxel spacings: how far a vertex of lod0 may go along the surface
+STRAY = 3.0  # errors; largest distance of a vertex from the next level; about .1 % would exceed it
+SLIDE = 0.5  # finest voxel spacings; largest slide of a vertex of lod0 along the surface
 
 
 def make_levels(
@@ -31,13 +31,14 @@ def make_levels(
 ) -> tuple[Lod, ...]:
     """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
 
-    planes      where tiles were cut
+    fine        positions float32 (n, 3) in um, world space (x, y, z)
+    planes      the cut planes
     spacing_um  of the voxels, (z, y, x)
-    source      what maps are baked from, the fine surface and what lies past the planes; without
-                one the fine surface alone, which nothing hides
-    first       the finest level to be made, of a surface that is itself the level before it
+    source      the surface that maps are baked from: the fine one, continued past the planes;
+                None: the fine surface alone, without ambient occlusion
+    first       the first level that is made; `fine` is then the level before it
 
-    Meshes are certified before seams of charts split their vertices: places stay the same.
+    Meshes are validated before the seams of charts split their vertices: positions stay the same.
     """
     lods: list[Lod] = []
     mesh = fine
@@ -66,7 +67,7 @@ def make_levels(
         with clock("measure"):
             to_mesh = Nearest(mesh, lod.samples)
             distance = measure_distance(to_fine, to_mesh)
-            # coarser can't be truer: sampling may say so by a hair, and viewers rely on the order
+            # a coarser level is no more accurate: sampling errors must not break the viewers' order
             distance = max(distance, lods[-1].distance_um if lods else 0.0)
             quality = Quality(
                 away=measure_spread(to_fine, to_mesh),
@@ -88,7 +89,7 @@ def sharpest_angle(mesh: Mesh) -> float:
     """Return the 1st percentile, in degrees, of the triangles' smallest angles."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     sides = np.sort(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), axis=1)
-    a, b, c = sides.T  # the smallest angle lies across from the shortest side
+    a, b, c = sides.T  # the smallest angle is opposite the shortest side
     cosine = (b**2 + c**2 - a**2) / np.maximum(2 * b * c, 1e-30)
     smallest = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     return float(np.percentile(smallest, 1))

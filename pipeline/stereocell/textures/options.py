@@ -5,22 +5,25 @@ from dataclasses import dataclass, replace
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, length_um, setting
 
-TEXTURES = tuple(2**k for k in range(6, 14))  # largest edges that a map may have
+TEXTURES = tuple(2**k for k in range(6, 14))  # allowed largest edges of a map, in texels
 MOST_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
-# Texels finer than voxels show nothing new; xatlas takes long over a tenth, and far below crashes.
-MOST_TEXELS = 10  # along the finest voxel spacing
-# Of rays into the body and past its ends: all that they cross is held in memory.
+# Texels finer than voxels show nothing new. At a tenth xatlas is slow, and far below it crashes.
+MOST_TEXELS = 10  # most texels along the finest voxel spacing
+# Largest reach of rays into the body and past its ends: the voxels they cross are held in memory.
 MOST_REACH = 64.0  # coarsest voxel spacings
 
 
 @dataclass(frozen=True, slots=True)
 class UnwrapOptions:
-    """UVs and baked maps. Levels without maps have occlusion and paint at their vertices."""
+    """UVs and baked maps. Levels without maps have occlusion and sampled channel at their vertices.
+
+    Raises UsageError for a number out of range.
+    """
 
     first_lod: int = setting(1, "the finest level that gets UVs and baked maps")
     texel_um: float | str = setting(AUTO, "um a texel; auto: the coarsest voxel spacing")
     padding: int = setting(6, "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2")
-    # Texels of one coarse voxel spacing want an edge of 1750 on a unit of 194 x 512 x 512 that is
+    # Texels of one coarse voxel spacing need an edge of 1750 on a unit of 194 x 512 x 512 that is
     # full of membranes, 300 to 1000 on nuclei and vessels.
     max_texture: int = setting(1024, "texels, largest edge of a map; texels grow up to 2.8 times")
     max_triangles: int = setting(100_000, "levels with more triangles go without maps")
@@ -47,7 +50,7 @@ class UnwrapOptions:
     def resolved(self, spacing_um: tuple[float, float, float]) -> "UnwrapOptions":
         """Return the options with every `auto` replaced by a length.
 
-        Raises UsageError for a length that suits no such voxels.
+        Raises UsageError for a length that doesn't fit the voxels.
         """
         finest, coarsest = min(spacing_um), max(spacing_um)
         texel_um = length_um("unwrap.texel_um", self.texel_um, coarsest)

@@ -1,11 +1,11 @@
-"""Which triangle lies where in a picture: texels of a map, pixels of a view. Plain numpy."""
+"""Rasterize triangles: texels of a map, pixels of a view. Plain numpy."""
 
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-_AT_ONCE = 1 << 20  # places looked at in one go: about 0.2 GB
+_AT_ONCE = 1 << 20  # texels or pixels computed at once: about 0.2 GB
 
 
 def find_texels(
@@ -14,12 +14,17 @@ def find_texels(
     size: tuple[int, int],
     beyond: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the texels in and near triangles: their numbers, triangle, barycentric weights (n, 3),
-    and how many texels outside of all triangles they lie: 0 inside.
+    """Return the texels in and near triangles.
 
-    `size` (height, width), row 0 at v = 1. A texel's place is its centre. One that lies in no
-    triangle goes with the nearest edge, `beyond` texels off at most; its weights are not clamped:
-    they say where it lies in the triangle's plane.
+    uvs        float32 (n, 2), origin at the lower left
+    triangles  uint32 (m, 3)
+    size       (height, width), texels; row 0 at v = 1
+    beyond     texels; a texel outside all triangles goes with the nearest edge within this distance
+    result     texel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
+               float64 (k, 3); distance to the triangles float64 (k,), in texels, 0 inside
+
+    A texel's position is its centre. Weights are not clamped: they give the position in the
+    triangle's plane.
     """
     height, width = size
     corners = uvs[triangles].astype(np.float64) * (width, height)
@@ -29,7 +34,7 @@ def find_texels(
     weights_of = np.zeros((height * width, 3))
     for triangle, weights, texel, outside in _cover(corners, size, beyond):
         better = np.flatnonzero(outside < nearest[texel])
-        # the best comes last: of equal places the last assignment stays
+        # the best comes last: the last assignment to a texel stays
         order = better[np.argsort(-outside[better], kind="stable")]
         at = texel[order]
         nearest[at] = outside[order]
@@ -41,9 +46,13 @@ def find_texels(
 def find_pixels(
     corners: NDArray[np.float64], depth: NDArray[np.float64], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return what is seen of triangles in a view: pixels, triangle, barycentric weights (n, 3).
+    """Return the visible points of triangles in a view.
 
-    `corners` (m, 3, 2) in pixels, x right, y down; `depth` (m, 3), larger is nearer.
+    corners  float64 (m, 3, 2), pixels, x right, y down
+    depth    float64 (m, 3), larger is nearer
+    size     (height, width), pixels
+    result   pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
+             float64 (k, 3)
     """
     height, width = size
     nearest = np.full(height * width, -np.inf)
@@ -65,9 +74,9 @@ def _cover(
 ) -> Iterator[
     tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 ]:
-    """Yield triangle, weights, place and how far outside (0: inside) of each place near triangles.
+    """Yield triangle, weights, pixel and distance outside (0: inside) of each pixel near triangles.
 
-    `corners` (m, 3, 2) in places, x right, y down.
+    corners  (m, 3, 2) in pixels, x right, y down
     """
     height, width = size
     last = np.array([width - 1, height - 1])
@@ -97,9 +106,9 @@ def _cover(
 def _frames(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return what `_weigh` needs of each triangle (10, m), and which are flat (m,).
+    """Return the numbers that `_weigh` needs of each triangle (10, m), and which are flat (m,).
 
-    Its corner a, its edges a to b and a to c, twice its area, and its height over each edge.
+    They are corner a, edges a to b and a to c, twice the area, and the height over each edge.
     """
     a, b, c = corners.transpose(1, 2, 0)
     ab, ac = b - a, c - a
@@ -114,10 +123,11 @@ def _frames(
 def _weigh(
     frames: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return barycentric weights (n, 3), and how far each place lies beyond its triangle's edges.
+    """Return barycentric weights (n, 3), and how far each point lies beyond its triangle's edges.
 
-    Beyond a corner that is less than the distance to it. `frames` (10, n): of each place's
-    triangle.
+    Beyond a corner that is less than the distance to the corner.
+
+    frames  (10, n), of each point's triangle
     """
     ax, ay, abx, aby, acx, acy, twice, *heights = frames
     x, y = x - ax, y - ay

@@ -1,8 +1,8 @@
-"""Another channel's intensity on a surface, as `--paint CD31=MART1` asks for.
+"""Sample another channel's intensity on a surface, as `--paint CD31=MART1` asks for.
 
-At each vertex: the largest value from the surface down to a stated depth below it, since a marker
-of the membrane peaks beside the iso-surface, not on it, and one of the cytoplasm below. Voxels
-count by the painted channel's own window, as in its 8-bit volume.
+Each vertex takes the largest value from the surface down to a given depth: a marker of the membrane
+has its maximum beside the iso-surface, not on it, and a marker of the cytoplasm below it. Intensity
+follows the sampled channel's own window, as in its 8-bit volume.
 """
 
 import numpy as np
@@ -24,9 +24,10 @@ def sample_channel(
 ) -> NDArray[np.float32]:
     """Return the intensity at each vertex, float32 (n,), 0..1.
 
-    painted  the other channel's voxels (z, y, x); they cover `lattice.window`
-    mesh     positions and unit normals in world um (x, y, z); its triangles are not looked at
+    painted           the sampled channel's voxels (z, y, x); they cover `lattice.window`
+    mesh              positions and unit normals in world space, um (x, y, z)
     intensity_window  voxel values that become 0 and 1
+    depth_um          depth below the surface, along the normal, that is sampled
     """
     points, spacing = mesh.positions, np.asarray(painted.spacing_um)
     voxels = painted.voxels.astype(np.float32)

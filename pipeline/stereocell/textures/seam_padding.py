@@ -1,22 +1,28 @@
-"""Make lookups on the edges of charts true: on both sides of a seam, and of a tile's cut.
+"""Fit the texels around charts so that lookups on both sides of a seam, and of a cut, are right.
 
-A bilinear lookup on a chart's edge mixes texels inside with texels beyond, whose own places lie
-past the surface. What they hold is free, as only such lookups see them: they are set so that the
-mix comes out as the surface says, by a few rounds of Kaczmarz's projections, averaged.
+A bilinear lookup on a chart's edge mixes texels inside with texels outside, whose centres lie past
+the surface. The texels outside are free, since only such lookups read them. They are fitted so that
+the mix equals the surface's value, by a few rounds of averaged Kaczmarz projections.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-ROUNDS = 8
-MOST = 0.35  # that a texel is changed by, of the range 0..1
-PER_TEXEL = 2.0  # places on an edge
+ROUNDS = 8  # rounds of projections
+MOST = 0.35  # largest change of a texel, values are 0..1
+PER_TEXEL = 2.0  # points per texel of a chart's edge
 
 
 def find_chart_edges(
     uvs: NDArray[np.float32], triangles: NDArray[np.uint32], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return places on the edges that have one triangle: triangle (n,), barycentric weights."""
+    """Return points on the edges that have one triangle.
+
+    uvs        float32 (n, 2)
+    triangles  uint32 (m, 3)
+    size       (height, width), texels
+    result     triangle int64 (k,), barycentric weights float64 (k, 3)
+    """
     height, width = size
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     ends = np.sort(edges.astype(np.int64), axis=1)
@@ -43,9 +49,12 @@ def fit_seam_texels(
     uvs: NDArray[np.float64],
     wanted: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return an image (h, w, k), row 0 at v = 1, whose free texels (h, w) make lookups true.
+    """Return the image with its free texels fitted to lookups.
 
-    `wanted` (n, k): what bilinear lookups at the UVs (n, 2) should give. Values are 0..1.
+    image    float64 (h, w, k), 0..1, row 0 at v = 1
+    is_free  bool (h, w), texels that may change, by MOST at most
+    uvs      float64 (n, 2), where lookups are made
+    wanted   float64 (n, k), 0..1, results of the bilinear lookups
     """
     height, width, depth = image.shape
     x, y = uvs[:, 0] * width - 0.5, (1 - uvs[:, 1]) * height - 0.5

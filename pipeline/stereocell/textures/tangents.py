@@ -1,15 +1,17 @@
-"""Tangents by MikkTSpace's rules (Mikkelsen 2008), which glTF and USD name as their convention.
+"""Tangents by the rules of MikkTSpace, which glTF and USD name as their convention.
 
-Each triangle has one direction along +u, of unit length. A vertex takes those of its triangles,
-each laid into the plane across the vertex's normal, made a unit again and weighted by the angle of
-the triangle's corner, measured in that plane; the sum is made a unit. The sign says on which side
-of normal and tangent +v lies: bitangent = sign * cross(normal, tangent).
+Each triangle has one direction along +u, of unit length. A vertex takes the directions of its
+triangles, each projected onto the plane across the vertex's normal, normalized again and weighted
+by the angle of the triangle's corner, measured in that plane; the sum is normalized. The sign
+gives the side of normal and tangent that +v lies on: bitangent = sign * cross(normal, tangent).
 
-No package for this installs: `pymikktspace` is source only and does not build. In one thing the
-rules are narrowed: where triangles that are mirrored in UV space meet others at one vertex,
-MikkTSpace splits it; here the larger angle wins. Charts of xatlas are not mirrored inside.
-The stage and the bundle carry these tangents, and the maps are baked with them, so that no reader
-has to derive its own.
+No package for this installs: `pymikktspace` is source only and does not build. The rules differ in
+one case: where triangles that are mirrored in UV space meet others at one vertex, MikkTSpace splits
+it; here the larger angle wins. Charts of xatlas are not mirrored inside. The stage and the bundle
+carry these tangents, and the maps are baked with them, so that no reader has to derive its own.
+
+References
+M. S. Mikkelsen, "Simulation of wrinkled surfaces revisited", University of Copenhagen, 2008.
 """
 
 import numpy as np
@@ -19,7 +21,11 @@ from stereocell.model.mesh import Mesh
 
 
 def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
-    """Return per-vertex tangents (n, 4): along +u, across the normal, and the bitangent's sign."""
+    """Return the tangent of each vertex, float32 (n, 4).
+
+    mesh    with UVs float32 (n, 2), origin at the lower left
+    result  a unit vector along +u, across the normal, and the bitangent's sign
+    """
     assert mesh.uvs is not None
     p, t = mesh.positions.astype(np.float64), mesh.uvs.astype(np.float64)
     normals = mesh.normals.astype(np.float64)
@@ -41,7 +47,7 @@ def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
             total[:, axis] += np.bincount(here, part[:, axis], len(p))
         handed += np.bincount(here, side * angle, len(p))
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    # a vertex whose triangles say nothing: any direction across the normal serves
+    # a vertex without a direction from its triangles: any direction across the normal serves
     beside = np.where(np.abs(normals[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     spare = _unit(np.cross(normals, beside))
     tangent = np.where(length > 1e-12, total / np.maximum(length, 1e-12), spare)
@@ -50,11 +56,11 @@ def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
 
 
 def _across(normals: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the vectors without their parts along the normals."""
+    """Return the vectors without their components along the normals."""
     return vectors - normals * (normals * vectors).sum(axis=1, keepdims=True)
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the vectors at unit length; what has none stays."""
+    """Return the vectors at unit length; a zero vector stays."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 1e-30)

@@ -1,4 +1,4 @@
-"""The textures of a level of detail: maps where it has UVs, values at its vertices elsewhere."""
+"""Textures of a level of detail: maps where it has UVs, values at its vertices elsewhere."""
 
 from dataclasses import replace
 
@@ -12,7 +12,11 @@ from stereocell.textures.unwrap import unwrap
 
 
 def texture_lod(lod: Lod, level: int, *, baker: Baker, options: UnwrapOptions, clock: Clock) -> Lod:
-    """Return the level with maps, or with values at its vertices; `options` are resolved."""
+    """Return the level with maps, or with values at its vertices.
+
+    level    number of the level, 0: the finest
+    options  resolved
+    """
     reason = f"finer than lod{options.first_lod}" if level < options.first_lod else ""
     if not reason:
         with clock("unwrap"):

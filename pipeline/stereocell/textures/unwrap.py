@@ -1,13 +1,13 @@
-"""UVs for a level of detail: charts that end at sharp edges, packed at a stated texel density.
+"""UVs of a level of detail: charts that end at sharp edges, packed at a given texel density.
 
-Charts and packing are xatlas's. It knows sharp edges by their normals alone, and ours are smooth:
-so it is given the mesh split along them, with the split parts' own normals.
+xatlas makes the charts and packs them. It finds sharp edges by the normals alone, and ours are
+smooth: so xatlas gets the mesh split along them, with the split parts' own normals.
 
 Padding and mip levels. A bilinear lookup inside a chart at mip level k reaches 1.5 * 2^k texels
-beyond it, and the texels between two charts are shared half and half: `padding` texels keep charts
-apart up to the level k for which padding >= 3 * 2^k. With 6 that is levels 0 and 1. A level of
-detail gives way to a coarser one before its texels, a coarse voxel wide, are much below a pixel,
-so deeper levels matter for the coarsest only, where what mixes is a rim of a chart.
+beyond it, and two charts share the texels between them half and half. So `padding` texels keep
+charts apart up to the level k for which padding >= 3 * 2^k; with 6 that is levels 0 and 1. The
+viewer replaces a level of detail by a coarser one before its texels, a coarse voxel wide, are much
+below a pixel. So deeper mip levels matter for the coarsest level only, and mix edges of charts.
 """
 
 import atexit
@@ -26,24 +26,25 @@ from stereocell.model.mesh import Mesh
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.tangents import make_tangents
 
-# xatlas 0.0.11 tells its worker threads to end without holding the lock that they sleep under: an
-# atlas destroyed at the very moment when a worker lies down waits for it for ever (seen once, its
-# stack in ~TaskScheduler). So an atlas is destroyed some unwraps later, its workers long asleep,
-# and the last ones never: the process takes them along.
+# xatlas 0.0.11 stops its worker threads without holding the lock that they sleep under. An atlas
+# destroyed just when a worker goes to sleep waits for it forever (seen once, in ~TaskScheduler).
+# So an atlas is destroyed some unwraps later, when its workers sleep, and the last ones never: they
+# end with the process.
 ATLASES_KEPT = 4
 _past_atlases: deque[xatlas.Atlas] = deque()
 
-SHARP_DEG = 75.0  # between two triangles; coarse levels turn by 60 everywhere
-MULTIPLE = 8  # of texels, a map's edges: blocks of 4 down to mip level 1
-COARSENINGS = 3  # of texels, each by the square root of two at least, before a level goes without
+SHARP_DEG = 75.0  # degrees between two triangles; on coarse levels 60 are common
+MULTIPLE = 8  # texels; a map's edges are multiples: blocks of 4 down to mip level 1
+COARSENINGS = 3  # most times that texels grow, each by sqrt 2 or more, before a level has no maps
 
 
 @dataclass(frozen=True, slots=True)
 class Unwrapped:
     """A mesh with UVs and tangents, split along the seams of its charts.
 
-    size      texels (height, width) of its maps
-    texel_um  edge of a texel on the surface
+    size      (height, width) of its maps, texels
+    texel_um  edge of a texel on the surface, um
+    charts    number of charts
     """
 
     mesh: Mesh
@@ -53,14 +54,18 @@ class Unwrapped:
 
 
 def mip_levels_apart(padding: int) -> int:
-    """Return for how many mip levels, from 0, a lookup in a chart meets no other: see above."""
+    """Return for how many mip levels, from 0 on, a lookup in a chart reads no other chart.
+
+    padding  texels between charts; see the module's text
+    """
     return int(math.log2(padding / 3)) + 1
 
 
 def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
-    """Return the mesh unwrapped, or why it isn't: too many triangles, or too many charts.
+    """Return the mesh with UVs, or the reason why not: too many triangles, or too many charts.
 
-    `options` are resolved. The mesh's own normals stay.
+    mesh     positions float32 (n, 3) in um, triangles uint32 (m, 3); its normals stay
+    options  resolved
     """
     if len(mesh.triangles) > options.max_triangles:
         return f"{len(mesh.triangles):,} triangles, more than {options.max_triangles:,}"
@@ -71,7 +76,7 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
         atlas.add_mesh(mesh.positions[vertices], corners, normals)
         charts, pack = xatlas.ChartOptions(), xatlas.PackOptions()
         charts.max_iterations = 1
-        charts.normal_seam_weight = 1000.0  # from here on no chart crosses a seam
+        charts.normal_seam_weight = 1000.0  # with 1000 and more no chart crosses a seam
         pack.texels_per_unit, pack.padding = 1 / texel_um, options.padding
         atlas.generate(charts, pack)
         width, height = atlas.width, atlas.height
@@ -104,8 +109,8 @@ def split_sharp_edges(
 ) -> tuple[NDArray[np.int64], NDArray[np.uint32], NDArray[np.float32]]:
     """Return the mesh cut open along its sharp edges, for xatlas.
 
-    The original vertex of each new one (n,), triangles (m, 3), and normals (n, 3), each of the
-    triangles around it that no sharp edge parts, weighted by area.
+    result  int64 (n,), the original vertex of each new one; triangles uint32 (m, 3); normals
+            float32 (n, 3), weighted by area, of the triangles that no sharp edge separates
     """
     triangles = mesh.triangles.astype(np.int64)
     a, b, c = mesh.positions[triangles].astype(np.float64).transpose(1, 0, 2)
@@ -121,7 +126,7 @@ def split_sharp_edges(
     cosine = (unit[one // 3] * unit[two // 3]).sum(axis=1)
     is_smooth = cosine > math.cos(math.radians(SHARP_DEG))
     one, two = one[is_smooth], two[is_smooth]
-    # the two triangles run along their common edge in opposite directions
+    # two triangles have their common edge in opposite directions
     joined = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
     links = coo_matrix((np.ones(len(joined[0]), np.int8), joined), (start.size, start.size))
     count, label = connected_components(links, directed=False)
