@@ -1,8 +1,13 @@
-"""A multiplicative bias field, as a receive coil leaves it: a low polynomial of log intensity.
+"""A multiplicative bias field, as a receive coil causes it: a low polynomial of log intensity.
 
-Fitted between two steps of the mixture to what the classes don't explain, voxels weighted by how
-sure that is: the EM of Wells, Grimson, Kikinis & Jolesz, IEEE Trans. Medical Imaging 15 (1996),
-with the polynomial basis of Van Leemput et al., IEEE Trans. Medical Imaging 18 (1999).
+It is fitted between two steps of the mixture to the part that the classes don't explain, each voxel
+weighted by its certainty: the EM of Wells et al., with the polynomial basis of Van Leemput et al.
+
+References
+W. M. Wells, W. E. L. Grimson, R. Kikinis & F. A. Jolesz, "Adaptive segmentation of MRI data", IEEE
+Trans. Medical Imaging 15, 1996. doi:10.1109/42.511747
+K. Van Leemput, F. Maes, D. Vandermeulen & P. Suetens, "Automated model-based bias field correction
+of MR images of the brain", IEEE Trans. Medical Imaging 18, 1999. doi:10.1109/42.811268
 """
 
 from dataclasses import dataclass
@@ -15,21 +20,29 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class BiasField:
-    """log of the field as a sum of Legendre products over a box of `shape` (z, y, x) voxels."""
+    """log of the field as a sum of Legendre products over a box of voxels.
+
+    shape    (z, y, x), voxels
+    terms    degrees (z, y, x) of each product
+    weights  of the products, in log intensity
+    """
 
     shape: tuple[int, int, int]
     terms: tuple[tuple[int, int, int], ...]
     weights: tuple[float, ...]
 
     def log_at(self, indices: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return log of the field at voxels, int (3, n) as (z, y, x); float32 (n,)."""
+        """Return log of the field at voxels, float32 (n,).
+
+        indices  int64 (3, n), rows (z, y, x)
+        """
         if not self.terms:
             return np.zeros(indices.shape[1], np.float32)
         basis = _basis(indices, self.shape, self.terms)
         return np.asarray(basis @ np.array(self.weights), np.float32)
 
     def whole(self) -> NDArray[np.float32]:
-        """Return the field, float32 (z, y, x)."""
+        """Return the field, a factor of intensity, float32 (z, y, x)."""
         degree = max((max(term) for term in self.terms), default=0)
         axes = [legendre.legvander(_scaled(np.arange(n), n), degree) for n in self.shape]
         cube = np.zeros((degree + 1,) * 3)
@@ -42,7 +55,10 @@ class BiasField:
 
 
 def flat_field(shape: tuple[int, int, int], degree: int) -> BiasField:
-    """Return the field that is 1 everywhere, of all terms up to a total degree but the constant."""
+    """Return the field that is 1 everywhere, with all terms up to a total degree but the constant.
+
+    shape  (z, y, x), voxels
+    """
     terms = [t for t in product(range(degree + 1), repeat=3) if 0 < sum(t) <= degree]
     z, y, x = shape
     ordered = tuple((a, b, c) for a, b, c in sorted(terms, key=lambda t: (sum(t), t)))
@@ -56,15 +72,19 @@ def fit_bias_field(
     residual: NDArray[np.float32],
     weights: NDArray[np.float32],
 ) -> BiasField:
-    """Return the field whose log is nearest to `residual` (n,), weighted, at voxels (3, n).
+    """Return the field whose log is nearest to the residual.
 
-    A constant is fitted along and left out: it is the classes' brightness, not the field's.
+    indices   int64 (3, n), rows (z, y, x)
+    residual  float32 (n,), log intensity that the classes don't explain
+    weights   float32 (n,), certainty of each voxel
+
+    A constant is fitted too and dropped: it is the classes' brightness, not the field's.
     """
     basis = _basis(indices, field.shape, field.terms)
     basis = np.concatenate([np.ones((len(basis), 1)), basis], axis=1)
     weighted = basis * weights[:, None]
     normal = weighted.T @ basis
-    # a hair of damping: terms that the mask doesn't tell apart stay small
+    # slight damping: terms that the mask doesn't distinguish stay small
     normal += 1e-6 * np.trace(normal) / len(normal) * np.eye(len(normal))
     found = np.linalg.solve(normal, weighted.T @ residual)
     return BiasField(field.shape, field.terms, tuple(float(w) for w in found[1:]))

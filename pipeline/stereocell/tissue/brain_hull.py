@@ -1,9 +1,13 @@
-"""The brain's hull: a closed mesh blown up from inside until it meets dark, as in BET.
+"""The brain's hull: a closed mesh that grows from inside until it meets dark voxels, as in BET.
 
-Smith, "Fast robust automated brain extraction", Human Brain Mapping 17 (2002): every vertex goes
-out along its normal while what lies below it is bright for its own surroundings, and is held by
-smoothness that tells a gyrus from a sharp corner. As the threshold is local, a bias field does not
-matter much; as the mesh is smooth, sulci are bridged and the neck is a hole too narrow to leave by.
+Every vertex moves out along its normal while the voxels below it are bright for their surroundings.
+Smoothness holds it back, by a rule that distinguishes a gyrus from a sharp corner. The threshold
+is local, so a bias field matters little; the mesh is smooth, so it bridges sulci, and the neck is a
+hole too narrow for it.
+
+References
+S. M. Smith, "Fast robust automated brain extraction", Human Brain Mapping 17, 2002.
+doi:10.1002/hbm.10062
 """
 
 from dataclasses import dataclass
@@ -13,18 +17,22 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-Points = NDArray[np.float64]  # (n, 3) as (z, y, x), mm
+Points = NDArray[np.float64]  # (n, 3), (z, y, x), mm
 Triangles = NDArray[np.int64]
-SUBDIVISIONS = 3  # 642 vertices, 14 mm apart on an adult's brain, and at last four times as many
-ITERATIONS = 400  # with each mesh
-SMOOTH_MM = (3.33, 10.0)  # radii of curvature: sharper is smoothed away, blunter is left
-DEEP_MM, NEAR_MM, EVERY_MM = 20.0, 10.0, 2.0  # below a vertex: where dark and bright are sought
-EDGE = 0.55  # Smith's fractional threshold, between dark and bright
+SUBDIVISIONS = 3  # 642 vertices, 14 mm apart on an adult's brain; at the end four times as many
+ITERATIONS = 400  # steps with each of the two meshes
+SMOOTH_MM = (3.33, 10.0)  # mm; radii of curvature: smaller are smoothed away, larger are kept
+DEEP_MM, NEAR_MM, EVERY_MM = 20.0, 10.0, 2.0  # mm below a vertex: search for dark, for bright, step
+EDGE = 0.55  # Smith's fractional threshold between dark and bright, 0..1
 
 
 @dataclass(frozen=True, slots=True)
 class Hull:
-    """points (n, 3) as (z, y, x), mm from voxel (0, 0, 0)'s centre; triangles (m, 3), outward."""
+    """A closed mesh, outward.
+
+    points     float64 (n, 3), (z, y, x), mm from the centre of voxel (0, 0, 0)
+    triangles  int64 (m, 3)
+    """
 
     points: Points
     triangles: Triangles
@@ -38,11 +46,14 @@ def find_hull(
     radius_mm: float,
     levels: tuple[float, float, float],
 ) -> Hull:
-    """Return the hull of the brain around `center_mm` (z, y, x).
+    """Return the hull of the brain around `center_mm`.
 
-    field   float32 (z, y, x), with voxels of 2 mm or so: finer ones show sulci to their bottom
-    radius  of a ball of the brain's volume; the mesh begins at half of it
-    levels  dark (air, bone), the least of what counts as bright, and the brain's median
+    field       float32 (z, y, x), voxels of about 2 mm: finer ones show the bottoms of sulci
+    spacing_mm  (z, y, x)
+    center_mm   (z, y, x), from the centre of voxel (0, 0, 0)
+    radius_mm   of a ball of the brain's volume; the mesh begins at half of it
+    levels      voxel values: dark (air, bone), the least value that counts as bright, the brain's
+                median
     """
     unit, triangles = _icosphere(SUBDIVISIONS)
     points = np.asarray(center_mm) + 0.5 * radius_mm * unit
@@ -65,7 +76,7 @@ def _inflate(
     depths = np.arange(1.0, DEEP_MM, EVERY_MM)
     near = int((depths < NEAR_MM).sum())
     edge_of = triangles[:, 0], triangles[:, 1]
-    padded = np.pad(field, 1).astype(np.float32)  # nothing past the ends
+    padded = np.pad(field, 1).astype(np.float32)  # 0 past the ends
     sharp, blunt = (1 / r for r in SMOOTH_MM)
     for _ in range(ITERATIONS):
         normals = _normals(points, triangles)
@@ -92,14 +103,19 @@ def fill_hull(
     spacing_mm: tuple[float, float, float],
     shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> NDArray[np.bool_]:
-    """Return the voxels that the hull, moved by `shift_mm`, passes or holds, bool (z, y, x)."""
+    """Return the voxels that the hull encloses or crosses, bool (z, y, x).
+
+    shape       (z, y, x), voxels
+    spacing_mm  (z, y, x)
+    shift_mm    (z, y, x), added to the hull's points
+    """
     corners = (hull.points[hull.triangles] + np.asarray(shift_mm)) / np.asarray(spacing_mm)
     longest = float(np.abs(corners - np.roll(corners, 1, axis=1)).max())
     n = max(1, int(np.ceil(2 * longest)))
     a, b = (k.ravel() / n for k in np.mgrid[: n + 1, : n + 1])
     keep = a + b <= 1
     weights = np.stack([1 - a - b, a, b], axis=1)[keep]
-    shell = np.zeros(tuple(s + 2 for s in shape), np.bool_)  # air all round
+    shell = np.zeros(tuple(s + 2 for s in shape), np.bool_)  # air on all sides
     for part in np.array_split(corners, 64):
         index = np.rint(np.einsum("wk,tkd->twd", weights, part)).astype(np.int64).reshape(-1, 3)
         index = np.clip(index, -1, shape) + 1
@@ -111,9 +127,12 @@ def fill_hull(
 def _look_below(
     padded: NDArray[np.float32], points: Points, normals: Points, depths: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Return the voxels nearest to `points` (n, 3), in voxels, less `depths` (k,) times `normals`.
+    """Return the voxels nearest to points moved down their normals by each depth, float32 (n, k).
 
-    float32 (n, k); the field has one voxel of air around it, which stands for all beyond.
+    padded   the field with one voxel of air around it, which stands for all voxels beyond
+    points   (n, 3), in voxels
+    normals  (n, 3), in voxels
+    depths   (k,)
     """
     flat = np.zeros((len(points), len(depths)), np.int64)
     for axis, n in enumerate(padded.shape):
@@ -134,7 +153,7 @@ def _normals(points: Points, triangles: Triangles) -> Points:
 
 
 def _icosphere(subdivisions: int) -> tuple[Points, Triangles]:
-    """Return a unit sphere: an icosahedron whose triangles are quartered; (n, 3), (m, 3)."""
+    """Return a unit sphere (n, 3), (m, 3): an icosahedron whose triangles are quartered."""
     golden = (1 + 5**0.5) / 2
     corners = [(0.0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
     found = np.array([np.roll(corner, k) for corner in corners for k in range(3)])
@@ -160,7 +179,7 @@ def _quarter(points: Points, triangles: Triangles) -> tuple[Points, Triangles]:
 
 
 def _neighbours(triangles: Triangles, n: int) -> tuple[Triangles, NDArray[np.int64]]:
-    """Return each vertex' neighbours (n, most), filled up with 0, and how many there are (n,)."""
+    """Return each vertex' neighbours (n, most), padded with 0, and their number (n,)."""
     edges = np.unique(
         np.concatenate([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b]), axis=0
     )

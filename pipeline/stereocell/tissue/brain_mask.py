@@ -1,8 +1,15 @@
-"""Where a head is, and where in it the brain: thresholds, a hull (tissue/brain_hull.py), fluid.
+"""Masks of a head and of its brain: thresholds, a hull (tissue/brain_hull.py), fluid.
 
-The hull begins at what erosion leaves of bright tissue, as in Shattuck et al., NeuroImage 13
-(2001), and is found twice: the second time with a rough bias field taken out, which the first one
-shows. Lengths are lengths, not voxels.
+The hull begins at the bright tissue that erosion leaves, as in Shattuck et al. It is found twice,
+the second time with a rough bias field removed, which is measured inside the first hull. Lengths
+are in um, not in voxels.
+
+References
+D. W. Shattuck, S. R. Sandor-Leahy, K. A. Schaper, D. A. Rottenberg & R. M. Leahy, "Magnetic
+resonance image tissue classification using a partial volume model", NeuroImage 13, 2001.
+doi:10.1006/nimg.2000.0730
+N. Otsu, "A threshold selection method from gray-level histograms", IEEE Trans. Systems, Man, and
+Cybernetics 9, 1979. doi:10.1109/TSMC.1979.4310076
 """
 
 from typing import Any
@@ -17,20 +24,22 @@ from stereocell.tissue.brain_hull import Hull, fill_hull, find_hull
 
 Mask = NDArray[np.bool_]
 Triple = tuple[float, float, float]
-COARSE_UM = 2000.0  # the hull is found in voxels of about this
-NOISE_UM = 800.0  # sigma that smooths them
-BIAS_UM = 20_000.0  # sigma of the rough bias field
-ERODED_UM = 4500.0  # parts brain from scalp, optic nerves and dura
-GYRI_UM = 3000.0  # bright tissue so far out of the hull is the brain's
-RIM_UM = 12000.0  # the fluid around the brain goes no farther
-CALM = 0.3  # share of the dark voxels, of lowest gradient, in which bone and fluid are told apart
-PARTED = 0.85  # Otsu's separability, 0..1, of two kinds: of an even spread it is .75
+COARSE_UM = 2000.0  # um; the hull is found in voxels of about this size
+NOISE_UM = 800.0  # um; sigma that smooths those voxels
+BIAS_UM = 20_000.0  # um; sigma of the rough bias field
+ERODED_UM = 4500.0  # um; erosion that separates the brain from scalp, optic nerves and dura
+GYRI_UM = 3000.0  # um; bright tissue within this distance of the hull belongs to the brain
+RIM_UM = 12000.0  # um; largest distance of the fluid from the hull
+CALM = 0.3  # share of the dark voxels, of lowest gradient, that separate bone and fluid
+PARTED = 0.85  # least separability of two kinds, 0..1; an even spread has .75
 
 
 def find_foreground(smooth: NDArray[np.float32]) -> Mask:
-    """Return what isn't background, bool (z, y, x): Otsu's class of log values, largest component.
+    """Return the foreground, bool (z, y, x): Otsu's class of log values, largest component.
 
-    `smooth` float32, noise smoothed. Raises SourceError for a constant volume.
+    smooth  float32 (z, y, x), voxel values, noise smoothed
+
+    Raises SourceError for a constant volume.
     """
     if smooth.min() == smooth.max():
         raise SourceError(f"every voxel is {smooth.flat[0]:g}: expected tissue of several kinds")
@@ -44,9 +53,13 @@ def find_foreground(smooth: NDArray[np.float32]) -> Mask:
 def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> Mask:
     """Return the brain with the fluid in and around it, bool (z, y, x).
 
-    `smooth` float32, noise smoothed. Where fluid is told from bone, it is followed outward from the
-    hull; where it is as dark as bone, its outer bound is not known, and the hull is what is
-    returned. Raises SourceError where there is no brain to begin at.
+    smooth      float32 (z, y, x), voxel values, noise smoothed
+    head        bool (z, y, x), the foreground
+    spacing_um  (z, y, x)
+
+    Where fluid differs from bone, the mask follows it outward from the hull. Where it is as dark as
+    bone, its outer bound is unknown, and the result is the hull. Raises SourceError where there is
+    no brain to begin at.
     """
     coarse, inside, spacing = _coarsen(smooth, head, spacing_um)
     hull, tissue_level = _find_hull(coarse, inside, spacing)
@@ -60,7 +73,7 @@ def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> M
 
 
 def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tuple[Hull, float]:
-    """Return the hull, and the level above which there is tissue, not fluid, bone or air."""
+    """Return the hull, and the level above which voxels are tissue, not fluid, bone or air."""
     level = float(threshold_multiotsu(field[head], 3)[0])
     tissue = head & (field > level)
     core = _within(tissue, -ERODED_UM, spacing_um)
@@ -87,13 +100,13 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
 
 
 def _levels(field: NDArray[np.float32], head: Mask, brain: Mask) -> Triple:
-    """Return what find_hull goes by: dark, the least of what is bright, the brain's median."""
+    """Return the levels of find_hull: dark, least bright value, the brain's median."""
     dark, bright = float(np.percentile(field, 2)), float(np.percentile(field[head], 98))
     return dark, dark + 0.1 * (bright - dark), float(np.median(field[brain]))
 
 
 def _rough_bias(field: NDArray[np.float32], brain: Mask, spacing_um: Triple) -> NDArray[np.float32]:
-    """Return the field's own blur in the brain, about 1 there; far from it 1."""
+    """Return the rough bias field: the field's blur in the brain, about 1; far from it 1."""
     sigma = [BIAS_UM / h for h in spacing_um]
     weight = ndimage.gaussian_filter(brain.astype(np.float32), sigma)
     log = np.log(np.maximum(field, np.float32(1e-6) * field.max())) * brain
@@ -117,14 +130,14 @@ def _add_fluid(
         return brain
     split = float(threshold_otsu(dark))
     bone, fluid = dark[dark <= split], dark[dark > split]
-    # half-way between their middles: voxels of mixed content pull Otsu's level up
+    # half-way between their medians: voxels of mixed content pull Otsu's level up
     split = min(0.5 * float(np.median(bone) + np.median(fluid)), split)
     near &= (smooth > split) & (~tissue | _within(brain, GYRI_UM, spacing_um))
     return np.asarray(ndimage.binary_fill_holes(_touching(near, brain)), np.bool_)
 
 
 def _separability(values: NDArray[np.float32]) -> float:
-    """Return the share of the variance that lies between Otsu's two classes, his eta (1979)."""
+    """Return the share of the variance that lies between Otsu's two classes, his eta, 0..1."""
     if values.min() == values.max():
         return 0.0
     split = float(threshold_otsu(values))
@@ -137,7 +150,7 @@ def _separability(values: NDArray[np.float32]) -> float:
 def _coarsen(
     field: NDArray[np.float32], mask: Mask, spacing_um: Triple
 ) -> tuple[NDArray[np.float32], Mask, Triple]:
-    """Return means over blocks of about COARSE_UM, smoothed, the mask of most, and the spacing."""
+    """Return smoothed means over blocks of COARSE_UM, the mask's majority, and the spacing."""
     z, y, x = (max(1, round(COARSE_UM / h)) for h in spacing_um)
     d, h, w = (n // k for n, k in zip(field.shape, (z, y, x), strict=True))
 
@@ -151,7 +164,7 @@ def _coarsen(
 
 
 def _shift(coarse_um: Triple, spacing_um: Triple) -> Triple:
-    """Return where the coarse voxel (0, 0, 0) has its centre, mm from the fine one's."""
+    """Return the centre of the coarse voxel (0, 0, 0) in mm from the fine one's, (z, y, x)."""
     z, y, x = ((c - f) / 2000 for c, f in zip(coarse_um, spacing_um, strict=True))
     return z, y, x
 
@@ -184,7 +197,7 @@ def _touching(mask: Mask, seed: Mask) -> Mask:
 
 
 def _within(mask: Mask, reach_um: float, spacing_um: Triple) -> Mask:
-    """Return the mask dilated (or, by a negative reach, eroded) by a ball."""
+    """Return the mask dilated by a ball, or eroded for a negative reach."""
     import edt
 
     far = edt.edt(mask if reach_um < 0 else ~mask, anisotropy=spacing_um, black_border=False)

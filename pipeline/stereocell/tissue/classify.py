@@ -1,9 +1,15 @@
-"""Tissue classes, learned from the volume itself: per-voxel probabilities, bias field removed.
+"""Learn tissue classes from the volume itself: probabilities of each voxel, bias field removed.
 
-Mixture of Gaussians on intensity and gradient magnitude, with the bias field fitted between its
-steps (tissue/bias_field.py) and a spatial prior at the end (tissue/potts_prior.py). How many
-classes: the Bayesian information criterion, Schwarz, Annals of Statistics 6 (1978). Everything is
-seeded and samples are taken by rule: the same voxels give the same bytes.
+A mixture of Gaussians is fitted to intensity and gradient magnitude, with the bias field fitted
+between its steps (tissue/bias_field.py) and a spatial prior at the end (tissue/potts_prior.py). The
+Bayesian information criterion chooses the number of classes. Everything is seeded, and samples are
+taken by rule: the same voxels give the same bytes.
+
+References
+G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+doi:10.1214/aos/1176344136
+C. Hennig, "Methods for merging Gaussian mixture components", Advances in Data Analysis and
+Classification 4, 2010. doi:10.1007/s11634-010-0058-3
 """
 
 from dataclasses import dataclass
@@ -21,32 +27,37 @@ from stereocell.tissue.brain_mask import find_brain, find_foreground
 from stereocell.tissue.potts_prior import apply_potts_prior
 
 Field = NDArray[np.float32]
-AUTO_CLASSES = range(2, 7)
-MODE_BINS = 64
-SHALLOWEST_DIP = 0.9  # of the lower peak: between two modes the histogram falls below
-LEAST_SHARE = 0.01  # of the voxels: less is no tissue
+AUTO_CLASSES = range(2, 7)  # numbers of classes that `auto` tries
+MODE_BINS = 64  # bins of the histogram whose modes are counted
+SHALLOWEST_DIP = 0.9  # largest histogram between two modes, by the lower peak's height
+LEAST_SHARE = 0.01  # least share of the voxels in a class
 
 
 @dataclass(frozen=True, slots=True)
 class TissueOptions:
+    """How classes are learned."""
+
     classes: int | Literal["auto"] = "auto"
     brain: bool = False  # learn inside the brain alone: heads in MR
-    bias_degree: int = 3  # of the polynomial; 0: the field is 1
-    bias_rounds: int = 6
-    sample: int = 120_000  # voxels of the mask, of which the mixture is fitted to
-    calm_share: float = 0.6  # those of the lowest gradient: one tissue, not a border of two
-    blur_voxels: float = 0.5  # at a border intensity is uncertain by the gradient over so much
-    smoothing_voxels: float = 0.8  # sigma, of the finest spacing, of both features
-    prior: float = 0.6
-    prior_rounds: int = 5
+    bias_degree: int = 3  # degree of the polynomial; 0: no bias field
+    bias_rounds: int = 6  # rounds of fitting mixture and bias field
+    sample: int = 120_000  # voxels of the mask to which the mixture is fitted
+    calm_share: float = 0.6  # share of them, of lowest gradient, that is used: inside one tissue
+    blur_voxels: float = 0.5  # voxels; x the gradient, the uncertainty of intensity at a border
+    smoothing_voxels: float = 0.8  # sigma in finest spacings, for both features
+    prior: float = 0.6  # strength of the Potts prior
+    prior_rounds: int = 5  # rounds of its mean field
 
 
 @dataclass(frozen=True, slots=True)
 class Tissue:
-    """probabilities  float32 (k, z, y, x), by rising intensity; 1 in sum in the mask, else 0
-    mask              bool (z, y, x): where classes were learned
-    means             of each class: intensity (bias removed) and gradient magnitude a um, (k, 2)
-    bic               of each number of classes that was tried
+    """The learned classes, by rising intensity.
+
+    probabilities  float32 (k, z, y, x), 0..1; their sum is 1 in the mask and 0 outside
+    mask           bool (z, y, x): where classes were learned
+    bias           the bias field
+    means          float64 (k, 2): intensity (bias removed) and gradient magnitude per um
+    bic            Bayesian information criterion, by number of classes
     """
 
     probabilities: Field
@@ -59,7 +70,13 @@ class Tissue:
 def learn_tissue(
     voxels: NDArray[Any], spacing_um: tuple[float, float, float], options: TissueOptions
 ) -> Tissue:
-    """Return the classes of `voxels` (z, y, x). Raises SourceError where there are none."""
+    """Return the tissue classes of a volume.
+
+    voxels      (z, y, x), any number type
+    spacing_um  (z, y, x)
+
+    Raises SourceError for a constant volume, and where a brain is asked for and not found.
+    """
     spacing = np.asarray(spacing_um)
     raw = voxels.astype(np.float32)
     sigma = options.smoothing_voxels * spacing.min() / spacing
@@ -79,9 +96,9 @@ def learn_tissue(
 
     counts = AUTO_CLASSES if options.classes == "auto" else [options.classes]
     flat = flat_field(shape, options.bias_degree)
-    # with each number of classes its own field: one is told from the other by both together
+    # each number of classes has its own field: the two depend on each other
     fields = {k: _learn_field(flat, sampled, indices, k, options) for k in counts}
-    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))  # voxels that the smoothing ties together
+    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))  # voxels that smoothing makes dependent
     independent = min(1.0, int(inside.sum()) / len(calm) / max(scale, 1e-9))
     bic, has_modes = {}, {}
     for k, field in fields.items():
@@ -117,13 +134,14 @@ def _gradient(field: Field, spacing: NDArray[np.float64]) -> Field:
 
 
 def _fit(samples: NDArray[Any], count: int) -> GaussianMixture:
-    """Return a mixture of one common covariance, begun at k-means of intensity: no random start.
+    """Return a mixture with one common covariance, started at k-means of intensity.
 
-    With a covariance for each, two classes would share one tissue's mean and part its gradients.
+    No start is random. With a covariance for each, two classes would share one tissue's mean and
+    divide its gradients.
     """
     edges = np.quantile(samples[:, 0], np.linspace(0, 1, count + 1))
     low, high = np.quantile(samples[:, 0], (0.005, 0.995))
-    # by shares and by range: a small class is missed by the one, a dim pair by the other
+    # starts by shares miss a small class, starts by range miss a dim pair
     starts = ((edges[1:] + edges[:-1]) / 2, np.linspace(low, high, count))
     fits = [
         KMeans(count, init=start[:, None], n_init=1, max_iter=50).fit(samples[:, :1])
@@ -155,20 +173,21 @@ def _spread(values: NDArray[Any], labels: NDArray[Any]) -> float:
 def _score(
     samples: NDArray[Any], log_field: Field, count: int, independent: float
 ) -> tuple[float, bool]:
-    """Return BIC of so many classes, and whether each is a mode of its own.
+    """Return BIC for a number of classes, and whether each class is a mode of its own.
 
-    Of intensity alone and the calmest voxels: gradients are no Gaussian, and voxels of mixed
-    content would be classes. `independent`: the share of the samples that smoothing left so. A
-    class without a mode in the histogram only mends the shape of another (Hennig, Advances in Data
-    Analysis and Classification 4, 2010).
+    It uses intensity alone and the calmest voxels: gradients are no Gaussian, and voxels of mixed
+    content would make classes. A class without a mode in the histogram only corrects another one's
+    shape (Hennig).
+
+    independent  share of the samples that are independent after smoothing
     """
     calm = samples[:, 1] <= np.quantile(samples[:, 1], 0.5)
     values = samples[calm, :1] / np.exp(log_field[calm])[:, None]
     mixture = _fit(values, count)
-    # as a density of the voxels as they were
+    # density of the voxels before correction
     likelihood = float(mixture.score(values)) - float(log_field[calm].mean())
     n = max(2.0, independent * len(values))
-    parameters = 2 * count  # means, shares but one, one variance
+    parameters = 2 * count  # means, all shares but one, one variance
     order = np.argsort(mixture.means_[:, 0])
     means, shares = mixture.means_[order, 0], mixture.weights_[order]
     are_modes = _dips(values[:, 0], means) < SHALLOWEST_DIP
@@ -177,7 +196,7 @@ def _score(
 
 
 def _dips(values: NDArray[Any], means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return, between each two means, the least of the histogram over the lower one's peak."""
+    """Return the least of the histogram between each two means, by the lower peak's height."""
     low, high = np.quantile(values, (0.002, 0.998))
     counts, edges = np.histogram(values, MODE_BINS, (float(low), float(high)))
     density = ndimage.gaussian_filter1d(counts.astype(np.float64), 1.5)
@@ -208,7 +227,7 @@ def _learn_field(
         mixture = _fit(corrected, count)
         share = mixture.predict_proba(corrected)
         level = np.maximum(mixture.means_[:, 0], 1e-6 * samples[:, 0].max())
-        # of log intensity: noise over level
+        # 1 / variance of log intensity: (level / noise)^2
         certainty = level**2 / mixture.covariances_[0, 0]
         weights = share @ certainty
         residual = measured - (share * certainty) @ np.log(level) / weights
@@ -221,7 +240,7 @@ def _learn_field(
 def _log_likelihood(mixture: GaussianMixture, intensity: Field, blur: Field) -> Field:
     """Return log of share times density, float32 (k, z, y, x), classes by rising intensity.
 
-    `blur`: what a border adds to the spread of intensity, so that there the neighbours decide.
+    blur  voxel values added to the spread of intensity at a border, so that neighbours decide there
     """
     order = np.argsort(mixture.means_[:, 0])
     result = np.empty((len(order), *intensity.shape), np.float32)

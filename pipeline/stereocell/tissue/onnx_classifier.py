@@ -1,11 +1,16 @@
-"""A network of the user's own, as an ONNX file, that tells each voxel's class.
+"""A user's own network, as an ONNX file, that classifies voxels.
 
-Patches half overlap and are blended by a Gaussian, as in Isensee et al., "nnU-Net", Nature Methods
-18 (2021). It runs on the processor, on one thread: the same voxels give the same bytes.
+Patches half overlap and are blended by a Gaussian, as in nnU-Net. The network runs on the processor
+on one thread: the same voxels give the same bytes.
 
-Input   float32 (1, 1, D, H, W): voxels less their mean over the foreground, by their deviation
-        there. D, H, W are what the model fixes, else 64.
-Output  float32 (1, K, D, H, W): probabilities, or anything else is taken for logits (softmax).
+Input   float32 (1, 1, D, H, W): (voxel - mean) / deviation, both over the foreground. D, H, W are
+        the model's fixed sizes, else 64.
+Output  float32 (1, K, D, H, W): probabilities; other values are taken for logits (softmax).
+
+References
+F. Isensee, P. F. Jaeger, S. A. A. Kohl, J. Petersen & K. H. Maier-Hein, "nnU-Net: a
+self-configuring method for deep learning-based biomedical image segmentation", Nature Methods 18,
+2021. doi:10.1038/s41592-020-01008-z
 """
 
 import hashlib
@@ -26,15 +31,20 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.tissue.brain_mask import find_foreground
 
 Field = NDArray[np.float32]
-PATCH = 64  # voxels each way where the model leaves it open
-LARGEST = 512  # and at most what it may ask for
-MOST_CLASSES = 32
-NAMES_KEY = "stereocell_classes"  # of the model's metadata: a JSON list of K names, "" leaves out
+PATCH = 64  # voxels along an edge where the model leaves it open
+LARGEST = 512  # most voxels along an edge that a model may ask for
+MOST_CLASSES = 32  # most outputs of a model
+NAMES_KEY = "stereocell_classes"  # metadata of the model: a JSON list of K names, "" leaves out
 
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A loaded model. `classes`: the names of its K outputs; an empty one is not shown."""
+    """A loaded model.
+
+    digest   SHA-256 of the file, hexadecimal
+    patch    (z, y, x), voxels
+    classes  names of its K outputs; a class with an empty name is not shown
+    """
 
     name: str
     digest: str
@@ -44,10 +54,11 @@ class Network:
 
     @property
     def count(self) -> int:
+        """The number of classes that are shown."""
         return sum(bool(name) for name in self.classes)
 
     def settings(self) -> dict[str, Any]:
-        """Return what the result depends on: no path and no name of a file."""
+        """Return the settings that the result depends on: no path and no file name."""
         return {
             "model": self.digest,
             "patch": list(self.patch),
@@ -57,7 +68,10 @@ class Network:
 
     @classmethod
     def load(cls, path: Path) -> "Network":
-        """Return the model, tried on one empty patch. Raises UsageError, SourceError."""
+        """Return the model, tried on one empty patch.
+
+        Raises UsageError if onnxruntime isn't installed, SourceError if the file is no such model.
+        """
         onnxruntime = _find_runtime()
         try:
             content = path.read_bytes()
@@ -79,7 +93,12 @@ class Network:
 
 
 def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
-    """Return probabilities float32 (k, z, y, x), 1 in sum, of voxels (z, y, x)."""
+    """Return the probabilities of the classes, float32 (k, z, y, x), with the sum 1.
+
+    voxels  (z, y, x), any number type
+
+    Raises SourceError where the network fails or returns other shapes or infinite numbers.
+    """
     values = voxels.astype(np.float32)
     inside = values[find_foreground(ndimage.gaussian_filter(values, 0.8))]
     values -= inside.mean(dtype=np.float64)
@@ -94,7 +113,7 @@ def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
     for corner in itertools.product(*starts):
         box = tuple(slice(a, a + p) for a, p in zip(corner, network.patch, strict=True))
         found = _run(network.name, network.session, padded[box])
-        if is_probability is None:  # asked of the first patch, so that all are taken alike
+        if is_probability is None:  # decided by the first patch, the same for all patches
             is_probability = bool(found.min() >= 0 and np.abs(found.sum(axis=0) - 1).max() < 1e-3)
         if not is_probability:
             found = np.exp(found - found.max(axis=0))
@@ -108,7 +127,7 @@ def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
 
 
 def _find_runtime() -> Any:
-    """Return onnxruntime, an optional package; by name, so that it is no part of our lineage."""
+    """Return onnxruntime, an optional package; cache keys don't follow imports by name."""
     try:
         return import_module("onnxruntime")
     except ImportError:
@@ -119,22 +138,22 @@ def _find_runtime() -> Any:
 
 
 def _errors() -> tuple[type[Exception], ...]:
-    """Return onnxruntime's errors, which have no class of their own in common."""
+    """Return onnxruntime's errors, which share no class of their own."""
     state = import_module("onnxruntime.capi.onnxruntime_pybind11_state")
     found = (v for v in vars(state).values() if isinstance(v, type) and issubclass(v, Exception))
     return (*found, RuntimeError, ValueError)
 
 
 def _why(error: Exception) -> str:
-    """Return what the runtime says without its own name and codes; files of no model say little."""
+    """Return the runtime's message without its name and codes, in one line."""
     text = " ".join(str(error).split())
-    if "protobuf" in text:  # it couldn't be parsed, or holds no graph
+    if "protobuf" in text:  # the file couldn't be parsed, or holds no graph
         return "found another kind of file"
     return re.sub(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ", "", text)[:200]
 
 
 def _starts(length: int, patch: int) -> list[int]:
-    """Return where patches begin that half overlap; the last one ends where the axis does."""
+    """Return the starts of patches that half overlap; the last patch ends where the axis does."""
     step = max(1, patch // 2)
     return [*range(0, length - patch, step), length - patch]
 

@@ -1,7 +1,14 @@
-"""Neighbours are likely of one class: a Potts prior, solved by mean field.
+"""A Potts prior, solved by mean field: neighbouring voxels are likely of one class.
 
-Zhang, Brady & Smith, IEEE Trans. Medical Imaging 20 (2001), with the mean-field update of Van
-Leemput et al. (1999) instead of iterated modes, so that probabilities stay probabilities.
+It is the model of Zhang, Brady & Smith, with the mean-field update of Van Leemput et al. instead
+of iterated modes, so that probabilities stay probabilities.
+
+References
+Y. Zhang, M. Brady & S. Smith, "Segmentation of brain MR images through a hidden Markov random field
+model and the expectation-maximization algorithm", IEEE Trans. Medical Imaging 20, 2001.
+doi:10.1109/42.906424
+K. Van Leemput, F. Maes, D. Vandermeulen & P. Suetens, "Automated model-based tissue classification
+of MR images of the brain", IEEE Trans. Medical Imaging 18, 1999. doi:10.1109/42.811270
 """
 
 import numpy as np
@@ -16,11 +23,14 @@ def apply_potts_prior(
     strength: float,
     rounds: int,
 ) -> NDArray[np.float32]:
-    """Return probabilities float32 (k, z, y, x), summing to 1 in the mask and 0 outside.
+    """Return probabilities, float32 (k, z, y, x), with the sum 1 in the mask and 0 outside.
 
-    `log_likelihood` float32 (k, z, y, x) holds the classes' shares, too. A neighbour (of six)
-    counts by its nearness, one at the finest spacing fully: anisotropic voxels are tied less along
-    the coarse axis.
+    log_likelihood  float32 (k, z, y, x), with the logs of the classes' shares
+    mask            bool (z, y, x)
+    spacing_um      (z, y, x)
+    strength        weight of a neighbour (of six) at the finest spacing; weights fall with the
+                    squared spacing, so that voxels depend less on neighbours along a coarse axis
+    rounds          updates of the mean field
     """
     nearest = min(spacing_um)
     probabilities = np.zeros_like(log_likelihood)
