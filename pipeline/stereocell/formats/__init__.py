@@ -1,1 +1,1 @@
-"""One codec for each file format. They know nothing of a build."""
+"""One codec for each file format. No codec depends on a build."""

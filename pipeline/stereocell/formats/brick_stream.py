@@ -1,11 +1,11 @@
 """Bytes of a voxel BVH, on disk and on the wire, and the messages of the websocket `/bricks`.
 
-docs/brick-stream.md tells the protocol and every byte; schemas/brick_stream.schema.json has the
-messages, and the layouts below as data, which a test holds against this module. All numbers are
+docs/brick-stream.md describes the protocol and every byte. schemas/brick_stream.schema.json holds
+the messages, and the layouts below as data; a test compares them with this module. All numbers are
 little-endian. Each brick is a zstd frame of its own, named by the first 128 bits of the SHA-256 of
-that frame: a cache of bricks is one by content, and what comes is checked before it is unpacked.
-Bricks differenced along x were 5 % larger than plain ones (7 T head, zstd 1 to 9), and zstd's level
-9 saved 1 % of level 3's bytes in six times its time: plain, level 3.
+that frame: a cache of bricks is addressed by content, and the client checks a brick before it
+unpacks it. Bricks differenced along x were 5 % larger than plain ones (7 T head, zstd 1 to 9), and
+zstd's level 9 saved 1 % of level 3's bytes in six times its time: plain, level 3.
 """
 
 import hashlib
@@ -45,8 +45,8 @@ ENTRY = struct.Struct("<III")
 TABLE_FRAME, BRICKS_FRAME = 1, 2
 _ZSTD = 1
 _ZSTD_LEVEL = 3
-_MAX_TABLE_BYTES = 1 << 28
-_LONGEST_FRAME = 1 << 14  # a zstd frame of a brick is at most some bytes longer than its 18^3
+_MAX_TABLE_BYTES = 1 << 28  # most bytes of a table that is read
+_LONGEST_FRAME = 1 << 14  # most bytes of a brick's zstd frame; a brick has 18^3 bytes
 
 
 class BrickFormatError(StereoCellError):
@@ -60,9 +60,9 @@ class Table:
     size         texels (z, y, x)
     threshold    as in voxel_bvh.Bvh
     source       first 128 bits of the SHA-256 of the volume's KTX2 file
-    nodes        records of RECORD: voxel_bvh.NODE's fields; `length` and `hash` of the brick's
-                 zstd frame, zeros in empty nodes
-    brick_bytes  of all frames together
+    nodes        records of RECORD (n,): the fields of voxel_bvh.NODE, and `length` (bytes) and
+                 `hash` of the brick's zstd frame, zeros in empty nodes
+    brick_bytes  length of all frames together
     """
 
     size: tuple[int, int, int]
@@ -73,13 +73,18 @@ class Table:
 
     @property
     def bytes(self) -> int:
-        """Length of the table as it is written: where the bricks begin in a file."""
+        """Length of the table in bytes: a file's bricks begin there."""
         return HEADER.size + self.nodes.nbytes
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a binary frame carries of one tree: `at` is a byte of its table, or a node."""
+    """The content of a binary frame for one tree.
+
+    tree  number of the tree
+    at    first byte in the tree's table, or number of the node
+    data  bytes of the table, or a brick's zstd frame
+    """
 
     tree: int
     at: int
@@ -88,7 +93,13 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A binary frame. kind: TABLE_FRAME or BRICKS_FRAME; view: whose it is, 0 for tables."""
+    """A binary frame.
+
+    kind      TABLE_FRAME or BRICKS_FRAME
+    sequence  number of the frame
+    view      id of the view whose bricks it carries; 0 for tables
+    parts     content, one part after the other
+    """
 
     kind: int
     sequence: int
@@ -104,7 +115,7 @@ def content_hash(data: bytes) -> bytes:
 def encode_tree(bvh: Bvh, source: bytes) -> bytes:
     """Return a tree as a file holds it: header, node records, bricks in the nodes' order.
 
-    source: the first 128 bits of the SHA-256 of the volume's KTX2 file.
+    source  first 128 bits of the SHA-256 of the volume's KTX2 file
     """
     compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL, write_content_size=True)
     frames = [compressor.compress(brick.tobytes()) for brick in bvh.bricks]
@@ -136,9 +147,9 @@ def encode_tree(bvh: Bvh, source: bytes) -> bytes:
 
 
 def parse_table(data: bytes) -> Table:
-    """Return the tree at the start of `data`, which may go on with the bricks.
+    """Return the tree at the start of `data`; bricks may follow it.
 
-    Raises BrickFormatError for whatever a client or server could stumble over.
+    Raises BrickFormatError for any value that would break a client or a server.
     """
     if len(data) < HEADER.size:
         raise BrickFormatError(f"a tree of {len(data)} bytes, expected {HEADER.size} or more")
@@ -193,7 +204,10 @@ def _check_nodes(nodes: NDArray[np.void], levels: int, stored: int, brick_bytes:
 
 
 def decode_brick(frame: bytes) -> Bytes3:
-    """Return a brick (18, 18, 18), (z, y, x), from its zstd frame. Raises BrickFormatError."""
+    """Return a brick, uint8 (18, 18, 18), (z, y, x), from its zstd frame.
+
+    Raises BrickFormatError for other bytes.
+    """
     try:
         size = zstandard.get_frame_parameters(frame).content_size
         if size != STORED**3:
@@ -205,7 +219,7 @@ def decode_brick(frame: bytes) -> Bytes3:
 
 
 def encode_frame(frame: Frame) -> bytes:
-    """Return the bytes of a binary frame; `data` of a table's part is not yet compressed."""
+    """Return the bytes of a binary frame; a table's `data` is passed uncompressed."""
     datas, lengths = [], []
     for part in frame.parts:
         is_table = frame.kind == TABLE_FRAME
@@ -219,7 +233,7 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 def decode_frame(data: bytes) -> Frame:
-    """Return a binary frame, tables' parts unpacked. Raises BrickFormatError."""
+    """Return a binary frame; a table's `data` comes uncompressed. Raises BrickFormatError."""
     if len(data) < FRAME.size:
         raise BrickFormatError(f"a frame of {len(data)} bytes, expected {FRAME.size} or more")
     kind, version, _, sequence, view, count = FRAME.unpack_from(data)
@@ -241,7 +255,10 @@ def decode_frame(data: bytes) -> Frame:
 
 
 def parse_message(text: str) -> dict[str, Any]:
-    """Return a client's message, which fits its schema. Raises BrickFormatError, in one line."""
+    """Return a client's message that fits its schema.
+
+    Raises BrickFormatError for other text; the error is one line.
+    """
     try:
         message = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
@@ -252,7 +269,7 @@ def parse_message(text: str) -> dict[str, Any]:
     validators = _validators()
     if not isinstance(kind, str) or kind not in validators:
         raise BrickFormatError(f"type: expected one of {', '.join(validators)}")
-    fault = next(validators[kind].iter_errors(message), None)  # all of them would take seconds
+    fault = next(validators[kind].iter_errors(message), None)  # finding all faults takes seconds
     if fault is not None:
         where = _short(f"{fault.json_path}: {fault.validator}")
         raise BrickFormatError(f"{kind}: {where} is not as the schema asks")

@@ -1,8 +1,8 @@
 """OpenEXR images: volumes as slice atlases, and transfer functions as lookup tables.
 
 An atlas lays the slices of a volume out in columns x rows, slice 0 at the upper left, as game
-engines import 3D textures. Its one channel is `Y`, which readers take for grey; a lone `R` comes in
-red. 1/255 steps survive a half exactly enough to be read back as the same bytes.
+engines import 3D textures. Its one channel is `Y`, which readers show as grey; a single `R` would
+be red. Half floats hold steps of 1/255 so exactly that the same bytes are read back.
 
 Compression, 196 x 514 x 514 noisy voxels on 2 cores: PIZ 0.5 s and 31 MB; ZIP 1.3 s and 52 MB; RLE
 0.4 s and 97 MB.
@@ -22,16 +22,18 @@ from stereocell.storage.atomic_write import replacing
 from stereocell.transfer.opacity import evaluate
 
 _MAGIC = b"\x76\x2f\x31\x01"
-_OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # tiles, deep data, several parts
+_OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # bits of the version: tiles, deep data, several parts
 _ROWS_OF = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}  # by compression
 _LEVELS = (np.arange(256, dtype=np.float32) / 255).astype(np.float16)
 
 
 def write_atlas(path: Path, volume: NDArray[np.uint8]) -> None:
-    """Write a volume, uint8 (z, y, x) with its apron, as `volume` / 255 in half floats.
+    """Write a volume as `volume` / 255 in half floats.
 
-    The header says how to cut it again: `columns`, `rows`, `atlasSize` (x, y, z), `apron`.
-    Raises OutputError.
+    volume  uint8 (z, y, x), with its apron
+
+    The header holds the numbers to cut it again: `columns`, `rows`, `atlasSize` (x, y, z), `apron`.
+    Raises OutputError if the file can't be written.
     """
     depth, height, width = volume.shape
     columns = min(depth, max(1, round((depth * height / width) ** 0.5)))  # nearly square
@@ -79,18 +81,18 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
 
 
 def check_exr(path: Path) -> None:
-    """Raise StageError if a file is missing, is no OpenEXR, or was cut short.
+    """Raise StageError if a file is missing, is not OpenEXR, or was cut short.
 
-    Follows the chunk offsets (OpenEXR's "File Layout") and reads no pixels. OpenEXR, asked to read
-    a file that was cut short, prints lines of its own before it raises. Tiled, deep and multi-part
-    files, which the pipeline never writes, are only known by their first bytes.
+    It follows the chunk offsets (OpenEXR's "File Layout") and reads no pixels. The OpenEXR library
+    prints lines of its own before it raises for a file that was cut short. Tiled, deep and
+    multi-part files, which the pipeline never writes, are checked by their first bytes only.
     """
     try:
         content = np.memmap(path, dtype=np.uint8, mode="r").data
         damage = _find_damage(content)
     except OSError as error:
         raise StageError(f"{path}: can't be read: {error.strerror or error}") from error
-    except ValueError:  # nothing to map
+    except ValueError:  # an empty file can't be mapped
         damage = "it is empty"
     except (struct.error, IndexError, KeyError):
         damage = "its header was cut short"
@@ -127,7 +129,7 @@ def _find_damage(content: memoryview) -> str | None:
 
 
 def _text_at(content: memoryview, start: int) -> tuple[bytes, int]:
-    """Return the text that a zero byte ends, and where the next thing begins."""
+    """Return the text that ends in a zero byte, and the position after that byte."""
     end = start
     while content[end]:
         end += 1
@@ -137,8 +139,10 @@ def _text_at(content: memoryview, start: int) -> tuple[bytes, int]:
 def write_lut(path: Path, points: OpacityPoints) -> None:
     """Write a transfer function as 256 x 1 RGBA half floats, opacity in A.
 
-    RGB is 1: the channel's colour multiplies it. Column i stands for intensity i / 255. Raises
-    OutputError.
+    points  (intensity, opacity) pairs, rising, 0..1
+
+    RGB is 1: a client multiplies it by the channel's colour. Column i is intensity i / 255. Raises
+    OutputError if the file can't be written.
     """
     table = np.ones((1, 256, 4), dtype=np.float16)
     table[0, :, 3] = evaluate(points)

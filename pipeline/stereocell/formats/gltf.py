@@ -1,16 +1,16 @@
 """Write one mesh as a binary glTF 2.0 file that a phone decodes fast.
 
-Assembled here because no package on PyPI writes EXT_meshopt_compression. Also used:
+The file is assembled here, since no package on PyPI writes EXT_meshopt_compression. It also uses
 KHR_mesh_quantization and, for baked maps, KHR_texture_basisu.
 
-No cracks between tiles. Neighbouring tiles hold the vertices on their common plane as equal
-floats; they must decode to equal positions too. So all files of a bundle share ONE lattice: a
-vertex becomes round(position / step), `step` the same everywhere and a power of two in METRES.
+No cracks between tiles. Neighbouring tiles have the vertices on their common plane as equal
+floats; the decoded positions must be equal too. So all files of a bundle share ONE lattice: a
+vertex becomes round(position / step), with the same `step` everywhere, a power of two in METRES.
 A file stores the 16-bit offset from its own origin, which is a lattice point as well, and its
-node carries scale = step and translation = origin * step. Every factor is then a dyadic number
-and a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps
-(for tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin).
-The coarsest LODs, which a reader waits for first, have a lattice of their own with longer steps.
+node has scale = step and translation = origin * step. Every factor is then a dyadic number, and
+a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps (for
+tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin). The coarsest
+LODs, which a viewer loads first, have a lattice of their own with longer steps.
 """
 
 import json
@@ -27,17 +27,17 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.version import GENERATOR
 
 _METRES_PER_UM = 1e-6
-_MOST_STEPS = 0xFFFF  # that 16 bits span
-_WANTED_STEPS = 1 << 14  # as fine as a 20th of a voxel, and the low bits don't compress
+_MOST_STEPS = 0xFFFF  # most steps along an axis: 16 bits
+_WANTED_STEPS = 1 << 14  # steps along an axis: a 20th of a voxel; more low bits don't compress
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
-AMBIENT_SHARE = 0.4  # of the light in the viewer's room, about
-_OF_COLOR = {"baseColorTexture"}  # the maps that lie one level deeper in a material
+AMBIENT_SHARE = 0.4  # share of ambient light in the viewer's room, about, 0..1
+_OF_COLOR = {"baseColorTexture"}  # maps that belong to the material's pbrMetallicRoughness
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What a surface is drawn with: linear RGB, metallic and roughness, all 0..1."""
+    """The appearance of a surface: linear RGB, metallic and roughness, all 0..1."""
 
     color: tuple[float, float, float]
     metallic: float = 0.0
@@ -83,10 +83,13 @@ def encode_glb(
 ) -> Glb:
     """Return the mesh as .glb.
 
-    `extras` come on the scene and on its one node. UVs are written only where there is a map to
-    look up, tangents where it is one of normals.
-    Raises ValueError for a mesh without triangles, one that is larger than 65535 steps along
-    an axis, and maps without UVs.
+    mesh      positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3), normals
+    step_m    step of the lattice in metres, see `choose_step`
+    extras    written on the scene and on its one node
+    textures  UVs are written only with a map, tangents only with a normal map
+
+    Raises ValueError for a mesh without triangles, for one larger than 65535 steps along an axis,
+    and for maps without UVs.
     """
     maps = _pick(textures or Textures())
     if len(mesh.triangles) == 0:
@@ -188,7 +191,7 @@ def _to_metres(point: NDArray[np.int64], step_m: float) -> tuple[float, float, f
 
 
 def _add_uvs(buffers: CompressedBuffers, uvs: NDArray[np.float32]) -> int:
-    """Store UVs, v downwards as glTF has it; 16 bits unless some lie outside 0..1."""
+    """Store UVs, v downwards as in glTF; 16 bits unless some lie outside 0..1."""
     flipped = np.stack([uvs[:, 0], 1 - uvs[:, 1]], axis=1)
     if flipped.min() < 0 or flipped.max() > 1:
         floats = np.ascontiguousarray(flipped, dtype=np.float32)
@@ -200,7 +203,7 @@ def _add_uvs(buffers: CompressedBuffers, uvs: NDArray[np.float32]) -> int:
 
 
 def _pick(textures: Textures) -> dict[str, bytes]:
-    """Return the maps that there are, by their names in a material."""
+    """Return the maps that exist, by their names in a material."""
     named = {
         "normalTexture": textures.normal,
         "occlusionTexture": textures.occlusion,
@@ -210,10 +213,10 @@ def _pick(textures: Textures) -> dict[str, bytes]:
 
 
 def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> int:
-    """Store what the base colour is multiplied by: the mesh's colours, dimmed where it is hidden.
+    """Store the factors of the base colour: the mesh's colours, darker where light is occluded.
 
-    glTF has no occlusion at vertices. An occlusion map dims ambient light only; what dims a colour
-    dims all light, so it gets the share that is ambient.
+    glTF has no occlusion at vertices. An occlusion map dims ambient light only, while a factor of
+    the colour dims all light. So the occlusion is multiplied by the share of ambient light.
     """
     colors = np.ones((len(order), 3))
     if mesh.colors is not None:
@@ -233,7 +236,7 @@ def _add_tangents(buffers: CompressedBuffers, tangents: NDArray[np.float32]) -> 
 
 
 def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Return unit vectors (n, 3); those of no length point to z."""
+    """Return unit vectors (n, 3); a zero vector becomes +z."""
     wide = vectors.astype(np.float64)
     lengths = np.linalg.norm(wide, axis=1, keepdims=True)
     wide[lengths[:, 0] == 0] = (0.0, 0.0, 1.0)
@@ -241,7 +244,7 @@ def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 
 
 def _padded(values: NDArray[Any]) -> NDArray[Any]:
-    """Return rows of 3 numbers with a zero behind: vertex strides are multiples of 4 bytes."""
+    """Return rows of 3 numbers with a zero appended: vertex strides are multiples of 4 bytes."""
     return np.pad(values, ((0, 0), (0, 1)))
 
 

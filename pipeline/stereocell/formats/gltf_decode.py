@@ -1,4 +1,4 @@
-"""Take a .glb of the bundle apart, by the tables of glTF 2.0 and of EXT_meshopt_compression."""
+"""Decode a .glb of the bundle, by the tables of glTF 2.0 and of EXT_meshopt_compression."""
 
 import json
 import struct
@@ -26,16 +26,16 @@ _CHUNK = struct.Struct("<I4s")
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """What a viewer draws of a file.
+    """The mesh and material of a file as a viewer draws them.
 
-    positions_m  float32 (n, 3), world metres
-    triangles    (m, 3)
-    normals      of the vertices, unit vectors (n, 3)
-    colors       of the vertices, 0..1 (n, 3), or None
-    color        of the material, linear RGB 0..1
+    positions_m  float32 (n, 3), world space, metres (x, y, z)
+    triangles    int64 (m, 3)
+    normals      float64 (n, 3), unit vectors
+    colors       float64 (n, 3), of the vertices, 0..1, or None
+    color        linear RGB of the material, 0..1
     maps         KTX2 files by their names in the material
-    uvs          of the vertices, v downwards (n, 2), or None
-    step_m       between two places that a vertex may have
+    uvs          float64 (n, 2), v downwards, or None
+    step_m       distance between two possible positions of a vertex, metres
     """
 
     positions_m: NDArray[np.float32]
@@ -49,7 +49,7 @@ class Drawn:
 
 
 def read_glb(path: Path) -> Drawn:
-    """Return what the one mesh of a file is. Raises CheckError for a file of another kind."""
+    """Return the one mesh of a file. Raises CheckError for a file of another kind."""
     try:
         return _drawn(*_open(path.read_bytes()))
     except OSError as error:
@@ -110,7 +110,7 @@ def _decode(document: dict[str, Any], binary: bytes, index: int) -> NDArray[Any]
     stored = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
     dtype = np.dtype(_TYPES[accessor["componentType"]])
     if view["mode"] == "TRIANGLES":
-        # the package decodes into 32-bit indices whatever they are meant to become
+        # the package decodes into 32-bit indices for both sizes of index
         indices: NDArray[Any] = meshoptimizer.decode_index_buffer(view["count"], 4, stored)
         return indices
     row = np.dtype([("row", dtype, view["byteStride"] // dtype.itemsize)])

@@ -1,13 +1,13 @@
 """Write KTX 2.0 textures: 8-bit volumes and tables, and baked maps.
 
-Volumes and tables are uncompressed texels, each mip level a zstd frame of its own.
+Volumes and tables are uncompressed texels; each mip level is a zstd frame of its own.
 
-No package on PyPI writes 3D KTX2. Followed: KTX 2.0 specification (Khronos, revision 2.0.4), of
-which only what these textures need is here: 8-bit UNORM with 1, 2 or 4 components, one layer,
-one face. The data format descriptor keeps `bytesPlane0` of the inflated data, as that revision
-asks; readers also know the older 0. Level data of a supercompressed file has no alignment.
+No package on PyPI writes 3D KTX2. This module follows the KTX 2.0 specification (Khronos, revision
+2.0.4) as far as these textures need it: 8-bit UNORM with 1, 2 or 4 components, one layer, one face.
+The data format descriptor holds `bytesPlane0` of the inflated data, as that revision asks; readers
+also know the older 0. Level data of a supercompressed file has no alignment.
 
-Read back is the finest level of such textures; sizes are checked before memory is taken.
+Only the finest level of such textures is read back; sizes are checked before memory is allocated.
 """
 
 import struct
@@ -29,17 +29,21 @@ _LEVEL = struct.Struct("<3Q")
 _VK_FORMATS = {1: 9, 2: 16, 4: 37}  # components: R8_UNORM, R8G8_UNORM, R8G8B8A8_UNORM
 _COMPONENTS = {vk_format: components for components, vk_format in _VK_FORMATS.items()}
 _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
-# texture x to the right, y down, z out of the picture, towards the viewer
+# by dimensions: texture x to the right, y down, z out of the picture, towards the viewer
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
-_ETC1S_QUALITY = 80  # of 100
+_ETC1S_QUALITY = 80  # quality, 1 to 100
 _ZSTD = 2
-_MAX_BYTES = 1 << 31  # of a level that is read
+_MAX_BYTES = 1 << 31  # most bytes of a level that is read
 _ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """Where one mip level's zstd frame lies in the file. `size`: texels (x, y, z)."""
+    """The zstd frame of one mip level.
+
+    size            texels (x, y, z)
+    offset, length  bytes in the file
+    """
 
     size: tuple[int, int, int]
     offset: int
@@ -48,37 +52,51 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Ktx2:
-    """A whole KTX2 file and where its levels are, finest first."""
+    """A whole KTX2 file and the places of its levels, finest first."""
 
     data: bytes
     levels: tuple[Level, ...]
 
 
 def encode_3d(levels: Sequence[NDArray[np.uint8]]) -> Ktx2:
-    """Return a 3D texture; levels finest first, each uint8 (z, y, x) or (z, y, x, components).
+    """Return a 3D texture.
 
-    Components: 1 (R8), 2 (R8G8) or 4 (R8G8B8A8), UNORM. Raises ValueError where level k is not
-    max(1, n >> k) texels along each axis.
+    levels  finest first, each uint8 (z, y, x) or (z, y, x, components). Components: 1 (R8),
+            2 (R8G8) or 4 (R8G8B8A8), UNORM
+
+    Raises ValueError where level k is not max(1, n >> k) texels along each axis, or not uint8.
+
+    >>> volume = np.arange(4 * 6 * 8, dtype=np.uint8).reshape(4, 6, 8)
+    >>> texture = encode_3d([volume, volume[::2, ::2, ::2]])
+    >>> [level.size for level in texture.levels]
+    [(8, 6, 4), (4, 3, 2)]
+    >>> np.array_equal(decode_finest(texture.data)[..., 0], volume)
+    True
     """
     return _encode([level if level.ndim == 4 else level[..., np.newaxis] for level in levels], 3)
 
 
 def encode_2d(image: NDArray[np.uint8]) -> Ktx2:
-    """Return a 2D texture of one level; uint8 (y, x, components), row 0 first."""
+    """Return a 2D texture of one level.
+
+    image  uint8 (y, x, components), row 0 first
+    """
     return _encode([image[np.newaxis]], 2)
 
 
 def encode_normal_map(image: NDArray[np.uint8]) -> bytes:
-    """Return a normal map, uint8 (y, x, 3), as a Basis Universal texture with mip levels.
+    """Return a normal map as a Basis Universal texture with mip levels.
 
-    Both sides must be multiples of 4 (KHR_texture_basisu); ValueError if not. One thread: the
-    bytes depend on their number. Baked maps, mean error of the normals in degrees: of smooth
-    bodies (64 to 128 texels wide), and of noisy cells (64 to 512):
+    image  uint8 (y, x, 3), tangent space
+
+    Raises ValueError unless both sides are multiples of 4 (KHR_texture_basisu). One thread encodes,
+    since the bytes depend on the number of threads. Size, mean error of the normals in degrees, and
+    time, on baked maps of smooth bodies (64 to 128 texels wide) and of noisy cells (64 to 512):
 
         UASTC, effort 1                 14 kB  1.3     43 kB  3.7   0.04 s
         UASTC, effort 1, lambda 2        9 kB  1.9     40 kB  4.2   0.04 s, its blocks show
         UASTC, effort 3                 15 kB  0.8     44 kB  1.9   0.09 s
-        UASTC, effort 3, lambda 0.5     14 kB  0.9     44 kB  1.9   0.10 s  (taken)
+        UASTC, effort 3, lambda 0.5     14 kB  0.9     44 kB  1.9   0.10 s  (chosen)
         UASTC, effort 3, lambda 1       12 kB  1.1     43 kB  2.1   0.10 s
         UASTC, effort 5, lambda 0.5      -             45 kB  1.8   0.32 s
     """
@@ -96,14 +114,23 @@ def encode_normal_map(image: NDArray[np.uint8]) -> bytes:
 
 
 def encode_occlusion_map(image: NDArray[np.uint8]) -> bytes:
-    """Return an ambient-occlusion map, uint8 (y, x, 3), grey: as a normal map, but ETC1S, whose
-    blocks don't show on what varies so slowly.
+    """Return an ambient-occlusion map with mip levels, ETC1S.
+
+    image  uint8 (y, x, 3), grey
+
+    Raises ValueError unless both sides are multiples of 4. Occlusion varies slowly, so ETC1S's
+    blocks don't show.
     """
     return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=False, linear=True)
 
 
 def encode_color_map(image: NDArray[np.uint8]) -> bytes:
-    """Return a base-colour map, uint8 (y, x, 3) in sRGB, ETC1S."""
+    """Return a base-colour map with mip levels, ETC1S.
+
+    image  uint8 (y, x, 3), sRGB
+
+    Raises ValueError unless both sides are multiples of 4.
+    """
     return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=True, linear=False)
 
 
@@ -185,7 +212,7 @@ def _key_value(key: str, value: str) -> bytes:
 def decode_finest(data: bytes) -> NDArray[np.uint8]:
     """Return level 0, uint8 (z, y, x, components); z is 1 in a 2D texture.
 
-    Raises SourceError, without the file's name, for what is no such texture.
+    Raises SourceError, without the file's name, if `data` is no such texture.
     """
     if len(data) < len(_IDENTIFIER) + _HEADER.size + _LEVEL.size or data[:12] != _IDENTIFIER:
         raise SourceError("no KTX 2.0 texture")

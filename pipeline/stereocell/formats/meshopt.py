@@ -1,4 +1,4 @@
-"""Lay out a .glb's buffers with EXT_meshopt_compression, by the library meshoptimizer."""
+"""Lay out the buffers of a .glb with EXT_meshopt_compression, by the library meshoptimizer."""
 
 from typing import Any
 
@@ -13,9 +13,12 @@ _VERTICES, _INDICES = 34962, 34963  # bufferView.target
 def reorder(
     triangles: NDArray[np.uint32], vertex_count: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.intp]]:
-    """Return indices (3m,) in the order of the GPU's vertex cache, and the vertices to keep.
+    """Return the triangles in an order that suits the GPU's vertex cache, and the vertices to keep.
 
-    The vertices come in the order of their first use; those of no triangle are left out.
+    triangles     uint32 (m, 3)
+    vertex_count  number of vertices
+    result        indices uint32 (3m,), by the kept vertices; kept vertices int64 (k,), in the order
+                  of their first use. Unused vertices are left out
     """
     source = np.ascontiguousarray(triangles, dtype=np.uint32).ravel()
     indices = np.empty_like(source)
@@ -28,9 +31,10 @@ def reorder(
 
 
 class CompressedBuffers:
-    """The compressed binary chunk (buffer 0) and the layout of what it decodes to (buffer 1).
+    """The compressed binary chunk (buffer 0) and the layout of its decoded data (buffer 1).
 
-    Buffer 1 has no data: EXT_meshopt_compression's fallback for readers that know the extension.
+    Buffer 1 has no data: it is EXT_meshopt_compression's fallback, which readers that know the
+    extension don't load.
     """
 
     def __init__(self) -> None:
@@ -48,8 +52,10 @@ class CompressedBuffers:
     def add_directions(self, directions: NDArray[np.float64], kind: str) -> int:
         """Store unit vectors (n, 3), or tangents (n, 4) with a sign; return the accessor's index.
 
-        By the filter OCTAHEDRAL of EXT_meshopt_compression: 8 bits each of two coordinates on an
-        octahedron, of which a reader makes three (or four) signed bytes; at most 1.1 degrees off.
+        kind  "VEC3" or "VEC4"
+
+        The filter OCTAHEDRAL of EXT_meshopt_compression stores two coordinates on an octahedron, 8
+        bits each. A reader decodes three (or four) signed bytes, at most 1.1 degrees off.
         """
         accessor = {"componentType": _BYTE, "normalized": True, "type": kind}
         return self.add_attribute(_octahedral(directions), accessor, filter_name="OCTAHEDRAL")
@@ -57,10 +63,14 @@ class CompressedBuffers:
     def add_attribute(
         self, values: NDArray[Any], accessor: dict[str, Any], filter_name: str | None = None
     ) -> int:
-        """Store rows of 4, 8, ... bytes, one a vertex; return the accessor's index."""
+        """Store one row per vertex; return the accessor's index.
+
+        values    (n, k), rows of 4, 8, ... bytes
+        accessor  its glTF properties without the count
+        """
         count, stride = len(values), values.itemsize * values.shape[1]
-        # The extension wants version 0 of the vertex codec; the library's newest is its default,
-        # and a setting of the whole process.
+        # The extension needs version 0 of the vertex codec. The library's default is the newest,
+        # and the version is a setting of the whole process.
         meshoptimizer.encode_vertex_version(0)
         encoded = meshoptimizer.encode_vertex_buffer(values, count, stride)
         view = self._add_view(encoded, "ATTRIBUTES", count, stride)
@@ -71,7 +81,7 @@ class CompressedBuffers:
         return self._add_accessor({**accessor, "count": count})
 
     def add_indices(self, indices: NDArray[np.uint32], vertex_count: int) -> int:
-        """Store triangles' indices (3m,); return the accessor's index."""
+        """Store triangles' indices, uint32 (3m,); return the accessor's index."""
         meshoptimizer.encode_index_version(1)
         encoded = meshoptimizer.encode_index_buffer(indices, len(indices), vertex_count)
         short = vertex_count <= 0xFFFF  # index 65535 itself would restart a strip
@@ -127,7 +137,7 @@ class CompressedBuffers:
 
 
 def _octahedral(directions: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Return (n, 4) signed bytes: x and y on the octahedron, what 1 is, and the sign if any."""
+    """Return signed bytes (n, 4): x and y on the octahedron, the value of 1, the sign if any."""
     x, y, z = (directions[:, :3] / np.abs(directions[:, :3]).sum(axis=1, keepdims=True)).T
     below = z < 0  # the lower half is folded over the upper one's edges
     u = np.where(below, np.copysign(1 - np.abs(y), x), x)

@@ -12,7 +12,7 @@ from zarr.codecs import ZstdCodec
 from zarr.storage import MemoryStore
 
 Triple = tuple[float, float, float]
-CHUNK = (1, 64, 128, 128)  # (c, z, y, x): 1 MB
+CHUNK = (1, 64, 128, 128)  # voxels (c, z, y, x): 1 MB
 
 
 def write_probabilities(
@@ -25,10 +25,16 @@ def write_probabilities(
     spacing_um: Triple,
     origin_um: Triple,
 ) -> None:
-    """Write volumes uint8 (z, y, x), one a channel (name, linear RGB), to a folder `path`.
+    """Write the channels to a folder `path`.
 
-    They begin at voxel `start` of a volume of `shape` (z, y, x) and are 0 elsewhere, which takes
-    no room. The same arguments give the same bytes. Not atomic: the caller's folder is.
+    volumes     uint8 (z, y, x), one for each channel
+    channels    name and linear RGB (0..1) of each
+    start       voxel (z, y, x) at which the volumes begin
+    shape       voxels (z, y, x) of the whole; it is 0 outside the volumes, which takes no room
+    spacing_um  (z, y, x)
+    origin_um   centre of voxel (0, 0, 0), (z, y, x)
+
+    The same arguments give the same bytes. The write is not atomic: the caller moves the folder.
     """
     axes: list[dict[str, str]] = [{"name": "c", "type": "channel"}]
     axes += [{"name": axis, "type": "space", "unit": "micrometer"} for axis in "zyx"]
@@ -55,7 +61,7 @@ def write_probabilities(
         }
     }
     files: dict[str, Buffer] = {}
-    # by way of memory: zarr writes from threads of its own, which would outlive an exception
+    # in memory first: zarr writes from threads of its own, which would outlive an exception
     group = zarr.open_group(MemoryStore(files), mode="w", zarr_format=3, attributes=attributes)
     array = group.create_array(
         "0",

@@ -1,6 +1,6 @@
-"""Write a mesh as binary STL, which printers' programs and mesh editors read.
+"""Write a mesh as binary STL, for slicers of 3D printers and mesh editors.
 
-STL knows no unit. Numbers are um, as everywhere: a slicer takes them for mm, 1000 times the size.
+STL has no unit. Numbers are um, as everywhere: a slicer reads them as mm, 1000 times the size.
 """
 
 import struct
@@ -13,12 +13,17 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.version import GENERATOR
 from stereocell.storage.atomic_write import replacing
 
-_HEAD = 84  # bytes: a line of text, the number of triangles
+_HEAD = 84  # bytes of the header: a line of text, the number of triangles
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def write_stl(path: Path, mesh: Mesh) -> None:
-    """Write the triangles (x, y, z in um) in place of an older file. Raises OutputError."""
+    """Write the mesh in place of an older file.
+
+    mesh  positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3)
+
+    Raises OutputError if the file can't be written.
+    """
     triangles = np.zeros(len(mesh.triangles), _TRIANGLE)
     corners = mesh.positions[mesh.triangles]
     a, b, c = corners.astype(np.float64).transpose(1, 0, 2)
@@ -31,7 +36,7 @@ def write_stl(path: Path, mesh: Mesh) -> None:
 
 
 def check_stl(path: Path) -> None:
-    """Raise StageError if a file is missing, or isn't as long as its number of triangles says."""
+    """Raise StageError if a file is missing, or its length doesn't fit its triangle count."""
     try:
         size = path.stat().st_size
         with path.open("rb") as file:

@@ -6,14 +6,13 @@
 Lengths are metres. Tilesets are z-up where glTF is y-up: readers turn glTF's (x, y, z) into
 (x, -z, y), and the boxes here are turned the same way.
 
-The extras of each content give its file's hash, so that a reader who trusts the tileset knows a
-spoilt surface. 128 bits are enough for that, in base64url, named as RFC 6920 names them:
-"sha-256-128".
+The extras of each content hold its file's hash, so that a reader that trusts the tileset detects a
+damaged surface. 128 bits are enough for that, in base64url, named as in RFC 6920: "sha-256-128".
 
-The first picture waits for manifest.json and one tileset, and of that for the coarsest LODs alone.
-So where tiles are many, the finer ones of each are in a tileset of their own, `<tile>/finer.json`,
-which is fetched with the first of them; few tiles are one file: one request. Numbers are rounded,
-boxes outwards and errors upwards. Together: 242 tiles of four LODs were 328 kB, are 112.
+The first picture needs manifest.json, one tileset, and the coarsest LODs alone. So where tiles are
+many, the finer LODs of each are in a tileset of their own, `<tile>/finer.json`, which a reader
+fetches with the first of them; few tiles are one file: one request. Numbers are rounded, boxes
+outwards and errors upwards. Together: 242 tiles of four LODs took 328 kB, and now 112.
 """
 
 import base64
@@ -31,24 +30,25 @@ from stereocell.storage.json_files import compact_json
 
 _METRES_PER_UM = 1e-6
 _NM_PER_METRE = 1e9
-CONTENT_HASH = "sha-256-128"  # in the extras of a content
+CONTENT_HASH = "sha-256-128"  # key in the extras of a content
 _CONTENT_HASH_BYTES = 16
-_ROOT_ERROR = 100.0  # in diagonals of the channel: never small enough to draw nothing
-MOST_WHOLE_TILES = 64  # that one file describes with all LODs: 59 kB with four each
+_ROOT_ERROR = 100.0  # diagonals of the channel: so large that readers always draw something
+MOST_WHOLE_TILES = 64  # most tiles that one file describes with all LODs: 59 kB with four each
 TILESET = "tileset.json"
 _FINER = "finer.json"
-_UPWARDS = Context(prec=4, rounding=ROUND_CEILING)  # four digits
+_UPWARDS = Context(prec=4, rounding=ROUND_CEILING)  # rounds up to four digits
 
 Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class TileLod:
-    """One .glb: its address from the tileset, and the box (x, y, z) of its vertices in metres.
+    """One .glb: its address from the tileset, and the box of its vertices.
 
-    uri          `<tile>/<name>.glb`
-    sha256       of the file, hexadecimal
-    distance_um  the LOD's measured distance from the finest surface
+    uri           `<tile>/<name>.glb`
+    sha256        of the file, hexadecimal
+    distance_um   the LOD's measured distance from the finest surface
+    min_m, max_m  corners of the box (x, y, z), metres, y up
     """
 
     uri: str
@@ -59,16 +59,19 @@ class TileLod:
 
 
 def content_hash(sha256: str) -> str:
-    """Return what a content's extras say of a file with this SHA-256 (hexadecimal)."""
+    """Return the hash in a content's extras, of a file with this SHA-256 (hexadecimal)."""
     start = bytes.fromhex(sha256)[:_CONTENT_HASH_BYTES]
     return base64.urlsafe_b64encode(start).rstrip(b"=").decode()
 
 
 def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
-    """Return a channel's JSON files by address; each tile's LODs finest first, at least one each.
+    """Return a channel's JSON files by address.
 
-    `tileset.json` describes up to MOST_WHOLE_TILES tiles alone; of more, it names the others. A
-    coarser LOD never gets a smaller geometricError than a finer one: readers ask for that.
+    tiles  the LODs of each tile, finest first, at least one each
+
+    `tileset.json` describes up to MOST_WHOLE_TILES tiles alone; if there are more, it refers to the
+    other files. A coarser LOD never gets a smaller geometricError than a finer one, as readers
+    require.
     """
     boxes = [_Box.around(lods) for lods in tiles]
     whole = _Box.holding(boxes)
@@ -87,7 +90,7 @@ def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
         address = f"{folder}/{_FINER}"
         files[address] = compact_json(_tileset(_nested(finer), coarsest["geometricError"]))
         sha256 = hashlib.sha256(files[address]).hexdigest()
-        # nothing is drawn here: what the JSON holds replaces the coarsest
+        # this tile has no surface of its own: the LODs of its JSON file replace the coarsest
         holder = _tile(box, coarsest["geometricError"], address, sha256)
         children.append(_nested([holder, coarsest]))
     root = {
@@ -102,7 +105,7 @@ def _tileset(root: dict[str, Any], error: float) -> dict[str, Any]:
     return {
         "asset": {"version": "1.1", "extras": {"generator": GENERATOR}},
         "geometricError": error,
-        "root": {**root, "refine": "REPLACE"},  # all below inherit it
+        "root": {**root, "refine": "REPLACE"},  # all tiles below inherit it
     }
 
 
@@ -124,7 +127,7 @@ def _tile(box: "_Box", error: float, uri: str, sha256: str) -> dict[str, Any]:
 
 
 def _nested(tiles: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the last tile, each having the one before as its child."""
+    """Return the last tile, with each tile as the child of the next."""
     for finer, coarser in pairwise(tiles):
         coarser["children"] = [finer]
     return tiles[-1]
@@ -139,7 +142,7 @@ class _Box:
 
     @classmethod
     def around(cls, lods: Sequence[TileLod]) -> "_Box":
-        """Return the box of all LODs, rounded outwards: a tile's box holds its children's."""
+        """Return the box of all LODs, rounded outwards: a tile's box contains its children's."""
         lows = zip(*(lod.min_m for lod in lods), strict=True)
         highs = zip(*(lod.max_m for lod in lods), strict=True)
         return cls._evened(
@@ -149,7 +152,7 @@ class _Box:
 
     @classmethod
     def holding(cls, boxes: Sequence["_Box"]) -> "_Box":
-        """Return the box that holds all of these."""
+        """Return the box that contains all of these."""
         return cls._evened(
             [min(axis) for axis in zip(*(box.low for box in boxes), strict=True)],
             [max(axis) for axis in zip(*(box.high for box in boxes), strict=True)],
@@ -164,10 +167,10 @@ class _Box:
         return math.dist(self.low, self.high) / _NM_PER_METRE
 
     def numbers(self) -> list[float]:
-        """Return centre and half axes in metres, z up."""
+        """Return centre and half axes in metres, z up, 12 numbers."""
         centre = [(a + b) // 2 for a, b in zip(self.low, self.high, strict=True)]
         half = [(b - a) // 2 for a, b in zip(self.low, self.high, strict=True)]
-        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # the shortest decimals there are
+        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # the shortest decimals
         hx, hy, hz = (n / _NM_PER_METRE for n in half)
         return [cx, 0 - cz, cy, hx, 0, 0, 0, hz, 0, 0, 0, hy]
 

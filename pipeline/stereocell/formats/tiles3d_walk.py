@@ -1,4 +1,4 @@
-"""Walk the tilesets of a bundle: what they name, also by way of external tilesets."""
+"""Walk the tilesets of a bundle, and the external tilesets that they name."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 
 _JSON = ".json"
-_MOST_CHARACTERS = 1024  # of an address: no file system knows longer names
+_MOST_CHARACTERS = 1024  # most characters of an address: no file system has longer names
 _REMEDY = "run `stereocell bundle OUT`"
 
 
@@ -18,12 +18,12 @@ _REMEDY = "run `stereocell bundle OUT`"
 class Content:
     """A file that a tileset names: a surface, or an external tileset.
 
-    tileset   the JSON file that names it
-    path      where it lies, in the bundle
-    named     the content as it stands there: `uri`, `extras`
-    error_m   geometricError of its tile
-    limit_m   that of the tile's parent
-    boxes     of the tile, its parent and so on: 12 numbers each, z up
+    tileset  the JSON file that names it
+    path     its path in the bundle
+    named    its entry in that file: `uri`, `extras`
+    error_m  geometricError of its tile, metres
+    limit_m  geometricError of the tile's parent, metres
+    boxes    of the tile, its parent and so on: 12 numbers each, metres, z up
     """
 
     tileset: Path
@@ -39,13 +39,14 @@ class Content:
 
 
 def walk(bundle: Path, tileset: Path, tile_id: str | None = None) -> Iterator[Content]:
-    """Yield each content of a tileset, and of those that it names, coarse ones first.
+    """Yield each content of a tileset, and of the tilesets that it names, coarse ones first.
 
-    tile_id  only what lies in this tile's folder is looked at; None: all
+    bundle   the folder that must contain all files
+    tile_id  only files in this tile's folder are yielded; None: all
 
     An external tileset is yielded before it is opened. Raises StereoCellError, which names the
-    file, where a tileset is missing or is none, or names a file outside `bundle` or a tileset that
-    was met before.
+    file, where a tileset is missing or invalid, or names a file outside `bundle` or a tileset that
+    was already visited.
     """
     place = _place(tileset)
     yield from _walk_file(_place(bundle), tileset, tile_id, None, (), {place})
@@ -97,5 +98,5 @@ def _walk_file(
 
 
 def _place(path: Path) -> Path:
-    """Return where a path leads; of links in a circle, some place."""
+    """Return the path without links; for links in a circle, some path."""
     return Path(os.path.realpath(path))

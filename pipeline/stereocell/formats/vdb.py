@@ -1,6 +1,6 @@
 """Write an 8-bit volume as an OpenVDB fog volume, with numpy and zlib alone (file format 224).
 
-No package on PyPI writes .vdb beside numpy 2. The layout follows OpenVDB's io/Archive.cc,
+No package on PyPI writes .vdb with numpy 2. The layout follows OpenVDB's io/Archive.cc,
 io/GridDescriptor.cc, io/Compression.h and tree/*.h (MPL-2.0; read, not copied). Little endian:
 
   file      magic, format, library version, has-offsets flag, UUID, file metadata, grid count
@@ -9,15 +9,15 @@ io/GridDescriptor.cc, io/Compression.h and tree/*.h (MPL-2.0; read, not copied).
   topology  buffer count, background, root -> 32^3 nodes of 128^3 -> 16^3 nodes of 8^3 -> leaves
   values    a code (0: only active values are stored, the rest is background), then the numbers
 
-The tree is Tree_float_5_4_3 saved as half floats: 1/255 steps survive a half exactly, since a half
-has 11 bits. Zero is inactive background and costs a bit a voxel.
+The tree is Tree_float_5_4_3 saved as half floats: a half has 11 bits, so that steps of 1/255 are
+read back exactly. Zero is inactive background and costs a bit for each voxel.
 
 Only active values are stored, each leaf's run compressed by zlib level 1. Measured on 2 cores: a
 smooth noisy volume of 194 x 512 x 512, 59 % active: 2.8 s and 53 MB (without zlib 67 MB); a crop of
 real light-sheet data, 98 % active, is 28 % smaller than without. Level 6 saves 1 % more.
 
-Read back are the grids' names and transforms, and no voxels. Formats before 222 lay out their head
-in another way.
+Only the grids' names and transforms are read back, no voxels. Formats before 222 have another
+layout of the head.
 """
 
 import hashlib
@@ -40,7 +40,7 @@ GRID_NAME = "density"
 
 _MAGIC = 0x56444220
 _FORMAT, _LIBRARY = 224, (12, 0)
-_OLDEST_FORMAT = 222  # whose head is laid out as it is now
+_OLDEST_FORMAT = 222  # first format with today's layout of the head
 _MAPS = {"ScaleTranslateMap", "UniformScaleTranslateMap"}
 _ZIP, _ACTIVE_MASK = 1, 2
 _ONLY_ACTIVE_VALUES = b"\x00"
@@ -62,12 +62,21 @@ def write_vdb(
     """Write `density` / 255 as the one grid of a file.
 
     density     uint8 (z, y, x), image rows downwards
-    first_um    (z, y, x) centre of voxel (0, 0, 0)
+    first_um    centre of voxel (0, 0, 0), (z, y, x)
     spacing_um  (z, y, x)
 
-    Grid index (i, j, k) is world (x, y, z). Rows are turned over, so that j grows upwards like the
-    world's y and the transform has positive scales only: some clients take a negative one for a
-    mirror. Same input, same bytes: the UUID is a hash of them. Raises OutputError.
+    Grid index (i, j, k) is world (x, y, z). Rows are reversed, so that j grows upwards like the
+    world's y, and the transform has positive scales only: some clients take a negative scale for a
+    mirror. The same input gives the same bytes: the UUID is a hash of the grid. Raises OutputError
+    if the file can't be written.
+
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "cell.vdb"
+    >>> volume = np.full((4, 6, 8), 255, np.uint8)
+    >>> write_vdb(path, volume, first_um=(0, 0, 0), spacing_um=(2.0, 0.5, 0.5))
+    >>> grid = read_vdb_head(path)[0]
+    >>> grid.name, grid.spacing.tolist(), grid.origin.tolist()
+    ('density', [0.5, 0.5, 2.0], [0.0, -2.5, 0.0])
     """
     upwards = density[:, ::-1]
     depth, height, width = spacing_um
@@ -82,10 +91,10 @@ def write_vdb(
 
 
 def check_vdb(path: Path) -> None:
-    """Raise StageError if a file is missing, is no OpenVDB, or ends before its grids do.
+    """Raise StageError if a file is missing, is not OpenVDB, or ends before its grids do.
 
-    Reads what says where the grids end, not the grids. A file without these offsets, or of a
-    format before 222, passes by its first bytes: other programs may have written it.
+    It reads the offsets at which the grids end, not the grids. A file without these offsets, or of
+    a format before 222, is checked by its first bytes only: other programs may have written it.
     """
     try:
         with path.open("rb") as file:
@@ -188,7 +197,7 @@ def _topology(origins: NDArray[np.int64], masks: NDArray[np.uint8]) -> bytes:
 
 
 def _runs(keys: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Return the half-open ranges of equal rows, which lie together."""
+    """Return the half-open ranges of equal rows; equal rows are neighbours."""
     if len(keys) == 0:
         return []
     cuts = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
@@ -197,7 +206,7 @@ def _runs(keys: NDArray[np.int64]) -> list[tuple[int, int]]:
 
 
 def _internal_node(children: NDArray[np.int64], edge: int) -> bytes:
-    """Return a node whose every slot without a child is inactive background."""
+    """Return a node; each slot without a child is inactive background."""
     bits = np.zeros((edge, edge, edge), dtype=bool)
     bits[tuple(children.T)] = True
     mask = np.packbits(bits.ravel(), bitorder="little").tobytes()
@@ -219,7 +228,7 @@ def _buffers(
         parts += [mask_bytes[leaf * size : (leaf + 1) * size], _ONLY_ACTIVE_VALUES]
         if len(packed) < len(raw):
             parts += [struct.pack("<q", len(packed)), packed]
-        else:  # a negative size says that the numbers stand as they are
+        else:  # a negative size: the numbers are not compressed
             parts += [struct.pack("<q", -len(raw)), raw]
         start = end
     return b"".join(parts)
@@ -236,7 +245,7 @@ def _active_box(voxels: NDArray[np.uint8]) -> tuple[bytes, bytes]:
 
 
 def _transform(offset: NDArray[np.float64], scale: NDArray[np.float64]) -> bytes:
-    """Return the map from index to world; OpenVDB also stores what follows from the scale."""
+    """Return the map from index to world, with the inverse scales that OpenVDB also stores."""
     uniform = bool(np.ptp(scale) == 0)
     kind = "UniformScaleTranslateMap" if uniform else "ScaleTranslateMap"
     numbers = [offset, scale, scale, 1 / scale, 1 / scale**2, 0.5 / scale]
@@ -256,10 +265,10 @@ def _string(text: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class VdbGrid:
-    """One grid. Its map is None where it is no plain scale and shift.
+    """One grid. Its map is None if it is not a plain scale and shift.
 
-    spacing  (3,) distance between voxels along x, y, z, in the file's units
-    origin   (3,) where voxel (0, 0, 0) has its centre
+    spacing  float64 (3,), distance between voxels along x, y, z, in the file's units
+    origin   float64 (3,), centre of voxel (0, 0, 0), x, y, z, in the file's units
     """
 
     name: str
@@ -268,7 +277,7 @@ class VdbGrid:
 
 
 def read_vdb_head(path: Path) -> list[VdbGrid]:
-    """Return the grids of a file, in its order; none for a format that isn't known.
+    """Return the grids of a file, in its order; none for an unknown format.
 
     Raises StageError if the file is missing or damaged.
     """
@@ -301,7 +310,7 @@ def _read_grids(file: BinaryIO, count: int) -> Iterator[VdbGrid]:
         if _text(file) in _MAPS:
             numbers = np.frombuffer(file.read(48), dtype="<f8")
             origin, spacing = numbers[:3], numbers[3:]
-        # a grid that shares its name with another has a counter behind a separator
+        # if two grids share a name, a counter follows it after a separator
         yield VdbGrid(name.split("\x1e")[0], spacing, origin)
         file.seek(end)
 

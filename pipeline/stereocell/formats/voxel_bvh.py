@@ -1,15 +1,20 @@
-"""Bricks of a volume and the tree over them that knows what is where, how bright, how far off.
+"""Bricks of a volume, and the tree over them with each brick's value range and error.
 
 A leaf is a brick of 16^3 texels with one texel of its neighbours on every side, so that trilinear
 sampling inside it needs no other brick. Coarser nodes are the averaged bricks of a mip pyramid on
-the same grid: node (x, y, z) of level l covers 16 * 2^l texels an axis. That makes the hierarchy an
-octree, not a binary tree: its nodes are the mip bricks that a client draws until finer ones come
-(Crassin et al., "GigaVoxels", I3D 2009), each child is eight times its parent's detail, and a
-level less is a sixth of the payloads of a binary tree, whose every second level has bricks of no
-mip level. There are no pointers: nodes lie breadth first, the children of one side by side.
+the same grid: node (x, y, z) of level l covers 16 * 2^l texels along an axis. So the hierarchy is
+an octree, not a binary tree: its nodes are the mip bricks that a client draws until finer ones
+arrive (Crassin et al.), and each child has eight times its parent's detail. A binary tree would
+have every second level without a mip level; the octree saves a sixth of its payloads. There are no
+pointers: nodes are stored breadth first, the children of a node side by side.
 
-What the threshold makes invisible is not stored: a node of which every texel that can be sampled
-is at or below it is empty, one record without a brick, and has nothing below it.
+Texels that the threshold makes invisible are not stored: a node is empty if every texel that can
+be sampled in it is at or below the threshold. It is one record without a brick and without
+children.
+
+References
+C. Crassin, F. Neyret, S. Lefebvre & E. Eisemann, "GigaVoxels: ray-guided streaming for efficient
+and detailed voxel rendering", I3D 2009. doi:10.1145/1507149.1507152
 """
 
 from collections.abc import Iterator
@@ -20,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 STREAM_BRICK = 16  # texels along a leaf's edge, without the apron; the viewer's build reads it
-STORED = STREAM_BRICK + 2  # texels along the edge of what is stored
-EMPTY = 1  # flag: no brick; the node is `constant` throughout
-_SLAB = 1 << 18  # texels that are compared at once: they stay in the cache
+STORED = STREAM_BRICK + 2  # texels along a stored brick's edge
+EMPTY = 1  # flag: no brick; every texel is `constant`
+_SLAB = 1 << 18  # texels compared at once: they stay in the cache
 
 NODE = np.dtype(
     [
@@ -48,22 +53,22 @@ Floats = NDArray[np.float32]
 class Bvh:
     """The tree of one volume.
 
-    size       texels (z, y, x) of the volume, its own apron among them
-    threshold  intensities up to it are invisible; -1: none is
-    nodes      records of NODE, breadth first from the root (coarsest level) to the leaves:
-               level        0: a leaf; a texel of level l averages 2^l texels an axis
+    size       texels (z, y, x) of the volume, with the apron
+    threshold  largest invisible intensity, 0..254; -1: all are visible
+    nodes      records of NODE (n,), breadth first from the root (coarsest level) to the leaves:
+               level        0: a leaf; a texel of level l averages 2^l texels along an axis
                flags        EMPTY or 0
                child_mask   bit x + 2 y + 4 z: that child is in the table. The children of a node
-                            follow one another in the order of their bits, those of one node
-                            behind those of the node before
+                            follow one another in the order of their bits, behind the children of
+                            the node before
                constant     mean of the texels in its box, rounded
                x, y, z      its box is [x, x + 1) * 16 * 2^level texels, cut at the volume's end
-               min, max     nothing that is sampled in its box, from its own brick or any below,
-                            leaves this range (an empty node is sampled as `constant`)
+               min, max     range of all values that are sampled in its box, from its own brick or
+                            any below (an empty node is sampled as `constant`)
                error_max    largest absolute difference between its brick, interpolated
                             trilinearly at the centres of the texels in its box, and these texels;
                             rounded up. 0 in leaves and empty nodes
-               error_rms    the root of the mean square of that difference
+               error_rms    root mean square of that difference
     bricks     uint8 (n, 18, 18, 18), (z, y, x): one for each node that is not empty, in order
     """
 
@@ -74,11 +79,20 @@ class Bvh:
 
 
 def build(volume: Bytes3, threshold: int) -> Bvh:
-    """Return the tree of a volume, uint8 (z, y, x); threshold in its intensities, -1 to 254.
+    """Return the tree of a volume.
 
-    A coarse texel averages the texels of its cell that lie inside the volume, the last one standing
-    for what lacks, in exact arithmetic, rounded once. Behind the volume's faces bricks repeat the
-    nearest texel, as GL_CLAMP_TO_EDGE does. Raises ValueError for an empty or oversized volume.
+    volume     uint8 (z, y, x)
+    threshold  largest invisible intensity, 0..254; -1: all are visible
+
+    A coarse texel is the mean of the texels of its cell inside the volume; the last one stands for
+    missing ones. Means are exact, and rounded once. Outside the volume bricks repeat the nearest
+    texel, as GL_CLAMP_TO_EDGE does. Raises ValueError for an empty or oversized volume.
+
+    >>> volume = np.zeros((20, 20, 20), np.uint8)
+    >>> volume[4:8, 4:8, 4:8] = 200
+    >>> bvh = build(volume, 10)
+    >>> len(bvh.nodes), bvh.bricks.shape, np.array_equal(reassemble(bvh), volume)
+    (9, (2, 18, 18, 18), True)
     """
     if volume.ndim != 3 or not volume.size or max(volume.shape) > STREAM_BRICK << 15:
         raise ValueError(f"a volume of {volume.shape} texels")
@@ -126,13 +140,16 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
 
 
 def first_children(nodes: NDArray[np.void]) -> NDArray[np.int64]:
-    """Return the index of each node's first child, and, behind the last, the number of nodes."""
+    """Return the index of each node's first child, int64 (n + 1,); at the end, the number of nodes.
+
+    nodes  records of NODE (n,)
+    """
     counts = np.bitwise_count(nodes["child_mask"]).astype(np.int64)
     return 1 + np.concatenate([[0], np.cumsum(counts)])
 
 
 def reassemble(bvh: Bvh) -> Bytes3:
-    """Return the volume (z, y, x) that the leaves make up, empty nodes as their constant."""
+    """Return the volume of the leaves, uint8 (z, y, x); an empty node is filled with `constant`."""
     volume = np.zeros(bvh.size, dtype=np.uint8)
     brick = iter(bvh.bricks)
     for node in bvh.nodes:
@@ -152,7 +169,11 @@ def reassemble(bvh: Bvh) -> Bytes3:
 
 
 def upsampling(level: int, count: int) -> Floats:
-    """Return the weights (count, 18) that interpolate a brick's row at finest texel centres.
+    """Return the weights that interpolate a brick's row at finest texel centres.
+
+    level   of the brick
+    count   finest texels along the box's axis
+    result  float32 (count, 18)
 
     Finest texel i of the box lies at (i + 1/2) / 2^level + 1/2 in the row, whose texel k has its
     centre at k.
@@ -162,7 +183,7 @@ def upsampling(level: int, count: int) -> Floats:
 
 
 def _make_pyramid(volume: Bytes3) -> list[Bytes3]:
-    """Return the levels, each half as long as the one before, until one brick holds all."""
+    """Return the levels, each half as long as the one before; the last one is a single brick."""
     levels = [volume]
     exact: NDArray[np.uint8] | Floats = volume
     while max(levels[-1].shape) > STREAM_BRICK:
@@ -175,8 +196,8 @@ def _make_pyramid(volume: Bytes3) -> list[Bytes3]:
 def _halve(values: NDArray[np.uint8] | Floats, axis: int) -> Floats:
     """Return the means of neighbours along an axis; a last one without a neighbour stays.
 
-    Exact: texels of level l are multiples of 1/8^l below 256, which float32 holds up to level 5,
-    and further down errs by less than 1e-4.
+    Exact: texels of level l are multiples of 1/8^l below 256, which float32 represents up to level
+    5; at deeper levels the error is below 1e-4.
     """
     taken = [slice(None)] * 3
     taken[axis] = slice(0, None, 2)
@@ -195,7 +216,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
     counts = np.ones((1, 1, 1), dtype=np.int64)
     for axis, n in enumerate(volume.shape):
         starts = np.arange(0, n, STREAM_BRICK)
-        sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)  # 16^3 * 255 at most
+        sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)  # at most 16^3 * 255
         shape = [1, 1, 1]
         shape[axis] = len(starts)
         counts = counts * np.diff(np.append(starts, n)).reshape(shape)
@@ -209,7 +230,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
 
 
 def _pad(level: Bytes3, grid: tuple[int, ...]) -> Bytes3:
-    """Return the texels that a level's bricks hold: an apron, and whole bricks at the end."""
+    """Return the texels of a level's bricks: with an apron, and whole bricks at the end."""
     widths = [(1, g * STREAM_BRICK + 1 - n) for g, n in zip(grid, level.shape, strict=True)]
     return np.pad(level, widths, mode="edge")
 
@@ -228,7 +249,7 @@ def _ranges(padded: Bytes3, ufunc: np.ufunc) -> Bytes3:
 
 
 def _reduce_children(ufunc: np.ufunc, values: NDArray[Any], neutral: int) -> NDArray[Any]:
-    """Return the sum, the largest, ... of every 2 x 2 x 2 nodes; `neutral` where one lacks."""
+    """Return the reduction of every 2 x 2 x 2 nodes; a missing node counts as `neutral`."""
     widths = [(0, n % 2) for n in values.shape]
     values = np.pad(values, widths, constant_values=neutral)
     for axis in range(3):
@@ -260,7 +281,7 @@ def _children(
 def _error(
     brick: Bytes3, level: int, place: NDArray[np.int64], volume: Bytes3
 ) -> tuple[int, float]:
-    """Return the largest and the root mean square difference of a brick to what it averages."""
+    """Return the largest and the root mean square difference of a brick to its texels."""
     edge = STREAM_BRICK << level
     z0, y0, x0 = (int(n) * edge for n in place)
     box = volume[z0 : z0 + edge, y0 : y0 + edge, x0 : x0 + edge]
@@ -274,7 +295,7 @@ def _error(
         flat = difference.ravel()
         largest = max(largest, flat.max(), -flat.min())
         squares += float(np.dot(flat, flat))
-    # float32 leaves some 1e-5 where the difference is a whole number
+    # float32 errs by some 1e-5 where the difference is a whole number
     return int(np.ceil(min(float(largest) - 1e-3, 255))), float(np.sqrt(squares / box.size))
 
 
