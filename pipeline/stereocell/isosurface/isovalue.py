@@ -50,7 +50,7 @@ from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.raggedness import find_raggedness
 from stereocell.model.errors import NoSurfaceError
 
-NOISE_FACTOR = 8.0  # x noise's mean squared gradient: edges are steeper; 3 to 16 choose alike
+NOISE_FACTOR = 8.0  # multiple of noise's mean g^2 that edges exceed; 3 to 16 choose alike
 DIM_PERCENTILE = 40.0  # percent of the voxels, the dimmest: noise is measured there, free of edges
 CHI = 0.789  # median over mean of a chi-square of three: of noise's squared gradient
 EDGES_SHARE = 0.70  # share of the largest total from which a level can be chosen, 0..1

@@ -27,7 +27,7 @@ import numpy as np
 from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.tiling import Box, Tile
 
-PLATEAU = 0.99  # share of the best score from which levels are as good; .95 cost a lone ball 11 %
+PLATEAU = 0.99  # share of the best score that is as good; .95 cost a lone ball 11 % of volume
 DISCONTINUITY_WEIGHT = 0.25  # growth of the evidence's exponent at a discontinuity of 1
 Neighbours = Mapping[str, Sequence[str]]
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from stereocell.model.mesh import Mesh, Spread
 
 PERCENTILE = 99.0  # percent; a sliver that vanishes, less than 1 % of the area, does not count
-ON_UM = 1e-6  # um; a point on the surface is this far off, after rounding to float32
+ON_UM = 1e-6  # um; points this close count as on the surface: float32 rounds
 
 
 class Nearest:

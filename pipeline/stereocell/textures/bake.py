@@ -1,8 +1,8 @@
 """Bake the fine surface into a coarser level: normals, ambient occlusion, the sampled channel.
 
 A point of the level takes the values of the nearest point on the fine surface's triangles,
-interpolated between the triangle's corners. The fine surface reaches past the tile's cut: the
-centres of a texel do too, by half a texel, and neighbours must shade the same on both sides.
+interpolated between the triangle's corners. The fine surface reaches past the tile's cut: a
+texel's centre can lie half a texel past it, and neighbours must shade the same on both sides.
 """
 
 from dataclasses import dataclass

@@ -30,11 +30,11 @@ from stereocell.textures.tangents import make_tangents
 # destroyed just when a worker goes to sleep waits for it forever (seen once, in ~TaskScheduler).
 # So an atlas is destroyed some unwraps later, when its workers sleep, and the last ones never: they
 # end with the process.
-ATLASES_KEPT = 4
+ATLASES_KEPT = 4  # most atlases that wait for their workers
 _past_atlases: deque[xatlas.Atlas] = deque()
 
 SHARP_DEG = 75.0  # degrees between two triangles; on coarse levels 60 are common
-MULTIPLE = 8  # texels; a map's edges are multiples: blocks of 4 down to mip level 1
+MULTIPLE = 8  # texels; edges of a map are multiples of it: blocks of 4 down to mip level 1
 COARSENINGS = 3  # most times that texels grow, each by sqrt 2 or more, before a level has no maps
 
 

@@ -29,7 +29,7 @@ from stereocell.tissue.potts_prior import apply_potts_prior
 Field = NDArray[np.float32]
 AUTO_CLASSES = range(2, 7)  # numbers of classes that `auto` tries
 MODE_BINS = 64  # bins of the histogram whose modes are counted
-SHALLOWEST_DIP = 0.9  # largest histogram between two modes, by the lower peak's height
+SHALLOWEST_DIP = 0.9  # largest dip between two modes, as a share of the lower peak
 LEAST_SHARE = 0.01  # least share of the voxels in a class
 
 

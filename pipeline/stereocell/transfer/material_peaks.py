@@ -16,7 +16,7 @@ FLAT_STEP = 3.0 / 255  # least noise, values are 0..1: rounding to 8 bits and a 
 LEAST_IN_COLUMN = 2e-5  # least share of all voxels in a column whose mode is used
 LEAST_SHARE = 0.004  # least share of the flat voxels that a material has
 LEAST_PROMINENCE = 0.2  # least prominence by the peak's height: a shoulder is no material
-MAX_MATERIALS = 6
+MAX_MATERIALS = 6  # most materials of a channel
 
 
 def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.float64]:
