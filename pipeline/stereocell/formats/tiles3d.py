@@ -164,6 +164,7 @@ class _Box:
 
     @property
     def diagonal_m(self) -> float:
+        """The length of the diagonal in metres."""
         return math.dist(self.low, self.high) / _NM_PER_METRE
 
     def numbers(self) -> list[float]:

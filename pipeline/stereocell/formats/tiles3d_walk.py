@@ -35,6 +35,7 @@ class Content:
 
     @property
     def is_tileset(self) -> bool:
+        """Whether the file is an external tileset."""
         return self.path.suffix == _JSON
 
 

@@ -49,6 +49,7 @@ class Defects:
 
     @property
     def total(self) -> int:
+        """Return the number of all defects."""
         return sum(self.counts.values())
 
     def vertices(self, triangles: NDArray[np.integer]) -> Indices:

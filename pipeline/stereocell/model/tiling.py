@@ -19,11 +19,13 @@ class Box:
 
     @property
     def shape(self) -> tuple[int, int, int]:
+        """Return the number of voxels, (z, y, x)."""
         z, y, x = (b - a for a, b in zip(self.start, self.stop, strict=True))
         return z, y, x
 
     @property
     def slices(self) -> tuple[slice, slice, slice]:
+        """Return the box as indices of the level, (z, y, x)."""
         z, y, x = (slice(a, b) for a, b in zip(self.start, self.stop, strict=True))
         return z, y, x
 

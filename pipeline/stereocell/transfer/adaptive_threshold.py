@@ -64,6 +64,7 @@ class Histogram:
 
     @property
     def bin_width(self) -> float:
+        """The width of a bin, in voxel values."""
         return (self.high - self.low) / len(self.counts)
 
 
