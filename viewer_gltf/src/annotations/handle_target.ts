@@ -34,7 +34,7 @@ export class HandleTarget implements Target {
   }
 
   choose(): void {
-    // it is dragged from now on, by whoever holds it
+    // it is dragged from now on, by the pointer that holds it
   }
 
   drag(key: string, ray: RoomRay): void {

@@ -91,7 +91,7 @@ function ghosted<
 >(mark: T, ghost: T): T {
   ghost.material.depthFunc = GreaterDepth;
   ghost.material.opacity *= GHOST;
-  ghost.material.color = mark.material.color; // one colour, whoever paints it
+  ghost.material.color = mark.material.color; // one colour, by either material
   for (const each of [mark, ghost]) {
     each.renderOrder = MARKS_ORDER;
     each.frustumCulled = false;

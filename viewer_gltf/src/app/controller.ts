@@ -1,6 +1,6 @@
 /**
  * What the user works the viewer by: panel, keys, list of keys, share link. Holds the panel's own
- * view and turns wishes into actions and commands; whoever draws the panel elsewhere takes
+ * view and turns wishes into actions and commands; code that draws the panel elsewhere takes
  * `layOut` and hands its wishes to `perform`.
  */
 

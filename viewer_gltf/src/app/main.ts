@@ -118,7 +118,7 @@ const WAITING = "The host does not answer: trying again. What has come stays on 
 watchWaiting((isWaiting) =>
   viewer?.dispatch({ type: isWaiting ? "notify" : "dismiss", text: WAITING }),
 );
-ready.catch(() => undefined); // told above; whoever awaits `ready` still sees it
+ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 
 /** Bugs: the console has the details, the page says that something is amiss. */
 function reportBug(error: unknown): void {

@@ -43,9 +43,9 @@ export class Viewer {
   readonly stereo: Stereo;
   readonly navigation: Navigation;
   state: ViewerState;
-  /** What a panel in the room shows; whoever has the panel says. */
+  /** What a panel in the room shows; the owner of the panel sets it. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
-  /** What a change has brought besides what it shows; whoever has the page tells it. */
+  /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;

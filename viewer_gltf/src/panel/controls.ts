@@ -1,5 +1,5 @@
 /**
- * The panel as plain data: sections of a few kinds of controls. Whoever draws it, in HTML or on a
+ * The panel as plain data: sections of a few kinds of controls. The code that draws it, in HTML or on a
  * plane in the room, shows the values and hands back the wish that a control's `to` makes of what
  * the user did. Pure.
  */

@@ -19,7 +19,7 @@ const STEP_RAD = Math.PI / 12;
 const ZOOM = 0.8;
 const STEP_M = 0.1;
 
-/** By whoever holds: their poses now, null where tracking is lost. At most two count. */
+/** By holder: its pose now, null where tracking is lost. At most two count. */
 export type Holders<K> = ReadonlyMap<K, HandPose | null>;
 
 /**

@@ -56,7 +56,7 @@ export type CanvasWish = Wish | CanvasChange;
  */
 export type Region = Readonly<{
   id: string;
-  /** For tests and for whoever reads the panel aloud. */
+  /** For tests and for programs that read the panel aloud. */
   label: string;
   rect: Rect;
   isSlide: boolean;

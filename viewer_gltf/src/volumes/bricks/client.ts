@@ -27,7 +27,7 @@ export type LinkMessage =
 
 export type Brick = Readonly<{ node: number; texels: Uint8Array<ArrayBuffer> }>;
 
-/** Whoever draws one volume. */
+/** A client that draws one volume. */
 export type Taker = Readonly<{
   onTable: (table: Table) => void;
   onBricks: (bricks: readonly Brick[]) => void;

@@ -86,7 +86,7 @@ export class RoomPanel {
     return this.quad.mesh.visible;
   }
 
-  /** What can be pointed at now, for tests and for whoever reads it aloud. */
+  /** What can be pointed at now, for tests and for a program that reads it aloud. */
   get regions(): readonly Region[] {
     return this.isOpen ? this.page.regions : [];
   }
@@ -126,7 +126,7 @@ export class RoomPanel {
     let isChanged = false;
     if (this.wantsPlace) {
       this.wantsPlace = false;
-      // Whoever looks down at the button has no clear heading: the button has.
+      // A head that looks down at the button has no clear heading: the button has.
       this.open(eye, this.openerYaw, around());
       isChanged = true;
     }

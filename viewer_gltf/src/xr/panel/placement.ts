@@ -27,7 +27,7 @@ const FOLLOW_PER_S = 4;
 
 /** So far under the gaze is the middle of what is told: it covers nothing that is looked at. */
 const NOTICE_BELOW = 20 * DEG;
-/** Whoever looks at the floor reads it there. */
+/** A user who looks at the floor reads it there. */
 const NOTICE_LOWEST = -60 * DEG;
 
 export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
