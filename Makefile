@@ -179,9 +179,22 @@ test-exhaustive: setup browser ## All tests, and the sweeps that `make test` tak
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
 	$(MAKE) --no-print-directory torture
 
+# the demo's bundle, or of half its tiles
+ifdef STEREOCELL_EXHAUSTIVE
+SHOWN := demo
+else
+SHOWN := half
+endif
+
 test-viewer: setup browser
-	cd $(VIEWER) && npm run --silent test
-	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/demo
+	$(VITEST) --project unit
+ifdef STEREOCELL_EXHAUSTIVE
+	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/$(SHOWN)
+else
+	test -e out/samples/half.ome.zarr || $(RUN) sample cycif out/samples/half.ome.zarr --grid 5x1
+	$(MAKE) --no-print-directory report INPUT=out/samples/half.ome.zarr OUT=out/$(SHOWN) ARGS="--preset cycif --grid 5x1"
+	$(RUN) check out/$(SHOWN) --deep --workers="$$WORKERS"
+endif
 	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
 	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
 	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
@@ -193,7 +206,7 @@ test-viewer: setup browser
 	cp -r out/edit/built/bundle out/edit/before
 	$(SUPPORT).stage_edits layer out/edit
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
-	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/demo/bundle" \
+	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/$(SHOWN)/bundle" \
 	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
 	  STEREOCELL_F_BUNDLES="$$out/f/of-f.ome.tif/bundle:$$out/f/of-f.ome.zarr/bundle:$$out/f/of-f.nii.gz/bundle:$$out/f/of-dicom/bundle" \
 	  STEREOCELL_EDIT_BUNDLES="$$out/edit/before:$$out/edit/built/bundle" \
