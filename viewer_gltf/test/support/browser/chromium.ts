@@ -6,7 +6,17 @@ import { type BrowserContext, type BrowserServer, chromium, type Page } from "pl
 export const CHROMIUM = process.env.CHROMIUM || "/usr/bin/chromium";
 export const HOW_TO_GET = `no Chromium at ${CHROMIUM}: apt-get install chromium, or set CHROMIUM to its path`;
 
+/** Of the browser's own window, which nobody sees; and what playwright leaves out, whose list this replaces. */
+const WITHOUT = [
+  ...["PreloadTopChromeWebUI", "InitialWebUI", "WebUIReloadButton"],
+  "SpareRendererForSitePerProcess",
+  ...["AvoidUnnecessaryBeforeUnloadCheckSync", "DestroyProfileOnBrowserClose", "HttpsUpgrades"],
+  ...["HttpsFirstBalancedModeAutoEnable", "LensOverlay", "MediaRouter", "PaintHolding"],
+  ...["ThirdPartyStoragePartitioning", "AvoidCorsURLLoaderRestartOnRedirect", "OptimizationHints"],
+  ...["NetworkTimeServiceQuerying", "AimEnabled", "PreconnectToSearch"],
+];
 const FLAGS = [
+  `--disable-features=${WITHOUT.join(",")}`,
   "--no-sandbox",
   "--disable-quic",
   "--no-first-run",
