@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise, smooth
 from stereocell.isosurface.isovalue import find_iso_value
-from stereocell.isosurface.options import CRITERIA, IsoValueOptions
+from stereocell.isosurface.options import BY_TILE, IsoValueOptions
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from support.iso_value_family import SPACING, Mask, Member, boundary_distance_um, dice, family, make
@@ -50,7 +50,7 @@ def find_solids(member: Member) -> tuple[Mask, dict[str, Mask]]:
     plain, ours = fields(counts)
     found = {name: plain > peer(plain) for name, peer in PEERS.items()}
     found |= {f"{name}, background subtracted": ours > peer(ours) for name, peer in PEERS.items()}
-    for criterion in CRITERIA:
+    for criterion in BY_TILE:
         options = IsoValueOptions(criterion=criterion)
         found[f"stereocell {criterion}"] = ours > find_iso_value(ours, SPACING, options).value
     return truth, found

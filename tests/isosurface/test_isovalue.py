@@ -13,7 +13,7 @@ from stereocell.filters.denoise import smooth
 from stereocell.isosurface.distance_field import signed_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.isovalue import PEAK_SHARE, _peak, find_iso_value
-from stereocell.isosurface.options import CRITERIA, IsoValueOptions
+from stereocell.isosurface.options import BY_TILE, IsoValueOptions
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
@@ -87,7 +87,7 @@ def test_gain_and_offset_carry_the_iso_value_along(gain: float, offset: float) -
     assert moved.value == pytest.approx(gain * plain + offset, abs=0.02 * gain + 1e-3 * abs(offset))
 
 
-@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("criterion", BY_TILE)
 def test_the_curve_is_recorded_and_peaks_at_the_value(criterion: str) -> None:
     found = find_iso_value(_ball(noise=10), SPACING, IsoValueOptions(criterion=criterion))
     assert found.score.max() == 1.0

@@ -8,7 +8,7 @@ from PIL import Image
 
 from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
-from stereocell.isosurface.options import CRITERIA
+from stereocell.isosurface.options import BY_TILE
 from stereocell.preview.iso_value import COLORS, Candidate, preview, table
 from support import phantoms
 
@@ -43,7 +43,7 @@ def test_the_table_names_every_criterion_with_levels_and_shares(
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert rows[0][0] == "candidate"
     assert rows[1][:2] == ["edges", "*"]
-    assert {row[0] for row in rows[1:-2]} == set(CRITERIA)
+    assert {row[0] for row in rows[1:-2]} == set(BY_TILE)
     assert " ".join(rows[-2]) == "* found; a build may draw it towards its neighbours'"
     assert rows[-1] == ["wrote", str(out)]
     _, _, above, raw, inside, confidence = rows[1]

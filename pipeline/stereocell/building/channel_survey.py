@@ -38,7 +38,7 @@ from stereocell.isosurface.neighbour_consensus import (
     find_neighbours,
     reconcile_iso_values,
 )
-from stereocell.isosurface.options import ADAPTIVE
+from stereocell.isosurface.options import CRITERIA
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
@@ -146,7 +146,7 @@ def iso_task(plan: Plan, tile: Tile, *, channel: Channel, statistics: ChannelSta
 def _is_given(plan: Plan, channel: Channel) -> bool:
     """Whether a channel's iso-value is not sought tile by tile: the user's, or its threshold."""
     settings = plan.settings
-    return channel.name in settings.iso_values or settings.isovalue.criterion == ADAPTIVE
+    return channel.name in settings.iso_values or not CRITERIA[settings.isovalue.criterion].by_tile
 
 
 def _given(plan: Plan, channel: Channel, statistics: ChannelStatistics) -> float | None:

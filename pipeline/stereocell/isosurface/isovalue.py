@@ -46,7 +46,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.isosurface.distance_field import gradient_magnitude
-from stereocell.isosurface.options import IsoValueOptions
+from stereocell.isosurface.options import CRITERIA, Criterion, IsoValueOptions
 from stereocell.isosurface.raggedness import find_raggedness
 from stereocell.model.errors import NoSurfaceError
 
@@ -108,7 +108,8 @@ def find_iso_value(
     gradient = gradient_magnitude(field, spacing_um)
     gradient /= np.float32(high - low)
     weights = gradient
-    if options.curve == "edges":
+    criterion = CRITERIA[options.criterion]
+    if criterion.discounts_noise:
         noise = NOISE_FACTOR / CHI * float(np.median(gradient[field <= dim])) ** 2
         tiny = np.float32(1e-12)
         weights = gradient * np.maximum(0, 1 - noise / np.maximum(gradient**2, tiny))
@@ -125,7 +126,7 @@ def find_iso_value(
         ndimage.gaussian_filter1d(h.astype(np.float64), 0.03 * options.bins)
         for h in (area, total, slope, count)
     )
-    score = _score(area, total, options)
+    score = _score(area, total, criterion, options.min_area_share)
     if not score.max() > 0:
         raise NoSurfaceError("no level separates anything")
     score = score / score.max()
@@ -143,15 +144,15 @@ def find_iso_value(
 
 
 def _score(
-    area: NDArray[np.float64], total: NDArray[np.float64], options: IsoValueOptions
+    area: NDArray[np.float64],
+    total: NDArray[np.float64],
+    criterion: Criterion,
+    min_area_share: float,
 ) -> NDArray[np.float64]:
     """Return the criterion over the levels, float64 (bins,); 0 for levels that can't be chosen."""
-    large = (area > 0) & (area >= options.min_area_share * area.max())
-    if options.curve == "pekar-area":
-        return np.where(large, area, 0.0)
-    exponent = {"pekar-total": 0.0, "pekar-mean": 1.0}.get(options.curve, 0.5)
-    score = np.where(large, total / np.where(large, area, 1.0) ** exponent, 0.0)
-    if options.curve == "edges":
+    large = (area > 0) & (area >= min_area_share * area.max())
+    score = np.where(large, criterion.score(total, np.where(large, area, 1.0)), 0.0)
+    if criterion.discounts_noise:
         score = np.where(total >= EDGES_SHARE * total.max(), score, 0.0)
     return score
 

@@ -1,13 +1,38 @@
 """Settings of the iso-value and of the surface. Light to import: every command reads them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag, length_um, setting
 
-CRITERIA = ("edges", "compromise", "pekar-mean", "pekar-total", "pekar-area")
-ADAPTIVE = "adaptive"  # the channel's threshold in all tiles; the curves are those of `edges`
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """A way to choose the iso-value: the level with the largest score.
+
+    score            of a level's surface, by its total gradient and its area, float64 (bins,) each
+    discounts_noise  whether noise's part is taken out of the gradients first, and levels with a
+                     small total can't be chosen
+    by_tile          False: the channel's threshold is the level of all tiles, the curve only shown
+    """
+
+    score: Callable[[Any, Any], Any]
+    discounts_noise: bool = False
+    by_tile: bool = True
+
+
+ADAPTIVE = "adaptive"
+CRITERIA = {
+    "edges": Criterion(lambda total, area: total / area**0.5, discounts_noise=True),
+    "compromise": Criterion(lambda total, area: total / area**0.5),
+    "pekar-mean": Criterion(lambda total, area: total / area),
+    "pekar-total": Criterion(lambda total, area: total),
+    "pekar-area": Criterion(lambda total, area: area),
+    ADAPTIVE: Criterion(lambda total, area: total / area**0.5, discounts_noise=True, by_tile=False),
+}
+BY_TILE = tuple(name for name, criterion in CRITERIA.items() if criterion.by_tile)
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +44,7 @@ class IsoValueOptions:
 
     criterion: str = setting(
         "edges",
-        "edges, compromise, pekar-mean, pekar-total, pekar-area; adaptive: the channel's threshold",
+        f"{', '.join(BY_TILE)}; {ADAPTIVE}: the channel's threshold",
         Flag("--iso-criterion", "how iso-values are found: edges (default), adaptive, ..."),
     )
     bins: int = setting(256, "levels tried over the range of a tile's voxels")
@@ -27,16 +52,10 @@ class IsoValueOptions:
     min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
     min_confidence: float = setting(0.4, "of a clear surface, 0 to 1; see the report")
 
-    @property
-    def curve(self) -> str:
-        """The member of CRITERIA that makes the curve over the levels."""
-        return CRITERIA[0] if self.criterion == ADAPTIVE else self.criterion
-
     def __post_init__(self) -> None:
-        if self.criterion not in (*CRITERIA, ADAPTIVE):
+        if self.criterion not in CRITERIA:
             raise UsageError(
-                f"isovalue.criterion is {self.criterion!r}, expected one of "
-                f"{', '.join((*CRITERIA, ADAPTIVE))}"
+                f"isovalue.criterion is {self.criterion!r}, expected one of {', '.join(CRITERIA)}"
             )
         if not 16 <= self.bins <= 65536:
             raise UsageError(

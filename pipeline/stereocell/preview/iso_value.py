@@ -20,7 +20,7 @@ from stereocell.building.settings import Settings
 from stereocell.building.tasks.iso_value import IsoField, read_iso_field
 from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.isovalue import IsoValue
-from stereocell.isosurface.options import ADAPTIVE, CRITERIA
+from stereocell.isosurface.options import ADAPTIVE, BY_TILE, CRITERIA
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.preview.draw_slices import VIEWS, Color, Slice, find_font, paint_slices
@@ -35,6 +35,7 @@ COLORS: dict[str, Color] = {
     "given": (255, 255, 255),
     ADAPTIVE: (255, 255, 255),
 }
+_OTHER: Color = (160, 160, 160)  # of a criterion without a colour of its own
 _LONGEST_PX = 900  # pixels, longest side of a slice
 _CHART_PX = 200  # pixels, height of the curve
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
@@ -79,8 +80,9 @@ def preview(
     field = read_iso_field(task)
     try:
         chosen = field.find_iso_value(plan.settings.isovalue)
-        found = {plan.settings.isovalue.curve: chosen}
-        for name in CRITERIA:
+        criterion = plan.settings.isovalue.criterion
+        found = {criterion if CRITERIA[criterion].by_tile else BY_TILE[0]: chosen}
+        for name in BY_TILE:
             if name not in found:
                 options = replace(plan.settings.isovalue, criterion=name)
                 found[name] = field.find_iso_value(options)
@@ -177,7 +179,10 @@ def _slices(
                 np.zeros((0, 2, 2)),
                 None,
                 # the chosen one last: on top
-                tuple((COLORS[c.name], plane - np.float32(c.level)) for c in reversed(candidates)),
+                tuple(
+                    (COLORS.get(c.name, _OTHER), plane - np.float32(c.level))
+                    for c in reversed(candidates)
+                ),
             )
         )
     return slices
@@ -200,7 +205,9 @@ def _compose(
     _draw_curve(draw, chart, candidates, chosen)
     y = chart[1] + _CHART_PX + _MARGIN_PX
     for candidate in candidates:
-        draw.rectangle((_MARGIN_PX, y + 3, _MARGIN_PX + 22, y + 13), fill=COLORS[candidate.name])
+        draw.rectangle(
+            (_MARGIN_PX, y + 3, _MARGIN_PX + 22, y + 13), fill=COLORS.get(candidate.name, _OTHER)
+        )
         sure = "" if candidate.confidence is None else f", confidence {candidate.confidence:.2f}"
         star = " *" if candidate.is_chosen else ""
         words = (
@@ -230,7 +237,7 @@ def _draw_curve(
     draw.line((left, bottom, right, bottom), fill=_AXIS)
     for candidate in reversed(candidates):
         x = x_of(candidate.level)
-        draw.line((x, top, x, bottom), fill=COLORS[candidate.name], width=2)
+        draw.line((x, top, x, bottom), fill=COLORS.get(candidate.name, _OTHER), width=2)
     points = [
         (x_of(float(level)), bottom - (bottom - top) * float(score))
         for level, score in zip(chosen.levels, chosen.score, strict=True)

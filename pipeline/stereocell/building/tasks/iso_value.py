@@ -11,7 +11,7 @@ from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.isovalue import IsoValue, find_iso_value
-from stereocell.isosurface.options import ADAPTIVE, IsoValueOptions
+from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError
 from stereocell.model.lattice_field import LatticeField
@@ -76,7 +76,7 @@ def _find(task: IsoTask) -> dict[str, Any]:
         "value": None, "confidence": 0.0, "reason": "", "background": field.below
     }  # fmt: skip
     try:
-        if task.given is None and task.settings.isovalue.criterion == ADAPTIVE:
+        if task.given is None and not CRITERIA[task.settings.isovalue.criterion].by_tile:
             raise NoSurfaceError("the channel's histogram has no peak: it has no threshold")
         found = field.find_iso_value(task.settings.isovalue)
     except NoSurfaceError as error:
