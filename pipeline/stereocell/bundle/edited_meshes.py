@@ -1,15 +1,15 @@
-"""Levels of detail as a bundle shows them where a mesh was edited by hand.
+"""Levels of detail in a bundle where a mesh was edited by hand.
 
-An edited finest level is the surface that counts from then on: coarser ones are made anew from it,
-by the same simplification, and distances are measured from it. A level that the artist edited too
-stays as it is, and is measured. Where only coarser levels were edited, these are measured.
+An edited finest level becomes the reference surface: coarser levels are recomputed from it, by the
+same simplification, and distances are measured from it. A coarser level that the artist edited too
+stays, and its distance is measured. Where only coarser levels were edited, these are measured.
 
-How an edit is known: the pipeline writes a hash of each mesh's points and faces into its layer, and
-compares it with the composed ones. The layer that an opinion comes from would not do: an edit in
-place and a flattened stage have one layer. A stage without hashes is taken as it is. Within the
-levels of one mesh, a transform of one level alone is an edit too.
+Edits are detected by a hash: the pipeline writes that of each mesh's points and faces into its
+layer, and the bundle compares it with the composed mesh's. The layer of an opinion would not do: an
+edit in place and a flattened stage have one layer. A stage without hashes counts as unedited.
+A transform of one level alone, among the levels of a mesh, is an edit too.
 
-Nothing of an edited mesh is claimed unseen: it is certified anew.
+Edited meshes are validated anew.
 """
 
 import json
@@ -51,7 +51,7 @@ T = TypeVar("T")
 
 
 class _Options(NamedTuple):
-    """How levels are made."""
+    """The options by which levels are made."""
 
     lod: LodOptions
     unwrap: UnwrapOptions
@@ -70,14 +70,17 @@ _DEFECTS = {
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The levels that are shown, finest first, and a line about what was edited, or nothing."""
+    """The levels of a bundle, finest first, and a line about edits, or an empty one."""
 
     lods: tuple[ComposedLod, ...]
     edit: str = ""
 
 
 def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
-    """Return a loaded tile's levels of one channel from `finest` on. Raises StageError."""
+    """Return a loaded tile's levels of one channel from `finest` on.
+
+    Raises StageError where a mesh can't be drawn, or has a point that is not finite.
+    """
     lods = list(read_lods(tile, channel_id))
     emptied = find_emptied(tile, channel_id)
     if emptied and (not lods or emptied[0] < lods[0].level):
@@ -95,7 +98,7 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
 
 
 def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
-    """Return the levels that are not as they were built, or that one alone was moved."""
+    """Return the levels whose shape differs from the built one, or that were moved alone."""
     edited = {lod.level for lod in lods if lod.shape != lod.built}
     if len({lod.own for lod in lods}) > 1:
         still = tuple(np.eye(4).ravel().tolist())
@@ -106,7 +109,7 @@ def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
 def _follow(
     tile: Usd.Prim, channel_id: str, lods: list[ComposedLod], edited: set[int]
 ) -> tuple[list[ComposedLod], list[str]]:
-    """Return the levels with those that follow from an edited one, and what is to be told."""
+    """Return the levels, with those recomputed from an edited one, and lines about the edits."""
     fine, options = lods[0], _options(tile.GetStage())
     planes = _cut_planes(tile, channel_id, fine)
     to_fine = Nearest(fine.mesh, options.lod.samples)
@@ -127,7 +130,7 @@ def _follow(
             for lod in lods
         ], told
     told = [verdict(fine)]
-    # an opinion outside the variants lies over all levels: the finest's edit, not their own
+    # an opinion outside the variants lies over all levels: it is the finest's edit, not their own
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
     made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
     result = [replace(fine, distance_um=0.0)]
@@ -153,7 +156,7 @@ def _make(
     options: _Options,
     planes: tuple[Plane, ...],
 ) -> dict[int, tuple[ComposedLod, int]]:
-    """Return the coarser levels made of the finest one, by level, and their numbers of defects."""
+    """Return the coarser levels recomputed from the finest, by level, and their defect counts."""
     fine, first = lods[0], lods[0].level + 1
     spacing = _spacing(tile, channel_id, fine)
     mesh, _ = _certified(_with_values(read_local(tile, channel_id, fine.level), fine), planes)
@@ -192,7 +195,7 @@ def _make(
 def _compose(
     made: Lod, lod: ComposedLod, fine: ComposedLod, source: Mesh, others: Sequence[Baker]
 ) -> ComposedLod:
-    """Return a level that was made anew, in world um; `others` look up green and blue."""
+    """Return a recomputed level, in world um; `others` sample the green and blue components."""
     mesh, baked = made.mesh, made.baked
     assert baked is not None
     color: NDArray[np.float32] | None = None
@@ -253,13 +256,13 @@ def _with_values(mesh: Mesh, fine: ComposedLod) -> Mesh:
 
 
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
-    """Return the mesh and its defects; welded, where seams of UVs or of normals cut it open."""
+    """Return the mesh and its defects; it is welded where seams of UVs or normals cut it open."""
     defects = find_defects(mesh, planes)
     if not defects.total:
         return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
     triangles = first[twin.ravel()][mesh.triangles].astype(np.uint32)
-    has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # as not at a pole's seam
+    has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # at a UV pole they lack it
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)
     found = find_defects(welded, planes)
@@ -279,9 +282,9 @@ def _describe(defects: Defects) -> str:
 
 
 def _cut_planes(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[Plane, ...]:
-    """Return where the mesh is open because another tile follows: at the ends of its tile's box.
+    """Return the planes where the mesh is open to another tile: the faces of its tile's box.
 
-    The stage names no planes, but a cut's vertices lie on one bit by bit, and moved ones do not.
+    The stage names no planes. Vertices of a cut lie on one bit by bit; moved vertices do not.
     """
     mesh = read_local(tile, channel_id, fine.level)
     low, high = _box(tile, channel_id) or (
@@ -305,7 +308,7 @@ def _volume(tile: Usd.Prim, channel_id: str) -> Usd.Prim:
 
 
 def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return the corners of a tile's lattice in its own space; None: its volume is gone."""
+    """Return the corners (x, y, z) of a tile's box in its own space, um; None: no volume."""
     prim = _volume(tile, channel_id)
     low, high = (
         prim.GetAttribute(f"stereocell:bounds{end}").Get() if prim else None
@@ -317,7 +320,7 @@ def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[float, float, float]:
-    """Return the voxel spacing (z, y, x) in um; without the volume an edge's usual length."""
+    """Return the voxel spacing (z, y, x), um; without a volume, the median length of an edge."""
     box, prim = _box(tile, channel_id), _volume(tile, channel_id)
     size = prim.GetAttribute("stereocell:atlasSize").Get() if box is not None else None
     if box is not None and size:
@@ -332,9 +335,9 @@ def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[float,
 
 
 def _options(stage: Usd.Stage) -> _Options:
-    """Return what the stage says of how its levels were made; defaults where it doesn't.
+    """Return the options by which the stage's levels were made; defaults where it states none.
 
-    Raises StageError for values that are none.
+    Raises StageError for invalid values.
     """
     for layer in stage.GetUsedLayers():
         found = layer.customLayerData.get("stereocell", {}).get("settings", {})
@@ -348,7 +351,7 @@ def _options(stage: Usd.Stage) -> _Options:
 
 
 def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
-    """Return a section of settings; keys of another version are passed over."""
+    """Return a section of settings; keys of other versions are ignored. Raises StageError."""
     known = {field.name for field in fields(kind)}  # type: ignore[arg-type]
     values = {
         key: json.loads(value) if isinstance(value, str) and value.startswith("[") else value
@@ -364,7 +367,7 @@ def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
 
 
 def _odd_units(tile: Usd.Prim, channel_id: str, level: int) -> Iterator[str]:
-    """Yield which layer has points in other units."""
+    """Yield a line where the layer of the points has other units."""
     prim = mesh_at(tile, channel_id, level)
     stack = prim.GetAttribute("points").GetPropertyStack() if prim else []
     for spec in stack[:1]:

@@ -1,9 +1,12 @@
-"""HTTP as far as a bundle needs it: whatever else comes is refused before it is looked at.
+"""The subset of HTTP that a bundle needs; all other requests are refused before processing.
 
-uvicorn hands every request to the application, and closes what it can't parse with 400. Here a
-request has no body (413; without one there is nothing to smuggle a second request in), one plain
-path, and a head of limited size; a client has so many connections and requests. A refused client
-may go on sending for LINGER_S: closed at once, its system would throw the answer away.
+uvicorn passes every request to the application, and closes those that it can't parse with 400. Here
+a request has no body (413; without one no second request can be smuggled in), one plain path, and a
+head of limited size; a client has a limited number of connections and requests. A refused client
+may continue to send for LINGER_S: if the socket closed at once, the client's system would discard
+the answer.
+
+References: RFC 9112 (HTTP/1.1).
 """
 
 import asyncio
@@ -27,12 +30,12 @@ from stereocell.serve.limits import (
     Clients,
 )
 
-_LINE_BYTES = 8 << 10  # a header; websockets takes no longer one
+_LINE_BYTES = 8 << 10  # bytes of a header; the websockets library accepts no longer one
 _VERSIONS = ("1.0", "1.1")
 
 
 class State(ServerState):
-    """What all connections of a server share."""
+    """The state that all connections of a server share."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -48,7 +51,7 @@ class _RefusedError(Exception):
 
 
 class GuardedHttp(HeadDeadline):
-    """uvicorn's HTTP protocol, for clients that may mean ill."""
+    """uvicorn's HTTP protocol with limits against malicious clients."""
 
     stall_s = STALL_S
     _is_refused = False
@@ -73,7 +76,7 @@ class GuardedHttp(HeadDeadline):
         self._is_counted = self._clients.enter(self._address)
         if not self._is_counted:
             self._refuse(_RefusedError(503, "too many connections are open, try again later"))
-            self.transport.close()  # lingering would keep what there is too much of
+            self.transport.close()  # lingering would hold the resource that is exhausted
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._is_counted:
@@ -83,7 +86,7 @@ class GuardedHttp(HeadDeadline):
         super().connection_lost(exc)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        self._is_counted = False  # it is the websocket's now, which leaves in its time
+        self._is_counted = False  # the websocket owns the connection now, and leaves later
         super().handle_websocket_upgrade(event)
 
     @property
@@ -109,7 +112,7 @@ class GuardedHttp(HeadDeadline):
             self._refuse(error)
 
     def _should_upgrade(self) -> bool:
-        """The place between a head and its answer: refuse what no honest client sends."""
+        """Check the request between its head and its answer, then continue."""
         self._judge()
         return super()._should_upgrade()
 
@@ -140,9 +143,9 @@ class GuardedHttp(HeadDeadline):
             raise _RefusedError(405, "websockets begin with GET")
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what can't be parsed; called where h11's error is handled.
+        """Answer a request that can't be parsed; called where h11's error is handled.
 
-        There is no text: it may have been a HEAD, whose answer has no body.
+        The answer has no text: the request may have been a HEAD, whose answer has no body.
         """
         status = getattr(sys.exception(), "error_status_hint", 400)
         if status == 431 and b"\n" not in self.conn.trailing_data[0]:
@@ -172,7 +175,7 @@ class GuardedHttp(HeadDeadline):
             headers=protect(self.server_state.default_headers + headers),
             reason=HTTPStatus(error.status).phrase.encode(),
         )
-        # a HEAD is told the length alone: h11 takes no body for its answer
+        # the answer to a HEAD has only the length: h11 accepts no body for it
         is_head = self.scope is not None and self.scope["method"] == "HEAD"
         for event in (answer, h11.Data(data=b"" if is_head else text), h11.EndOfMessage()):
             self.transport.write(self.conn.send(event) or b"")
@@ -183,7 +186,7 @@ class GuardedHttp(HeadDeadline):
             self.transport.close()  # TLS: waits for the client's part of the end
         self.loop.call_later(LINGER_S, self.transport.abort)
 
-    # --- answers that nobody takes
+    # --- answers that the client doesn't read
 
     def pause_writing(self) -> None:
         super().pause_writing()

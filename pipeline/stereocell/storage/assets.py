@@ -1,9 +1,9 @@
 """Find the files that ship beside the code: JSON Schemas, the USD schema, hand-written layers,
 the viewer.
 
-A checkout keeps `schemas/`, `usd_assets/` and `viewer_gltf/` at its top, two levels above the
-package; a wheel carries them inside the package. Inside goes first: a checkout has nothing there,
-while two levels above an installed package lies a folder that is not ours.
+A checkout has `schemas/`, `usd_assets/` and `viewer_gltf/` at its top, two levels above the
+package; a wheel has them inside the package. The package is searched first: in a checkout it holds
+none of them, while two levels above an installed package lies a foreign folder.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ _HOMES = (_PACKAGE, _PACKAGE.parents[1])
 def find_asset(relative: str) -> Path:
     """Return the path of a shipped file or folder, such as `usd_assets/lights.usda`.
 
-    Raises FileNotFoundError if the installation lacks it.
+    Raises FileNotFoundError where the installation lacks it.
     """
     for home in _HOMES:
         if (home / relative).exists():

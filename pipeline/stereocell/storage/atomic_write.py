@@ -1,10 +1,10 @@
 """Write a file under a temporary name beside it, flush it, rename it: the whole file or none.
 
-Temporary names are never used twice, and who works for a command that has ended puts nothing in its
-place: whoever was cut off from a build that has gone on without it, as a worker whose scheduler was
-killed, spoils nothing. Who writes next clears away what it left.
+Temporary names are never used twice, and a worker of a command that has ended renames nothing. So a
+worker that was cut off, for example because its scheduler was killed, can't damage a build that
+went on without it. The next writer removes its temporary files.
 
-Where OUT is on object storage, it is put there then: see workspace.py.
+With OUT on object storage, the file is then uploaded: see workspace.py.
 """
 
 import os
@@ -22,7 +22,7 @@ from stereocell.storage.workspace import making, upload
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path with the suffix of `path`; on leaving, it takes the place of `path`.
+    """Yield a temporary path with the suffix of `path`; at the end, it takes the place of `path`.
 
     If the body raises, nothing is left behind. Raises OutputError where the system refuses
     (rights, space).
@@ -47,17 +47,17 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Put a file of these bytes at `path`, whole or not at all. Raises OutputError."""
+    """Write a file of these bytes at `path`, whole or not at all. Raises OutputError."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)
 
 
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
-    """Yield an empty folder beside `path`; on leaving, it takes the place of `path`.
+    """Yield an empty folder beside `path`; at the end, it takes the place of `path`.
 
-    If the body raises, `path` stays as it was. What a killed run left is cleared away first.
-    Raises OutputError where the system refuses (rights, space).
+    If the body raises, `path` stays as it was. Remains of a killed run are removed first. Raises
+    OutputError where the system refuses (rights, space).
     """
     require_asked()
     token = secrets.token_hex(4)
@@ -81,7 +81,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 
 
 def _swap(new: Path, path: Path, old: Path) -> None:
-    """Rename `new` to `path`; a folder that isn't empty can't be renamed over."""
+    """Rename `new` to `path`; `path` goes to `old` first, since it may be a folder with files."""
     if path.exists():
         os.replace(path, old)
     try:

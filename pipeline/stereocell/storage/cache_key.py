@@ -1,10 +1,10 @@
 """The name of a cached result: a hash of its input, its settings and the code that makes it.
 
-The code is found from the imports, starting at the result's maker: a list by hand would be
-forgotten. The walk leaves out modules that can't change a byte of a result (NEUTRAL): how files are
-opened and written whole, how tasks are spread, how a plan was settled, as its values are a part of
-each result's content. Of the rest, comments, docstrings and the words of messages don't count.
-Libraries count by version where a module imports them that is not left out.
+The code is found from the imports, starting at the result's maker: a manual list would become
+outdated. The walk leaves out modules that can't change a byte of a result (NEUTRAL): those that
+open and write files or distribute tasks, and those that make a plan, whose values are part of each
+result's content. In all others, comments, docstrings and texts of messages don't count. A library
+counts by its version where a module of the walk imports it.
 """
 
 import ast
@@ -20,7 +20,7 @@ from typing import Any
 
 from stereocell.storage.assets import find_asset
 
-# Packages and modules below `stereocell` whose code changes no byte of a result
+# packages and modules below `stereocell` whose code changes no byte of a result
 NEUTRAL = (
     "storage",
     "engine",
@@ -42,7 +42,7 @@ _LOG_OBJECTS = {"console", "logger", "logging", "log", "warnings"}
 def key_of(content: Any, *makers: ModuleType | str) -> str:
     """Return the name of a result, 20 hexadecimal digits.
 
-    content  what the result depends on, as JSON takes it
+    content  the inputs of the result, as values of JSON
     makers   the modules, or their dotted names, whose code makes it
     """
     digests = [_digest(_name(maker)) for maker in makers]
@@ -74,18 +74,18 @@ def _digest(module: str) -> str:
 def _reach(
     module: str, left_out: tuple[str, ...]
 ) -> tuple[tuple[Path, ...], tuple[tuple[str, str], ...]]:
-    """Return the files of ours that a module needs, itself among them, and (library, version)."""
+    """Return our files that a module needs, its own included, and (library, version) pairs."""
     found: dict[Path, None] = {}
     foreign: set[str] = set()
     waiting = [module]
     while waiting:
         name = waiting.pop()
         if name == _NAME or _is_below(name, left_out):
-            continue  # the package's own names are for its users: nothing is made by them
+            continue  # the package's own names are for its users; no result depends on them
         if name.split(".")[0] != _NAME:
             foreign.add(name.split(".")[0])
             continue
-        file = _modules().get(name)  # none if it is the name of something inside a module
+        file = _modules().get(name)  # None for the name of something inside a module
         if file is not None and file not in found:
             found[file] = None
             assets, imports = _needs(file)
@@ -98,18 +98,18 @@ def _reach(
 
 
 def _is_below(name: str, parts: Collection[str]) -> bool:
-    """Return whether a module is one of some below `stereocell`, or lies in one of them."""
+    """Return whether a module is one of `parts` below `stereocell`, or lies in one of them."""
     return any(name == f"{_NAME}.{part}" or name.startswith(f"{_NAME}.{part}.") for part in parts)
 
 
 @cache
 def _code(file: Path) -> str:
-    """Return a module's syntax tree as text, without docstrings and words for people."""
+    """Return a module's syntax tree as text, without docstrings and texts of messages."""
     return ast.dump(_Bare().visit(ast.parse(file.read_bytes())))
 
 
 class _Bare(ast.NodeTransformer):
-    """Takes from a syntax tree all that changes no result."""
+    """Removes from a syntax tree all parts that change no result."""
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         """Visit a node's own; a body of which nothing is left does nothing."""
@@ -119,7 +119,7 @@ class _Bare(ast.NodeTransformer):
         return node
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
-        """Leave out docstrings (any lone constant), prints and log lines."""
+        """Remove docstrings (any lone constant), prints and log lines."""
         match node.value:
             case ast.Constant():
                 return None
@@ -135,18 +135,18 @@ class _Bare(ast.NodeTransformer):
         """Leave out what does nothing."""
 
     def visit_Raise(self, node: ast.Raise) -> ast.AST:
-        """Leave out what an error says, not whether and as what it is raised."""
+        """Remove an error's text; keep its class and the statement."""
         return _Wordless().visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        """Leave out the comment of a setting, which stands behind its default."""
+        """Remove the comment of a setting, which follows its default."""
         if isinstance(node.func, ast.Name) and node.func.id == "setting":
             node.args, node.keywords = node.args[:1], []
         return self.generic_visit(node)
 
 
 class _Wordless(ast.NodeTransformer):
-    """Takes the texts out of an expression."""
+    """Removes the texts from an expression."""
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         return ast.Constant(None) if isinstance(node.value, str) else node
@@ -157,10 +157,10 @@ class _Wordless(ast.NodeTransformer):
 
 @cache
 def _distributions() -> Mapping[str, tuple[Distribution, ...]]:
-    """Return the installed packages by what they are imported as.
+    """Return the installed packages by the names under which they are imported.
 
-    As importlib.metadata.packages_distributions() tells it, which makes a path of each of their
-    files, needs a second for that, and passes over a package that is one extension module.
+    importlib.metadata.packages_distributions() takes a second, since it makes a path of each file,
+    and misses a package that is one extension module.
     """
     found: dict[str, list[Distribution]] = {}
     for package in distributions():
@@ -186,7 +186,7 @@ def _modules() -> Mapping[str, Path]:
 
 @cache
 def _needs(file: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """Return what ships beside the code and the modules that a file of ours names."""
+    """Return the shipped files and the modules that a file of ours names."""
     code = file.read_bytes()
     tree = ast.parse(code)
     assets = _assets(tree) if _FINDER.encode() in code else ()
@@ -194,7 +194,7 @@ def _needs(file: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
 
 
 def _assets(tree: ast.Module) -> Iterator[Path]:
-    """Yield the files that ship beside the code and that a module finds by a literal name."""
+    """Yield the shipped files that a module finds by a literal name."""
     for node in ast.walk(tree):
         match node:
             case ast.Call(func=ast.Name(id=id), args=[ast.Constant(value=name)]) if id == _FINDER:
@@ -203,7 +203,7 @@ def _assets(tree: ast.Module) -> Iterator[Path]:
 
 
 def _imports(statements: Iterable[ast.AST]) -> Iterator[str]:
-    """Yield what is imported by statements and by those inside them; expressions hold none."""
+    """Yield the imports of statements and of those inside them; expressions contain none."""
     for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -1,7 +1,7 @@
-"""What a command may write as long as it is at work in OUT, and its workers for it.
+"""A command's claim on OUT: it and its workers may write as long as the command runs.
 
-A command's workers may outlive it, as a cluster's do: before they put anything in its place, they
-look whether OUT's lock still says what it said when they were asked.
+A command's workers may outlive it, as those of a cluster do. Before they put a result in its place,
+they check that OUT's lock still has the content of the time of the request.
 """
 
 import json
@@ -28,7 +28,7 @@ LOCK = ".lock"
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What OUT/.lock says while one command is at work there: for its workers. Picklable."""
+    """The content of OUT/.lock while one command works there, for its workers. Picklable."""
 
     file: Path
     content: bytes
@@ -50,13 +50,13 @@ _worked_for: ContextVar[Claim | None] = ContextVar("worked_for", default=None)
 
 
 def held() -> Claim | None:
-    """Return the claim that this command has on the folder that it works in."""
+    """Return the claim of this command on its folder; None: it has none."""
     return _held.get()
 
 
 @contextmanager
 def holding(claim: Claim) -> Iterator[None]:
-    """Have a claim within the block, for the workers of a command."""
+    """Set this command's claim within the block, for its workers."""
     before = _held.set(claim)
     try:
         yield
@@ -66,7 +66,7 @@ def holding(claim: Claim) -> Iterator[None]:
 
 @contextmanager
 def working_for(claim: Claim) -> Iterator[None]:
-    """Write within the block for the command that has this claim, and only as long as it has."""
+    """Within the block, write only as long as the command with this claim runs."""
     before = _worked_for.set(claim)
     try:
         yield
@@ -82,7 +82,7 @@ def require_asked() -> None:
 
 
 def describe(command: str) -> dict[str, Any]:
-    """Return what a lock says of the command that holds it, for people and for `Claim`."""
+    """Return the content of a lock: the command that holds it, for people and for `Claim`."""
     return {
         "id": str(uuid4()),
         "process": os.getpid(),
@@ -95,12 +95,12 @@ def describe(command: str) -> dict[str, Any]:
 
 
 def in_words(content: bytes) -> str:
-    """Return the command that a lock's content names, in words."""
+    """Return the command in a lock's content as a phrase."""
     try:
         owner = json.loads(content)
         return (
             f"`stereocell {owner['command']}` (process {owner['process']} on {owner['host']}, "
             f"since {owner['since']})"
         )
-    except (ValueError, KeyError, TypeError):  # it has just begun
+    except (ValueError, KeyError, TypeError):  # that command has just begun
         return "another command"

@@ -1,8 +1,9 @@
-"""Lists of files, with size and SHA-256 of each: what was written, to be held against later.
+"""Lists of written files with the size and SHA-256 of each, to compare them with later.
 
-A unit, the stage and the bundle each have one. Whoever reads a file hashes it before (`is_same`),
-`stereocell check` hashes all. What only asks whether there is anything to do reads no file that is
-no newer than its list: there sizes have to do. SHA-256 hashes 1 GB/s here, BLAKE2b no more.
+A unit, the stage and the bundle each have one. A reader hashes a file before it reads it
+(`is_same`); `stereocell check` hashes all files. A check whether there is work to do hashes no file
+that is no newer than its list: there it compares sizes only. SHA-256 hashes 1 GB/s here, BLAKE2b no
+more.
 """
 
 import hashlib
@@ -17,7 +18,7 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.json_files import read_json
 from stereocell.storage.workspace import cached, is_mirrored, sizes_below
 
-# by path from the list's folder, with forward slashes: {"bytes": ..., "sha256": ...}
+# path relative to the list's folder, with forward slashes -> {"bytes": ..., "sha256": ...}
 FileList = Mapping[str, Mapping[str, Any]]
 MISSING, DAMAGED = "missing", "damaged"
 
@@ -30,7 +31,7 @@ def measure(file: Path) -> dict[str, Any]:
 
 
 def list_files(*paths: Path, root: Path) -> dict[str, dict[str, Any]]:
-    """Return the list of files, and of all below folders, by their paths from `root`."""
+    """Return the list of files, and of all files below folders, by their paths from `root`."""
     listed = {}
     for path in paths:
         with cached(path):
@@ -49,9 +50,9 @@ def to_json(content: object) -> bytes:
 
 
 def read_list(path: Path, remedy: str) -> dict[str, Any]:
-    """Return the list that a file holds. Raises OutputError.
+    """Return the list in a file. Raises OutputError where it is missing or damaged.
 
-    Its entries alone are looked at: a schema of all takes hundreds of times as long.
+    Only the form of its entries is checked: a schema takes hundreds of times as long.
     """
     listed = read_json(path, None, remedy)
     if not isinstance(listed, dict) or not listed or not all(map(_is_entry, listed.values())):
@@ -64,15 +65,15 @@ def _is_entry(entry: Any) -> bool:
 
 
 def is_same(file: Path, entry: Mapping[str, Any]) -> bool:
-    """Return whether a file, which is at hand, is the one of the list."""
+    """Return whether a fetched file is the one of the list."""
     return file.stat().st_size == entry["bytes"] and measure(file) == entry
 
 
 def find_faults(root: Path, listed: FileList, since: Path | None = None) -> dict[str, str]:
-    """Return what is wrong with the files of a list, by path: MISSING or DAMAGED.
+    """Return the fault of each file of a list that has one, by path: MISSING or DAMAGED.
 
-    since  the file that holds the list: a file that is no newer and of the right size passes; so
-           does, on object storage, any of the right size. None: all are hashed
+    since  the file that holds the list: a file of the right size passes where it is no newer than
+           this, and always on object storage. None: all files are hashed
     """
     return dict(_faults(root, listed, since))
 
@@ -98,5 +99,5 @@ def _faults(root: Path, listed: FileList, since: Path | None) -> Iterator[tuple[
         faults += 1
         yield path, fault
     if since is not None and hashed and not faults:
-        with suppress(OSError):  # a copy whose files have the times of copying: hashed once
+        with suppress(OSError):  # copied files have the times of copying: they are hashed once
             os.utime(since)

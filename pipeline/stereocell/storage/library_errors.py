@@ -1,4 +1,4 @@
-"""What the format libraries raise on damaged, odd or unreachable sources, told in one line."""
+"""Errors of the format libraries on damaged, unusual or unreachable sources, as one line."""
 
 import logging
 import math
@@ -21,10 +21,10 @@ import stereocell.storage.location as location
 from stereocell.model.errors import SourceError, StereoCellError
 from stereocell.storage.processes import address_limit, shortage
 
-# Met in truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError and
-# KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile a
-# ValueError, and struct.error for a header cut short. Metadata of another form than the format's
-# end in AttributeError, sizes beyond this machine in MemoryError, OverflowError and SystemError.
+# Seen with truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError
+# and KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile
+# ValueError, and struct.error for a truncated header. Metadata of another form than the format's
+# raise AttributeError, sizes beyond this machine MemoryError, OverflowError and SystemError.
 _FAULTS = (
     OSError,
     EOFError,
@@ -45,7 +45,7 @@ _FAULTS = (
 
 
 def _faults() -> tuple[type[BaseException], ...]:
-    """Return what is caught: aiohttp's errors too where something has imported it, slowly."""
+    """Return the caught classes: aiohttp's too where it is imported already (it is slow)."""
     aiohttp = sys.modules.get("aiohttp")
     return _FAULTS if aiohttp is None else (*_FAULTS, aiohttp.ClientError)
 
@@ -54,7 +54,9 @@ def _faults() -> tuple[type[BaseException], ...]:
 def one_line(
     where: str, expected: str, raised: type[StereoCellError] = SourceError
 ) -> Iterator[None]:
-    """Turn what a library raises inside the block into an error of one line.
+    """Turn an error of a library inside the block into `raised` with a text of one line.
+
+    expected  the expected state of the source, for the text
 
     Only calls into format libraries belong inside: the caught classes are broad.
     """
@@ -70,9 +72,9 @@ def one_line(
 def raise_if_short(
     error: BaseException, where: str, raised: type[StereoCellError] = SourceError
 ) -> None:
-    """Raise an error of one line if a library's own is for want of memory on this machine.
+    """Raise `raised` with one line where a library's error comes from a lack of memory here.
 
-    Without a limit a MemoryError is the file's doing, which may claim any size.
+    Without a limit of address space a MemoryError comes from the file, which may state any size.
     """
     is_ours = not isinstance(error, MemoryError) or address_limit() < math.inf
     if is_ours and (words := shortage(error)):
@@ -107,7 +109,7 @@ def _reason(error: BaseException) -> str:
         return f"metadata: {error}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
-    if isinstance(error, TimeoutError):  # aiohttp says more of silence than of other waits
+    if isinstance(error, TimeoutError):  # aiohttp's text is longer for silence than for other waits
         is_silence = bool(str(error))
         return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"
     return _shortened(str(error)) or type(error).__name__
@@ -130,7 +132,7 @@ class _Collector(logging.Filter):
 
 @contextmanager
 def collected_log(logger_name: str) -> Iterator[list[str]]:
-    """Keep a library's log lines from the user inside the block; yields them as they come."""
+    """Hide a library's log lines from the user inside the block; yield their list."""
     collector = _Collector()
     logger = logging.getLogger(logger_name)
     logger.addFilter(collector)

@@ -1,4 +1,4 @@
-"""Where a source lies: a local path or an address that fsspec opens."""
+"""The place of a source: a local path or an address that fsspec opens."""
 
 import os
 import re
@@ -22,8 +22,8 @@ _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
-ANSWER_S = 25.0  # less than SILENCE_S: of a timeout fsspec's http makes "does not exist"
-_CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs tries it again
+ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
+_CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
     "AWS_PROFILE",
@@ -37,7 +37,7 @@ _AWS_CREDENTIALS = (
 class Location:
     """One source.
 
-    source    an absolute local path or an address, as the format libraries take it
+    source    an absolute local path or an address, in the form of the format libraries
     is_local  a path on this machine
     """
 
@@ -46,7 +46,10 @@ class Location:
 
     @classmethod
     def of(cls, source: str | Path) -> "Location":
-        """Return the location of a path or of an address such as `https://...` or `s3://...`."""
+        """Return the location of a path or of an address such as `https://...` or `s3://...`.
+
+        Raises UsageError for an invalid address.
+        """
         text = str(source)
         if not _ADDRESS.match(text):
             return cls(os.path.abspath(os.path.expanduser(text)), True)
@@ -62,13 +65,13 @@ class Location:
 
     @property
     def folder(self) -> Path:
-        """The source's own folder, links followed: what it names has to lie there or below."""
+        """The source's own folder, links followed: its files must lie there or below."""
         path = Path(os.path.realpath(self.source))
         return path if path.is_dir() else path.parent
 
     @property
     def shown(self) -> str:
-        """The source without what an address may hold in secret (user, password, signature)."""
+        """The source without secrets of an address (user, password, signature)."""
         if self.is_local:
             return self.source
         parts = urlsplit(self.source)
@@ -83,16 +86,16 @@ class Location:
 
     @property
     def name(self) -> str:
-        """The file's name without its suffix, to show; `plate.zarr/0` becomes `plate-0`."""
+        """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
         parts = self.parts
         first = next((i for i, part in enumerate(parts) if part.endswith(".zarr")), len(parts) - 1)
         return "-".join(_stem(part) for part in parts[first:]) or "dataset"
 
     @property
     def format(self) -> str | None:
-        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content tells.
+        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content fits one.
 
-        DICOM is any other folder on this machine, and a file that says so in its first bytes.
+        DICOM is any other folder on this machine, and a file with DICOM's first bytes.
         """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
@@ -111,12 +114,12 @@ class Location:
 
     @property
     def storage_options(self) -> dict[str, Any]:
-        """What fsspec needs beside the address.
+        """The options of fsspec for this address.
 
-        s3: signed requests if this machine's environment holds credentials or `FSSPEC_S3` says
-        so, else anonymous ones, which public buckets take. The endpoint comes from the usual
-        environment (`AWS_ENDPOINT_URL`), and what `FSSPEC_S3` says of waiting goes first.
-        http: waits for silence alone, else aiohttp gives up what takes 5 minutes, however it goes.
+        s3: signed requests where this machine's environment holds credentials or `FSSPEC_S3`
+        requests it, else anonymous ones, which public buckets accept. The endpoint comes from the
+        usual environment (`AWS_ENDPOINT_URL`); timeouts of `FSSPEC_S3` take precedence.
+        http: a timeout for silence only; else aiohttp stops any transfer after 5 minutes.
         """
         scheme = urlsplit(self.source).scheme
         if scheme in ("http", "https"):
@@ -139,28 +142,28 @@ class Location:
 
 
 def _http_client() -> dict[str, Any]:
-    """Return aiohttp's settings: ours, and over them what the user has for fsspec."""
-    from aiohttp import ClientTimeout  # slow to import, and only the network wants it
+    """Return aiohttp's settings: ours, overridden by the user's for fsspec."""
+    from aiohttp import ClientTimeout  # slow to import, and only the network needs it
 
     waits = ClientTimeout(total=None, sock_connect=SILENCE_S, sock_read=SILENCE_S)
     configured: dict[str, Any] = {}
-    for protocol in ("http", "https"):  # one file system to fsspec: either's settings are both's
+    for protocol in ("http", "https"):  # fsspec has one file system for both
         configured |= fsspec.config.conf.get(protocol, {}).get("client_kwargs", {})
     return {"timeout": waits, **configured}
 
 
 def does_answer(files: AbstractFileSystem, path: str) -> bool:
-    """Return whether a store says anything at all within ANSWER_S; errors are an answer too.
+    """Return whether a store answers within ANSWER_S; an error is an answer, too.
 
-    Each request is tried again, with its own wait: without this one, a host that takes connections
-    and is silent would be waited for for minutes.
+    Each request is repeated, with its own timeout: without this limit, a silent host that accepts
+    connections would block for minutes.
     """
     if isinstance(files, AsyncFileSystem):
         try:
             sync(files.loop, files._exists, path, timeout=ANSWER_S)
         except FSTimeoutError:
             return False
-        except Exception:  # told by who reads, better
+        except Exception:  # the reader reports it, better
             pass
     return True
 
@@ -178,11 +181,12 @@ def require_own(
     named: str,
     raised: type[StereoCellError] = SourceError,
 ) -> os.stat_result | None:
-    """Return the state of a file that a source names, or None where there is none.
+    """Return the state of a file that a source refers to, or None where there is none.
 
-    Sources come from strangers, and results are published: so whatever they name, by a path in
-    their metadata or by a link, has to be a regular file in one of `folders` (links followed) or
-    below. Else it is not opened, which would hang on a pipe, and `raised` says `named` and why.
+    Sources come from strangers, and results are published. So every file that a source refers to,
+    by a path in its metadata or by a link, must be a regular file in one of `folders` (links
+    followed) or below. Else `raised` is raised, with `named` and the reason, and the file is not
+    opened (a pipe would block).
     """
     real = os.path.realpath(path)
     if not is_own(real, folders):
@@ -191,7 +195,7 @@ def require_own(
         )
     try:
         status = os.stat(real)
-    except OSError:  # told by who reads
+    except OSError:  # the reader reports it
         return None
     if not stat.S_ISREG(status.st_mode):
         raise raised(f"{named}: is no regular file, expected one")
@@ -201,7 +205,7 @@ def require_own(
 def require_own_key(key: str, named: str) -> None:
     """Raise SourceError where a key leaves the address that it is joined to.
 
-    Stores of http take `%2e%2e` for `..`, as often as it is escaped.
+    Stores of http accept `%2e%2e` for `..`, escaped any number of times.
     """
     found, steps = "", key
     while found != steps:
@@ -217,7 +221,7 @@ def require_apart(source: str | Path, out: Path) -> None:
         return
     path = Path(location.source)
     outermost = next((p for p in [*reversed(path.parents), path] if p.suffix == ".zarr"), path)
-    # not Path.resolve, which has no word of ours for links in a ring
+    # not Path.resolve, which raises its own error for a ring of links
     if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(outermost)):
         raise UsageError(
             f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "

@@ -1,8 +1,8 @@
-"""One command at a time writes into an OUT: who comes second is told who is at work there.
+"""One command at a time writes into an OUT; a second one gets an error that names the first.
 
-OUT/.lock is held by the system's own lock (flock), which ends with its process however that ends: a
-stale file is taken over by itself, and no process id that has been given away again can mislead.
-What the file says is for people alone. On NFS the lock holds between machines (Linux 2.6.12 on).
+OUT/.lock is held by the system's own lock (flock), which ends with its process in any case: the
+next command takes over a stale file, and a reused process ID can't mislead. The file's content is
+for people only. On NFS the lock works between machines (Linux 2.6.12 on).
 """
 
 import json
@@ -22,11 +22,10 @@ from stereocell.storage.temporary_names import clear_remains
 
 @contextmanager
 def alone_in(out: Path, command: str) -> Iterator[None]:
-    """Hold OUT for a command that writes into it; a folder that stays empty is not left behind.
+    """Hold OUT for a command that writes into it; a folder that stays empty is removed.
 
-    If who held it before was killed, what that one had half written is removed.
-
-    Raises OutputError if another process holds it, naming that one, or if OUT can't be written.
+    If the previous holder was killed, its half-written files are removed. Raises OutputError where
+    another process holds OUT (the text names it), or where OUT can't be written.
     """
     made = _missing_folders(out)
     try:
@@ -43,22 +42,22 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
             with holding(Claim((out / LOCK).absolute(), (out / LOCK).read_bytes())):
                 yield
         finally:
-            with suppress(OSError):  # OUT can't be written any more: whoever comes takes it over
-                (out / LOCK).unlink(missing_ok=True)  # while it is held: nobody waits at this file
+            with suppress(OSError):  # OUT isn't writable any more: the next command takes it over
+                (out / LOCK).unlink(missing_ok=True)  # while held: no command waits for it
             os.close(file)
     finally:
         for folder in made:
-            with suppress(OSError):  # something lies in it
+            with suppress(OSError):  # it has content
                 folder.rmdir()
 
 
 def _missing_folders(out: Path) -> list[Path]:
-    """Return OUT and the folders above it that are not there, the innermost first."""
+    """Return OUT and the folders above it that don't exist, the innermost first."""
     return [folder for folder in (out, *out.parents) if not folder.exists()]
 
 
 def _hold(path: Path, command: str) -> tuple[int, bool]:
-    """Return the open lock, and whether who held it before was killed."""
+    """Return the open lock, and whether its previous holder was killed."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
@@ -70,13 +69,13 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
             raise OutputError(
                 f"{path.parent}: {told} is writing here: wait until it has ended"
             ) from None
-        # whoever held it before may have removed the file in between
+        # the previous holder may have removed the file in between
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file), path.stat()):
                 break
         os.close(file)
     was_killed = os.fstat(file).st_size > 0
-    with suppress(OSError):  # a full disk: what it says is for people
+    with suppress(OSError):  # a full disk: the content is only for people
         os.ftruncate(file, 0)
         os.write(file, json.dumps(describe(command)).encode())
     return file, was_killed

@@ -1,9 +1,10 @@
 """One command at a time writes into an OUT on object storage.
 
-On object storage nothing ends by itself: the object is written anew every BEAT_S seconds, and one
-that has not been for STALE_S, or whose process on this machine is gone, is taken over. The clocks
-of machine and storage may differ by minutes. Only one can create it where the storage knows
-conditional writes (AWS since 2024); elsewhere two that begin within a second may both get in.
+On object storage no lock ends by itself. The holder writes the object anew every BEAT_S seconds; a
+command takes over a lock that is older than STALE_S, or whose process on this machine is gone. The
+clocks of machine and storage may differ by minutes. Where the storage supports conditional writes
+(AWS since 2024), only one command can create the lock; elsewhere two that begin within a second may
+both succeed.
 """
 
 import json
@@ -22,17 +23,17 @@ if sys.platform != "win32":
     pass
 from stereocell.storage.claim import describe, in_words
 
-BEAT_S, STALE_S = 60.0, 600.0
-_SETTLE_S = 1.0  # after taking over: another may have done so at once
+BEAT_S, STALE_S = 60.0, 600.0  # s between writes; age in s at which a lock is stale
+_SETTLE_S = 1.0  # s to wait after a takeover: another command may have done the same
 
 
 @contextmanager
 def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[[], None]]:
-    """Hold an OUT on object storage: `path` is the lock's in a file system of fsspec.
+    """Hold an OUT on object storage; `path` is the lock's path in a file system of fsspec.
 
-    Yields what raises OutputError once the lock is another's: who slept past STALE_S, as a laptop
-    does, loses it. Raises OutputError if another process holds it, naming that one. What the
-    storage itself raises is the caller's.
+    Yields a function that raises OutputError once another command holds the lock: a process that
+    sleeps longer than STALE_S, as on a suspended laptop, loses it. Raises OutputError where another
+    process holds it (the text names it). Errors of the storage pass through.
     """
     content = json.dumps(describe(command)).encode()
     _create(fs, path, shown, content)
@@ -42,7 +43,7 @@ def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[
 
     def renew() -> None:
         nonlocal renewed
-        with suppress(Exception):  # a storage that fails now is met where it matters
+        with suppress(Exception):  # a failure of the storage is reported at the next read or write
             there = _read(fs, path)
             if there is not None and there[0] == content:
                 fs.pipe_file(path, content)
@@ -55,7 +56,7 @@ def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[
             renew()
 
     def require() -> None:
-        if not lost and time.time() - renewed > 2 * BEAT_S:  # it has slept
+        if not lost and time.time() - renewed > 2 * BEAT_S:  # the process has slept
             renew()
         if lost:
             raise OutputError(
@@ -85,7 +86,7 @@ def _create(fs: Any, path: str, shown: str, content: bytes) -> None:
                 break
             there = _read(fs, path)
         if there is not None and there[0] == content:
-            break  # it was put, and only the storage's answer to that was lost
+            break  # the write succeeded, only the storage's answer was lost
         if there is not None:
             if not _is_stale(*there):
                 raise OutputError(
@@ -103,7 +104,7 @@ def _create(fs: Any, path: str, shown: str, content: bytes) -> None:
 
 
 def _read(fs: Any, path: str) -> tuple[bytes, float] | None:
-    """Return a lock's content and how many seconds ago it was written; None: there is none."""
+    """Return a lock's content and its age in seconds; None: there is none."""
     try:
         content, written = fs.cat_file(path), fs.modified(path)
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""One OUT on object storage: its objects, fetched and put as files."""
+"""One OUT on object storage: its objects, fetched and uploaded as files."""
 
 import os
 import re
@@ -13,12 +13,12 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.claim import LOCK, has_ended
 from stereocell.storage.object_lock import alone_at
 
-Size = int | None  # of an object in bytes; None: it is gone
+Size = int | None  # of an object in bytes; None: it was removed
 
-_SMALL_BYTES = 1 << 16
-# what tells of others is put after them, in this order
+_SMALL_BYTES = 1 << 16  # largest object that counts as small
+# files that list or describe others; they are uploaded after those, in this order
 _LAST = ("tile.usdc", "stage.usda", "files.json", "manifest.json", "unit.json", "tile.json")
-# what steers a build: a few objects for each unit, all small
+# the objects that steer a build: a few for each unit, all small
 STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
     r"|units/[^/]+/stage\.json|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
@@ -27,14 +27,14 @@ STEERING = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where OUT lies, and the folder in which it is worked on. Picklable."""
+    """The address of OUT, and the local working folder. Picklable."""
 
     address: str
     root: Path
 
     @property
     def shown(self) -> str:
-        """The address without what it may hold in secret."""
+        """The address without secrets."""
         from stereocell.storage.location import Location
 
         return Location.of(self.address).shown.rstrip("/")
@@ -43,10 +43,10 @@ class Place:
 class Mirror:
     """One OUT on object storage, as this process knows it.
 
-    sizes  of all objects by key, where they are known (in the process that runs the command, which
-           alone is in OUT); None: the storage is asked each time
-    claim  what OUT's lock says as long as the command is at work for which this process works
-    news   what this process has put and removed since somebody asked
+    sizes  of all objects by key, bytes, where known (in the process of the command, which alone
+           writes into OUT); None: the storage is asked each time
+    claim  the content of OUT's lock while the command runs that this process works for
+    news   the objects that this process has uploaded and removed since the last reset
     """
 
     def __init__(self, place: Place, claim: bytes = b"") -> None:
@@ -54,8 +54,8 @@ class Mirror:
         self.claim = claim
         self.sizes: dict[str, int] | None = None
         self.news: dict[str, Size] = {}
-        self.making: set[Path] = set()  # folders that this process will keep as a whole
-        self.moves: dict[str, str] = {}  # into one of them: from where, by what it is called there
+        self.making: set[Path] = set()  # folders that this process will upload as a whole
+        self.moves: dict[str, str] = {}  # key in one of them -> key of the object to move there
         self._folders: dict[str, set[str]] = {}
         self._require_alone: Callable[[], None] = self._require_claim
 
@@ -98,10 +98,10 @@ class Mirror:
             if there != self.claim:
                 raise has_ended(self.place.shown)
 
-    # --- what lies there
+    # --- listing
 
     def list_all(self) -> None:
-        """Learn of every object; who holds OUT removes what killed commands left half-made."""
+        """List every object; the holder of OUT removes temporary objects of killed commands."""
         self.sizes = {}
         found = self._find("")
         for key, size in found.items():
@@ -110,7 +110,7 @@ class Mirror:
             self._remove([key for key in found if "/." in f"/{key}" and key != LOCK])
 
     def keys_of(self, path: Path) -> dict[str, int]:
-        """Return the objects of a file or of all below a folder, with their sizes."""
+        """Return the objects of a file, or of all files below a folder, with their bytes."""
         key = self._key(path)
         if self.sizes is None:
             return self._find(key)
@@ -128,7 +128,7 @@ class Mirror:
         return {name[len(base) + 1 :]: entry for name, entry in found.items()}
 
     def marks(self, folder: Path) -> list[tuple[str, int, str]]:
-        """Return key, bytes and the storage's own mark of each object below a folder, in order."""
+        """Return key, bytes and the storage's ETag (or time) of each object below a folder."""
         entries = self._list(self._key(folder)).items()
         return [
             (key, int(e["size"]), str(e.get("ETag") or e.get("LastModified") or ""))
@@ -144,7 +144,7 @@ class Mirror:
                 yield from self._below(child)
 
     def learn(self, news: Mapping[str, Size]) -> None:
-        """Take in what a worker has put and removed. Raises OutputError if OUT is another's now."""
+        """Record a worker's uploads and removals. Raises OutputError if OUT was taken over."""
         self._require_alone()
         for key, size in news.items():
             self._learn(key, size)
@@ -167,16 +167,16 @@ class Mirror:
         key = path.relative_to(self.place.root).as_posix()
         return "" if key == "." else key
 
-    # --- to here
+    # --- download
 
     def fetch(self, keys: Iterable[str]) -> list[Path]:
-        """Fetch the objects that aren't here; return their files."""
+        """Fetch the objects that aren't here yet; return their files."""
         fs, base = self._storage
         files = {key: self.place.root / key for key in keys}
         missing = {key: file for key, file in files.items() if not file.exists()}
         if not missing:
             return []
-        # under another name at first: another worker of this machine may want the same
+        # under another name first: another worker of this machine may fetch the same object
         parts = {key: f.with_name(f".{f.name}.{os.getpid()}") for key, f in missing.items()}
         for file in missing.values():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -186,12 +186,12 @@ class Mirror:
             os.replace(part, missing[key])
         return list(missing.values())
 
-    # --- to there
+    # --- upload
 
     def upload(self, path: Path, there: Mapping[str, str] | None = None) -> None:
-        """Put a file, or all of a folder in place of what was there.
+        """Upload a file, or a folder in place of the old one.
 
-        there  what is to be moved into the folder: from where, by what it is called there
+        there  objects to move into the folder: new key -> old key
         """
         there = there or {}
         files = [path] if path.is_file() else [f for f in path.rglob("*") if f.is_file()]

@@ -1,4 +1,4 @@
-"""Other processes of this machine, and what there is for them."""
+"""Other processes of this machine, and its resources for this one."""
 
 import errno
 import hashlib
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from stereocell.model.errors import StereoCellError
 
-# bytes; measured on 2 cores: below, OpenBLAS gives up, and USD, which writes the stage, crashes
+# bytes of address space; measured on 2 cores: below, OpenBLAS gives up, and USD (stage) crashes
 _LEAST, _LEAST_FOR_STAGE, _LEAST_PER_CORE = 1.5e9, 2.9e9, 0.15e9
 _STAGE_WRITERS = ("build", "stage", "tissue")
 _SIGNS = re.compile(
@@ -23,14 +23,14 @@ _SIGNS = re.compile(
 
 
 def cores() -> int:
-    """Return how many cores this process may use: by its affinity, and by its container's quota."""
-    from dask.system import cpu_count  # takes a while, and most commands don't ask
+    """Return the number of cores for this process, by its affinity and its container's quota."""
+    from dask.system import cpu_count  # slow to import, and most commands don't need it
 
     return int(cpu_count())
 
 
 def available_bytes() -> int:
-    """Return the memory that is free to use, of the machine or of the container."""
+    """Return the free memory in bytes, of the machine or of the container."""
     import psutil
     from distributed.system import memory_limit
 
@@ -38,9 +38,9 @@ def available_bytes() -> int:
 
 
 def address_limit() -> float:
-    """Return the bytes of address space that this process may have (`ulimit -v`), or infinity."""
+    """Return the bytes of address space that this process may use (`ulimit -v`), or infinity."""
     try:
-        import resource  # which Windows lacks
+        import resource  # Windows lacks it
     except ImportError:
         return math.inf
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
@@ -48,9 +48,9 @@ def address_limit() -> float:
 
 
 def require_address_space(command: str) -> None:
-    """Raise StereoCellError where libraries would crash for want of address space, wordlessly.
+    """Raise StereoCellError where libraries would crash for lack of address space.
 
-    What their code, and a stack and a heap for a thread of each core, take before any voxel.
+    The need is that before any voxel: their code, and a stack and a heap for a thread of each core.
     """
     least = _LEAST_FOR_STAGE if command in _STAGE_WRITERS else _LEAST
     least += _LEAST_PER_CORE * (os.cpu_count() or 1)
@@ -62,9 +62,9 @@ def require_address_space(command: str) -> None:
 
 
 def shortage(error: BaseException) -> str:
-    """Return what is to be said of an error if it, or its cause, is a want of memory; else empty.
+    """Return a line for an error that a lack of memory caused, itself or by its cause; else "".
 
-    Threads, processes and shared libraries that can't be had for want of it have errors of theirs.
+    A lack of memory for threads, processes and shared libraries has errors of its own.
     """
     seen: BaseException | None = error
     while seen is not None:
@@ -86,33 +86,33 @@ def _allowed() -> str:
 
 
 def machine() -> str:
-    """Return 8 hexadecimal digits for where a process's id means something: this machine, or this
-    container, since it was started. Others may have its name, and a container's host its start."""
+    """Return 8 hexadecimal digits that identify the scope of process IDs: this machine or container
+    since its start. Another machine may have the same host name, a container its host's boot ID."""
     place = socket.gethostname()
-    with suppress(OSError):  # Linux has them
+    with suppress(OSError):  # Linux has both files
         place += Path("/proc/sys/kernel/random/boot_id").read_text()
         place += os.readlink("/proc/self/ns/pid")
     return hashlib.sha256(place.encode()).hexdigest()[:8]
 
 
 def start_of(process: int) -> str:
-    """Return what tells a running process of this machine from all that had or will have its id.
+    """Return a mark that distinguishes a process of this machine from others with the same ID.
 
-    Empty: it can't be seen, or there is none.
+    Empty: it can't be read, or there is no such process.
     """
     import psutil
 
     with suppress(OSError, psutil.Error):
         if not Path("/proc/self/stat").exists():
             return str(psutil.Process(process).create_time())
-        # what psutil returns moves with the clock on Linux: ticks since the machine's start don't
+        # on Linux psutil's value shifts with the clock; ticks since the machine's start don't
         state, *fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
         return "ended" if state in "ZX" else fields[18]
     return ""
 
 
 def is_alive(process: int, start: str = "") -> bool:
-    """Return whether a process of that id runs, and where its start is known: that very one."""
+    """Return whether a process with this ID runs and, where its start is known, is the same."""
     import psutil
 
     now = start_of(process)

@@ -1,23 +1,23 @@
-"""The names under which files and folders are written, before they take their place."""
+"""The temporary names of files and folders before they are renamed."""
 
 import os
 import re
 import shutil
 from pathlib import Path
 
-# of a file .STEM.TOKEN.SUFFIX, of a folder .NAME.TOKEN.partial and .NAME.TOKEN.old
+# file: .STEM.TOKEN.SUFFIX; folder: .NAME.TOKEN.partial and .NAME.TOKEN.old
 _TEMPORARY = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}(?P<suffix>\.partial|\.old|\.\w+|)")
 
 
 def clear_remains(out: Path) -> None:
-    """Remove all that a killed command left in the OUT that it wrote into."""
+    """Remove all temporary files that a killed command left in its OUT."""
     for path in out.rglob(".*"):
         if _TEMPORARY.fullmatch(path.name):
             _remove(path)
 
 
 def clear_beside(path: Path) -> None:
-    """Remove what a killed worker left of `path` beside it."""
+    """Remove the temporary files of `path` that a killed worker left beside it."""
     if path.parent.is_dir():
         for name in os.listdir(path.parent):
             found = _TEMPORARY.fullmatch(name)
@@ -27,6 +27,6 @@ def clear_beside(path: Path) -> None:
 
 def _remove(path: Path) -> None:
     if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)  # who was cut off may still write there
+        shutil.rmtree(path, ignore_errors=True)  # a worker that was cut off may still write there
     else:
         path.unlink(missing_ok=True)

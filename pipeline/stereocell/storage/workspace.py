@@ -1,14 +1,14 @@
-"""An OUT on object storage: written and read here as files, kept there as objects.
+"""An OUT on object storage: written and read here as files, stored there as objects.
 
-pxr, numpy and PIL want files. So where OUT is an address (`s3://...`), a command works in a folder
-of this machine that lasts as long as it does, and each of a cluster's workers in one of the same
-name on its own machine:
+pxr, numpy and PIL need files. So where OUT is an address (`s3://...`), a command works in a
+temporary folder of this machine, and each worker of a cluster in one of the same name on its own
+machine:
 
-- `upload` puts what was written under its final name, whole, what tells of the others last. A large
-  file is then taken away here: the disk holds what is at work, never the build.
-- `fetch` gets what is about to be read; the small files that steer a build come at the start.
+- `upload` stores a written file or folder under its final name, whole, files that describe others
+  last. It then removes a large file here: the disk holds the work in progress, never the build.
+- `fetch` gets a file before it is read; small files that steer a build are fetched at the start.
 
-In any other folder these do nothing, so that readers and writers just call them.
+For any other folder these functions do nothing, so that readers and writers can always call them.
 """
 
 import os
@@ -24,20 +24,20 @@ from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.object_store import STEERING, Mirror, Place
 from stereocell.storage.processes import is_alive, machine
 
-# of whose command: where it runs, and its process
+# folder of a command: its machine, its process
 _SCRATCH = re.compile(r"stereocell\.([0-9a-f]{8})\.(\d+)\.\w+")
-_LONGEST_S = 7 * 24 * 3600.0  # no command of another machine works for so long in one folder
+_LONGEST_S = 7 * 24 * 3600.0  # longest work of another machine's command in one folder
 
 _open: list[Mirror] = []  # of this process: none or one
 
 
 def _of(path: Path) -> Mirror | None:
-    """Return the mirror that a path lies in."""
+    """Return the mirror that a path lies in; None: the path is local."""
     return next((mirror for mirror in _open if path.is_relative_to(mirror.place.root)), None)
 
 
 def fetch(*paths: Path) -> None:
-    """Fetch files, or all of folders. Raises OutputError."""
+    """Fetch files, or all files of folders. Raises OutputError where the storage fails."""
     for path in paths:
         mirror = _of(path)
         if mirror is not None and not path.is_file():
@@ -46,9 +46,9 @@ def fetch(*paths: Path) -> None:
 
 @contextmanager
 def cached(*paths: Path) -> Iterator[None]:
-    """Have files, or all of folders, here within the block; what it fetched is gone afterwards.
+    """Fetch files, or all files of folders, for the block; fetched files are removed at its end.
 
-    Raises OutputError.
+    Raises OutputError where the storage fails.
     """
     fetched: list[Path] = []
     try:
@@ -63,9 +63,9 @@ def cached(*paths: Path) -> Iterator[None]:
 
 
 def upload(path: Path) -> None:
-    """Put a file that was written under its final name. Raises OutputError.
+    """Upload a file that was written under its final name. Raises OutputError.
 
-    One of a folder that this process is making is put with the folder.
+    A file of a folder that this process is making is uploaded with the folder.
     """
     mirror = _of(path)
     if mirror is not None and not any(path.is_relative_to(folder) for folder in mirror.making):
@@ -74,7 +74,7 @@ def upload(path: Path) -> None:
 
 @contextmanager
 def making(folder: Path, final: Path) -> Iterator[None]:
-    """Put a folder as a whole that the block makes at `folder` and renames to `final`."""
+    """Upload a folder as a whole: the block writes it at `folder` and renames it to `final`."""
     mirror = _of(folder)
     if mirror is None or any(folder.is_relative_to(outer) for outer in mirror.making):
         yield
@@ -91,7 +91,7 @@ def making(folder: Path, final: Path) -> Iterator[None]:
 
 
 def move(file: Path, to: Path) -> None:
-    """Have a file that is kept in a folder that is being made, too; it may be gone from its own."""
+    """Move or link a stored file into a folder that is being made; its old path may vanish."""
     mirror = _of(file)
     if mirror is not None and not file.is_file():
         mirror.moves[mirror._key(to)] = mirror._key(file)
@@ -99,12 +99,12 @@ def move(file: Path, to: Path) -> None:
     to.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(file, to)
-    except OSError:  # a file system without
+    except OSError:  # a file system without links
         os.replace(file, to)
 
 
 def remove(path: Path) -> None:
-    """Remove a file, or a folder with all that lies in it, if it is there. Raises OutputError."""
+    """Remove a file, or a folder with all its files, if it exists. Raises OutputError."""
     mirror = _of(path)
     if mirror is not None:
         mirror.remove(path)
@@ -115,7 +115,7 @@ def remove(path: Path) -> None:
 
 
 def sizes_below(path: Path) -> dict[Path, int]:
-    """Return every file at or below a path, here or kept, in order, with its bytes."""
+    """Return every file at or below a path, local or stored, in order, with its bytes."""
     mirror = _of(path)
     if mirror is not None:
         return {mirror.place.root / key: n for key, n in sorted(mirror.keys_of(path).items())}
@@ -124,7 +124,7 @@ def sizes_below(path: Path) -> dict[Path, int]:
 
 
 def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:
-    """Return key, bytes and mark of all that is kept below a folder: what an edit alters.
+    """Return key, bytes and mark of all objects below a folder: an edit changes them.
 
     None for a folder that is on no object storage.
     """
@@ -133,24 +133,24 @@ def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:
 
 
 def is_file(path: Path) -> bool:
-    """Return whether a file is there, here or kept."""
+    """Return whether a file exists, local or stored."""
     return path.is_file() or (_of(path) is not None and path in sizes_below(path))
 
 
 def is_mirrored(path: Path) -> bool:
-    """Return whether a path is of an OUT on object storage: here are copies, of later times."""
+    """Return whether a path belongs to an OUT on object storage: local copies have later times."""
     return _of(path) is not None
 
 
 @contextmanager
 def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
-    """Yield the folder of this machine in which an OUT at an address is worked on.
+    """Yield the folder of this machine that stands for an OUT at an address.
 
-    Holds OUT for a `command` that writes there; without one, all of OUT is fetched, or what lies
-    below one folder of it. In errors from inside the block, the address stands for the folder.
+    command  writes into OUT, which is held for it; empty: all of OUT is fetched
+    only     without a command: fetch only the objects below this folder of OUT
 
-    Raises OutputError if nothing can be read there or another command writes there, UsageError for
-    an address that can't be written.
+    In errors from inside the block, the address replaces the folder. Raises OutputError where the
+    storage fails or another command writes there, UsageError for an address that can't be written.
     """
     if address.partition("://")[0] in ("http", "https"):
         from stereocell.storage.location import Location
@@ -177,7 +177,7 @@ def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
 
 
 def _clear_scratch() -> None:
-    """Remove what killed commands left here: this machine's, and others' whose workers ran here."""
+    """Remove folders that killed commands left here: this machine's, and old ones of others."""
     for folder in Path(tempfile.gettempdir()).glob("stereocell.*"):
         name = _SCRATCH.fullmatch(folder.name)
         if name is None:
@@ -190,7 +190,7 @@ def _clear_scratch() -> None:
 
 
 def joined(place: Place, claim: bytes) -> Mirror:
-    """Return the mirror of an OUT that this process works on for a command elsewhere."""
+    """Return the mirror of an OUT on which this process works for a command elsewhere."""
     mirror = next((mirror for mirror in _open if mirror.place == place), None)
     if mirror is None:
         _clear_scratch()
@@ -206,6 +206,6 @@ def opened_here() -> Mirror | None:
 
 
 def forget(root: Path) -> None:
-    """Leave the folder in which this process worked, and remove it."""
+    """Close the mirror of this process and remove its folder."""
     _open.clear()
     shutil.rmtree(root, ignore_errors=True)

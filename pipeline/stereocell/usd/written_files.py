@@ -1,11 +1,10 @@
-"""files.json of a stage: what the build wrote there, to be told from damage and from edits.
+"""files.json of a stage lists the files that the build wrote, to detect damage and edits.
 
-A layer that is not as it was written and can still be opened may have been edited in place, though
-layers of an artist's own are where edits belong, or be damaged: both are said. It is never made
-anew by itself, and it is used: but for a binary one of the very size that it had. USD opens most of
-those in which a bit flipped (34 of 40 tried gave a bundle), and an edit that is saved is seldom as
-long to the byte. Any other file that differs is damaged. Files that are not listed are an artist's
-own.
+A layer that differs from the list but can be opened may have been edited in place (although edits
+belong in an artist's own layers), or be damaged; messages name both. It is never rebuilt
+automatically, and it is used, except for a binary layer of unchanged size. USD opens most layers
+with a flipped bit (34 of 40 tried gave a bundle), and a saved edit seldom has the same length to
+the byte. Any other file that differs is damaged. Files outside the list are an artist's own.
 """
 
 import hashlib
@@ -36,13 +35,13 @@ ADVICE = "edits belong in a layer of your own over the stage"
 
 
 def write_list(stage_dir: Path, tiles: FileList, *others: Path) -> None:
-    """Write files.json: the files of `tiles`, which are known, and all that is at `others`."""
+    """Write files.json: the given entries of `tiles`, and new ones of all files at `others`."""
     listed = {**tiles, **list_files(*others, root=stage_dir)}
     write_bytes(stage_dir / FILES, encode(listed))
 
 
 def read_stage_list(stage_dir: Path) -> dict[str, Any]:
-    """Return what files.json holds. Raises OutputError."""
+    """Return the content of files.json. Raises OutputError where it is missing or damaged."""
     return read_list(stage_dir / FILES, REMEDY)
 
 
@@ -52,7 +51,7 @@ def digest_of(listed: FileList) -> str:
 
 
 def find_damage(root: Path, listed: FileList, since: Path | None = None) -> dict[str, str]:
-    """Return what is wrong with the files of a list, by path: as `file_list.find_faults` says, or
+    """Return the fault of each file of a list that has one, by path: as `file_list.find_faults`, or
     CHANGED or DOUBTFUL for a layer."""
     faults = find_faults(root, listed, since)
     return {
@@ -62,7 +61,7 @@ def find_damage(root: Path, listed: FileList, since: Path | None = None) -> dict
 
 
 def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
-    """Return what is to be said of a file that is not the one of the list."""
+    """Return the fault of a file that differs from the list."""
     if file.suffix not in LAYER_SUFFIXES:
         return DAMAGED
     with cached(file):
@@ -73,23 +72,23 @@ def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
 
 
 def is_kept(root: Path, listed: FileList, since: Path) -> bool:
-    """Return whether no file of a list is lost or damaged but a layer that may have been edited."""
+    """Return whether every file of a list is unchanged or a layer that may have been edited."""
     return set(find_damage(root, listed, since).values()) <= {CHANGED, DOUBTFUL}
 
 
 @dataclass(slots=True)
 class AsWritten:
-    """What the lists of the stages say of the files that are read from them.
+    """Compares files with the lists of their stages before they are read.
 
-    lists    of each stage by its folder; those of others are read there once they are needed
-    changed  layers that are not as they were written, and were let through
+    lists    of each stage by its folder; other lists are read there on first use
+    changed  layers that differ from their list and were accepted
     """
 
     lists: dict[Path, FileList] = field(default_factory=dict)
     changed: set[Path] = field(default_factory=set)
 
     def require(self, file: Path) -> Path:
-        """Return a file, which is at hand. Raises StageError for a damaged one."""
+        """Return a fetched file. Raises StageError where it is missing or damaged."""
         place = file.parent.resolve() / file.name
         folder, listed = self._list_over(place.parent)
         entry = listed.get(place.relative_to(folder).as_posix())
@@ -98,7 +97,7 @@ class AsWritten:
         return file
 
     def require_layers(self, folder: Path) -> None:
-        """Raise StageError if a layer right in a folder of a stage is damaged or lost."""
+        """Raise StageError where a layer directly in a folder of a stage is missing or damaged."""
         folder = folder.resolve()
         root, listed = self._list_over(folder)
         for path, entry in listed.items():
@@ -108,7 +107,7 @@ class AsWritten:
                 self._require(file, entry)
 
     def _list_over(self, folder: Path) -> tuple[Path, FileList]:
-        """Return the list that holds what lies in a folder, and where it lies; an empty one."""
+        """Return the folder of the list that covers `folder`, and the list; or an empty one."""
         for parent in (folder, *folder.parents):
             if parent not in self.lists:
                 # a bundle has a files.json, too
