@@ -268,7 +268,7 @@ def _digest_of_bundle(out_folder: OutFolder) -> str:
 
 
 def digest_of_manifest(out_folder: OutFolder) -> str:
-    """Return a digest of the bundle's manifest, which no list holds; empty: there is none."""
+    """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
     manifest = out_folder.bundle_dir / bundle_writer.MANIFEST
     with cached(manifest):
         return str(measure(manifest)["sha256"])[:20] if manifest.is_file() else ""

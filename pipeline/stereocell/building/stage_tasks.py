@@ -46,7 +46,7 @@ class TileTask:
         return self.stage_dir / "tiles" / self.content.id
 
     def is_done(self) -> bool:
-        """Return whether the tile stands whole and comes from the same things, whole as well."""
+        """Return whether the tile and its units are whole, and its inputs are unchanged."""
         found = find_sealed(self.record, _RECORD)
         if found is None or found["key"] != self.key:
             return False
@@ -54,7 +54,7 @@ class TileTask:
         return are_whole and written_files.is_kept(self.folder, found["files"], since=self.record)
 
     def listed(self) -> FileList:
-        """Return the files of the tile, which is done, by their paths from the stage's folder."""
+        """Return the files of a finished tile, by their paths from the stage's folder."""
         found = read_sealed(self.record, _RECORD, written_files.REMEDY)
         return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
 

@@ -1,7 +1,7 @@
-"""survey.json: what the first pass found of each channel.
+"""survey.json: the first pass's results for each channel.
 
-pydantic turns the dataclasses into plain values and back; schemas/units.schema.json says what other
-readers find there.
+pydantic turns the dataclasses into plain values and back; schemas/units.schema.json describes the
+file for other readers.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class TileIso:
                 has none, and is built with the mean of the others
     background  mean over the tile, voxel values; 0: none is subtracted
     confidence  0..1
-    reason      why the value is no better known; empty: it is sure
+    reason      the reason for a low confidence; empty: the value is certain
     file        the tile's own result, relative to OUT
     """
 
@@ -36,10 +36,10 @@ class TileIso:
 
 @dataclass(frozen=True, slots=True)
 class ChannelSurvey:
-    """One channel, as the first pass found it.
+    """The first pass's results for one channel.
 
-    statistics_file  where the statistics were read from, relative to OUT
-    iso              by tile id
+    statistics_file  the file of the statistics, relative to OUT
+    iso              by tile ID
     """
 
     statistics: ChannelStatistics
@@ -49,11 +49,11 @@ class ChannelSurvey:
     appearance: Appearance
 
 
-Survey = dict[str, ChannelSurvey]  # by channel id
+Survey = dict[str, ChannelSurvey]  # by channel ID
 
 
 def read_survey(out_folder: OutFolder) -> Survey:
-    """Return what survey.json holds. Raises OutputError where it is missing or damaged."""
+    """Return the content of survey.json. Raises OutputError where it is missing or damaged."""
     return _surveys().validate_python(out_folder.survey())
 
 

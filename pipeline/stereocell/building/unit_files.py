@@ -91,7 +91,7 @@ def find_damage(directory: Path) -> dict[str, str]:
 
 
 def load_record(directory: Path) -> dict[str, Any]:
-    """Return what unit.json holds: triangles, distances, reason. Raises OutputError."""
+    """Return the content of unit.json: triangles, distances, reason. Raises OutputError."""
     return read_sealed(directory / _RECORD, SCHEMA, _remedy(directory))
 
 

@@ -33,15 +33,15 @@ def _stop(*_: object) -> None:
 
 @contextmanager
 def interrupts_put_off() -> Iterator[None]:
-    """Within, Ctrl-C and SIGTERM wait: what must not be left half done is short, and ends itself.
+    """Delay Ctrl-C and SIGTERM until the end of the block, which must be short and end by itself.
 
-    The last that came is raised at the end.
+    The last signal that arrived is raised at the end.
     """
     came: list[int] = []
     before = {}
-    if threading.current_thread() is threading.main_thread():  # only it can ask for that
+    if threading.current_thread() is threading.main_thread():  # only it can set handlers
         for number in (signal.SIGINT, signal.SIGTERM):
-            if callable(signal.getsignal(number)):  # neither ignored nor the system's
+            if callable(signal.getsignal(number)):  # neither ignored nor the system's default
                 before[number] = signal.signal(number, lambda found, _: came.append(found))
     try:
         yield

@@ -104,7 +104,7 @@ def _check_files(location: Location, tiff: TiffFile) -> None:
     if not location.is_local or not tiff.ome_metadata:
         return
     root = ElementTree.fromstring(tiff.ome_metadata)
-    names = {  # each once: there may be one for each plane
+    names = {  # each once: every plane may name its file
         element.get("FileName"): None
         for element in root.iter()
         if element.tag.endswith("UUID") and element.text != root.get("UUID", "")

@@ -208,7 +208,7 @@ def _lod(record: dict[str, Any], size: int) -> LodFacts:
 
 
 def read_curve(out: Path, unit: UnitFacts) -> dict[str, Any]:
-    """Return what the first round wrote of a unit: levels, score, found (none if constant)."""
+    """Return the first pass's result of a unit: levels, score, found (none if constant)."""
     return read_sealed(out / unit.iso_file, ISO_VALUE, AGAIN)
 
 

@@ -132,7 +132,7 @@ class _Bare(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_Pass(self, node: ast.Pass) -> None:
-        """Leave out what does nothing."""
+        """Remove statements without effect."""
 
     def visit_Raise(self, node: ast.Raise) -> ast.AST:
         """Remove an error's text; keep its class and the statement."""

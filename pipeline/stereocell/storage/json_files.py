@@ -1,7 +1,7 @@
-"""JSON files of ours: read against their schema, one line for what is wrong; written whole.
+"""JSON files of ours: checked against their schema, with errors of one line; written whole.
 
-A sealed one holds a hash of all else that is in it, as `sha256`: of numbers a schema says little,
-and one digit that changed would be built on.
+A sealed file has a hash of its other content, `sha256`: a schema can't detect a changed digit of a
+number, and the build would go on with it.
 """
 
 import hashlib
@@ -27,9 +27,9 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
     """Return the content of a JSON file that fits `schema`.
 
     schema  a file of schemas/, with `#Name` for one of its definitions; None: any JSON
-    remedy  what the user can do about a file that is missing or damaged
+    remedy  the user's next step where the file is missing or damaged, for messages
 
-    Raises OutputError, which names file, field and remedy.
+    Raises OutputError; its text names file, field and remedy.
     """
     fetch(path)
     try:
@@ -38,7 +38,7 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
         raise OutputError(f"{path} is missing: {remedy}") from None
     except OSError as error:
         raise OutputError(f"{path}: can't be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:  # of lists in lists in lists
+    except (ValueError, RecursionError) as error:  # of deeply nested lists
         raise OutputError(f"{path}: damaged, no JSON ({error}): {remedy}") from None
     if schema is None:
         return content
@@ -69,17 +69,19 @@ def find_json(path: Path, schema: str) -> Any:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Put `content` at `path` as JSON, whole or not at all. Raises OutputError."""
+    """Write `content` to `path` as JSON, whole or not at all. Raises OutputError."""
     write_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 
 def write_sealed(path: Path, content: Mapping[str, Any]) -> None:
-    """Put `content` at `path` as sealed JSON, whole or not at all. Raises OutputError."""
+    """Write `content` to `path` as sealed JSON, whole or not at all. Raises OutputError."""
     write_json(path, {**content, _SEAL: _digest_of(content)})
 
 
 def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
-    """Return what sealed JSON holds, as `read_json` does. Raises OutputError, for damage too."""
+    """Return the content of sealed JSON, without its hash. Raises OutputError as `read_json` does,
+    and where the hash differs.
+    """
     content = dict(read_json(path, schema, remedy))
     if content.pop(_SEAL) != _digest_of(content):
         raise OutputError(f"{path}: damaged: {remedy}")
@@ -87,7 +89,7 @@ def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
 
 
 def find_sealed(path: Path, schema: str) -> dict[str, Any] | None:
-    """Return what sealed JSON holds, or None where there is none that is as it was written."""
+    """Return the content of sealed JSON, or None where it is missing, invalid or changed."""
     try:
         return read_sealed(path, schema, "")
     except OutputError:
@@ -99,7 +101,7 @@ def _digest_of(content: Mapping[str, Any]) -> str:
 
 
 def compact_json(content: Any) -> bytes:
-    """Return JSON for what a phone waits for: half the bytes."""
+    """Return JSON without spaces, half the bytes, for files that a phone downloads."""
     return (json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n").encode()
 
 

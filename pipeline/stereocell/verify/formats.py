@@ -119,7 +119,7 @@ def _check_tissue(out: Path) -> str:
 
 
 def _check_units(out_folder: OutFolder) -> str:
-    """Check every file of the units against the hash in its unit.json, and what they rest on."""
+    """Check the units' files against the hashes in unit.json, and the survey behind them."""
     problems, files = _spoilt_survey(out_folder), 0
     for name, key in out_folder.index().items():
         tile_id, channel_id = name.split("/")
@@ -134,7 +134,7 @@ def _check_units(out_folder: OutFolder) -> str:
 
 
 def _spoilt_survey(out_folder: OutFolder) -> list[str]:
-    """Return what is wrong with the survey and with the windows and iso-values it was made of."""
+    """Return the faults of the survey, and of its files of windows and iso-values."""
     survey = find_sealed(out_folder.survey_file, SURVEY)
     if survey is None:
         return [_fault_of(out_folder, out_folder.survey_file)]
@@ -346,9 +346,9 @@ def _spoilt_content(content: Content) -> list[str]:
 
 
 def _check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
-    """Check every file against files.json, every reference too, and that no file is unlisted.
+    """Compare every file and every reference with files.json, and report unlisted files.
 
-    out_folder  the OUT that the bundle lies in, which knows the manifest; None: it lies by itself
+    out_folder  the OUT of the bundle, which has a hash of the manifest; None: a bundle by itself
     """
     manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
     listed = read_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)

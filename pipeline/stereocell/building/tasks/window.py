@@ -59,7 +59,7 @@ def statistics_to_json(statistics: ChannelStatistics) -> dict[str, Any]:
 
 
 def statistics_from_json(content: Mapping[str, Any]) -> ChannelStatistics:
-    """Return what `statistics_to_json` was given; the content has passed its schema."""
+    """Return statistics that `statistics_to_json` converted; `content` has passed its schema."""
     return _adapter().validate_python(content)
 
 
