@@ -19,6 +19,9 @@ from stereocell.building.source_tasks import (
     run_on_input,
 )
 from stereocell.building.survey_file import (
+    AGAIN,
+    ISO_VALUE,
+    WINDOW,
     ChannelSurvey,
     Survey,
     TileIso,
@@ -44,9 +47,6 @@ from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import ChannelStatistics, make_appearance
-
-WINDOW, ISO_VALUE = "units.schema.json#Window", "units.schema.json#IsoValue"
-AGAIN = "run `stereocell units OUT` again"
 
 
 def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey:

@@ -14,6 +14,10 @@ from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
+# The files that the first pass leaves beside survey.json, and the remedy for a damaged one
+WINDOW, ISO_VALUE = "units.schema.json#Window", "units.schema.json#IsoValue"
+AGAIN = "run `stereocell units OUT` again"
+
 
 @dataclass(frozen=True, slots=True)
 class TileIso:

@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from json import JSONDecodeError
 from xml.etree.ElementTree import ParseError
 
-from bioio_base.exceptions import UnsupportedFileFormatError
-from botocore.exceptions import BotoCoreError  # type: ignore[import-untyped]
 from pydantic import ValidationError
 from zarr.errors import NodeNotFoundError
 from zstandard import ZstdError
@@ -39,15 +37,21 @@ _FAULTS = (
     struct.error,
     zlib.error,
     ZstdError,
-    BotoCoreError,
-    UnsupportedFileFormatError,
 )
+# Classes of libraries that take long to import: an error of theirs is raised once they are there
+_UNSUPPORTED = ("bioio_base.exceptions", "UnsupportedFileFormatError")
+_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"), _UNSUPPORTED)
 
 
 def _faults() -> tuple[type[BaseException], ...]:
-    """Return the caught classes: aiohttp's too where it is imported already (it is slow)."""
-    aiohttp = sys.modules.get("aiohttp")
-    return _FAULTS if aiohttp is None else (*_FAULTS, aiohttp.ClientError)
+    """Return the caught classes, of the slow libraries those that are imported already."""
+    late = (_imported(module, name) for module, name in _LATE)
+    return (*_FAULTS, *(found for found in late if found is not None))
+
+
+def _imported(module: str, name: str) -> type[BaseException] | None:
+    """Return a library's class of errors, or None where the library is not imported."""
+    return getattr(sys.modules.get(module), name, None)
 
 
 @contextmanager
@@ -82,7 +86,8 @@ def raise_if_short(
 
 
 def _reason(error: BaseException) -> str:
-    if isinstance(error, UnsupportedFileFormatError):
+    unsupported = _imported(*_UNSUPPORTED)
+    if unsupported is not None and isinstance(error, unsupported):
         cause = error.__cause__ or error.__context__
         if cause is not None:
             return _reason(cause)
