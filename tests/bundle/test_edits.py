@@ -124,6 +124,22 @@ def test_points_edited_outside_the_variants_are_named_with_the_remedy(edit):
         edit(change)
 
 
+def test_what_moves_over_time_is_refused_and_named(edit):
+    """As a frame of an animation has it, which other programs show."""
+
+    def points(stage):
+        mesh = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0.points")
+        mesh.Set([point + Gf.Vec3f(0, 0, 1) for point in mesh.Get()], 0.0)
+
+    def tile(stage):
+        prim = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+        UsdGeom.Xformable(prim).AddTranslateOp(opSuffix="mine").Set(Gf.Vec3d(0, 5, 0), 0.0)
+
+    for change, name in ((points, "CD31_r0_c0.points"), (tile, r"r0_c0.xformOp:translate:mine")):
+        with pytest.raises(StereoCellError, match=f"{name}: found values over time, expected one"):
+            edit(change)
+
+
 def test_color_of_one_tile_stays_in_that_tile(edit):
     look = "/Specimen/Tiles/r0_c1/CD31/CD31_r0_c1_look"
     edited = edit(

@@ -103,11 +103,11 @@ def test_workers_that_do_not_answer_are_said_in_words(monkeypatch: pytest.Monkey
 # A main thread that fails, and SIGTERM while it ends its workers
 _STOPPED_AT_ITS_END = """
 import asyncio, os, signal, sys
-from distributed import Client
+from distributed import LocalCluster
 from stereocell.engine.interrupts import answering_sigterm
 from stereocell.engine.run import Engine
 
-closed, left = Client._close, [signal.SIGTERM]
+closed, left = LocalCluster._close, [signal.SIGTERM]
 
 async def close(self, *given, **named):
     while left:
@@ -115,7 +115,7 @@ async def close(self, *given, **named):
         await asyncio.sleep(0.5)
     await closed(self, *given, **named)
 
-Client._close = close
+LocalCluster._close = close
 
 def work():
     engine = Engine(1)

@@ -20,6 +20,16 @@ def value_of(prim: Usd.Prim, name: str) -> Any:  # USD's type of the attribute
     return value
 
 
+def require_still(*attributes: Usd.Attribute) -> None:
+    """Raise StageError for values over time, as of an animation: those are not looked at."""
+    for attribute in attributes:
+        if attribute and attribute.GetNumTimeSamples():
+            raise StageError(
+                f"{attribute.GetPath()}: found values over time, expected one without a time: "
+                "nothing moves here, export one frame"
+            )
+
+
 def file_of(attribute: Usd.Attribute) -> Path:
     """Return the file that an asset attribute resolves to. Raises StageError if there is none."""
     asset = attribute.Get() if attribute else None

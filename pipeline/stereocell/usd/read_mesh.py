@@ -14,6 +14,7 @@ from pxr import Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
+from stereocell.usd.read_attributes import require_still
 
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
@@ -33,6 +34,9 @@ def read_mesh(
 
     Raises StageError where its arrays contradict each other.
     """
+    require_still(
+        mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
+    )
     points = _values(mesh.GetPointsAttr(), np.float32)
     counts = _values(mesh.GetFaceVertexCountsAttr(), np.int64)
     indices = _values(mesh.GetFaceVertexIndicesAttr(), np.int64)
