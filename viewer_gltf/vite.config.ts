@@ -75,6 +75,7 @@ export default defineConfig({
           include: ["{src,scripts}/**/*.test.ts"],
           environment: "node",
           isolate: false, // modules are read once for all files, which is most of what they take
+          testTimeout: 30_000, // on a busy machine the longest takes ten times its second
         },
       },
       {
