@@ -393,14 +393,10 @@ def _to_world(prim: Usd.Prim) -> NDArray[np.float64]:
 
     Raises StageError where it is flat, infinite or leads too far away.
     """
-<<<<<<< HEAD
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
-=======
     for path in prim.GetPath().GetAncestorsRange():
         for op in UsdGeom.Xformable(prim.GetStage().GetPrimAtPath(path)).GetOrderedXformOps():
             require_still(op.GetAttr())
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what is raised here
->>>>>>> 6bff063 (Values over time in an edit are refused by name, not passed over)
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     try:
         matrix = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
     except Tf.ErrorException as error:
