@@ -344,12 +344,10 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
         "opacity": 0.7,
         "softness": 0.5,
     }
-    for suggested, shapes, reason in zip(
-        proposals, ([], [triangle] * 2), ("too <dim>", ""), strict=True
-    ):
-        suggested["reason"] = reason
-        suggested["transfer_2d"]["functions"] = {"arcs": shapes}
-    OutFolder(out).survey_file.write_text(json.dumps(survey))
+    proposals[0]["reason"], proposals[1]["reason"] = "too <dim>", ""
+    proposals[0]["transfer_2d"]["functions"] = {}
+    proposals[1]["transfer_2d"]["functions"] = {"arcs": [triangle] * 2}
+    OutFolder(out).save_survey(survey)
     _, parsed = _write(out)
     assert [b for a, b in pairwise(parsed.texts) if a == "2D function"] == [
         "none: too <dim>",
