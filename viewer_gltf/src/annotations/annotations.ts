@@ -29,7 +29,7 @@ import { Ruler } from "./ruler";
 import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
 import { type Sight, screenZoom } from "./style";
 
-/** A head that is held still moves by less. */
+/** Largest move of a head at rest, m. */
 const TREMBLE_M = 0.03;
 
 export type MarksOptions = ReadingOptions &

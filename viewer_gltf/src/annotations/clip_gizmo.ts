@@ -130,7 +130,7 @@ function points(count: number): BufferGeometry {
   return new BufferGeometry().setAttribute("position", positions);
 }
 
-/** The area inside a convex rim, whose points it shares. */
+/** The area inside a convex rim; it shares the rim's points. */
 function fan(rim: BufferGeometry): BufferGeometry {
   const corners = Array.from({ length: MOST_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
   return new BufferGeometry()

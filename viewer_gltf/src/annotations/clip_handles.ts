@@ -30,7 +30,7 @@ export type ClipHandle = Readonly<{ id: ClipHandleId; position: Vec3 }>;
 export type HandleId = ClipHandleId | LampHandleId;
 export type Handle = Readonly<{ id: HandleId; position: Vec3 }>;
 
-/** A ray means a handle within this angle of its middle, by what points. */
+/** Angle around a handle's middle within which a ray means it, radians, by the pointer. */
 export const TOLERANCE_RAD = {
   mouse: 1.3 * HANDLE_RADIUS,
   touch: 2.2 * HANDLE_RADIUS,
@@ -39,7 +39,7 @@ export const TOLERANCE_RAD = {
 } as const;
 export type Pointing = keyof typeof TOLERANCE_RAD;
 
-/** From the plane's middle to its tip, as a share of the longest edge of what is shown. */
+/** Length of the plane's arm, as a share of the longest edge of what is shown. */
 const ARM = 0.2;
 
 export function armOf({ min, max }: Box): number {

@@ -11,7 +11,7 @@ import { Label } from "./label";
 import type { Probed } from "./probe";
 import type { Sight } from "./style";
 
-/** The gaze has to rest for so long. */
+/** Time for which the gaze rests before the name comes, s. */
 export const NAME_S = 0.4;
 
 export type Named = Readonly<{ probed: Probed; text: string }>;

@@ -15,12 +15,12 @@ export const LAMP_HANDLES = ["lamp-0", "lamp-1", "lamp-2"] as const;
 export type LampHandleId = (typeof LAMP_HANDLES)[number];
 /** um, world. */
 export type LampHandle = Readonly<{ id: LampHandleId; position: Vec3 }>;
-/** What of the state says where lamps are. */
+/** The part of the state that places lamps. */
 export type LitState = Pick<ViewerState, "mode" | "areLampsShown" | "trace">;
 
 /**
- * A ray that goes beside the sphere tips a lamp over the rim that its origin sees, by so much: when
- * it comes back it has the lamp on the other side.
+ * Angle, radians, by which a ray beside the sphere tips a lamp over the rim that its origin sees:
+ * when the ray comes back it has the lamp on the other side.
  */
 export const TIP_RAD = (4 * Math.PI) / 180;
 
@@ -29,7 +29,7 @@ export type Slid = Readonly<{ place: Vec3; isBeside: boolean }>;
 /** `action` null: the lamp is there already. */
 export type LampDrag = Readonly<{ action: Action | null; isBeside: boolean }>;
 
-/** Lengths of the specimen: a hand that rests does not begin the picture anew. */
+/** Least move of a lamp, in lengths of the specimen: a hand at rest leaves the picture. */
 const SAME = 1e-9;
 
 export function isLampHandle(id: string): id is LampHandleId {
@@ -49,7 +49,7 @@ export function lampHandles(state: LitState, specimen: Box): readonly LampHandle
 }
 
 /**
- * What dragging a lamp to a ray (um) makes of it; null: it is not there, or the ray says nothing.
+ * The result of dragging a lamp to a ray (um); null: it is not there, or the ray gives no place.
  *
  * @param wasBeside whether the ray before, of the same drag, went beside the sphere
  */
@@ -78,7 +78,7 @@ export function dragLamp(
  * Where a point comes to lie on its sphere about 0 when it follows a ray. Of the two places at which
  * the ray meets the sphere the one nearer to the point counts. Beside the sphere it is the rim that is
  * seen from the ray's origin: the point goes over it to the other side, once, and then along it.
- * null: the ray says nothing about it.
+ * null: the ray gives no place.
  */
 export function slideOnSphere(
   from: Vec3,

@@ -98,7 +98,7 @@ describe("the value at a point", () => {
     expect(valueAt(flat, one, [0, 10], [1, 2, 1])).toBeNull();
   });
 
-  it("is said with the digits that 8 bits hold", () => {
+  it("is written with the digits that 8 bits hold", () => {
     expect(valueText(1234.56, [0, 65535])).toBe("1235");
     expect(valueText(0.123456, [0, 1])).toBe("0.123");
     expect(valueText(12.3456, [0, 255])).toBe("12");
@@ -112,7 +112,7 @@ describe("the distance of two points", () => {
     expect(distanceBetween([1, 2, 3], [3, 5, 9])).toBe(7);
   });
 
-  it("is said with three digits in the unit that keeps it short", () => {
+  it("is written with three digits in the unit that keeps it short", () => {
     const said = [0, 0.0123, 0.4567, 0.9996, 1, 9.996, 12.34, 123.4, 999.4, 999.9, 12345, 1.5e6];
     expect(said.map(distanceText)).toEqual([
       "0 µm",

@@ -1,4 +1,4 @@
-/** What a measurement says: the distance of two points, the channel's value at one. Pure. */
+/** A measurement's text: the distance of two points, the channel's value at one. Pure. */
 import { Matrix4, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
@@ -16,7 +16,7 @@ export type VolumeLevel = Readonly<{
 /** The voxel values of the source that are 0 and 255 in the volumes. */
 export type Window = readonly [number, number];
 
-/** Points of the rim are inside, whatever the matrices round. */
+/** Tolerance at the rim: the matrices round, and points of the rim still are inside. */
 const RIM = 1e-6;
 const DIGITS = 3;
 

@@ -15,7 +15,7 @@ import {
 } from "./style";
 
 const UP = new Vector3(0, 1, 0);
-/** As hex, for the label. */
+/** Colour of points and labels, as hex. */
 const COLOR = "#ffd24a";
 
 export class MeasureMark {
@@ -42,7 +42,7 @@ export class MeasureMark {
     this.show([], "");
   }
 
-  /** `key` tells what the values depend on besides the points: they are read anew when it differs. */
+  /** `key` names what else the values depend on: they are read anew when it differs. */
   show(points: readonly Vec3[], key: string): void {
     this.count = points.length;
     this.ends.forEach(({ mesh, values }, i) => {

@@ -34,7 +34,7 @@ describe("the axes that are seen", () => {
 });
 
 describe("um to a pixel", () => {
-  it("is what projecting two points says, at the depth of the focus", () => {
+  it("equals the projection of two points, at the depth of the focus", () => {
     const camera = new PerspectiveCamera(40, 1.5, 0.01, 20);
     camera.position.set(0.3, -0.2, 2);
     camera.lookAt(0.1, 0.4, -0.5);

@@ -117,7 +117,7 @@ describe("a ray at volumes", () => {
     expect(Math.abs(100 - depth - (found?.point[2] ?? 0))).toBeLessThan(2.1);
   });
 
-  it("tells the channel that is met, and heeds cut and disc", () => {
+  it("returns the channel that is met, and heeds cut and disc", () => {
     const front = volumeOf("A", (z) => (z > 60 ? 255 : 0), 255);
     const back = volumeOf("B", (z) => (z < 30 ? 255 : 0), 255);
     const both = [back, front];

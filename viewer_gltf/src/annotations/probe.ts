@@ -31,10 +31,10 @@ export type Probed = Readonly<{
 }>;
 
 const MOST_SAMPLES = 512;
-/** What is less opaque along the whole ray is not seen. */
+/** Least opacity along a whole ray that the user sees, 0..1. */
 const SEEN = 0.1;
 const BYTES = [0, 255] as const;
-/** A surface may lie outside its volume by so many of its voxels. */
+/** Farthest place of a surface outside its volume, in voxels. */
 const OUTSIDE_VOXELS = 2;
 
 /** The same ray, its direction of unit length. */

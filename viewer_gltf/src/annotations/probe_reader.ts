@@ -20,7 +20,7 @@ import {
 } from "./probe";
 import { levelAtHand, TexelCache } from "./texel_cache";
 
-/** Where a ray meets a volume is looked for in a level of at most so many texels. */
+/** Most texels of the level in which the reader looks for a ray's hit. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
 
 export type ReadingOptions = Readonly<{

@@ -8,12 +8,12 @@ import { chooseScaleBar, LONGEST_PX } from "../math/round_length";
 import { Label } from "./label";
 import { DIM, disposeMarks, lengthAt, MARKS_ORDER, markMesh, type Sight } from "./style";
 
-/** The longest ruler is seen under this angle. */
+/** Angle under which the user sees the longest ruler, radians. */
 const LONGEST_RAD = (16 * Math.PI) / 180;
 const THICKNESS_RAD = (0.25 * Math.PI) / 180;
-/** Below the specimen, as a share of its longest edge. */
+/** Gap between specimen and ruler, as a share of the specimen's longest edge. */
 const GAP = 0.06;
-/** 1, 2 and 5 are all told apart by five parts, every second one of them dark. */
+/** Parts of the ruler, every second one dark: five parts distinguish lengths of 1, 2 and 5. */
 const PARTS = 5;
 
 /** A round length for a ruler at a distance, um. */

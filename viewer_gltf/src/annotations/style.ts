@@ -18,9 +18,9 @@ import {
 } from "three";
 
 const RADIANS = Math.PI / 180;
-/** After the marched volumes, which lie over everything else. */
+/** Render order: after the marched volumes, which lie over everything else. */
 export const MARKS_ORDER = 1001;
-/** Opacity of what lies behind a surface. */
+/** Opacity of marks behind a surface, 0..1. */
 const GHOST = 0.35;
 
 export const ACCENT = 0x5aa9ff;
@@ -30,19 +30,19 @@ export const MEASURE = 0xffd24a;
 export const PLANE = 0xc792ff;
 const RIM = 0x0b0d12;
 const RIM_SCALE = 1.3;
-/** x, y, z: told apart by colour-blind eyes too (after Okabe & Ito), and labelled. */
+/** x, y, z: distinct to colour-blind eyes too (after Okabe & Ito), and labelled. */
 export const AXIS_COLORS = ["#e8743b", "#35b98c", "#6cb8f0"] as const;
 
-/** Radians, in a headset. */
+/** Radii of marks in a headset, radians. */
 export const HANDLE_RADIUS = 0.7 * RADIANS;
-/** A handle that is meant or held is so much larger. */
+/** Size of a handle that is meant or held, as a factor. */
 export const MEANT = 1.35;
 export const POINT_RADIUS = 0.28 * RADIANS;
 export const LINE_RADIUS = 0.06 * RADIANS;
-/** Of a label's line. */
+/** Height of a label's line in a headset, radians. */
 export const LABEL_HEIGHT = 1.15 * RADIANS;
 
-/** Of a label's line on a flat screen, CSS pixels; all else in proportion. */
+/** Height of a label's line on a flat screen, CSS pixels; all else in proportion. */
 export const LABEL_PX = 20;
 
 /** Where the eye is, um; where up is to it, of any length; how much larger than in a headset angles are. */

@@ -9,9 +9,9 @@ import type { LevelSource } from "../state/on_screen";
 import { levelsToFetch, texels } from "../volumes/mip_levels";
 import type { VolumeLevel } from "./measure";
 
-/** Of memory, beside the texels that were asked for last. */
+/** Most bytes of memory, beside the texels that were asked for last. */
 const KEPT_BYTES = 64 * 1024 * 1024;
-/** Where no level is at hand, the finest one of so many texels is fetched. */
+/** Most texels of a level that is fetched where none is at hand. */
 const FETCHED_TEXELS = 4 * 1024 * 1024;
 
 type Kept = Readonly<{ bytes: number; level: Promise<VolumeLevel> }>;

@@ -36,7 +36,7 @@ export type Snapshot = Readonly<{
   /** Of three's own count. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;
-  /** What is said before the eyes now, in stereo. */
+  /** The notices before the eyes now, in stereo. */
   told: readonly string[];
 }>;
 

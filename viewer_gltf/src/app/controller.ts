@@ -36,9 +36,9 @@ import {
 } from "../xr/cardboard/viewer_profile";
 import type { Viewer } from "./viewer";
 
-/** What a phone lacks for it, the phone says when it is asked. */
+/** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
-/** Figures that change with each frame can be read at this rate. */
+/** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
 const LENS_KEY = "stereocell-lens";

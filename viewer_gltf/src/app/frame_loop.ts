@@ -15,7 +15,7 @@ import { ERROR_TARGET_PX } from "../surfaces/surface_set";
 import type { Stereo } from "../xr/stereo";
 import type { Contents } from "./scene_contents";
 
-/** A page that slept has not been looked at for as long. */
+/** Longest time that a frame counts, s: nobody looked at a page that slept. */
 const LONGEST_FRAME_S = 0.1;
 
 export type FrameOptions = Readonly<{

@@ -1,4 +1,4 @@
-/** Start: find the bundle, show it, or say on the page why not. */
+/** Start: find the bundle, show it, or report on the page why not. */
 import "../panel/html/page.css";
 import "../panel/html/panel.css";
 import "../panel/html/widgets.css";
@@ -111,7 +111,7 @@ void opened.then(
   (made) => {
     viewer = made;
   },
-  () => undefined, // told above
+  () => undefined, // reported above
 );
 void ready.then(keepOffline, () => undefined);
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
@@ -120,7 +120,7 @@ watchWaiting((isWaiting) =>
 );
 ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 
-/** Bugs: the console has the details, the page says that something is amiss. */
+/** Bugs: the console has the details, the page reports that something is amiss. */
 function reportBug(error: unknown): void {
   if (!(error instanceof Error)) return; // such as a ResizeObserver's harmless message
   viewer?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });

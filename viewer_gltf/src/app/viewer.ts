@@ -33,7 +33,7 @@ import { FrameLoop } from "./frame_loop";
 import { Contents } from "./scene_contents";
 import { StereoTransition } from "./stereo_transition";
 
-/** A phone's third pixel in each direction costs more than it shows. */
+/** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
@@ -267,7 +267,7 @@ export class Viewer {
     if (!(error instanceof BundleError)) throw error;
     const isMendable = error instanceof TemporaryError;
     const text = isMendable ? error.notice : error.message;
-    // for each of a host's files it would be told anew
+    // it would be reported again for each of a host's files
     if (isMendable && this.state.mendable.includes(text)) return;
     this.dispatch({ type: "notify", text, isMendable });
   }

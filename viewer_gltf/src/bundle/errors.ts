@@ -6,7 +6,7 @@ export class BundleError extends Error {
 /** A fault that may be gone a second later: no connection, or a host that is busy. */
 export class TemporaryError extends BundleError {
   override readonly name = "TemporaryError";
-  /** What the page says, once for all files that the same befalls. */
+  /** The page's notice, shown once for all files with the same fault. */
   readonly notice: string;
 
   constructor(message: string, { notice = message, ...options }: TemporaryErrorOptions = {}) {

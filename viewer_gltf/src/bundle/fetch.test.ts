@@ -21,7 +21,7 @@ const whole = () =>
 describe("a request", () => {
   afterEach(() => vi.unstubAllGlobals());
 
-  it("whose connection breaks within the file is tried again", async () => {
+  it("is tried again when its connection breaks within the file", async () => {
     const answers = [broken(), whole()];
     const fetched = vi.fn(async () => answers.shift());
     vi.stubGlobal("fetch", fetched);
@@ -48,7 +48,7 @@ describe("a request", () => {
   it.each([
     ["", "can't be reached, or forbids this page"],
     [503, "answers 503"],
-  ])("that fails for the host's sake (%s) is told once for all files", async (status, fault) => {
+  ])("that fails for the host's sake (%s) is reported once for all", async (status, fault) => {
     vi.useFakeTimers();
     vi.stubGlobal("fetch", async () => {
       if (status === "") throw new TypeError("no network");

@@ -16,7 +16,7 @@ describe("a hash", () => {
     await checkHash("a.glb", ABC, SHORT, SHA_256_128);
   });
 
-  it("of other bytes is told with what was expected and what was found", async () => {
+  it("of other bytes is reported with the expected and the found one", async () => {
     const other = HASH.replace("b", "c");
     const wrong = checkHash("a.ktx2: level 2", ABC, other);
     await expect(wrong).rejects.toThrow(

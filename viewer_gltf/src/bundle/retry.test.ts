@@ -27,7 +27,7 @@ describe("a job that may be tried again", () => {
     await expect(withRetries(job, null, [0, 0])).rejects.toThrow("not found");
   });
 
-  it("is told once as waiting, and once as done, however many wait", async () => {
+  it("is reported once as waiting, and once as done, however many wait", async () => {
     const reported: boolean[] = [];
     watchWaiting((isWaiting) => reported.push(isWaiting));
     const jobs = [1, 2, 3].map((n) => failing(n, new TemporaryError("busy")));

@@ -1,9 +1,9 @@
-/** Try again what may succeed a moment later, and say meanwhile that the network is awaited. */
+/** Try again what may succeed a moment later, and report meanwhile that the network is awaited. */
 import { TemporaryError } from "./errors";
 
-/** Before the second, third and fourth try. */
+/** Pauses before the second, third and fourth try, ms. */
 export const PAUSES_MS: readonly number[] = [300, 1200, 4000];
-/** A device that knows that it has no network is given this long to find one, at each pause. */
+/** Longest wait for a network at each pause, ms, on a device that knows that it has none. */
 const OFFLINE_MS = 30_000;
 
 /** Told when jobs begin to wait for another try, and when none waits any more. */

@@ -37,7 +37,7 @@ describe("the manifest's check", () => {
     expect(checkManifest(MANIFEST)).toBe(MANIFEST);
   });
 
-  it("tells another format and another version, found against expected", () => {
+  it("reports another format and another version, found against expected", () => {
     expect(() => checkManifest({ ...MANIFEST, format: "tileset" })).toThrow(
       'manifest.json: format: expected "stereocell-bundle", found "tileset"',
     );
@@ -76,13 +76,13 @@ describe("other JSON", () => {
     );
   });
 
-  it("that is a host's error page is told as such", () => {
+  it("that is a host's error page is reported as such", () => {
     expect(() => parseJson("<!doctype html><title>Oops</title>", "manifest.json")).toThrow(
       'manifest.json: expected JSON, found "<!doctype html>',
     );
   });
 
-  it("that is cut short is told as such", () => {
+  it("that is cut short is reported as such", () => {
     const text = JSON.stringify(MANIFEST).slice(0, 200);
     expect(() => parseJson(text, "manifest.json")).toThrow(
       /^manifest\.json: the JSON is broken or cut short \(/,

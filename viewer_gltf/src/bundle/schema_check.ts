@@ -15,7 +15,7 @@ export const VERSION = 1;
 function checkSchema(schema: object, value: unknown, path: string): void {
   const result = new Validator(schema as Schema, "2020-12", true).validate(value);
   if (result.valid) return;
-  // The innermost error says most; after a wrong tuple the validator adds a bare "false".
+  // The innermost error is the most exact; after a wrong tuple the validator adds a bare "false".
   const depth = (unit: OutputUnit) => unit.instanceLocation.split("/").length;
   const specific = result.errors.filter((unit) => unit.keyword !== "false");
   const { instanceLocation, error } = (specific.length > 0 ? specific : result.errors).reduce(

@@ -15,7 +15,7 @@ import type { Eyes } from "./eyes";
 import { partOf } from "./offscreen_target";
 import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "./shaders/sources";
 
-/** Order among all that is blended. */
+/** Render order of the pass: first among all that is blended. */
 export const FIRST = -1000;
 export const LAST = 1000;
 

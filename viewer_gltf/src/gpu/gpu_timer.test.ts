@@ -4,7 +4,7 @@ import { GpuTimer, type TimedContext } from "./gpu_timer";
 const RESULT = 1;
 const AVAILABLE = 2;
 
-/** A context whose GPU answers when told to. */
+/** A context with a GPU that answers on demand. */
 function standIn(hasExtension = true) {
   const results = new Map<WebGLQuery, number>();
   const ended: WebGLQuery[] = [];
@@ -75,7 +75,7 @@ describe("the GPU's time", () => {
     expect(queries.deleted).toBe(8);
   });
 
-  it("is not told from a broken clock", () => {
+  it("is not read from a broken clock", () => {
     const { gl, answer, queries } = standIn();
     const timer = GpuTimer.create(gl);
     frame(timer);

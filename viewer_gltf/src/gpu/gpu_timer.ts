@@ -6,7 +6,7 @@
 /** From the extension's registry entry; TypeScript's DOM types leave it out. */
 const TIME_ELAPSED = 0x88bf;
 const GPU_DISJOINT = 0x8fbb;
-/** A driver that never answers must not be given queries without end. */
+/** Most queries without an answer: a driver may never answer. */
 const MOST_PENDING = 8;
 
 export type TimedContext = Pick<

@@ -8,7 +8,7 @@ export type MemoryBudget = Readonly<{ volumes: number; surfaces: number }>;
 const MIB = 1024 * 1024;
 const SMALL: MemoryBudget = { volumes: 128 * MIB, surfaces: 128 * MIB };
 const LARGE: MemoryBudget = { volumes: 512 * MIB, surfaces: 384 * MIB };
-/** GiB, as browsers tell: a computer with so little is treated as a phone is. */
+/** Memory, GiB, as browsers report it: a computer with so little is treated as a phone is. */
 const LITTLE = 4;
 
 export function memoryBudget({ userAgent, deviceMemory }: Device): MemoryBudget {

@@ -25,7 +25,7 @@ export function leaveUncut(mesh: Mesh): void {
   };
 }
 
-/** three uploads a material's uniforms once for all objects that it draws, unless it is told to. */
+/** three uploads a material's uniforms once for all its objects, unless the caller forces it. */
 function setCount(material: Material, uniform: Count, value: number): void {
   if (uniform.value === value) return;
   uniform.value = value;

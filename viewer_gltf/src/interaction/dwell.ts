@@ -10,7 +10,7 @@ export type Dwell = Readonly<{
 }>;
 
 export const DWELL_S = 1.5;
-/** A frame counts for no longer than this: a stall of the page is no gaze. */
+/** Longest time that a frame counts, s: a stall of the page is no gaze. */
 const LONGEST_FRAME_S = 0.1;
 
 export const NO_DWELL: Dwell = { target: null, elapsed_s: 0, hasFired: false };

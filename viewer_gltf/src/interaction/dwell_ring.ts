@@ -18,13 +18,13 @@ const DIAMETER_DEG = 1.5;
 const DOT_DEG = 0.3;
 /** Inner radius as a share of the outer. */
 const HOLE = 0.72;
-/** A dark rim, by so much of the radius: white is seen on anything then. */
+/** Width of the dark rim, as a share of the radius: it makes white visible on anything. */
 const RIM = 0.1;
 const WHITE = 0xffffff;
 const DARK = 0x0b0d12;
 const PARTS = 72;
 const INDICES_PER_PART = 6;
-/** After the volumes' picture, which covers all that is drawn before it. */
+/** Render order: after the volumes' picture, which covers all that is drawn before it. */
 const OVER_ALL = 2000;
 const RADIANS = Math.PI / 180;
 
@@ -43,7 +43,7 @@ export class Ring {
   constructor() {
     this.group.name = "ring";
     this.group.add(...this.parts);
-    // the dark ones first: they lie in one plane, so that nothing else tells their order
+    // the dark ones first: they lie in one plane, so that nothing else gives their order
     this.parts.forEach((part, i) => {
       part.renderOrder = OVER_ALL + i;
     });

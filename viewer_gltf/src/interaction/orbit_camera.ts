@@ -14,10 +14,10 @@ const NEAREST_M = 0.05;
 const FARTHEST_M = 8;
 /** Share of a glide that is left a second after the hand let go. */
 const LEFT_AFTER_A_SECOND = 0.88 ** 60;
-/** A key turns by this. */
+/** Turn by one key press, radians. */
 const TURN_RAD = Math.PI / 12;
 const ZOOM = 0.8;
-/** And moves by this share of the picture's height. */
+/** Move by one key press, as a share of the picture's height. */
 const PAN = 0.1;
 
 /** Metres of the room. */

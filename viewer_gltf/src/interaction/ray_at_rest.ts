@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 import type { Ray } from "../math/vec3";
 
-/** A ray that turns by more has moved. */
+/** Largest turn of a ray at rest, radians. */
 const TREMBLE_RAD = (1.2 * Math.PI) / 180;
 
 export type Rest = Readonly<{ ray: Ray; elapsed_s: number }>;

@@ -3,7 +3,7 @@ import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from
 import type { Ray } from "../math/vec3";
 import type { RoomRay } from "./ray_pointer";
 
-/** A pointer that moves less than this between down and up is a click, not an orbit. */
+/** Most px between down and up of a click; a pointer that moves further orbits. */
 const CLICK_PX = 5;
 
 /** The ray from `eye` through `towards` (room) in the specimen's own space (um, world). */
@@ -21,7 +21,7 @@ export function rayUnder(point: Vector2, camera: PerspectiveCamera, specimen: Ob
   return rayInto(specimen, camera.position.clone(), towards);
 }
 
-/** The ray straight ahead of the head, whose pose in the room is `head`. */
+/** The ray straight ahead of the head. `head` is the head's pose in the room. */
 export function rayAhead(head: Matrix4, specimen: Object3D): Ray {
   const eye = new Vector3().setFromMatrixPosition(head);
   return rayInto(specimen, eye, new Vector3(0, 0, -1).applyMatrix4(head));

@@ -24,9 +24,9 @@ export type BoxHandle = Readonly<{
 /** `middle` moves the plane along its normal, `tip` turns it about the middle. */
 export type PlaneHandles = Readonly<{ middle: Vec3; tip: Vec3 }>;
 
-/** The box stays so thick, as a share of the specimen's edge. */
+/** Least thickness of the box, as a share of the specimen's edge. */
 const THINNEST = 0.01;
-/** Rays so parallel to a handle's axis (sine squared of the angle) say nothing about it. */
+/** Least sine squared of the angle between a ray and a handle's axis that gives a place. */
 const PARALLEL = 1e-6;
 
 /** What is left of a ray's span inside box and plane; null: nothing. */

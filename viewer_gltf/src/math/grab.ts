@@ -17,7 +17,7 @@ export type SpecimenPose = Readonly<{
 
 export const SMALLEST_SCALE = 0.05;
 export const LARGEST_SCALE = 50;
-/** Hands closer than this give no direction and no size. */
+/** Least distance of the hands, m: closer ones give no direction and no size. */
 const NEAR_M = 0.01;
 
 export function poseMatrix(pose: SpecimenPose): Matrix4 {

@@ -4,9 +4,9 @@ import type { Box } from "./box";
 import type { ClipPlane } from "./clip";
 import type { Vec3 } from "./vec3";
 
-/** A plane cuts a box in at most so many corners. */
+/** Most corners of a plane's cut through a box. */
 export const MOST_CORNERS = 6;
-/** Corners nearer than this share of the box's diagonal are one. */
+/** Least distance of two corners, as a share of the box's diagonal: nearer ones are one. */
 const SAME = 1e-9;
 
 /** Corners in order round the plane's normal; fewer than three where the plane passes the box by. */

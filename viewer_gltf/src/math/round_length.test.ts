@@ -15,7 +15,7 @@ describe("the scale bar", () => {
     }
   });
 
-  it("says its length in the unit that keeps the number short", () => {
+  it("writes its length in the unit that keeps the number short", () => {
     const labels = [0.0001, 0.004, 0.00625, 0.1, 1, 6.2, 6.25, 20, 100].map(
       (um_per_px) => chooseScaleBar(um_per_px)?.label,
     );

@@ -1,6 +1,6 @@
 /** A scale bar: a round length that is neither too short nor too long on the screen. Pure. */
 
-/** The shortest is 0.4 of it: from 2 to 5 is the largest step between round lengths. */
+/** Longest bar, px. The shortest is 0.4 of it: 2 to 5 is the largest step of round lengths. */
 export const LONGEST_PX = 160;
 
 export type ScaleBar = Readonly<{ length_um: number; length_px: number; label: string }>;

@@ -10,7 +10,7 @@ import type { Asked } from "../bundle/request_log";
 import { type Keys, ownBundle, type Plan, planFor } from "./request_plan";
 import type { Store } from "./store";
 
-/** A network that takes longer than this to answer counts as none where a copy is kept. */
+/** Longest wait for the network's answer, ms: then a kept copy is used. */
 const PATIENCE_MS = 5000;
 const FIRST_SERVER_FAULT = 500;
 
@@ -169,7 +169,7 @@ export class Keeper {
     return response;
   }
 
-  /** Keep a file, or a part of it, if it is what files.json says. The page tells what is not. */
+  /** Keep a file, or a part of it, if it is as in files.json. The page reports any other file. */
   private async keepFile(
     base: string,
     ref: FileRef,
@@ -190,7 +190,7 @@ export class Keeper {
     await this.store.put(this.keys.file(base, ref.sha256, range), { body, type, range: found });
   }
 
-  /** After a restart of this worker the kept manifest tells; that there is none is not for good. */
+  /** After a restart of this worker the kept manifest lists them; its absence is not for good. */
   private async listedOf(base: string): Promise<Listed | null> {
     let listed = this.listed.get(base);
     if (listed === undefined) {
@@ -220,7 +220,7 @@ export class Keeper {
       await this.store.retain(this.keys.files(base), (each) => hashes.has(this.keys.hashOf(each)));
       return listed;
     } catch {
-      return null; // nothing is kept of a bundle that can't be understood; the page says why
+      return null; // nothing is kept of a bundle that can't be understood; the page reports why
     }
   }
 }

@@ -4,7 +4,7 @@ import { ownBundle } from "./request_plan";
 import type { Opened } from "./sw";
 import workerAddress from "./sw?worker&url";
 
-/** A worker takes its pages over within this time, or never. */
+/** Longest time until a worker takes its pages over, ms. */
 const CLAIM_MS = 10_000;
 
 /** Only on a host that browsers trust (https, or this machine), and for bundles of that host. */
@@ -38,7 +38,7 @@ export async function keepOffline(): Promise<void> {
     document.documentElement.dataset.offline = data ? "ready" : "refused";
     port1.close();
   };
-  // Whatever is asked from now on passes the worker; what came before, it is told.
+  // Requests from now on pass the worker; the page reports the earlier ones to it.
   const asked = takeAsked();
   const message: Opened = { type: "opened", page: location.href, asked: wasServed ? [] : asked };
   active?.postMessage(message, [port2]);

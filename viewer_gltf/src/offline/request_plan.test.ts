@@ -15,7 +15,7 @@ describe("the answer to a request", () => {
     expect(plan("https://host/cells/report/", null)).toEqual({ kind: "none" });
   });
 
-  it("tells the viewer's own files from the bundle's", () => {
+  it("distinguishes the viewer's own files from the bundle's", () => {
     expect(plan(`${FOLDER}assets/index-a1.js`)).toEqual({
       kind: "asset",
       name: "assets/index-a1.js",
@@ -71,7 +71,7 @@ describe("the store's keys", () => {
     for (const key of all) expect(new URL(key).href).toBe(key);
   });
 
-  it("tell the hash", () => {
+  it("return the hash", () => {
     const key = keys.file("https://host/a/?t=/1", "00ff", "bytes=0-9");
     expect(key.startsWith(keys.files("https://host/a/?t=/1"))).toBe(true);
     expect(keys.hashOf(key)).toBe("00ff");

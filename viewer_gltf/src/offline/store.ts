@@ -1,13 +1,13 @@
 /**
  * The files that are kept for use without a network: a Cache of the browser, bounded in size, least
- * recently used first to go. A Cache tells neither sizes nor ages: a ledger beside the entries does.
+ * recently used first to go. A Cache has neither sizes nor ages: a ledger beside the entries has.
  */
 import { fromText, outOfRoom, toText, type Use } from "./ledger";
 
 const LIMIT_BYTES = 512 * 1024 * 1024;
-/** What is left after the browser has refused to store more. */
+/** Share of the entries that stays after the browser has refused to store more. */
 const KEPT_AT_REFUSAL = 0.5;
-/** Writing the ledger waits for more changes to come. */
+/** Pause before the ledger is written, ms: more changes may come. */
 const SAVE_DELAY_MS = 300;
 
 /** `range`: the Content-Range of a part of a file. */

@@ -8,7 +8,7 @@ import { Keys } from "./request_plan";
 import { Store } from "./store";
 
 /**
- * What a page tells when it has shown its first picture. The answer, on the port, comes once all is
+ * A page's report of its first picture. The answer, on the port, comes once all is
  * kept: whether the page would open without a network.
  */
 export type Opened = Readonly<{ type: "opened"; page: string; asked: readonly Asked[] }>;

@@ -77,7 +77,7 @@ describe("the grips of the cuts", () => {
     expect(moved("x-min", 1, CLIP, tile).box?.min[0]).toBe(51);
   });
 
-  it("are told with the place that they have now", () => {
+  it("are announced with the place that they have now", () => {
     expect(cutText(CLIP, moved("y-min", 1))).toBe("Box: y from -19.6 µm");
     expect(cutText(CLIP, moved("plane-middle", 1))).toBe("Plane at 27.0 µm");
     expect(cutText(CLIP, moved("turn-x", 6))).toBe("Plane faces 0, -0.5, 0.87");

@@ -21,7 +21,7 @@ type Turn = (typeof TURNS)[number];
 /** A face of the box, the plane along its normal, or the plane about an axis of the specimen. */
 export type ClipPart = BoxHandleId | "plane-middle" | Turn;
 
-/** Of the edge of what is shown. */
+/** One step of a key, as a share of the edge of what is shown. */
 const STEP = 0.02;
 const STEP_RAD = Math.PI / 36;
 const AXIS_NAMES = ["x", "y", "z"] as const;
@@ -72,7 +72,7 @@ export function clipPartName(clipPart: ClipPart): string {
   return `The box, ${side === "min" ? "lower" : "upper"} end of ${AXIS_NAMES[axis]}`;
 }
 
-/** What a change has made of the cuts, in words; that of one part is told alone. */
+/** The announcement of a change of the cuts; a change of one part is announced alone. */
 export function cutText(before: Clip, after: Clip): string {
   const { box, plane } = after;
   if ((before.box === null) !== (box === null) || (before.plane === null) !== (plane === null)) {

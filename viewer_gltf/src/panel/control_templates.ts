@@ -95,7 +95,7 @@ function colourOf<On>(row: ColourParameter<On>, on: On, channel?: string): Colou
   };
 }
 
-/** A colour by the palettes: beside the field for any colour, whose id is another. */
+/** A colour by the palettes: beside the field for any colour, which has another id. */
 export function paletteOf<On>(
   row: ColourParameter<On>,
   on: On,

@@ -20,7 +20,7 @@ export type Lenses = "v1" | "v2" | "own";
 export type PanelChange =
   | Readonly<{ panel: "find"; text: string }>
   | Readonly<{ panel: "page"; page: number }>
-  /** The channel whose card is open, and whom the channel keys mean; null: none. */
+  /** The channel with the open card, which the channel keys mean; null: none. */
   | Readonly<{ panel: "pick"; channel: string | null }>
   /** The part of the cuts that the keys move. */
   | Readonly<{ panel: "clip-part"; clipPart: ClipPart }>

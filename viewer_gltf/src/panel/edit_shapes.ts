@@ -1,6 +1,6 @@
 /**
- * What is done to the shapes of a two-dimensional transfer function: which is meant, what has hold of
- * it, and by which numbers it is told. Plain data and pure functions.
+ * Edits of the shapes of a two-dimensional transfer function: the shape that is meant, its hold,
+ * and the numbers that describe it. Plain data and pure functions.
  */
 
 import type { Shape, ShapeKind, Shapes } from "../bundle/transfer_2d";
@@ -23,9 +23,9 @@ export type Meant = Readonly<{ index: number; count: number }>;
 /** What a pointer has taken hold of, and what it was then. */
 export type Grasp = Readonly<{ index: number; part: Part; from: HistogramPoint; shape: Shape }>;
 
-/** Less than a finger trembles: a press alone moves nothing. */
+/** Least move of a pointer, in the plane's units: a finger trembles, a press moves nothing. */
 const STILL: HistogramPoint = { value: 1 / 255, gradient: 1 / 63 };
-/** New shapes stand beside each other. */
+/** Places of new shapes, 0..1: beside each other. */
 const PLACES = [0.3, 0.5, 0.7, 0.4, 0.6];
 
 /** null: there is none. */
@@ -131,7 +131,7 @@ export const SHAPE_NUMBERS: readonly ShapeNumber[] = [
 
 const ends = ([low, high]: readonly [number, number]) => `${low.toFixed(2)} – ${high.toFixed(2)}`;
 
-/** For who does not see it. */
+/** For a user who can't see it. */
 export function shapeText({ kind, values, gradients, opacity, softness, color }: Shape): string {
   const hex = toHex(color);
   return [

@@ -1,4 +1,4 @@
-/** Keys as the browser tells of them: their names, and who else wants them. */
+/** Keys as the browser reports them: their names, and the elements that want them too. */
 
 /**
  * The name of a key that was pressed: as `KeyboardEvent.key` has it, with Shift where that leaves no

@@ -38,7 +38,7 @@ const CONTEXT: KeyContext = {
 };
 
 describe("the keys", () => {
-  it("mean one thing each, and say what", () => {
+  it("mean one thing each, and name it", () => {
     const names = ALL.flatMap(({ keys }) => keys);
     expect(new Set(names).size).toBe(names.length);
     expect(ALL.filter(({ label }) => label.length < 3)).toEqual([]);
@@ -158,7 +158,7 @@ describe("the keys", () => {
     expect(wishOf("N", { ...CONTEXT, state: whole })).toBeNull();
   });
 
-  it("mean the channel whose card is open, or the first one shown", () => {
+  it("mean the channel with the open card, or the first one shown", () => {
     expect(wishOf("o", CONTEXT)).toEqual({
       type: "set",
       id: "opacity",
@@ -214,7 +214,7 @@ describe("the keys", () => {
     expect(clipOf("n")).toMatchObject({ clip: { plane: { normal: [0, 0, 1], offset_um: 4 } } });
   });
 
-  it("are told in words that name the new value", () => {
+  it("are announced in words that name the new value", () => {
     const ranges = new Map([["c0", [100, 1120] as const]]);
     const after = (name: string) => {
       const wish = wishOf(name, CONTEXT);

@@ -69,7 +69,7 @@ describe("the panel's layout", () => {
     expect(controls.filter(({ label }) => label === "")).toEqual([]);
   });
 
-  it("changes each part of a channel to what its control says", () => {
+  it("changes each part of a channel to its control's value", () => {
     const state = start();
     const layout = laid(state);
     const channel = (wish: Wish) => granted(state, wish).channels[0];
@@ -190,7 +190,7 @@ describe("the panel's layout", () => {
     expect(state.clip.plane).not.toBeNull();
   });
 
-  it("offers in stereo to try again what another try may mend, as long as it is told", () => {
+  it("offers another try in stereo while a notice shows a fault that it may mend", () => {
     const facts = { ...FACTS, isStereo: true };
     const withNotice = (isMendable: boolean) =>
       reduce(start(), { type: "notify", text: "a fault", isMendable });
@@ -209,7 +209,7 @@ describe("the panel's layout", () => {
     expect(clipOf("clip-plane").plane?.offset_um).toBe(3);
   });
 
-  it("says the measured distance, and the channels' values at both ends", () => {
+  it("shows the measured distance, and the channels' values at both ends", () => {
     const points = [
       [0, 0, 0],
       [3, 4, 0],
@@ -231,7 +231,7 @@ describe("the panel's layout", () => {
     expect(find(laid(state), "button", "clear-measured").refusal).toBe("");
   });
 
-  it("says why stereo can't be had, and leaves out what the viewer has not", () => {
+  it("reports why stereo can't be had, and leaves out what the viewer has not", () => {
     const layout = laid(start());
     expect(find(layout, "button", "stereo").refusal).toBe("No headset was found.");
     expect(controlsOf(layout).some(({ id }) => id === "split")).toBe(false);
@@ -241,7 +241,7 @@ describe("the panel's layout", () => {
     expect(find(had, "button", "split").refusal).toBe("");
   });
 
-  it("takes the code of a phone viewer that is not Google's, and says what is wrong with it", () => {
+  it("takes the code of a phone viewer that is not Google's, and reports its fault", () => {
     const faultOfCode = (code: string) => (code === "" ? "The code is empty." : "");
     const facts = { ...FACTS, split: { isAvailable: true, reason: "" }, faultOfCode };
     const other = changePanel(START_VIEW, { panel: "lenses", lenses: "own" });

@@ -25,7 +25,7 @@ export type Facts = StereoSupport &
     /** The specimen, or the isolated tile; um, world. */
     shown: Box;
     ranges: Ranges;
-    /** Of the channel whose joint histogram is open, if it has come. */
+    /** Of the channel with the open joint histogram, if it has come. */
     histogram?: Histogram | null;
     /** The tile that is looked at. */
     focusTile: string | null;
@@ -43,7 +43,7 @@ export type Facts = StereoSupport &
     values: readonly (readonly string[])[];
   }>;
 
-/** The newest few say what is wrong. */
+/** Most notices on the panel: the newest few are enough. */
 const MOST_NOTICES = 3;
 
 const POINT_NAMES = ["First point", "Second point"] as const;

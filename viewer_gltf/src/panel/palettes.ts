@@ -1,6 +1,6 @@
 /**
  * Colours to choose from, sRGB. The field's go by the dye that is usually shown so; the others can
- * be told apart without red or green: Okabe & Ito, "Color Universal Design", 2008 (their black
+ * be distinguished without red or green: Okabe & Ito, "Color Universal Design", 2008 (their black
  * would not show on a dark ground).
  */
 import type { Palette } from "./controls";

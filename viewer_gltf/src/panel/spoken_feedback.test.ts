@@ -16,7 +16,7 @@ const START = [
 const after = (action: Action, before = START) =>
   spokenFeedback(action, before, reduce(before, action), new Map());
 
-describe("what is told of the light", () => {
+describe("announcements of the light", () => {
   it("names the part of a lamp that has changed", () => {
     const { isOn, color, place, numbers } = LAMP[0];
     expect(after(setTo(isOn, false))).toBe("Lamp 1: off");
@@ -26,11 +26,11 @@ describe("what is told of the light", () => {
     expect(after(setTo(numbers[3], 2))).toBe("Lamp 1, strength: 2 x");
   });
 
-  it("says of a lamp that was dragged that it has moved, not where along one axis", () => {
+  it("report of a dragged lamp that it has moved, not where along one axis", () => {
     expect(after({ type: "move-lamp", lamp: 2, place: [1, 0, -1] })).toBe("Lamp 3: moved");
   });
 
-  it("says whether there are lamps to be dragged", () => {
+  it("report whether there are lamps to be dragged", () => {
     const show = (areShown: boolean, before = START) =>
       after({ type: "set", id: "trace/lamps", value: areShown }, before);
     expect(show(true)).toBe("Lamps shown: drag them");
@@ -56,7 +56,7 @@ describe("what is told of the light", () => {
     expect(names.size).toBe(LIGHT_NUMBERS.length);
   });
 
-  it("tells of the room, of scatterings and of what comes after", () => {
+  it("report the room, scatterings and post-processing", () => {
     const set = (id: string, value: string | boolean) => after({ type: "set", id, value });
     expect(set("trace-room", "sky")).toBe("Room: sky");
     expect(set("trace/multiple", false)).toBe("Scattered once");

@@ -13,7 +13,7 @@ import { measuredText } from "./layout";
 import { intensityText, type Ranges } from "./sections/channels";
 import { LENS_NAMES } from "./sections/stereo";
 
-/** @param state after the wish was granted; "" where the picture says it all */
+/** @param state after the wish was granted; "" where the picture shows it all */
 export function spokenFeedback(
   wish: Wish,
   before: ViewerState,

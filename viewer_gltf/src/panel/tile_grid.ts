@@ -1,9 +1,9 @@
-/** Tiles by row and column, where their ids say so: r<row>_c<column>. Row 0 is on top. Pure. */
+/** Tiles by row and column, where their ids hold them: r<row>_c<column>. Row 0 is on top. Pure. */
 
 export type Cell = Readonly<{ id: string; row: number; column: number }>;
 export type Grid = Readonly<{ rows: number; columns: number; cells: readonly Cell[] }>;
 
-/** A map of more cells would be no map to tap on. */
+/** Most cells of a map: the user could not tap on more. */
 const MOST_CELLS = 400;
 
 /** null: the ids are of another kind (or of several layers), or the map would be too large. */

@@ -18,7 +18,7 @@ import type { TraceSettings } from "../state/path_trace_settings";
 import { areSame, type TraceView } from "./eye_rays";
 import { TRACE_DENOISE, TRACE_MEAN, TRACE_SHOW, TRACE_WARP } from "./shaders/sources";
 
-/** With so many samples a pixel is left as it is: see denoise.frag.glsl. */
+/** Samples with which a pixel is left as it is: see denoise.frag.glsl. */
 const DENOISED = 192;
 const DENOISE_GAPS = [1, 2, 4] as const;
 

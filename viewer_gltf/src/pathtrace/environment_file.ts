@@ -9,9 +9,9 @@ import {
   type Radiance,
 } from "./environment_sampling";
 
-/** Finer, a room's light differs from a coarser one's by nothing that a volume shows. */
+/** Most columns of a room's light: a volume would not show finer ones. */
 const MOST_COLUMNS = 512;
-/** A file that claims more is refused. */
+/** Most texels of a file: a larger one is refused. */
 const MOST_TEXELS = 16384 * 8192;
 
 /** A built-in one, which lies beside the viewer. Throws BundleError. */

@@ -46,7 +46,7 @@ export function environmentTables({ width, height, rgb }: Radiance): Environment
   return { width, height, light, aliases: aliasesOf(weights, sum), mean };
 }
 
-/** The same light, whose luminance in the mean is `luminance`; darkness stays. */
+/** The same light, scaled to a mean luminance of `luminance`; darkness stays. */
 export function asBrightAs(tables: EnvironmentTables, luminance: number): EnvironmentTables {
   const [r, g, b] = tables.mean;
   const found = 0.2126 * r + 0.7152 * g + 0.0722 * b;

@@ -19,7 +19,7 @@ const extinctionOf = (table: Float32Array, i: number, channel = 0) =>
   table[4 * (256 * channel + i) + 3];
 
 describe("a medium's table", () => {
-  it("takes away of light in a voxel what the opacity says (Beer and Lambert)", () => {
+  it("takes away light in a voxel by its opacity (Beer and Lambert)", () => {
     const voxel_um = 0.7;
     const made = mediumTable([{ color: WHITE, table: tableOf((i) => i) }], voxel_um, 0, 1);
     for (const i of [0, 1, 100, 200, 254]) {

@@ -7,7 +7,7 @@ import { ROWS } from "../bundle/transfer_2d";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { envelopeOf, type TransferTable2d } from "../volumes/transfer_table_2d";
 
-/** An opacity of 1 would be infinitely dense. */
+/** Largest opacity, 0..1: 1 would be infinitely dense. */
 const MOST_OPACITY = 0.999;
 
 /** How one channel looks: see `tile_march`. */

@@ -34,9 +34,9 @@ export function areSame(a: readonly TraceView[], b: readonly TraceView[]): boole
   return a.length === b.length && a.every(({ fromBox }, k) => fromBox.equals(b[k].fromBox));
 }
 
-/** A head that rests still trembles: by so much, at most. */
+/** Largest tremble of a head at rest, degrees. */
 const TREMBLE_DEG = 0.3;
-/** Of the distance to the box's middle. */
+/** Largest move of a head at rest, as a share of the distance to the box's middle. */
 const TREMBLE_SHARE = 0.006;
 
 /** Whether eyes have moved by no more than a head that rests. */

@@ -48,11 +48,11 @@ import {
 
 /** Pixels along the edge of a tile that rests or is sampled as a whole. */
 export const NOISE_TILE = 16;
-/** The noise of the tiles is looked at anew after so many samples. */
+/** Samples between two looks at the noise of the tiles. */
 const NOISE_EVERY = 8;
-/** At this one a tile is as good as done. */
+/** Noise at which a tile is as good as done. */
 const CALM = 0.004;
-/** Samples that are kept of a view a little aside. */
+/** Most samples that are kept of a view a little aside. */
 const MOST_ASIDE = 48;
 
 /** How a frame is gathered. */
@@ -73,7 +73,7 @@ export type Gathering = Readonly<{
 export class Tracer {
   /** Samples of a pixel since the picture began anew; tiles that rest have fewer. */
   samples = 0;
-  /** Those of them whose paths begin where they do now. */
+  /** Those of them with paths from the present view. */
   rested = 0;
   private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
   private readonly noise = floatTarget(1, FloatType);

@@ -21,10 +21,10 @@ import { frameOf } from "./texel_frame";
 import type { TraceScene } from "./uniforms";
 
 const NOT_LOADED = "The part of the page that follows light could not be had.";
-/** More pixels take more memory than a phone's browser gives. */
+/** Most pixels of a picture: more take more memory than a phone's browser gives. */
 const MOST_PIXELS = 2_000_000;
 const FIRST_SAMPLES = 6;
-/** While the picture moves: what the denoiser makes a whole of. */
+/** Most pixels while the picture moves: the denoiser fills in the rest. */
 const MOST_MOVING_PIXELS = 160_000;
 
 /** What of the volumes is used. */
@@ -97,7 +97,7 @@ export class TracedVolume {
     return this.tracer?.samples ?? 0;
   }
 
-  /** The volumes on screen, for who asks what is at a point. */
+  /** The volumes on screen, for a caller that reads values at a point. */
   shown(): readonly ShownVolume[] {
     const { state } = this;
     if (state === null || !this.isShown) return [];
@@ -134,7 +134,7 @@ export class TracedVolume {
     this.setAppearances();
   }
 
-  /** Light by a file of the user's; the state then has to say "own". */
+  /** Light by a file of the user's; the state then has to hold "own". */
   async lightBy(file: File): Promise<void> {
     const [tables, tracer] = await Promise.all([readEnvironment(file), this.prepare()]);
     tracer.lightBy(tables);
@@ -244,7 +244,7 @@ export class TracedVolume {
         channels.map(async (id) => ({ id, tiles: await this.volumes.sourcesOf(id) })),
       );
       if (abort.signal.aborted) return;
-      // a channel whose list did not come has been told of
+      // a missing list of a channel has been reported
       this.sources = found.flatMap((each) =>
         each.tiles === null ? [] : [{ id: each.id, tiles: each.tiles }],
       );

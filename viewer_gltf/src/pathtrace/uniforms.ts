@@ -1,4 +1,4 @@
-/** What the path tracer's shader is told: of the medium, the scene, its light and its paths. */
+/** The path tracer's uniforms: the medium, the scene, its light and its paths. */
 import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { SKIP_BRICK } from "../bundle/generated/constants";
@@ -10,18 +10,18 @@ import { turnOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";
 
-/** A path that is lit more brightly counts as one that is lit so: halves of floats end at 65504 ... */
+/** Most light of a path: halves of floats end at 65504 ... */
 const MOST_LIGHT = 60_000;
 /** ... and a picture of few samples would sparkle. */
 const MOST_LIGHT_MOVING = 200;
-/** More often no path is scattered, in a medium that swallows nothing. */
+/** Most scatterings of a path, in a medium that swallows nothing. */
 const MOST_SCATTERS = 512;
-/** ... in a picture that moves: what the paths would still have met is taken for the room's mean. */
+/** ... in a picture that moves: the room's mean replaces the rest of the path. */
 const FEW_SCATTERS = 16;
 /** Exponent of a shiny surface's lobe. */
 const GLOSS = 60;
 
-/** Of the longest edge of the box. */
+/** Radius of a lamp, as a share of the longest edge of the box. */
 const LAMP_RADIUS = 0.08;
 const OCCLUSION_REACH = 0.06;
 
@@ -31,7 +31,7 @@ export type TraceScene = Readonly<{
   clip: MarchClip;
   /** A number that changes with what is opaque in the room. */
   solids: number;
-  /** The specimen's box, um: where lamps are told. */
+  /** The specimen's box, um: lamps are placed by it. */
   bounds: Bounds;
 }>;
 

@@ -11,11 +11,11 @@ import {
 } from "../state/focus_tiles";
 import type { ViewerState } from "../state/viewer_state";
 
-/** The disc opens in this time once its volumes are there. */
+/** Time in which the disc opens once its volumes are there, s. */
 export const OPENING_S = 0.4;
 /** Share of the outer radius within which there is no surface any more. */
 const INNER = 0.6;
-/** Finer levels are fetched once the gaze has been on the same tiles for so long. */
+/** Time that the gaze stays on the same tiles before finer levels are fetched, s. */
 const REFINE_S = 0.25;
 
 const RADIANS = Math.PI / 180;

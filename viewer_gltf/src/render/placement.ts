@@ -4,9 +4,9 @@ import type { Manifest } from "../bundle/generated/bundle";
 type Bounds = Manifest["specimen"]["bounds_um"];
 type Vec3 = readonly [number, number, number];
 
-/** The specimen's longest edge in the room. */
+/** The specimen's longest edge in the room, m. */
 export const LONGEST_EDGE_M = 1.2;
-/** In a headset the specimen's centre is this far in front of the eyes, at their height. */
+/** From the eyes to the specimen's centre in a headset, m, at the eyes' height. */
 export const XR_DISTANCE_M = 1.1;
 /** Share of the picture that the specimen may fill at the start. */
 const FILL = 0.88;

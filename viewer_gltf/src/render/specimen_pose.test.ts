@@ -35,7 +35,7 @@ describe("the specimen in the room", () => {
     expect(specimen.isMoved).toBe(false);
   });
 
-  it("stays within reach of whoever carries it, and goes home", () => {
+  it("stays within the user's reach, and goes home", () => {
     const specimen = new Specimen(mutable(WHOLE));
     const far = { ...specimen.pose, position: new Vector3(1000, 0, 0) };
     specimen.moveTo(far, new Vector3());

@@ -6,9 +6,9 @@ import { LONGEST_EDGE_M, place } from "./placement";
 
 type Bounds = Manifest["specimen"]["bounds_um"];
 
-/** A change that is not made by hand is followed with the eyes. */
+/** Length of a move that no hand makes, s: the user's eyes can follow it. */
 export const MOVE_S = 0.4;
-/** Nobody carries the specimen out of sight. */
+/** Farthest place of a carried specimen, m: it stays in sight. */
 const FARTHEST_M = 5;
 
 export class Specimen {

@@ -19,9 +19,9 @@ export type CameraView = Readonly<{
   specimen: SpecimenLook | null;
 }>;
 
-/** The room is no larger; nobody finds what is farther away. */
+/** Farthest place in the room, m: the user finds nothing beyond it. */
 const FARTHEST_M = 100;
-/** Closer to its target a camera has no direction. */
+/** Least distance of a camera from its target, m: closer it has no direction. */
 const NEAREST_M = 1e-4;
 
 /** `eye`, and `pose` where the specimen was moved. */

@@ -1,9 +1,9 @@
 /** Numbers in an address: short when written, harmless when read. Pure. */
 
-/** Microns of a metre-sized specimen and metres of the room: all that a view is made of is less. */
+/** Largest number in a view: um of a metre-sized specimen, or metres of the room. */
 const LARGEST = 1e7;
 const DIGITS = 6;
-/** A picometre of the specimen, a micrometre of the room: what a turn's rounding leaves. */
+/** Numbers below this are 0 (um of the specimen, m of the room): a turn's rounding leaves them. */
 const NOTHING = 1e-6;
 
 export function written(values: readonly number[]): string {

@@ -12,7 +12,7 @@ describe("the page's address", () => {
     expect(settingsOf("?bundle=x")).toEqual([]);
   });
 
-  it("is told where it can't be read", () => {
+  it("is reported where it can't be read", () => {
     expect(settingsOf("?mode=cube&switch=&disc=wide")).toEqual([
       {
         type: "notify",

@@ -17,7 +17,7 @@ function valueIn(row: Parameter<ViewerState>, text: string): Value | null {
   return text.trim() !== "" && Number.isFinite(value) ? value : null;
 }
 
-/** The actions that bring a state there; what can't be read is told by one more. */
+/** The actions that bring a state there; one more reports unreadable settings. */
 export function settingsOf(search: string): readonly Action[] {
   const asked = new URLSearchParams(search);
   return IN_ADDRESS.flatMap((row): readonly Action[] => {

@@ -19,7 +19,7 @@ function wordOf<On>(row: Parameter<On>, on: On, words: SwitchWords): string {
   }
 }
 
-/** The value that a word says; null: none. */
+/** The value that a word stands for; null: none. */
 function valueIn<On>(row: Parameter<On>, word: string, words: SwitchWords): Value | null {
   switch (row.kind) {
     case "number":

@@ -90,7 +90,7 @@ describe("the light in a link", () => {
     expect(readLight("room:own")).toEqual([null]);
   });
 
-  it("that can't be read is told of, part by part", () => {
+  it("that can't be read is reported, part by part", () => {
     for (const part of [
       "",
       "bias",
@@ -119,7 +119,7 @@ describe("the light in a link", () => {
     expect([one, none, other].map((action) => action !== null)).toEqual([true, false, true]);
   });
 
-  it("never leads beyond the limits, nor throws, whatever it says", () => {
+  it("never leads beyond the limits, nor throws, whatever it holds", () => {
     const random = seeded(9);
     const pieces = [
       ...LIGHT_NUMBERS.map(({ link }) => link),

@@ -53,7 +53,7 @@ const CAMERA: CameraView = {
   target: [0.1, 0, -0.05],
   specimen: { position: [0, 0, -1.5], orientation: [0, 0.6, 0, 0.8], scale: 2.5 },
 };
-/** Which channel has been shown for how long is no part of a view, nor is what was told. */
+/** A view, without the notices and without the time for which each channel has been shown. */
 const viewOf = (state: ViewerState) => ({
   ...state,
   notices: [],
@@ -106,7 +106,7 @@ describe("a link to a view", () => {
     expect(opened(hash).channels.some(({ shown }) => shown)).toBe(false);
   });
 
-  it("tells of channels and tiles that are not here, and shows the rest", () => {
+  it("reports channels and tiles that are not here, and shows the rest", () => {
     const state = opened("#v=1&c=c5,CD8&l=CD4:o0.5,c5:o0.5&tile=r9_c9&disc=20");
     expect(state.notices).toEqual([
       "Link: this bundle has no channel CD8, channel CD4, tile r9_c9.",
@@ -122,7 +122,7 @@ describe("a link to a view", () => {
     expect(shown(opened("#v=1&c=CD8,CD4"))).toEqual(shown(start()));
   });
 
-  it("of a newer viewer, or of none, is told and does nothing else", () => {
+  it("of a newer viewer, or of none, is reported and does nothing else", () => {
     expect(noticesOf("#v=2&disc=20")).toEqual(["Link: this viewer reads version 1, found 2."]);
     expect(noticesOf("#section-3")).toHaveLength(1);
     expect(opened("#v=2&disc=20").discRadius_deg).toBe(start().discRadius_deg);
@@ -154,7 +154,7 @@ describe("a link to a view", () => {
     ["#v=1&l=c0:oNaN", "l c0:oNaN"],
     ["#v=1&l=c0:c12345", "l c0:c12345"],
     ["#v=1&l=c0:tevil", "l c0:tevil"],
-  ])("%s is told and left out", (hash, named) => {
+  ])("%s is reported and left out", (hash, named) => {
     expect(noticesOf(hash)).toEqual([`Link: left out what can't be read: ${named}.`]);
     const { notices, ...state } = opened(hash);
     const { notices: _, ...opening } = start();

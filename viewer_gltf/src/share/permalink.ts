@@ -10,7 +10,7 @@
  * corner), cut (a plane's normal and offset), points (um), tool, dwell, quality, light (see
  * path_trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
- * have taken, and what can't be read is told and left out.
+ * have taken; an unreadable part is reported and left out.
  */
 
 import type { Box } from "../math/box";
@@ -32,10 +32,10 @@ import { readLight, writeLight } from "./path_trace_link";
 import { readShapes, writeShapes } from "./shapes_link";
 
 const VERSION = "1";
-/** Seventy channels that all look different take less. */
+/** Longest link, characters: seventy channels that all look different take less. */
 const LONGEST = 8000;
 const WORDS: SwitchWords = ["off", "on"];
-/** A channel's letter alone says that a switch is off. */
+/** A switch of a channel: the letter alone means off. */
 const CHANNEL_WORDS: SwitchWords = ["", "on"];
 const NAMED_APART: ReadonlySet<Parameter<ViewerState>> = new Set([...VOLUMES, ...LIGHT]);
 /** Besides where volumes show, and the light, which has a part of its own. */

@@ -62,7 +62,7 @@ describe("shapes in a link", () => {
     expect(back.channels[5].shapes).toEqual({});
   });
 
-  it("that can't be read are told, and change nothing", () => {
+  it("that can't be read are reported, and change nothing", () => {
     const good = writeShapes(SHAPES);
     for (const text of [
       ...[`c0:sown_${good}0`, `c0:sown_x${good.slice(1)}`, "c0:sown", `c0:snone_${good}`],

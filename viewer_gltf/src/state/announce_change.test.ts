@@ -12,7 +12,7 @@ const announcement = (state: ViewerState, action: Action) =>
   announcementOf(state, reduce(state, action), MANIFEST.tiles);
 
 describe("a remark", () => {
-  it("says which channel left for another", () => {
+  it("names the channel that left for another", () => {
     const fifth: Action = { type: "show", channel: "c5", shown: true };
     expect(announcement(START, fifth)).toBe("4 channels show at once: Marker 0 left for Marker 5.");
     const room = reduce(START, { type: "show", channel: "c2", shown: false });
@@ -20,7 +20,7 @@ describe("a remark", () => {
     expect(announcement(room, fifth)).toBeNull();
   });
 
-  it("says that the cut has taken all of the only tile that is shown", () => {
+  it("announces that the cut has taken all of the only tile that is shown", () => {
     const [{ id: near, bounds_um }] = MANIFEST.tiles;
     const far = MANIFEST.tiles.at(-1)?.id ?? "";
     const cutTo: Action = { type: "set-clip", clip: { box: bounds_um, plane: null } };

@@ -32,5 +32,5 @@ export type Command =
   | "pan-up"
   | "pan-down";
 
-/** Where nobody does what was asked for. */
+/** The announcement where the viewer can't do what was asked for. */
 export const CANT = "This viewer can't do that here.";

@@ -99,7 +99,7 @@ describe("the disc", () => {
     expect(advanceFocus(FAR_AWAY, input(9, -9, 25)).disc).toEqual([]);
   });
 
-  it("ends before the first tile whose volume is not there", () => {
+  it("ends before the first tile without its volume", () => {
     const state = advanceFocus(FAR_AWAY, input(8, -5, 10));
     const radius = Math.atan(4 / 10);
     expect(discReach(state, radius, () => true)).toBe(radius);

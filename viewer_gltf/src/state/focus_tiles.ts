@@ -10,11 +10,11 @@ import { type BoxedTile, pickTile } from "../math/pick";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { FocusTiles } from "./representation";
 
-/** A tile is left at so much more than the distance at which it was met. */
+/** Distance at which the focus leaves a tile, as a multiple of the one at which it was met. */
 export const HYSTERESIS = 1.1;
-/** The gaze goes on to another tile once it has been on it for so long. */
+/** Time that the gaze rests on another tile before the focus moves there, s. */
 export const REST_S = 0.12;
-/** So many tiles can be volumes in the disc: a corner has four. */
+/** Most tiles that are volumes in the disc: a corner has four. */
 export const MAX_DISC_TILES = 4;
 /** Rays that feel where the disc reaches: so many rings of so many. */
 const RINGS = 20;
@@ -123,8 +123,8 @@ function discTiles(
 }
 
 /**
- * The outer radius that the disc may have now, so that it ends before the first tile whose volume
- * is not there: a box's edge would show.
+ * The outer radius that the disc may have now, so that it ends before the first tile without its
+ * volume: a box's edge would show.
  */
 export function discReach(
   { felt }: FocusState,

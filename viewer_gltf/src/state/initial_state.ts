@@ -6,12 +6,12 @@ import { START_TOOLS } from "./parameters/tools";
 import { type Mode, START_VOLUMES } from "./parameters/volumes";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
-/** So many tiles can open as volumes; of a larger specimen the chosen tile does. */
+/** Most tiles that open as volumes; of a larger specimen the chosen tile does. */
 export const VOLUME_TILES_AT_START = 16;
 /** DICOM's terms for scans of whole bodies, which are best seen as light passes through them. */
 const TRACED_MODALITIES: readonly string[] = ["MR", "CT"];
 
-/** The tiles, those first whose centres are nearest to the specimen's. */
+/** The tiles, by the distance of their centres from the specimen's, nearest first. */
 function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number][] {
   const centerOf = ({ min, max }: Manifest["specimen"]["bounds_um"]) =>
     min.map((v, i) => (v + max[i]) / 2);

@@ -1,4 +1,4 @@
-/** What is on screen, as a measurement reads it. Surfaces and volumes say it of themselves. */
+/** What is on screen, as a measurement reads it. Surfaces and volumes report it themselves. */
 import type { Mesh } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 

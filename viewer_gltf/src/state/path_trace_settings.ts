@@ -20,7 +20,7 @@ export type EnvironmentName = (typeof ENVIRONMENTS)[number];
 
 export const TONE_MAPS = ["filmic", "none"] as const;
 
-/** A picture with so many samples of each pixel is done. */
+/** Samples of each pixel in a finished picture. */
 export const ENOUGH_SAMPLES = 1024;
 
 type TraceNumber = Readonly<{
@@ -72,7 +72,7 @@ export const POST_NUMBERS = {
   sharpness: { label: "Sharpness", start: 0.2, limits: [0, 2], text: percent },
 } as const satisfies TraceNumbers;
 
-/** Lamps stay within reach of a hand round the specimen. */
+/** Farthest place of a lamp, in lengths of the specimen: a hand round it reaches the lamp. */
 export const LAMP_REACH = 3;
 
 /** Of one lamp: where it is, and how strong. */

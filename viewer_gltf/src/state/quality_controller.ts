@@ -77,17 +77,17 @@ const WINDOW = 20;
 const SHORT_WINDOW = 8;
 const SHORT_WINDOW_MS = 400;
 const PAUSE = 4;
-/** A frame so many times as long as its window is a stall, unless SHORT_WINDOW follow in a row. */
+/** Length of a stall, in lengths of its window, unless SHORT_WINDOW such frames follow in a row. */
 const STALL = 4;
-/** A display's own unsteadiness is not a frame over budget. */
+/** Frame times above the budget that still keep it, as a factor: displays are unsteady. */
 const TOLERANCE: Readonly<Record<Timing, number>> = { work: 1, interval: 1.15 };
-/** A notch is taken back only if it is expected to leave so much of the budget unused. */
+/** Share of the budget within which a notch must be expected to stay before it is taken back. */
 const ROOM = 0.9;
-/** What a notch is taken to cost before that was measured. */
+/** Cost of a notch before a measurement, as a factor to the frame's time. */
 const USUAL_PRICE = 1.15;
-/** Below this share of the usual time the load has fallen. */
+/** Share of the usual time below which the load has fallen. */
 const FALLEN = 0.85;
-/** Far over budget, a notch is given up for every such factor. */
+/** Factor over budget for which one notch is given up. */
 const FACTOR_A_NOTCH = 1.25;
 const MOST_NOTCHES = 6;
 const PATIENCE = 90;
@@ -130,7 +130,7 @@ export function frameBudget_ms(rate_hz: number, timing: Timing): number {
 
 /**
  * The quality after one more frame. Give it no frame that came after a rest (a picture that did not
- * change is not drawn): such an interval says nothing.
+ * change is not drawn): such an interval means nothing.
  */
 export function advanceQuality(quality: Quality, frame_ms: number, budget_ms: number): Quality {
   if (quality.level !== "auto" || !(frame_ms > 0) || !Number.isFinite(frame_ms)) return quality;

@@ -196,7 +196,7 @@ describe("the viewer's state", () => {
     expect(chosen.channels[0].transferFunction).toBe("default");
   });
 
-  it("says each fault once and forgets it when dismissed", () => {
+  it("reports each fault once and forgets it when dismissed", () => {
     const text = "channels/c0/r0_c0/lod0.glb: not found (404)";
     const twice = after(
       initialState(sampleManifest(1)),
@@ -222,7 +222,7 @@ describe("the viewer's state", () => {
     expect(reduce(faulty, { type: "dismiss", text: "no network" }).mendable).toEqual([]);
   });
 
-  it("tells which notice a change has brought, also once more", () => {
+  it("returns the notice that a change has brought, also once more", () => {
     const brought = (before: ViewerState, action: Parameters<typeof reduce>[1]) =>
       newNotice(before, reduce(before, action));
     const faulty = after(
@@ -277,7 +277,7 @@ describe("what the stage draws in a tile", () => {
     expect(back).toEqual(state);
   });
 
-  it("opens as volumes only so many tiles, from the middle, and says so", () => {
+  it("opens as volumes only so many tiles, from the middle, and reports it", () => {
     const many = unclear(sampleManifest(3), 2);
     const state = initialState(withRow(many, VOLUME_TILES_AT_START + 4, "volume"));
     const tilesOf = (channel: string) =>

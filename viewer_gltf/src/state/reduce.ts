@@ -37,7 +37,7 @@ function withShown(state: ViewerState, id: string): ViewerState {
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
 
-/** Narrower, a window would be one step of the 8 bits. */
+/** Least width of a window, 0..1: a narrower one would be one step of the 8 bits. */
 const NARROWEST_WINDOW = 1 / 128;
 
 /** The next state. Returns the same object if the action changes nothing. */

@@ -1,4 +1,4 @@
-/** Who is drawn how: for each channel and tile, surface or volume. Pure. */
+/** The representation of each channel and tile: surface or volume. Pure. */
 
 import { VOLUME_TILES_AT_START } from "./initial_state";
 import { isTraced } from "./parameters/volumes";
@@ -22,7 +22,7 @@ export type FocusTiles = Readonly<{
 
 export const NO_FOCUS: FocusTiles = { focusTile: null, disc: [], near: new Set() };
 
-/** A tile whose volume is wanted, with its channels in the bundle's order. */
+/** A tile with a wanted volume, and its channels in the bundle's order. */
 export type WantedTile = Readonly<{
   tile: string;
   channels: readonly string[];

@@ -10,7 +10,7 @@ import type { ChannelState } from "./viewer_state";
 
 const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.4 });
 
-/** The first channel, whose function `soft` is two-dimensional in the bundle, after some actions. */
+/** The first channel after some actions; its function `soft` is 2D in the bundle. */
 function channelAfter(...actions: readonly Action[]): ChannelState {
   const [first, ...others] = sampleManifest(2).channels;
   const names = { ...first.transfer_functions_2d, names: ["soft"] };
@@ -60,7 +60,7 @@ describe("the two-dimensional functions of a channel", () => {
     expect(channelAfter(set("none", [SHAPE]))).toEqual(channelAfter());
   });
 
-  it("keep within the limits, whoever made the shapes", () => {
+  it("keep within the limits, for shapes from anywhere", () => {
     const wrong = [
       { ...SHAPE, opacity: Number.NaN },
       { ...SHAPE, values: [0.5, 0.4] as const },

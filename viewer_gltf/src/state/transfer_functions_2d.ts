@@ -18,7 +18,7 @@ import { LEAST_HEIGHT, LEAST_WIDTH } from "./transfer_shapes";
 export const OWN = "own";
 /**
  * Places in the joint histogram, opacities and softness are whole multiples of one part of so many, so that a
- * link says them exactly: a quarter of the table's columns, two characters of base 36.
+ * link holds them exactly: a quarter of the table's columns, two characters of base 36.
  */
 export const STEPS = 1020;
 
@@ -53,7 +53,7 @@ export function isTwoD(functions: Functions, name = functions.transferFunction):
     : made.length > 0 || name === OWN;
 }
 
-/** Whose shapes an editor changes: the chosen function's, if it has any, or those of one's own. */
+/** The function that an editor changes: the chosen one, if it has shapes, or the user's own. */
 export function editedName(functions: Functions): string {
   return isTwoD(functions) ? functions.transferFunction : OWN;
 }
@@ -82,7 +82,7 @@ function roundedRange([low, high]: Range, least: number): Range {
   return [from / STEPS, to / STEPS];
 }
 
-/** The shape in such numbers as a link says; null: it is none. */
+/** The shape in such numbers as a link holds; null: it is none. */
 export function onLattice(shape: Shape): Shape | null {
   if (faultOf(shape) !== null) return null;
   return {

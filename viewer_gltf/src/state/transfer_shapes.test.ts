@@ -195,7 +195,7 @@ describe("an edit", () => {
 });
 
 describe("a shape from outside", () => {
-  it("is told what is wrong with it", () => {
+  it("is refused with a reason", () => {
     expect(faultOf(TRIANGLE)).toBeNull();
     expect(faultOf({ ...TRIANGLE, values: [0.5, 0.5] })).toMatch(/values are \(0.5, 0.5\)/);
     expect(faultOf({ ...TRIANGLE, gradients: [0.5, 1.5] })).toMatch(/gradients/);

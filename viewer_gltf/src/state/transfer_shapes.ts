@@ -13,7 +13,7 @@ import {
   type Shapes,
 } from "../bundle/transfer_2d";
 
-/** The least that a shape keeps, of the plane's width and height: a cell of the table. */
+/** Least size of a shape, as a share of the plane's width and height: a cell of the table. */
 export const LEAST_WIDTH = 1 / (COLUMNS - 1);
 export const LEAST_HEIGHT = 1 / (ROWS - 1);
 
@@ -131,7 +131,7 @@ export function outline(shape: Shape): readonly HistogramPoint[] {
  * What lies at a point: the shape on top, which is the last, and the part of it.
  *
  * @param reach how far off a corner or an edge may be, in each direction of the plane
- * @param selected index of a shape whose corners and edges go before those of others
+ * @param selected index of a shape: its corners and edges go before those of others
  */
 export function hitTest(
   shapes: Shapes,

@@ -31,7 +31,7 @@ export type ChannelState = Functions &
     /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
     window: readonly [number, number];
     hasSurface: boolean;
-    /** Its surface can't be told from noise: as long as the volume is on, no surface is drawn. */
+    /** Its surface is as noise: as long as the volume is on, no surface is drawn. */
     prefersVolume: boolean;
   }>;
 

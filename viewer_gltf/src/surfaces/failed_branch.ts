@@ -6,9 +6,9 @@ export type Branch<T> = {
 };
 
 /**
- * What hangs from the next tile above that can draw something: the tile, or what holds the external
- * tileset whose root it is. A holder draws nothing, and would be a hole without that root. It comes
- * anew once it was dropped from memory: nothing may be put back into it.
+ * The child of the next tile above that can draw something: the tile itself, or the holder of the
+ * external tileset with this root. A holder draws nothing, and would be a hole without the root. It
+ * comes anew once it was dropped from memory: nothing may be put back into it.
  */
 export function branchOf<T extends Branch<T>>(tile: T): T {
   let branch = tile;

@@ -4,7 +4,7 @@ import { checkGlb, checkTileset, contentHashes, TilesetFiles } from "./fetch_con
 
 const PATH = "channels/A/r0_c0/lod0.glb";
 
-/** The header says `length`; the file has `found` bytes. */
+/** The header holds `length`; the file has `found` bytes. */
 function glb(length: number, found: number): Uint8Array {
   const bytes = new Uint8Array(found);
   const view = new DataView(bytes.buffer);
@@ -15,7 +15,7 @@ function glb(length: number, found: number): Uint8Array {
 }
 
 describe("a surface's file", () => {
-  it("is as long as its header says", () => {
+  it("is as long as in its header", () => {
     expect(() => checkGlb(glb(40, 40), PATH)).not.toThrow();
     expect(() => checkGlb(glb(40, 28), PATH)).toThrow(`${PATH}: expected 40 bytes, found 28`);
   });
@@ -87,7 +87,7 @@ describe("the files of a tileset", () => {
   const bytesOf = (root: object) =>
     Buffer.from(JSON.stringify({ asset: { version: "1.1" }, geometricError: 1, root }));
 
-  /** A coarsest surface whose finer ones are in an external tileset; a host that serves `files`. */
+  /** A coarsest surface with finer ones in an external tileset; a host that serves `files`. */
   function serve(changed: Readonly<Record<string, Uint8Array>> = {}) {
     const finer = bytesOf(tile("lod0.glb", surface));
     const holder = tile("r0_c0/finer.json", finer);

@@ -22,7 +22,7 @@ export function checkGlb(bytes: Uint8Array, path: string): void {
   }
 }
 
-/** The bytes of a surface, whose hash its tileset gave. Throws BundleError, or AbortError. */
+/** The bytes of a surface; its tileset gave `hash`. Throws BundleError, or AbortError. */
 async function fetchGlb(
   base: string,
   path: string,
@@ -31,7 +31,7 @@ async function fetchGlb(
 ): Promise<ArrayBuffer> {
   const response = await request(fileAddress(base, path), path, { signal });
   const bytes = await readBody(response, path);
-  checkGlb(bytes, path); // says more of a file cut short than its hash
+  checkGlb(bytes, path); // describes a file cut short better than its hash
   await checkHash(path, bytes, hash, SHA_256_128);
   return bytes.buffer;
 }
@@ -86,7 +86,7 @@ async function fetchTileset(base: string, file: FileRef): Promise<Tileset> {
   return checkTileset(parseJson(text, file.path), file.path);
 }
 
-/** An external tileset, whose hash the one above it gave. Throws BundleError, or AbortError. */
+/** An external tileset; the one above it gave `hash`. Throws BundleError, or AbortError. */
 async function fetchExternal(
   base: string,
   path: string,
@@ -95,7 +95,7 @@ async function fetchExternal(
 ): Promise<Tileset> {
   const response = await request(fileAddress(base, path), path, { signal });
   const bytes = await readBody(response, path);
-  // says more of a host's error page than its hash
+  // describes a host's error page better than its hash
   const tileset = checkTileset(parseJson(new TextDecoder().decode(bytes), path), path);
   await checkHash(path, bytes, hash, SHA_256_128);
   return tileset;

@@ -79,7 +79,7 @@ export class SurfaceLoader {
     void this.meshopt?.then((worker) => worker.dispose());
     this.ktx2?.then(
       (loader) => loader.dispose(),
-      () => undefined, // told where it was wanted
+      () => undefined, // reported to the caller that wanted it
     );
   }
 }

@@ -29,7 +29,7 @@ import type { TileProgress } from "./overview_progress";
 const UM_PER_METRE = 1e6;
 /** The root holds no content; below it lie the tiles' coarsest LODs. */
 const DEPTH_OF_COARSEST = 1;
-/** What is left of a full cache after hidden surfaces were dropped. */
+/** Share of a full cache that stays after hidden surfaces were dropped. */
 const KEPT_SHARE = 0.75;
 
 export type Surface = Readonly<{

@@ -87,7 +87,7 @@ describe("empty space", () => {
     expect([...of([alpha, clear])]).toEqual([FAR, FAR, FAR]);
   });
 
-  it("is not told of arrays that don't fit each other", () => {
+  it("rejects arrays that don't fit each other", () => {
     const alpha = new Uint8Array(256);
     const bricks = [new Uint8Array(6)];
     const wrong = { bricks, alphas: [alpha], count: [4, 1, 1] } as const;

@@ -8,7 +8,7 @@
  */
 import type { Size3 } from "../bundle/ktx2";
 
-/** Opacity below half a step of 8 bits is not drawn. */
+/** Least opacity that is drawn, in steps of 8 bits. */
 const INVISIBLE = 0.5;
 export const FAR = 255;
 

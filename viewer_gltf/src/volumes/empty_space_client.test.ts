@@ -8,7 +8,7 @@ function request(x: number): OccupancyRequest {
   return { bricks: [BRICKS], alphas: [], count: [x, 1, 1] };
 }
 
-/** A worker that answers when told to, with the x count of the request. */
+/** A worker that answers on demand, with the x count of the request. */
 function standIn() {
   const asked: number[] = [];
   let isTerminated = false;
@@ -37,7 +37,7 @@ function standIn() {
   };
 }
 
-describe("tables of leaps from the worker", () => {
+describe("tables of skips from the worker", () => {
   it("arrive one after the other", async () => {
     const { asked, answer, client } = standIn();
     const first = client.computeDistances("a", request(1));

@@ -38,7 +38,7 @@ export class OccupancyClient {
       this.next();
     };
     this.port.onerror = (event) => {
-      event.preventDefault(); // told through the promise, so not once more to the console
+      event.preventDefault(); // reported through the promise, so not printed on the console again
       if (event.message) this.fail(event.message);
       else this.giveUp("the worker's script did not load");
     };

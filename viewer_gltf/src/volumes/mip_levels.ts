@@ -1,7 +1,7 @@
 /** Which mip levels of a volume to fetch, coarse first. Pure. */
 import type { MipLevel } from "../bundle/generated/volumes";
 
-/** The first picture comes from the finest level that is not larger than this. */
+/** Largest level for the first picture, bytes: it comes from the finest one within this. */
 export const FIRST_LEVEL_BYTES = 64 * 1024;
 export function texels(level: MipLevel): number {
   const [x, y, z] = level.size;
@@ -11,7 +11,7 @@ export function texels(level: MipLevel): number {
 /**
  * Indices into `levels` (which go from fine to coarse), in the order in which they are fetched:
  * first a small one, then each finer one up to the finest that fits into `budget_bytes` (one byte
- * a texel) and whose sides the GPU takes. The coarsest is always allowed.
+ * a texel) and has sides that the GPU takes. The coarsest is always allowed.
  */
 export function levelsToFetch(
   levels: readonly MipLevel[],

@@ -4,11 +4,11 @@ import type { BrickTile } from "./bricks/brick_atlas";
 import type { TileMarch } from "./tile_raymarch";
 import type { Packed, TileTexture } from "./tile_texture";
 
-/** A volume that has come fades in, one that goes fades out. */
+/** Length of a fade, s: a volume that has come fades in, one that goes fades out. */
 export const PRESENCE_S = 0.25;
-/** So many tiles that are no longer looked at stay for a while: the gaze often comes back. */
+/** Tiles that stay for a while after the gaze has left them: it often comes back. */
 const KEPT_TILES = 2;
-/** Bytes of a level and of the next coarser one, which stays while the finer one fades in. */
+/** Bytes of a level with the next coarser one, as a factor: both stay during a fade. */
 const WITH_OLD_LEVEL = 9 / 8;
 
 export type Resident = {
@@ -58,7 +58,7 @@ export class Residency {
     return this.budget / (WITH_OLD_LEVEL * (wanted + KEPT_TILES));
   }
 
-  /** From now on none is wanted, until it is said again. */
+  /** From now on none is wanted, until the next request. */
   unwantAll(): void {
     this.turn++;
     for (const resident of this.residents.values()) resident.wanted = null;

@@ -35,11 +35,11 @@ import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
-/** Hard limit of a ray, whatever the volume's size and through however many tiles it goes. */
+/** Most steps of a ray, for any size of the volume and any number of tiles. */
 export const MAX_STEPS = 100;
-/** A ray that is this opaque goes no further. */
+/** Opacity, 0..1, at which a ray ends. */
 const OPAQUE = 0.99;
-/** Steps are not shorter than this share of a voxel. */
+/** Shortest step, in voxels. */
 const STEP_VOXELS = 1;
 
 /** What all tiles share in a frame: uniforms by reference. */

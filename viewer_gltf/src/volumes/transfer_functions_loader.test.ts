@@ -68,7 +68,7 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
     expect(faults).toEqual([]);
   });
 
-  it("tells a fault once, and is asked for again when that is wanted", async () => {
+  it("reports a fault once, and is asked for again when that is wanted", async () => {
     const wrong = [
       [{ ...SHAPE, values: [0.6, 0.4] }, "functions.soft.0: values are (0.6, 0.4)"],
       [{ ...SHAPE, opacity: 2 }, "functions.soft.0.opacity"],

@@ -11,7 +11,7 @@ import type { Transfer2d } from "../bundle/transfer_2d";
 export type Histogram = Readonly<{
   /** 256 x 64 bytes, row 0 is gradient 0: the logarithm of the number of voxels. */
   cells: Uint8Array;
-  /** A panel tells pictures apart by their text: a name is enough. */
+  /** A panel distinguishes pictures by their text: a name is enough. */
   toJSON: () => string;
 }>;
 

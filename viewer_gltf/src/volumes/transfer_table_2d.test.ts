@@ -8,7 +8,7 @@ import { opacities } from "./transfer_luts";
 import { alikeRows, envelopeOf, transferTable2d } from "./transfer_table_2d";
 
 describe("the table of value and gradient", () => {
-  it("never shows what its envelope hides: leaps hold at every gradient", () => {
+  it("never shows what its envelope hides: skips hold at every gradient", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;

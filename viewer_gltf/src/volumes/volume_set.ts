@@ -1,4 +1,4 @@
-/** All volumes on screen: follows who is drawn how, loads what is missing, drops what is gone. */
+/** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
 import { Group, Matrix4, Scene, Vector3 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
@@ -148,7 +148,7 @@ export class VolumeSet {
     );
   }
 
-  /** Volumes lie in the world of the specimen, whose place in the room this is. */
+  /** Places the volumes: they lie in the specimen's world. `specimen` is its pose in the room. */
   placeAs(specimen: Matrix4): void {
     this.group.matrix.copy(specimen);
     this.group.matrixWorldNeedsUpdate = true;
@@ -302,7 +302,7 @@ export class VolumeSet {
     return source.volume;
   }
 
-  /** How a channel whose list has come is to look. */
+  /** The appearance of a channel. The channel's list must have come. */
   appearance(state: ViewerState, id: string): Appearance {
     const channel = state.channels.find((c) => c.id === id);
     const volumes = this.channels.get(id);

@@ -77,7 +77,7 @@ describe("a level by range", () => {
     expect(caches).toEqual(["default", "reload"]);
   });
 
-  it("that is cut short is told by its length", async () => {
+  it("that is cut short is recognised by its length", async () => {
     serve(FILE.subarray(0, 70));
     await expect(source().level(0, signal)).rejects.toThrow("expected 100 bytes, found 70");
   });

@@ -4,7 +4,7 @@
  */
 import type { Hit, Met, RoomRay, Target } from "../interaction/ray_pointer";
 
-/** A gaze that stays within this of where it came to rest is resting. */
+/** A gaze that stays within this angle of its first direction rests, radians. */
 const REST_RAD = (1.5 * Math.PI) / 180;
 
 export class GazeCarry implements Target {

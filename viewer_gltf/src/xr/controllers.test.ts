@@ -9,7 +9,7 @@ function handOf(source: Partial<Record<keyof XRInputSource, unknown>>): Hand {
 }
 
 describe("an input source", () => {
-  it("squeezes if its profiles say so; bare hands and one-button remotes don't", () => {
+  it("squeezes if its profiles have it; bare hands and one-button remotes don't", () => {
     const profiles = ["meta-quest-touch-plus", "generic-trigger-squeeze-thumbstick"];
     expect(handOf({ profiles }).canSqueeze).toBe(true);
     const remote = ["oculus-go", "generic-trigger-touchpad"];

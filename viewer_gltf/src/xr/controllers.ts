@@ -34,11 +34,11 @@ const KINDS = {
 /** Of a thumbstick or touchpad, -1..1: to the right, and towards the body. */
 export type Stick = Readonly<{ x: number; y: number }>;
 const AT_REST: Stick = { x: 0, y: 0 };
-/** Sticks never rest at zero. */
+/** Dead zone of a stick, as a share of its way: sticks never rest at zero. */
 const DEAD = 0.15;
 
 const LINE_RADIUS_M = 0.0012;
-/** A ray that meets nothing is drawn as long as this. */
+/** Length of a ray that meets nothing, m. */
 const LINE_M = 1.5;
 
 export class Hand {

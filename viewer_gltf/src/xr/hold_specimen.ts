@@ -14,7 +14,7 @@ const UP = new Vector3(0, 1, 0);
 const RIGHT = new Vector3(1, 0, 0);
 const TURN_DEG_PER_S = 90;
 const ZOOM_PER_S = 2.5;
-/** As the keys move the camera on a flat screen. */
+/** One step of a turn, radians: as the keys move the camera on a flat screen. */
 const STEP_RAD = Math.PI / 12;
 const ZOOM = 0.8;
 const STEP_M = 0.1;

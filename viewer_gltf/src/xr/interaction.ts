@@ -44,7 +44,7 @@ export type HandsOptions = Readonly<{
   onLeave: () => void;
 }>;
 
-/** A trigger held on the specimen for so long, or moved so far, holds it: where nothing squeezes. */
+/** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;
 const HOLD_M = 0.02;
 

@@ -1,9 +1,9 @@
 /** The immersive session: two eyes, the specimen in front of them. */
 import { PerspectiveCamera, type WebGLRenderer } from "three";
 
-/** Even motion is worth more than 90 or 120 pictures of which some come late. */
+/** Wanted frames a second: 72 even ones look better than 90 or 120 of which some come late. */
 const RATE_HZ = 72;
-/** 0..1, where the layer offers it: the panel's text stays legible beside the middle. */
+/** Foveation, 0..1, where the layer offers it: the panel's text stays legible at the side. */
 const FOVEATION = 0.67;
 
 export class XrSession {
@@ -30,7 +30,7 @@ export class XrSession {
     return this.session;
   }
 
-  /** Frames a second, where the headset tells. */
+  /** Frames a second, where the headset reports them. */
   get rate_hz(): number | undefined {
     return this.session?.frameRate;
   }
@@ -67,7 +67,7 @@ export class XrSession {
     if (typeof xr.setFoveation === "function") xr.setFoveation(FOVEATION);
     if (!session.supportedFrameRates?.includes(RATE_HZ)) return;
     if (typeof session.updateTargetFrameRate !== "function") return;
-    // A wish: whatever the headset says, it goes on at its own rate.
+    // A wish: the headset may refuse, and then goes on at its own rate.
     void session.updateTargetFrameRate(RATE_HZ).catch(() => undefined);
   }
 }

@@ -12,7 +12,7 @@ describe("stereo", () => {
     expect(found).toEqual({ isAvailable: true, reason: "" });
   });
 
-  it("tells why it is not there", async () => {
+  it("reports why it is not there", async () => {
     const reasonOf = async (...args: Parameters<typeof findXrSupport>) =>
       (await findXrSupport(...args)).reason;
     expect(await reasonOf(undefined, false)).toContain("https");

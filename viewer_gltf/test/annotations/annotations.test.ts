@@ -30,7 +30,7 @@ describeInChromium("marks", () => {
   beforeEach(async () => {
     await page?.close();
     page = await browser.context.newPage();
-    // a page with an address, as a worker's is told from it
+    // a page with an address: a worker's address is relative to it
     await page.route("http://marks.test/", (route) =>
       route.fulfill({
         contentType: "text/html",
@@ -101,7 +101,7 @@ describeInChromium("marks", () => {
     expect(said.size).toBeGreaterThan(2);
   });
 
-  it("say the true distance of two measured points", async () => {
+  it("show the true distance of two measured points", async () => {
     await look([0.3, 0.2, 1.6]);
     const points = [
       [250, -200, 100],
@@ -133,7 +133,7 @@ describeInChromium("marks", () => {
     expect(await tap([20, -380, 200])).toHaveLength(1); // begins anew, on the tile's box
   });
 
-  it("say what the channels are there, on the source's scale", async () => {
+  it("show the channels' values there, on the source's scale", async () => {
     await look([0, 0, 1.6]);
     await page.evaluate(() =>
       window.bench?.measure([
@@ -236,7 +236,7 @@ describeInChromium("marks", () => {
     expect(await name()).toBe("r0_c1");
   });
 
-  it("turn the axes with the specimen, and say whither they lead", async () => {
+  it("turn the axes with the specimen, and name their directions", async () => {
     await look([0, 0, 1.6]);
     const label = () => page.locator(".orientation-mark").getAttribute("aria-label");
     expect(await label()).toBe("x leads right, y up, z towards you");

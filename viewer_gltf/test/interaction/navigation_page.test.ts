@@ -9,7 +9,7 @@ import { prepareStand } from "../support/browser/stand";
 
 /** Of the little axes in the corner, which are 76 pixels wide: half a degree is a quarter. */
 const UNTURNED_PX = 0.25;
-/** Of the stage: that which is seen of a specimen whose corner is in the middle, and more. */
+/** Of the stage: the visible part of a specimen with its corner in the middle, and more. */
 const SEEN = 0.01;
 
 describeInChromium("a view that is moved and zoomed", () => {

@@ -231,7 +231,7 @@ describeInChromium("an artist's layer over the stage", () => {
       expect(apartIn(COARSE, picture, remembered("balls as a surface"))).toBeGreaterThan(40);
     });
 
-    it("makes a block as opaque as its new opacity points say", async () => {
+    it("makes a block as opaque as its new opacity points", async () => {
       await stand.open();
       await stand.viewer.recolor("Slab", "#ffffff");
       const picture = await only(stand, "Slab", "volume");

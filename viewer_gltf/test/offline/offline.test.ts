@@ -191,7 +191,7 @@ describeInChromium("without a network", () => {
     }
   });
 
-  it("a file that is not what files.json says is not kept", async () => {
+  it("a file that is not as in files.json is not kept", async () => {
     const body = (await readFile(join(root, CHANGED))).toString("latin1");
     const wrong = Buffer.from(body.replace('"Balls"', '"Bulls"'), "latin1");
     host.overrides.set(FOLDER + CHANGED, { status: 200, body: wrong });

@@ -35,7 +35,7 @@ describeInChromium("the page's policy", () => {
     await other?.stop();
   });
 
-  /** What the browser said was against the policy. */
+  /** The browser's reports of violations of the policy. */
   function watch(): string[] {
     const told: string[] = [];
     stand.viewer.page.on("console", (message) => {

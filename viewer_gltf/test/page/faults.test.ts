@@ -1,4 +1,4 @@
-/** Files that are broken, missing or slow: the rest stays on screen, and the page says so. */
+/** Files that are broken, missing or slow: the rest stays on screen, and the page reports it. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { expect, it } from "vitest";
@@ -46,7 +46,7 @@ describeInChromium("a faulty bundle", () => {
     expect(stand.host.requests.filter((request) => request.path === path)).toHaveLength(3);
   });
 
-  it("says which surface was cut short, and draws the rest", async () => {
+  it("reports which surface was cut short, and draws the rest", async () => {
     const path = `${BALLS}/r0_c1/lod1.glb`;
     const whole = await readFile(join(stand.bundle, path));
     const body = whole.subarray(0, whole.length - 40);
@@ -57,7 +57,7 @@ describeInChromium("a faulty bundle", () => {
     ]);
   });
 
-  it("says that a tileset is not the one of the manifest", async () => {
+  it("reports that a tileset is not the one of the manifest", async () => {
     const path = `${BALLS}/tileset.json`;
     const text = await readFile(join(stand.bundle, path), "utf8");
     const body = text.replace('"1.1"', '"1.0"');
@@ -82,7 +82,7 @@ describeInChromium("a faulty bundle", () => {
     expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
   });
 
-  it("is told in words where the address is none", async () => {
+  it("is reported where the address is none", async () => {
     await stand.viewer.page.goto(
       `${stand.host.address}/app/?bundle=${encodeURIComponent("http://")}`,
     );
@@ -101,7 +101,7 @@ describeInChromium("a faulty bundle", () => {
     expect(await bar.isVisible()).toBe(false);
   });
 
-  it("says on the page when the viewer itself fails", async () => {
+  it("reports on the page when the viewer itself fails", async () => {
     await stand.open();
     await stand.viewer.page.evaluate(() => {
       setTimeout(() => {

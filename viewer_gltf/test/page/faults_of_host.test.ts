@@ -41,36 +41,36 @@ describeInChromium("a fault on the way", () => {
     return (await stand.viewer.page.locator("[data-fatal]").textContent()) ?? "";
   }
 
-  it("a decoder that can't be had is told for every surface, and nothing hangs", async () => {
+  it("a decoder that can't be had is reported for every surface, and nothing hangs", async () => {
     await stand.viewer.page.route("**/meshopt_worker*", (route) => route.abort());
     await stand.open("&mode=off");
     await stand.viewer.settled();
     const report = await notices();
-    expect(report.length).toBeGreaterThan(1); // what comes after the first is told too
+    expect(report.length).toBeGreaterThan(1); // later faults are reported too
     for (const text of report) expect(text).toMatch(/\.glb: the surface can't be read: meshopt: /);
     expect((await stand.viewer.snapshot()).triangles).toBe(0);
   });
 
-  it("a manifest that is cut short is told as such", async () => {
+  it("a manifest that is cut short is reported as such", async () => {
     const text = JSON.stringify(stand.manifest);
     expect(await fatalText(text.slice(0, text.length / 2))).toContain(
       "manifest.json: the JSON is broken or cut short (",
     );
   });
 
-  it("a manifest of a newer format is told with both versions", async () => {
+  it("a manifest of a newer format is reported with both versions", async () => {
     expect(await fatalText(JSON.stringify({ ...stand.manifest, version: 2 }))).toContain(
       "manifest.json: version: this viewer reads version 1, found 2; open the bundle with the viewer",
     );
   });
 
-  it("a bundle without channels is told in one line", async () => {
+  it("a bundle without channels is reported in one line", async () => {
     expect(await fatalText(JSON.stringify({ ...stand.manifest, channels: [] }))).toContain(
       "manifest.json: channels: the bundle holds none, so nothing can be shown",
     );
   });
 
-  it("a host that can't be reached is told as such", async () => {
+  it("a host that can't be reached is reported as such", async () => {
     await stand.viewer.page.route("**/manifest.json", (route) => route.abort());
     await stand.viewer.page.goto(through());
     const fatal = stand.viewer.page.locator("[data-fatal]");
@@ -190,7 +190,7 @@ describeInChromium("a fault on the way", () => {
     expect((await viewer.snapshot()).volumes.length).toBeGreaterThan(0);
   });
 
-  it("a network that stays away is told, and what is here stays on screen", async () => {
+  it("a network that stays away is reported, and loaded parts stay on screen", async () => {
     const viewer = new ViewerPage(stand.viewer.page);
     await viewer.open(through("&mode=off"));
     await viewer.settled();

@@ -171,7 +171,7 @@ describeInChromium("the viewer", () => {
     expect(a - b).toBeLessThan(half / 4);
   });
 
-  it("says why stereo can't start where there is no headset", async () => {
+  it("reports why stereo can't start where there is no headset", async () => {
     await stand.open();
     const reason = stand.viewer.page.locator("[data-stereo-reason]");
     await expect.poll(() => reason.textContent()).toContain("headset");
@@ -183,20 +183,20 @@ describeInChromium("the viewer", () => {
     return (await stand.viewer.page.locator("[data-fatal]").textContent({ timeout: 20_000 })) ?? "";
   }
 
-  it("says on the page which file is missing", async () => {
+  it("reports on the page which file is missing", async () => {
     const text = await fatalText(`${stand.host.address}/app/?bundle=../nowhere/`);
     expect(text).toContain("manifest.json: not found (404)");
     expect(text).toContain("/nowhere/manifest.json");
   });
 
-  it("says on the page which version it found and which it reads", async () => {
+  it("reports on the page which version it found and which it reads", async () => {
     const body = JSON.stringify({ ...stand.manifest, version: 99 });
     stand.host.overrides.set("/bundle/manifest.json", { status: 200, body });
     const text = await fatalText(`${stand.host.address}/app/?bundle=../bundle/`);
     expect(text).toContain("this viewer reads version 1, found 99");
   });
 
-  it("says on the page that a file is no JSON", async () => {
+  it("reports on the page that a file is no JSON", async () => {
     stand.host.overrides.set("/bundle/manifest.json", {
       status: 200,
       body: "<html>Sign in</html>",
@@ -205,7 +205,7 @@ describeInChromium("the viewer", () => {
     expect(text).toContain('manifest.json: expected JSON, found "<html>Sign in</html>"');
   });
 
-  it("says on the page that the browser has no WebGL 2", async () => {
+  it("reports on the page that the browser has no WebGL 2", async () => {
     await stand.viewer.page.addInitScript(() => {
       HTMLCanvasElement.prototype.getContext = () => null;
     });

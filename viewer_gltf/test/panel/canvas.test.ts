@@ -162,7 +162,7 @@ describeInChromium("the panel in the room", () => {
     expect(moved?.gradients[1]).toBeCloseTo(0.8, 2);
   });
 
-  it("says why a control refuses, under the gaze, for a while", async () => {
+  it("reports why a control refuses, under the gaze, for a while", async () => {
     await hands().gazeOnly();
     await hands().openPanel();
     await gazeAt("tab=tiles");
@@ -182,7 +182,7 @@ describeInChromium("the panel in the room", () => {
     expect((await hands().status()).told).toEqual([]);
   });
 
-  it("leaves what is told where the head looked when it came", async () => {
+  it("leaves a notice where the head looked when it came", async () => {
     const fault = "channels/c0/r0_c0/lod0.glb: not found (404). The other tiles go on.";
     const tell = (text: string) => hands().page.evaluate((t) => window.hands.tell(t), text);
     const noticeAt = () => hands().page.evaluate(() => window.hands.noticeAt());

@@ -186,7 +186,7 @@ describeInChromium("the panel", () => {
     expect(await axes()).not.toBe(from);
   });
 
-  it("cuts the only tile that is shown at its own middle, and says where a cut left nothing", async () => {
+  it("cuts the only tile that is shown at its own middle, and reports an empty cut", async () => {
     await stand.viewer.unfold("cut");
     const said = () => page().locator("[data-said]").textContent();
     const { tiles } = stand.manifest;
@@ -253,7 +253,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     expect((await first()).opacity).toBeCloseTo(0.95, 5);
   });
 
-  it("says the same before the eyes in stereo", async () => {
+  it("announces the same before the eyes in stereo", async () => {
     await addHeadset(page());
     await stand.open("&mode=off");
     await stand.viewer.enterStereo();
@@ -264,7 +264,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     expect((await state()).notices).toEqual([]);
   });
 
-  it("finds one of seventy channels, and says which leaves for a fifth", async () => {
+  it("finds one of seventy channels, and names the one that leaves for a fifth", async () => {
     const { manifest, host } = stand;
     const [, , block] = manifest.channels;
     const more = Array.from({ length: 67 }, (_, i) => ({
@@ -374,7 +374,7 @@ describeInChromium("the panel as it lies there", () => {
   });
 });
 
-/** Runs in the page: texts whose contrast (WCAG 2.2, 1.4.3) is too low, but of what is disabled. */
+/** Runs in the page: texts with too low a contrast (WCAG 2.2, 1.4.3), but for disabled ones. */
 function lowContrasts(): string[] {
   type Rgba = [number, number, number, number];
   const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });

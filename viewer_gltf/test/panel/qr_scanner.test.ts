@@ -52,7 +52,7 @@ describeInChromium("the scanner", () => {
     expect(tracks).toEqual(["ended"]);
   });
 
-  it("says so where the camera is refused", async () => {
+  it("reports it where the camera is refused", async () => {
     await addCamera(false);
     await stand.viewer.page.keyboard.press("K");
     await expect

@@ -84,7 +84,7 @@ describeInChromium("the path-traced page", () => {
 
   /** Paths that are scattered once: that is quicker, and most tests are of other things. */
   const ONCE = "light=many:false";
-  /** As a scan of a whole body: the bundle says so. */
+  /** As a scan of a whole body, by the bundle's own entry. */
   async function open(query = `&quality=low#v=1&${ONCE}`): Promise<void> {
     const { manifest } = stand;
     const scan = { ...manifest, specimen: { ...manifest.specimen, modality: "MR" } };
@@ -96,7 +96,7 @@ describeInChromium("the path-traced page", () => {
   async function press(...keys: readonly string[]): Promise<void> {
     for (const key of keys) await page().keyboard.press(key);
   }
-  /** Of a picture with nothing said over it. */
+  /** Of a picture with no announcement over it. */
   async function shoot(least = 5): Promise<Picture> {
     await gathered(least);
     const said = () => page().locator("[data-said]").textContent();
@@ -313,7 +313,7 @@ describeInChromium("the path-traced page", () => {
     for (const [k, v] of is.entries()) expect(Math.abs(v - was[k])).toBeLessThan(8);
   });
 
-  it("says once that the light can't be had, and tries again when asked", async () => {
+  it("reports once that the light can't be had, and tries again when asked", async () => {
     stand.host.overrides.set(STUDIO, { status: 503, body: "" });
     await open();
     await expect.poll(notices, PATIENT).toHaveLength(1);
@@ -326,7 +326,7 @@ describeInChromium("the path-traced page", () => {
     expect(drawn(await shoot(4))).toBeGreaterThan(340);
   });
 
-  it("says so where the page lacks what follows light, and asks for it again", async () => {
+  it("reports it where the page lacks what follows light, and asks for it again", async () => {
     await page().route(/\/path_tracer-[^/]*\.js$/, (route) => route.abort());
     await open();
     await expect.poll(notices, PATIENT).toEqual([expect.stringContaining("follows light")]);

@@ -71,7 +71,7 @@ describeInChromium("the path tracer", () => {
   );
   const gather = (run: Run) => call("gather", run);
 
-  /** The same medium told in other ways. */
+  /** The same medium in other forms. */
   const TOLD = [
     ["by value and gradient", { isTwoD: true }],
     ["in bricks", { isBricked: true }],
@@ -111,7 +111,7 @@ describeInChromium("the path tracer", () => {
     expect(Math.abs(mean(found) - 1)).toBeLessThan(0.01);
   });
 
-  describe("lets through a slab what Beer and Lambert say", () => {
+  describe("lets light through a slab by Beer and Lambert's law", () => {
     const far: Run = {
       ...BASE,
       spacing_um: [1, 1, 1],
@@ -140,7 +140,7 @@ describeInChromium("the path tracer", () => {
     });
 
     for (const [name, told] of TOLD) {
-      it(`told ${name}`, async () => {
+      it(`given ${name}`, async () => {
         const { channels = 1 }: Partial<Run> = told;
         const opacity = 20; // of one channel; as 8-bit tables hold it, alike channels' shares
         const share = Math.round(255 * (1 - (1 - opacity / 255) ** (1 / channels)));

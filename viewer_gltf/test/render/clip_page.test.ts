@@ -1,6 +1,6 @@
 /**
- * What the clip plane and box cut away of the picture, surfaces and volumes alike, in one eye and in
- * two. Rays through the specimen tell what is to be seen: where a ray's whole way is cut away there
+ * The clip plane and box cut surfaces and volumes alike, in one eye and in two. Rays through the
+ * specimen give the expected picture: where a ray's whole way is cut away there
  * is nothing, and where all of it is kept the picture is what it was.
  */
 import { expect, it } from "vitest";
@@ -21,7 +21,7 @@ const HANDLE_PX = 16;
 const LINE_PX = 3;
 /** From a plane's middle to its tip. */
 const ARM_UM = 0.2 * 64;
-/** Neighbours that differ by more are a silhouette, whose blend is another one in each drawing. */
+/** Least difference of neighbours at a silhouette: each drawing blends it otherwise. */
 const EDGE = 24;
 /** Rays so near to a cut are no matter: the picture's own edges. */
 const MARGIN_UM = 0.6;
@@ -208,7 +208,7 @@ function expectCut(found: Found, atLeast: number, which: string): void {
   expect(found.changed, which).toBeLessThanOrEqual(SAME * found.stays);
 }
 
-/** A link that says all that matters. */
+/** A link that holds all that matters. */
 const linkOf = (mode: Mode, more: string) =>
   `#v=1&c=${CHANNELS}&mode=${mode}&dwell=off&quality=high${more}`;
 
@@ -251,7 +251,7 @@ describeInChromium("a cut", () => {
     const eye = eyeOf("side", AWAY_M, 40, whole);
     const press = async (key: string) => {
       await page().keyboard.press(key);
-      // what the page tells of it lies over the picture
+      // the page's announcement of it lies over the picture
       await expect
         .poll(() => page().locator("[data-said]").textContent(), { timeout: 30_000 })
         .toBe("");

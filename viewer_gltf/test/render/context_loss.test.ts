@@ -45,7 +45,7 @@ describeInChromium("the graphics driver", () => {
     expect(warnings.filter((text) => /TilesRenderer|does not belong/.test(text))).toEqual([]);
   });
 
-  it("takes no large textures: a coarser level is shown, and the page says so", async () => {
+  it("takes no large textures: a coarser level is shown, and the page reports it", async () => {
     await stand.viewer.page.addInitScript(() => {
       const { prototype } = WebGL2RenderingContext;
       const original = prototype.getParameter;

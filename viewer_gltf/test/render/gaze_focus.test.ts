@@ -1,4 +1,4 @@
-/** Who is drawn how: surfaces from afar, volumes round the gaze, in one tile, or everywhere. */
+/** Representations: surfaces from afar, volumes round the gaze, in one tile, or everywhere. */
 import { expect, it } from "vitest";
 import type { Mode } from "../../src/state/parameters/volumes";
 import { project } from "../support/browser/camera";

@@ -145,7 +145,7 @@ describeInChromium("the path tracer's chunks", () => {
         (await drawn(square)).forEach((v, k) => {
           expect(Math.abs(v - squares[k]), `square ${k}`).toBeLessThan(SLACK + grid);
         });
-        // and what theory says of the cosines
+        // and the cosines by theory
         if (way === "PHASE") expect(Math.abs(dot(found.slice(0, 3), FROM) - g)).toBeLessThan(SLACK);
         if (way === "DIFFUSE") {
           expect(Math.abs(dot(found.slice(0, 3), NORMAL) - 2 / 3)).toBeLessThan(SLACK);
@@ -237,7 +237,7 @@ describeInChromium("the path tracer's chunks", () => {
       expect((await look(body))[0]).toBeCloseTo(1, 3);
     });
 
-    it("is drawn in proportion to what comes from there, and tells of it", async () => {
+    it("is drawn in proportion to what comes from there, and returns it", async () => {
       const weights = Array.from({ length: width * height }, (_, i) => {
         const row = Math.floor(i / width);
         const cap = (at: number) => Math.cos((at / height) * Math.PI);
@@ -299,7 +299,7 @@ describeInChromium("the path tracer's chunks", () => {
       expect(await medium(2, [0, 0, 1, 1])).toEqual([0, 0, 0, 0]);
     });
 
-    it("is found by the box's um, whose rows run against y", async () => {
+    it("is found by the box's um, with rows that run against y", async () => {
       const textures = { uMedium: floats([256, 2], table) };
       const head = `#define CHANNELS 1
         const vec3 uTexLow = vec3(0.25, 0.75, 0.25); const vec3 uTexPerUm = vec3(0.5, -0.5, 0.25);
@@ -363,7 +363,7 @@ describeInChromium("the path tracer's chunks", () => {
       expect(Math.abs(found[2] - second)).toBeLessThan(SLACK * LENGTH * spread);
     });
 
-    it("through a medium that thickens as far as its optical depth says, by either tracking", async () => {
+    it("through a thickening medium by its optical depth, by either tracking", async () => {
       // extinction p.x / 32, um: along the ray (0.7 + 0.707 t) / 32
       const at = (x: number) => x / 32;
       const depth = at(FROM[0]) * LENGTH + (at(DIR[0]) * LENGTH ** 2) / 2;
@@ -487,7 +487,7 @@ describeInChromium("the path tracer's chunks", () => {
       expectClose(await history(2, 0.25, [1, 2], edge, "sums"), [15, 0, 0, 7.5]);
       expect((await history(2, 0.25, [1, 2], edge, "moments"))[1]).toBeCloseTo(10, 3);
       // an edge has gone by: it is found from this side, too
-      // by what is near the box's middle, where nothing tells how far to look
+      // by what is near the box's middle, where nothing gives the distance
       expect((await history(2, -1, [2, 2], edge, "sums"))[0]).toBeCloseTo(20, 0);
       expect(await history(2, 1, [1, 2], edge, "sums")).toEqual([0, 0, 0, 0]);
       expect((await history(2, 1, [1, 2], edge, "moments"))[1]).toBeCloseTo(10, 3);

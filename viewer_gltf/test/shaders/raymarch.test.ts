@@ -25,7 +25,7 @@ describeInChromium("the ray-march", () => {
     expect(covered).toBeGreaterThan(0.99);
   });
 
-  it("keeps to the limit where leaps and samples alternate", async () => {
+  it("keeps to the limit where skips and samples alternate", async () => {
     const { most, covered } = await count({ side: 198, opacity: 1, bricks: "checkerboard" });
     expect(most).toBeLessThanOrEqual(100);
     expect(covered).toBeGreaterThan(0.99);
@@ -36,7 +36,7 @@ describeInChromium("the ray-march", () => {
     expect(most).toBeLessThanOrEqual(2);
   });
 
-  it("leaps through what is empty", async () => {
+  it("skips empty space", async () => {
     const { most, covered } = await count({ side: 198, opacity: 255, bricks: "none" });
     expect(most).toBeLessThanOrEqual(5);
     expect(covered).toBeGreaterThan(0.99);
@@ -50,7 +50,7 @@ describeInChromium("the ray-march", () => {
     }
   });
 
-  it("shows the same with leaps and without, whatever is drawn", async () => {
+  it("shows the same with skips and without, whatever is drawn", async () => {
     let drawn = 0;
     const seeds = sweep(
       Array.from({ length: 30 }, (_, i) => i),
@@ -76,7 +76,7 @@ describeInChromium("the ray-march", () => {
     expect(Math.abs(found - expected)).toBeLessThan(2 / 255);
   });
 
-  it("makes a uniform cube as opaque as its length says, whatever its opacity", async () => {
+  it("makes a uniform cube as opaque as its length makes it, at any opacity", async () => {
     // 64 voxels are a step each; of 200 some are longer than a voxel, and are corrected for it
     for (const side of [67, 203]) {
       for (const opacity of [1, 5, 20]) {
@@ -135,7 +135,7 @@ describeInChromium("the ray-march", () => {
     await expectBlock(ahead(0.5, 1, 2), 6.5, 1); // t counts from the start
     await expectBlock(ahead(0.5, 0.5, 0), 13, 1);
     await expectBlock(ahead(7.5, 1, 0), 0.5, 0); // the visible brick's own end
-    await expectBlock(ahead(6.5, -1, 0), 0.5, 1); // back from brick 6, whose block is that brick
+    await expectBlock(ahead(6.5, -1, 0), 0.5, 1); // back from brick 6: its block is that brick
   });
 
   it("classifies by the table, with the opacity of the step's length", async () => {

@@ -106,7 +106,7 @@ describeInChromium("the shader's chunks", () => {
     });
   });
 
-  it("tell by which cut a ray came in", async () => {
+  it("return the cut by which a ray came in", async () => {
     const cut = async (planes: number[][], body: string) => {
       const lines = planes.map((plane, i) => `uCutsGiven[${i}] = ${vec(...plane)};`).join("\n");
       const chunks = await readChunks("clip_planes");
@@ -250,7 +250,7 @@ describeInChromium("the shader's chunks", () => {
     });
   });
 
-  it("sample between voxels as the distances to them say, and mix a fresh level in", async () => {
+  it("sample between voxels by the distances to them, and mix a fresh level in", async () => {
     const values = (add: number) =>
       Array.from({ length: 8 }, (_, i) => [20 * i + add, 255 - 20 * i, i % 2 ? 255 : 0, 7]).flat();
     const volume = (add: number): Texture => ({
@@ -289,8 +289,8 @@ describeInChromium("the shader's chunks", () => {
 
   describe("light a sample", () => {
     /**
-     * Of an intensity that rises by `slope` a um, in two channels, on voxels of 0.5 x 0.75 x 2 um
-     * whose rows run against y, as a tile's do.
+     * Of an intensity that rises by `slope` a um, in two channels, on voxels of 0.5 x 0.75 x 2 um;
+     * their rows run against y, as a tile's do.
      */
     function lit(slope: readonly number[], dir: readonly number[], light: readonly number[]) {
       const size = [40, 60, 24]; // um
@@ -329,7 +329,7 @@ describeInChromium("the shader's chunks", () => {
       }
     });
 
-    it("as much as the angle says: full in the lamp's way, half at 60 degrees, none beyond", async () => {
+    it("by the angle: full in the lamp's way, half at 60 degrees, none beyond", async () => {
       const facing = (degrees: number) => {
         const at = (degrees * Math.PI) / 180;
         return lit([0, 0, -0.5], [0, 0, -1], [Math.sin(at), 0, Math.cos(at)]);

@@ -16,7 +16,7 @@ describeInChromium("two-dimensional transfer functions", () => {
   const SLOPE_AT = [20, 28] as const;
   const OPACITY = 3 / 255;
   const through = 1 - (1 - OPACITY) ** 48;
-  /** Opacities of the columns whose middle lies between two places. */
+  /** Opacities of the columns with their middle between two places. */
   const between = (columns: readonly number[], from: number, to: number) =>
     columns.filter((_, i) => {
       const x = (48 * (i + 0.5)) / columns.length;
@@ -55,7 +55,7 @@ describeInChromium("two-dimensional transfer functions", () => {
     expect(drawn).toBeGreaterThan(500);
   });
 
-  it("show the same with leaps and without", async () => {
+  it("show the same with skips and without", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 8; seed++) {
       const found = await bare.call("compareSkips2d", seed);

@@ -59,7 +59,7 @@ describeInChromium("the share link", () => {
       for (const key of keys) await page().keyboard.press(key);
       await stand.viewer.settled();
     };
-    /** What the link says of eye and specimen. */
+    /** Eye and specimen in the link. */
     const written = async (): Promise<readonly number[]> => {
       await press("l");
       const parts = new URLSearchParams((await hash()).slice(1));
@@ -110,7 +110,7 @@ describeInChromium("the share link", () => {
     expectSame(await written(), moved);
   });
 
-  it("goes to the clipboard, and says so", async () => {
+  it("goes to the clipboard, and is announced", async () => {
     await page().context().grantPermissions(["clipboard-read", "clipboard-write"]);
     await stand.open();
     await page().keyboard.press("d");
@@ -131,7 +131,7 @@ describeInChromium("the share link", () => {
     expect(await page().evaluate(() => getSelection()?.toString())).toBe(page().url());
   });
 
-  it("shows what it can of a link to another bundle, and says what is missing", async () => {
+  it("shows what it can of a link to another bundle, and reports what is missing", async () => {
     await stand.open("#v=1&c=Balls,CD8&tile=r7_c7&disc=9&box=NaN");
     const { state } = await stand.viewer.snapshot();
     expect(state.channels.filter(({ shown }) => shown).map(({ id }) => id)).toEqual(["Balls"]);

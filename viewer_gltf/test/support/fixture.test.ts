@@ -1,4 +1,4 @@
-/** Numbers out of the picture, on bodies whose look can be written down. */
+/** Numbers out of the picture, on bodies with a known look. */
 import { beforeEach, expect, it } from "vitest";
 import { project } from "./browser/camera";
 import { isBackground, type Picture, type Pixel, takePicture } from "./browser/picture";
@@ -37,7 +37,7 @@ describeInChromium("the picture of the fixture", () => {
       expectLetter(stand.viewer, stand.manifest, F, as, FIXTURE_LETTER));
   }
 
-  it("draws a uniform block as opaque as its length says", async () => {
+  it("draws a uniform block as opaque as its length makes it", async () => {
     await showAsVolume("Block");
     await stand.viewer.recolor("Block", "#ffffff");
     const picture = await takePicture(stand.viewer.page);

@@ -1,4 +1,4 @@
-/** What Python has to say: the float64 references, which lie in the repository's tests/support. */
+/** Python's answers: the float64 references, which lie in the repository's tests/support. */
 import { execFile } from "node:child_process";
 import { existsSync } from "node:fs";
 import { join } from "node:path";

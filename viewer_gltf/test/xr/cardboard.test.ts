@@ -10,7 +10,7 @@ import type { Spot } from "../support/xr/cardboard_harness";
 const WIDTH = 844;
 const HEIGHT = 390;
 const PIXELS_PER_m = 153.3 / 0.0254;
-/** Cardboard v1, whose 40 degrees are less than this screen shows: both eyes see them in full. */
+/** Cardboard v1: its 40 degrees are less than this screen shows, so both eyes see them in full. */
 const V1 = { interLens_m: 0.06, screenToLens_m: 0.042, lensHeight_m: 0.032, k: [0.441, 0.156] };
 const PIXELS_PER_TANGENT = WIDTH / 2 / (2 * Math.tan((40 * Math.PI) / 180));
 const ADDRESS = "http://localhost/split";
@@ -187,7 +187,7 @@ describeInChromium("stereo without WebXR", () => {
     expect(Math.abs((left.x + right.x) / 2 - WIDTH / 4)).toBeLessThan(1);
   });
 
-  it("tells in words that the orientation was refused, and leaves the page as it was", async () => {
+  it("reports that the orientation was refused, and leaves the page as it was", async () => {
     await page.evaluate(() => {
       Object.assign(DeviceOrientationEvent, { requestPermission: async () => "denied" });
     });
@@ -215,7 +215,7 @@ describeInChromium("stereo without WebXR", () => {
     ]);
   });
 
-  it("says what this browser could not give, and goes on without", async () => {
+  it("reports what this browser could not give, and goes on without", async () => {
     await page.evaluate(() => {
       Object.assign(HTMLElement.prototype, {
         requestFullscreen: undefined,

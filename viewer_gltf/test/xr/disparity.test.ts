@@ -1,4 +1,4 @@
-/** Stereo that is right: a known point lies where the two eyes' geometry says, drawn either way. */
+/** Stereo that is right: a known point lies at its place by the two eyes' geometry, either way. */
 import { expect, it } from "vitest";
 import { place, XR_DISTANCE_M } from "../../src/render/placement";
 import { addHeadset } from "../support/browser/chromium";

@@ -117,7 +117,7 @@ describeInChromium("the page in stereo", () => {
     expect((await notices()).join()).not.toMatch(/not allowed/);
   });
 
-  it("says what to do where an iPhone's owner refuses", async () => {
+  it("tells the user what to do after an iPhone's refusal", async () => {
     await addIphone("denied");
     await tapSplit();
     await expect
@@ -127,7 +127,7 @@ describeInChromium("the page in stereo", () => {
     await expect.poll(isFull).toBe(false);
   });
 
-  it("says so where the rest of the page can't be had, and gives the screen back", async () => {
+  it("reports it where the rest of the page can't be had, and gives the screen back", async () => {
     await addIphone("granted");
     await stand.viewer.page.route("**/split_session*", (route) => route.abort());
     await tapSplit();
@@ -144,7 +144,7 @@ describeInChromium("the page in stereo", () => {
     await stand.viewer.page.keyboard.press("t");
     await stand.viewer.page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
-    // What the browser could not give is said before the eyes: the stage hides the page.
+    // Each refused feature is reported before the eyes: the stage hides the page.
     const { told } = await stand.viewer.snapshot();
     expect(told.at(-1)).toMatch(/can't keep the screen on/);
     expect(told).toEqual(await notices());

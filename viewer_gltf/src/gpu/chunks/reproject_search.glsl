@@ -1,7 +1,7 @@
 // Where another eye, nearby, sees the surface that a ray from `eye` meets: in pixels of its part of
 // the picture. To and fro between distance and place: `away` is a first guess, and becomes how far
-// the surface is, if any is met. Whoever includes this says how far the other eye sees at a pixel,
-// um; 0: nothing is met there.
+// the surface is, if any is met. The including shader defines `metAt`: the distance that the other
+// eye sees at a pixel, um; 0: nothing is met there.
 float metAt(ivec2 pixel);
 
 const int SEEK_ROUNDS = 4;

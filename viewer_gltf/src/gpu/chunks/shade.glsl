@@ -1,4 +1,4 @@
-const float AMBIENT = 0.4;  // what faces away keeps its colour: channels are told by it
+const float AMBIENT = 0.4;  // for sides that face away: they keep the channel's colour
 const float DIFFUSE = 0.7;  // a little above 1 in all, as the surfaces' lamp is
 // Steps of intensity over two voxels: below the first they are the noise of 8 bits and of the
 // detector, above the second a boundary of its own; between, light fades in.
@@ -6,7 +6,7 @@ const float NOISE_STEP = 0.03;
 const float BOUNDARY_STEP = 0.18;
 const float FLAT_STEP = 1e-4;  // less than one of 8 bits: no direction at all
 
-// Diffuse light by the gradient (Levoy 1988). 1 where there is none to tell a direction, or only
+// Diffuse light by the gradient (Levoy 1988). 1 where there is none to give a direction, or only
 // noise.
 float shadeBy(vec3 gradient, vec3 dir) {
   float steepness = length(gradient);

@@ -15,10 +15,10 @@ import {
 } from "./draw_list";
 import { captioned, LABEL, one, region, toneOf, unlessRefused } from "./parts";
 
-/** A map of few tiles need not fill the panel. */
+/** Largest cell, px: a map of few tiles need not fill the panel. */
 const LARGEST_CELL = 96;
 const MAP_HEIGHT = 7 * ROW;
-/** 1.25 degrees at 1.2 m: of smaller ones no gaze could choose one. */
+/** Smallest cell, px: 1.25 degrees at 1.2 m; no gaze could choose a smaller one. */
 const SMALLEST_CELL = 42;
 
 /** Options side by side. */

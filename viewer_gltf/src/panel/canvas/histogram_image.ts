@@ -2,7 +2,7 @@
 import { COLUMNS, ROWS } from "../../bundle/transfer_2d";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 
-/** Of the page's accent, where there are most voxels. */
+/** Colour of the most voxels, sRGB, 0..255: the page's accent. */
 const COLOR = [150, 190, 240] as const;
 
 const made = new WeakMap<Histogram, HTMLCanvasElement>();

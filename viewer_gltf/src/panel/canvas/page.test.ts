@@ -114,7 +114,7 @@ describe("the panel on a plane", () => {
     }
   });
 
-  it("says why where something is refused", () => {
+  it("reports why something is refused", () => {
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
     const radius = find(page, "disc-radius");

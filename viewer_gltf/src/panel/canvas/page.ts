@@ -16,10 +16,10 @@ import {
   text,
 } from "./draw_list";
 
-/** Of the texture, px: it grows with nothing. */
+/** Width of the texture, px: it never grows. */
 export const WIDTH = 1024;
 export const HEIGHT = 640;
-/** A row is 37.5 mm: 1.8 degrees at 1.2 m. */
+/** Pixels to a metre: a row is 37.5 mm, 1.8 degrees at 1.2 m. */
 export const PX_PER_M = 1600;
 
 const MARGIN = 16;

@@ -4,7 +4,7 @@ import { type Block, type Mark, type Rect, type Region, ROW, SMALL, text } from 
 
 /** A control's label, as a share of the row that it shares with the control. */
 export const LABEL = 0.27;
-/** A caption over a row. */
+/** Height of a caption over a row, px. */
 const CAPTION = 34;
 
 export function one(marks: readonly Mark[], regions: readonly Region[], height = ROW): Block {
@@ -21,7 +21,7 @@ export function region(
   return { id, label, rect, to, isSlide };
 }
 
-/** What can't be used tells why when it is chosen, wherever in it. */
+/** A refused control reports the reason when the user chooses any part of it. */
 export function unlessRefused(
   { refusal }: Pick<Control, "refusal">,
   regions: readonly Region[],

@@ -7,11 +7,11 @@ import type { HistogramEditor } from "../controls";
 import { type Block, type Mark, type Rect, SMALL, text } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";
 
-/** Of the plane on the panel. */
+/** Height of the plane on the panel, px. */
 const HEIGHT = 300;
-/** Texts of the axes. */
+/** Space for the axes' texts, px. */
 const AXIS = 30;
-/** A corner is as near as this, px: a ray trembles. */
+/** Reach of a corner, px: a ray trembles. */
 const REACH = 26;
 const HANDLE = 22;
 

@@ -71,7 +71,7 @@ export class Help {
       onClose();
     });
     this.dialog.addEventListener("close", () => {
-      if (!this.dialog.open) onClose(); // the browser may close it whatever `cancel` says
+      if (!this.dialog.open) onClose(); // the browser may close it in spite of `cancel`
     });
     this.dialog.addEventListener("keydown", (event) => {
       // For a moment after it was closed the focus is still in it.

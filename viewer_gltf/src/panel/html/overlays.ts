@@ -4,7 +4,7 @@ import { element, setText } from "../../dom/element";
 import type { ViewerState } from "../../state/viewer_state";
 import type { Progress } from "../../surfaces/overview_progress";
 
-/** What is said stays for as long; a screen reader reads it at once. */
+/** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
@@ -47,7 +47,7 @@ export class Notices {
   update({ notices, mendable }: Pick<ViewerState, "notices" | "mendable">): void {
     if (notices === this.drawn) return; // what is written anew is read out anew
     this.drawn = notices;
-    // A broken host fails for every file: the newest few say what is wrong.
+    // A broken host fails for every file: the newest few notices are enough.
     const shown = notices.slice(-3);
     const hidden = notices.length - shown.length;
     this.root.replaceChildren(
@@ -82,7 +82,7 @@ export class Said {
   }
 }
 
-/** Nothing can be shown: say what is wrong and what can be done, in the page. */
+/** Nothing can be shown: report the fault and what can be done, in the page. */
 export function showFatal(parent: HTMLElement, title: string, text: string): void {
   parent.replaceChildren(
     element(

@@ -12,14 +12,14 @@ import type { HistogramEditor } from "../controls";
 import { shapeText } from "../edit_shapes";
 import { hooks, type Send, type Widget } from "./widget";
 
-/** Of the canvas; the page scales it. */
+/** Width of the canvas, px; the page scales it. */
 const WIDTH = 640;
 const HEIGHT = 320;
 const HANDLE = 22;
-/** Of the canvas, left around the plane: half a handle lies beyond its edge. */
+/** Space around the plane, px of the canvas: half a handle lies beyond its edge. */
 const PAD = 14;
 const PLANE: Rect = { x: PAD, y: PAD, width: WIDTH - 2 * PAD, height: HEIGHT - 2 * PAD };
-/** As near as this, px of the page. */
+/** Reach of the pointer, px of the page. */
 const MOUSE_REACH = 8;
 const FINGER_REACH = 22;
 /** One step of an arrow, in cells of the table. */

@@ -49,7 +49,7 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
       ariaLabel: first.name ?? first.label,
       onchange: () => {
         const wanted = input.checked;
-        input.checked = now.value; // the state says what it is
+        input.checked = now.value; // the state holds its value
         if (!now.refusal) send(now.to(wanted));
       },
     },
@@ -90,7 +90,7 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     },
     hooks(first.id),
   );
-  const text = element("output", { ariaHidden: "true" }); // the input says it itself
+  const text = element("output", { ariaHidden: "true" }); // the input announces it itself
   const head = element(
     "span",
     { className: "head" },

@@ -14,7 +14,7 @@ import { transferFunction2dItems } from "./transfer_function_2d";
 
 /** Channels of a page that are not shown; fewer need no search. */
 export const PAGE = 6;
-/** The volumes have 8 bits. */
+/** Steps of a window's slider: the volumes have 8 bits. */
 const WINDOW_STEPS = 255;
 
 /** The voxel values of the source that are 0 and 255 in the volumes, by channel. */
@@ -99,7 +99,7 @@ function cardOf(
   };
 }
 
-/** The hidden channels whose name or id holds what is sought. */
+/** The hidden channels with the sought text in their name or id. */
 export function foundChannels(state: ViewerState, search: string): readonly ChannelState[] {
   const sought = search.trim().toLowerCase();
   return state.channels.filter(

@@ -29,7 +29,7 @@ export function stereoItems(
   ];
 }
 
-/** A phone in a viewer of lenses: which, and of another than Google's own what its code says. */
+/** A phone in a viewer of lenses: which one, and the code of one that is not Google's. */
 function splitItems(
   split: XrSupport,
   { canScan, faultOfCode }: StereoSupport,

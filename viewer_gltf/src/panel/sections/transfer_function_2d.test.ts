@@ -23,7 +23,7 @@ const RECTANGLE = makeShape("rectangle", { value: 0.5, gradient: 0.5 });
 const TRIANGLE = makeShape("triangle", { value: 0.2, gradient: 0.5 });
 const REACH = { value: 0.03, gradient: 0.05 };
 
-/** A panel and a state that wishes change, as who has them does. */
+/** A panel and a state that wishes change, as the panel's caller keeps them. */
 class Controller {
   state: ViewerState = initialState(sampleManifest(3));
   view: PanelView = changePanel(START_VIEW, { panel: "histogram", channel: "c0" });
@@ -152,7 +152,7 @@ describe("the editor of value and gradient", () => {
     expect(items(known)[1]).toMatchObject({ refusal: "", shapes: [TRIANGLE] });
   });
 
-  it("is worked by keys, which tell what they did", () => {
+  it("is worked by keys, which announce what they did", () => {
     const controller = new Controller();
     const before = controller.state;
     controller.press("Q");
@@ -202,7 +202,7 @@ describe("its block on the panel in the room", () => {
     expect(block.height).toBeLessThan(492); // fits a page beside the way on
   });
 
-  it("tells why it refuses", () => {
+  it("reports why it refuses", () => {
     const controller = new Controller(RECTANGLE);
     const [{ regions }] = blocksOf({ ...controller.editor, refusal: "Not now." }, 760);
     expect(regions[0].press).toBeUndefined();

@@ -9,7 +9,7 @@ import { type Key, key, meantChannel, neighbour, ofChannel } from "../key";
 import { nextColour } from "../palettes";
 import { refusalOf, setShapes } from "./transfer_function_2d";
 
-/** Of a shape's number: five cells of its table. */
+/** One step of a shape's number, 0..1: five cells of its table. */
 const SHAPE_STEP = 5 / 255;
 
 function addShapeOf(kind: Shape["kind"]) {

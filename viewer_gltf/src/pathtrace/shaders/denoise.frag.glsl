@@ -1,6 +1,6 @@
 // One round of an edge-avoiding a-trous wavelet (Dammertz et al., HPG 2010): mix pixels that lie
-// `uGap` apart, as far as distance, coverage and brightness say that they show the same, each as
-// exactly as so few samples can tell. The more a pixel has gathered, the more it keeps what it has.
+// `uGap` apart, as far as distance, coverage and brightness show that they are alike, each as
+// exactly as so few samples allow. The more a pixel has gathered, the more it keeps of its own.
 precision highp float;
 
 uniform sampler2D uColor;

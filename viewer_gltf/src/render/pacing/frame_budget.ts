@@ -13,7 +13,7 @@ import {
 } from "../../state/quality_controller";
 
 const RATE_HZ = 60;
-/** So many times a frame's time between two frames: the picture is not kept up. */
+/** Time between two late frames, as a multiple of a frame's time. */
 const LATE = 1.3;
 
 export class Pace {
@@ -47,7 +47,7 @@ export class Pace {
       const { timing } = this.quality;
       const budget_ms = frameBudget_ms(rate_hz, timing);
       const work_ms = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
-      // where frames are late, or no answer comes, the GPU's own time says nothing
+      // where frames are late, or no answer comes, the GPU's own time means nothing
       const isLate = this.frame_ms > LATE * (1000 / rate_hz);
       const spent_ms = isLate ? Math.max(work_ms ?? 0, interval_ms) : work_ms;
       if (spent_ms !== null) this.quality = advanceQuality(this.quality, spent_ms, budget_ms);

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { RestPace } from "./redraw_at_rest";
 
-/** A GPU whose pictures last so long; the milliseconds at which one was asked for. */
+/** A GPU with pictures of this length; the milliseconds at which one was asked for. */
 function run(picture_ms: number, until_ms: number): number[] {
   let now = 0;
   let doneAt = 0;

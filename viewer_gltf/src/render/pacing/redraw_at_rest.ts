@@ -4,9 +4,9 @@
  */
 import type { FencedContext } from "./samples_per_frame";
 
-/** A picture that took no longer keeps nothing waiting. */
+/** Time of a quick picture, ms: it keeps nothing waiting. */
 const LITTLE_MS = 50;
-/** A page that slept did not draw for as long. */
+/** Longest time that a picture counts, ms: a page that slept did not draw for as long. */
 const MOST_MS = 1000;
 const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
 const SYNC_STATUS = 0x9114;

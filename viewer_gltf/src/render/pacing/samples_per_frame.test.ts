@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { GatherPace } from "./samples_per_frame";
 
-/** A GPU whose frames last so long, by the number of samples. */
+/** A GPU with frames of this length, by the number of samples. */
 function stand(msOf: (passes: number) => number) {
   let now = 0;
   let doneAt = 0;

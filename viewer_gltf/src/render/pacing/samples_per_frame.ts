@@ -3,7 +3,7 @@
  * browser takes more work than the GPU has done; so each frame waits until the one before is done.
  */
 
-/** A frame at rest may last so long: the page still answers at once. */
+/** Longest frame at rest, ms: the page still answers at once. */
 const FRAME_MS = 60;
 const MOST = 16;
 const LEAST = 1 / 64;

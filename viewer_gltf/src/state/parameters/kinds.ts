@@ -6,7 +6,7 @@ import type { Rgb } from "../../math/color";
 
 export type Value = number | boolean | string | Rgb;
 
-/** A key and what the list of keys says of it. */
+/** A key and its text in the list of keys. */
 type KeyWords = readonly [key: string, label: string];
 
 /** `On`: what of the state it is of. */
@@ -14,7 +14,7 @@ type Row<On, T extends Value> = Readonly<{
   /** Of the panel's control, and of the action that sets it. */
   id: string;
   label: string;
-  /** The label where nothing around says what it is of. */
+  /** The label where nothing around names its subject. */
   name?: (on: On) => string;
   /** Its name in a link; absent: it is in none. */
   link?: string;
@@ -23,7 +23,7 @@ type Row<On, T extends Value> = Readonly<{
   /** Whether there is anything that it changes; absent: always. */
   isShown?: (on: On) => boolean;
   get: (on: On) => T;
-  /** What is said once a key has set it. */
+  /** The announcement once a key has set it. */
   spoken: (on: On) => string;
 }> & {
   /** @param value one that `accepted` gives back */

@@ -22,7 +22,7 @@ describe("the parameters", () => {
     expect(isUnique(PARAMETERS.map(({ link }) => link))).toBe(true);
     expect(isUnique(CHANNEL.map(({ link }) => link))).toBe(true);
     expect(IN_ADDRESS.every(({ link }) => link !== undefined)).toBe(true);
-    // of a channel's look, a letter says which
+    // of a channel's look, a letter names the part
     expect(CHANNEL.every(({ link }) => link?.length === 1 && !"wst".includes(link))).toBe(true);
   });
 
@@ -78,7 +78,7 @@ describe("the parameters", () => {
     expect(set.channels).toEqual([first, { ...second, opacity: 0.25 }]);
   });
 
-  it("say in a notice what this device can't do", () => {
+  it("report in a notice what this device can't do", () => {
     const poor = initialState(sampleManifest(1), false);
     const asked = reduce(poor, setTo(MODE, "traced"));
     expect(asked.mode).toBe(poor.mode);

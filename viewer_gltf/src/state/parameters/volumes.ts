@@ -25,7 +25,7 @@ type Volumes = VolumeSettings &
   Readonly<{ canTrace: boolean; tiles: readonly Readonly<{ representation: string }>[] }>;
 
 const NO_FLOATS = "This device can't draw into textures of floats: light can't be gathered here.";
-/** Of a distance, so that near and far feel alike. */
+/** One step of a distance, as a factor: near and far feel alike. */
 const DISTANCE_FACTOR = 1.1;
 
 const lens = lensesOf<Volumes>();

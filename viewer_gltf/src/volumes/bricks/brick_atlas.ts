@@ -17,9 +17,9 @@ import type { VolumeSource } from "../volume_source";
 import type { Brick, BrickLink, Taker } from "./client";
 import { drawnNodes, NOTHING, rangesOf, STORED, STORED_BYTES, type Table } from "./tree";
 
-/** Slots along an edge of an atlas: a byte tells one. */
+/** Most slots along an edge of an atlas: one byte holds a slot's coordinate. */
 const MOST_SLOTS = 254;
-/** What came is shown so often: tables of skips are made anew each time. */
+/** Pause between updates with new bricks, ms: each update makes the tables of skips anew. */
 const SHOW_EVERY_MS = 250;
 /** A cell that is the same throughout. */
 const UNIFORM = 255;

@@ -5,7 +5,7 @@
 
 const NAME = "stereocell-bricks";
 const VERSION = 1;
-/** Then the oldest tables and their bricks go. */
+/** Most bytes in the cache: beyond it the oldest tables and their bricks go. */
 const LIMIT_BYTES = 512 * 1024 * 1024;
 
 export type KeptTable = Readonly<{

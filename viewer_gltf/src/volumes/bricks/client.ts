@@ -1,4 +1,4 @@
-/** The thread that draws, and its worker for `/bricks`: what they say to one another. */
+/** The messages between the thread that draws and its worker for `/bricks`. */
 import { TemporaryError } from "../../bundle/errors";
 import type { BrickView } from "./protocol";
 import { parseTable, STORED_BYTES, type Table } from "./tree";
@@ -34,11 +34,11 @@ export type Taker = Readonly<{
   onRefused: (text: string) => void;
 }>;
 
-/** A view that is asked for again and again: not more often. */
+/** Shortest pause between two requests of a view, ms. */
 const VIEW_EVERY_MS = 200;
-/** Bytes of bricks that one view may bring: what is most wrong comes first. */
+/** Most bytes of bricks for one view: bricks with the largest error come first. */
 const BUDGET_BYTES = 64 * 1024 * 1024;
-/** A texel may be so long on the screen before finer ones are asked for. */
+/** Longest edge of a texel on the screen, px: beyond it the client asks for finer ones. */
 const TEXEL_PX = 1;
 
 export class BrickLink {

@@ -8,9 +8,9 @@ import type { LinkAsk, LinkMessage } from "./client";
 import { BRICKS_FRAME, type Frame, parseFrame, type ServerMessage, TABLE_FRAME } from "./protocol";
 import { haveBits, hexOf, parseTable, STORED_BYTES, type Table } from "./tree";
 
-/** Bricks are written to the cache so many at a time. */
+/** Bricks in one write to the cache. */
 const BATCH = 64;
-/** Volumes that one message may name. */
+/** Most volumes that one message may name. */
 const MOST_AT_ONCE = 64;
 const RETRY_MS = [500, 1000, 2000, 5000, 10_000];
 
@@ -244,7 +244,7 @@ async function openOne(volume: Volume): Promise<void> {
   }
 }
 
-/** Trees whose table is here, and of which the server knows what the cache has. */
+/** Trees with a table here; the server knows which of their bricks the cache has. */
 function readyTrees(): readonly number[] {
   return [...trees].filter(([, { isBegun }]) => isBegun).map(([number]) => number);
 }

@@ -16,7 +16,7 @@ export type BrickView = Readonly<{
 export type Part = Readonly<{ tree: number; at: number; bytes: Uint8Array<ArrayBuffer> }>;
 export type Frame = Readonly<{ kind: number; sequence: number; parts: readonly Part[] }>;
 
-/** What the server says in text. */
+/** The server's text messages. */
 export type ServerMessage =
   | Readonly<{ type: "welcome" }>
   | Readonly<{

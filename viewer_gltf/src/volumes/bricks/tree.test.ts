@@ -81,7 +81,7 @@ describe("a table of bricks", () => {
     expect([...before]).toEqual(perBrick([0, 0], [7, 7]).flat());
   });
 
-  it("tells which bricks are there by bits, the first one lowest", () => {
+  it("encodes the present bricks as bits, the first one lowest", () => {
     const present = Uint8Array.of(1, 0, 0, 0, 0, 0, 0, 1, 0, 1);
     expect([...atob(haveBits(present))].map((c) => c.charCodeAt(0))).toEqual([0x81, 0x02]);
   });

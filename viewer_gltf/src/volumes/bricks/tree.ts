@@ -8,7 +8,7 @@ import { BundleError } from "../../bundle/errors";
 import { SKIP_BRICK, STREAM_BRICK } from "../../bundle/generated/constants";
 import type { Size3 } from "../../bundle/ktx2";
 
-/** Texels along an edge of what a node stores: with its apron. */
+/** Texels along an edge of a node's stored brick, with its apron. */
 export const STORED = STREAM_BRICK + 2;
 export const STORED_BYTES = STORED ** 3;
 const MAGIC = [0x89, 0x53, 0x43, 0x42, 0x56, 0x48, 0x0d, 0x0a];
@@ -94,7 +94,7 @@ function bitsOf(mask: number): number {
   return count;
 }
 
-/** A set of nodes as the message `have` tells it. */
+/** A set of nodes as the message `have` encodes it. */
 export function haveBits(present: Uint8Array): string {
   const bits = new Uint8Array(Math.ceil(present.length / 8));
   present.forEach((is, n) => {
@@ -109,7 +109,7 @@ export function haveBits(present: Uint8Array): string {
 export const NOTHING = 0xffffffff;
 
 /**
- * Of every cell (x fastest) the finest node there is: one whose brick has come, or an empty one;
+ * Of every cell (x fastest) the finest node there is: one with a brick here, or an empty one;
  * NOTHING where none has.
  *
  * @param present one byte a node: whether its brick has come

@@ -23,7 +23,7 @@ import type { Profile } from "./viewer_profile";
 
 const CELLS = 40;
 const SIDES: readonly Side[] = ["left", "right"];
-/** The line between the eyes, for laying the phone into the viewer; its share of the height. */
+/** Length of the line between the eyes, as a share of the height: it aligns phone and viewer. */
 const LINE_HEIGHT = 0.15;
 const LINE_COLOR = 0x606060;
 

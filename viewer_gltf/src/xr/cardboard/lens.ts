@@ -36,13 +36,13 @@ export type Tangents = Readonly<{ left: number; right: number; bottom: number; t
 
 const BORDER_m = 0.003;
 const INCH_m = 0.0254;
-/** Android's own definition of the unit behind a CSS pixel; phones round it by up to a tenth. */
+/** CSS pixels per inch by Android's own definition; phones round it by up to a tenth. */
 export const CSS_PIXELS_PER_INCH = 160;
 
 /**
- * A browser doesn't tell a screen's size. On an iPhone it follows from the pixel ratio (458 to 476
- * dots per inch at 3, 326 at 2); elsewhere a CSS pixel is taken to be 1/160 inch. Who knows better
- * gives a setting: a phone's true figure is its dots per inch over its devicePixelRatio.
+ * A browser doesn't report a screen's size. On an iPhone the pixel ratio gives it (458 to 476
+ * dots per inch at 3, 326 at 2); elsewhere a CSS pixel is taken to be 1/160 inch. The user can set
+ * a better value: a phone's true figure is its dots per inch over its devicePixelRatio.
  */
 export function cssPixelsPerInch(userAgent: string, devicePixelRatio: number): number {
   if (!/iPhone|iPod/.test(userAgent)) return CSS_PIXELS_PER_INCH;

@@ -1,5 +1,5 @@
 /**
- * How the head is turned, from what the phone says of itself: `deviceorientation` events and the
+ * The head's turn, from the phone's own reports: `deviceorientation` events and the
  * angle at which the screen is held. Only turning is known, not moving; a neck that the eyes lie
  * before makes up for the most noticed part of that.
  *
@@ -19,7 +19,7 @@ export const FREE_HEADING: Heading = { yaw_rad: 0, isHeld: false };
 const X = new Vector3(1, 0, 0);
 const Y = new Vector3(0, 1, 0);
 const Z = new Vector3(0, 0, 1);
-/** From where the neck turns to between the eyes: mean of adults, as in Google's SDK. */
+/** From the neck's pivot to the point between the eyes, m: mean of adults, as in Google's SDK. */
 const NECK_TO_EYES_M = new Vector3(0, 0.075, -0.08);
 /** Beyond this the phone looks at floor or ceiling, and lies in a hand rather than in a viewer. */
 const STEEP = Math.SQRT1_2;

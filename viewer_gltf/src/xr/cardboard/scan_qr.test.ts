@@ -4,7 +4,7 @@ import { canScan, scanCode } from "./scan_qr";
 const video = (readyState = 4) => ({ readyState }) as HTMLVideoElement;
 const noAbort = new AbortController().signal;
 
-/** A browser whose detector sees one answer a call. */
+/** A browser with a detector that returns one answer a call. */
 function see(answers: string[][], formats = ["qr_code"]): void {
   vi.stubGlobal(
     "BarcodeDetector",
@@ -31,12 +31,12 @@ describe("scanning a viewer's code", () => {
     expect(await canScan()).toBe(false);
   });
 
-  it("tells that a code is another's", async () => {
+  it("reports that a code is another's", async () => {
     see([["https://example.org/menu"]]);
     await expect(scanCode(video(), noAbort)).rejects.toThrow("not a Cardboard viewer's code");
   });
 
-  it("stops when it is told to, before the camera's first frame too", async () => {
+  it("stops when the caller aborts it, before the camera's first frame too", async () => {
     see([["https://g.co/cardboard"]]);
     const stop = new AbortController();
     const scanned = scanCode(video(0), stop.signal);

@@ -61,7 +61,7 @@ describe("the screen", () => {
     expect(log).toEqual(["wake", "fill", "lock", "sleep", "unlock", "leave"]);
   });
 
-  it("tells what could not be had, each for itself", async () => {
+  it("reports each refused feature on its own", async () => {
     const { element, host } = fakePage({ canFill: false, canLock: false, canWake: false });
     const { problems } = await holdScreen(element, () => undefined, host);
     expect(problems).toHaveLength(3);
@@ -84,7 +84,7 @@ describe("the screen", () => {
     expect(log.filter((each) => each === "wake")).toHaveLength(2);
   });
 
-  it("tells when the user leaves full screen", async () => {
+  it("reports when the user leaves full screen", async () => {
     const { log, document, element, host } = fakePage();
     const hold = await holdScreen(element, () => log.push("left"), host);
     document.dispatchEvent(new Event("fullscreenchange")); // it was entered

@@ -1,7 +1,7 @@
 /**
  * The phone's screen while it is in a viewer: full, held across, and awake. Each is a favour that
  * some browser doesn't do (an iPhone's Safari has no full screen and no lock), so none is needed:
- * what could not be had is told in words.
+ * each refused feature is reported.
  */
 export type ScreenHold = Readonly<{ problems: readonly string[]; release: () => void }>;
 

@@ -1,5 +1,5 @@
 /**
- * Stereo without WebXR, for a phone in a Cardboard whose browser has none (Safari on an iPhone):
+ * Stereo for a phone in a Cardboard, in a browser without WebXR (Safari on an iPhone):
  * split screen, lens distortion, the head's turn.
  *
  * Why not a polyfill. webxr-polyfill 2.0.3 with cardboard-vr-display 1.0.19 (both Apache-2.0) were
@@ -11,8 +11,8 @@
  *   three's of the mesh drawn last. That mesh is gone from then on, in stereo and after it: 65
  *   "no buffer is bound to enabled attribute" in the second after the end. Reported to both
  *   projects in 2023 (webxr-polyfill 170, three 26166); open in one, declined by the other.
- * - It patches enable, viewport, bindFramebuffer... of the context whose state three caches, and
- *   gives a frame buffer without anti-aliasing and with 16 bits of depth.
+ * - It patches enable, viewport, bindFramebuffer... of the context, although three caches its
+ *   state; its frame buffer has no anti-aliasing and 16 bits of depth.
  * - It never asks Safari for the orientation, so that the head stands still since iOS 13; it knows
  *   the two viewers of 2014 and 2015, and reads no code; it fetches its table of phones from
  *   another host, which our Content-Security-Policy forbids, and that table ends in 2020.

@@ -120,12 +120,12 @@ describe("a viewer's code", () => {
     [toBase64(message({ fov: `2a10${floats(40, 95, 40, 40)}` })), "5 to 85 degrees, found 95"],
     [toBase64(message({ distortion: `3a04${floats(-2)}` })), "folds the picture: -2.00"],
     [toBase64(message({ distortion: `3a04${floats(Number.NaN)}` })), "folds the picture: NaN"],
-  ])("that is bad is told in words: %j", (text, words) => {
+  ])("that is bad is refused with a reason: %j", (text, words) => {
     expect(() => parseProfile(text)).toThrow(words);
     expect(() => parseProfile(text)).toThrow(expect.objectContaining({ name: "ProfileError" }));
   });
 
-  it("that can't be read is told in words", () => {
+  it("that can't be read is reported with a reason", () => {
     expect(faultOfCode("")).toContain("empty");
     expect(faultOfCode("https://example.org/")).toContain("not a Cardboard viewer's code");
     expect(faultOfCode("https://g.co/cardboard")).toBe("");

@@ -1,6 +1,6 @@
 /**
- * The viewer profile: what a Cardboard's maker says of its lenses, printed on it as a QR code. The
- * code is an address whose parameter `p` is base64url of the protocol buffer `DeviceParams`, by
+ * The viewer profile: a Cardboard's lenses by its maker, printed on it as a QR code. The
+ * code is an address; its parameter `p` is base64url of the protocol buffer `DeviceParams`, by
  * the field numbers of Google's Cardboard SDK (proto/cardboard_device.proto, Apache-2.0).
  */
 import { BundleError } from "../../bundle/errors";
@@ -103,7 +103,7 @@ function readParams(base64: string): Profile {
     const standard = base64.replaceAll("-", "+").replaceAll("_", "/").replace(/=+$/, "");
     fields = readFields(Uint8Array.from(atob(standard), (c) => c.charCodeAt(0)));
   } catch (error) {
-    // atob has its own way to say that it found no base64, the reader that the bytes end too soon.
+    // atob throws its own error where it finds no base64, the reader where the bytes end too soon.
     if (!(error instanceof DOMException || error instanceof RangeError)) throw error;
     throw new ProfileError(`The viewer's code is damaged or cut off: ${shortened(base64)}. ${HOW}`);
   }

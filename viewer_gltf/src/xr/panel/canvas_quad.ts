@@ -18,9 +18,9 @@ import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
 const LIT_OPACITY = 0.14;
-/** Before the quad by so much. */
+/** Distance before the quad, m. */
 const LIT_M = 0.001;
-/** Text is looked at aslant. */
+/** Anisotropy of the texture, samples: the user may see the text aslant. */
 const ANISOTROPY = 4;
 
 /** px on the quad. */

@@ -1,6 +1,6 @@
 /**
- * What is told in stereo: a label under the place that the head looks at when it comes. It stays
- * there in the room, since what moves with the head makes sick, and goes by itself.
+ * A notice in stereo: a label under the place that the head looks at when it comes. It stays
+ * there in the room, since a label that moves with the head makes sick, and goes by itself.
  */
 import { type Matrix4, Vector3 } from "three";
 import { CanvasQuad } from "./canvas_quad";
@@ -15,9 +15,9 @@ import {
 } from "./notice_queue";
 import { headBearing, noticeBearing, pointAt } from "./placement";
 
-/** Nearer than the specimen mostly is, and not so near that eyes have to cross. */
+/** Distance from the head, m: mostly before the specimen, and not so near that eyes cross. */
 const DISTANCE_M = 0.9;
-/** Over volumes, marks and a specimen that is held closer; under the ring. */
+/** Render order: over volumes, marks and a specimen that is held closer; under the ring. */
 const RENDER_ORDER = 1900;
 
 export class RoomNotice {

@@ -18,7 +18,7 @@ function after(announcements: Announcements, seconds: number): readonly string[]
   return now.texts;
 }
 
-describe("what is told in stereo", () => {
+describe("notices in stereo", () => {
   it("goes by itself after six seconds", () => {
     expect(after(announced("a"), ANNOUNCED_S - 0.25)).toEqual(["a"]);
     expect(after(announced("a"), ANNOUNCED_S)).toEqual([]);

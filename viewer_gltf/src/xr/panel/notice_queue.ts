@@ -1,10 +1,10 @@
 /**
- * What is told before the eyes in stereo, where nobody sees the page: a few texts under each other,
+ * Notices before the eyes in stereo, where nobody sees the page: a few texts under each other,
  * the newest last. One after the other goes by itself. Pure.
  */
 import { type Mark, type Rect, TEXT, text } from "../../panel/canvas/draw_list";
 
-/** The oldest has been read by then; the next one has as long from then on. */
+/** Time for the oldest notice, s: then it goes, and the next one has as long. */
 export const ANNOUNCED_S = 6;
 const MOST = 3;
 
@@ -15,13 +15,13 @@ export type Announcements = Readonly<{
 }>;
 export const NO_ANNOUNCEMENTS: Announcements = { texts: [], elapsed_s: 0 };
 
-/** What is told again is the newest again. */
+/** A repeated text becomes the newest again. */
 export function announce({ texts, elapsed_s }: Announcements, newest: string): Announcements {
   const others = texts.filter((each) => each !== newest).slice(1 - MOST);
   return { texts: [...others, newest], elapsed_s: others[0] === texts[0] ? elapsed_s : 0 };
 }
 
-/** Returns the same object while nothing is told. */
+/** Returns the same object while there is no notice. */
 export function advanceAnnouncements(announcements: Announcements, dt_s: number): Announcements {
   const { texts } = announcements;
   if (texts.length === 0) return announcements;
@@ -30,11 +30,11 @@ export function advanceAnnouncements(announcements: Announcements, dt_s: number)
   return texts.length === 1 ? NO_ANNOUNCEMENTS : { texts: texts.slice(1), elapsed_s: 0 };
 }
 
-/** px: as wide as half of what a Cardboard shows, 0.9 m away. */
+/** Width of a notice, px: half of a Cardboard's field of view, 0.9 m away. */
 export const NOTICE_WIDTH = 840;
 const PAD = 16;
 const LINE = Math.ceil(1.15 * TEXT);
-/** Letters are about half as wide as they are high, words break early. */
+/** Letters in a line: a letter is about half as wide as it is high, and words break early. */
 const LETTERS = Math.floor((NOTICE_WIDTH - 4 * PAD) / (0.58 * TEXT));
 const MOST_LINES = 4;
 export const NOTICE_HEIGHT = MOST * (MOST_LINES * LINE + 3 * PAD);

@@ -24,7 +24,7 @@ import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } 
 const DISTANCE_M = 1.2;
 const OPENER_M = 0.7;
 const OPENER: Rect = { x: 0, y: 0, width: 208, height: 80 };
-/** What is no part of the state (frame time, gazed tile) is read as often. */
+/** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
 const HALF = {
   yaw: Math.atan(WIDTH / PX_PER_M / 2 / DISTANCE_M),
@@ -54,7 +54,7 @@ export class RoomPanel {
   private state: ViewerState | null = null;
   private isStale = true;
   private rested_s = 0;
-  /** null until the first frame tells where the head looks. */
+  /** null until the first frame gives the head's direction. */
   private openerYaw: number | null = null;
   /** It opens with the next frame, which knows where the eye is. */
   private wantsPlace = false;
@@ -109,7 +109,7 @@ export class RoomPanel {
   }
 
   /**
-   * @param around tells points of the specimen's hull, room
+   * @param around gives points of the specimen's hull, room
    * @returns whether it looks otherwise than before
    */
   update(

@@ -47,7 +47,7 @@ describe("the panel's place", () => {
   });
 });
 
-describe("what is told", () => {
+describe("a notice", () => {
   it("is under the gaze, but for one at the floor", () => {
     expect(noticeBearing({ yaw: 1, pitch: 0.2 })).toEqual({
       yaw: 1,

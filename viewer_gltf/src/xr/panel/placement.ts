@@ -10,24 +10,24 @@ export type Extent = Readonly<{
 }>;
 
 const DEG = Math.PI / 180;
-/** Between specimen and panel. */
+/** Gap between specimen and panel, radians. */
 const GAP = 3 * DEG;
-/** Heads are not turned further for it. */
+/** Farthest directions of the panel, radians, down and sideways: heads turn no further for it. */
 const LOWEST = -35 * DEG;
 const FARTHEST = 62 * DEG;
-/** It is read looking down a little, as a page is. */
+/** Pitch of the panel, radians: the user looks down on it a little, as on a page. */
 const COMFORT = -15 * DEG;
-/** Where the button is: under all that is looked at, and under the panel. */
+/** Pitch of the button, radians: under the specimen, and under the panel. */
 export const OPENER_PITCH = -52 * DEG;
-/** The head turns so far before the button follows. */
+/** The head turns this far, radians, before the button follows. */
 const SLACK = 35 * DEG;
-/** Looking down further than this is looking for the button: it waits. */
+/** Pitch of the head, radians: a user who looks down further looks for the button, so it waits. */
 const LOOKING_DOWN = -20 * DEG;
 const FOLLOW_PER_S = 4;
 
-/** So far under the gaze is the middle of what is told: it covers nothing that is looked at. */
+/** From the gaze down to a notice's middle, radians: the notice covers nothing of interest. */
 const NOTICE_BELOW = 20 * DEG;
-/** A user who looks at the floor reads it there. */
+/** Lowest pitch of a notice, radians: a user who looks at the floor reads it there. */
 const NOTICE_LOWEST = -60 * DEG;
 
 export function noticeBearing({ yaw, pitch }: Bearing): Bearing {

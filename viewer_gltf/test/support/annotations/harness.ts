@@ -214,7 +214,7 @@ class Bench {
     return { x: ((x + 1) / 2) * clientWidth, y: ((1 - y) / 2) * clientHeight };
   }
 
-  /** What the scale bar says, its pixels, and those of as much of the specimen at the focus. */
+  /** The scale bar's text, its pixels, and those of as much of the specimen at the focus. */
   scale() {
     const bar = this.marks.scaleBar.root;
     const text = bar.textContent ?? "";

@@ -6,7 +6,7 @@ import { type BrowserContext, type BrowserServer, chromium, type Page } from "pl
 export const CHROMIUM = process.env.CHROMIUM || "/usr/bin/chromium";
 export const HOW_TO_GET = `no Chromium at ${CHROMIUM}: apt-get install chromium, or set CHROMIUM to its path`;
 
-/** Of the browser's own window, which nobody sees; and what playwright leaves out, whose list this replaces. */
+/** Features of the browser's own window, which nobody sees; and those of playwright's own list. */
 const WITHOUT = [
   ...["PreloadTopChromeWebUI", "InitialWebUI", "WebUIReloadButton"],
   "SpareRendererForSitePerProcess",

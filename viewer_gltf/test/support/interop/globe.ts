@@ -35,7 +35,7 @@ export type Report = Readonly<{ loaded: number; failed: readonly string[] }>;
 export class Globe {
   private constructor(
     private readonly page: Page,
-    /** What the page's console says of errors. */
+    /** The errors on the page's console. */
     readonly errors: readonly string[],
   ) {}
 

@@ -50,13 +50,13 @@ export type Run = Readonly<{
   asides?: readonly (readonly number[])[];
   /** Samples of every pixel in a frame: below 1, of so many pixels. */
   share?: number;
-  /** How the same medium is told: as so many alike channels, by value and gradient, in bricks. */
+  /** The form of the same medium: as so many alike channels, by value and gradient, in bricks. */
   channels?: 1 | 2 | 4;
   isTwoD?: boolean;
   isBricked?: boolean;
   /** As while the picture moves. */
   isDraft?: boolean;
-  /** So many equal parts of the passes are told of one by one. */
+  /** Number of equal parts of the passes that are reported one by one. */
   batches?: number;
 }>;
 
@@ -69,7 +69,7 @@ export type Gathered = Readonly<{
   picture: number[];
   /** Of each batch: what its passes added to the sums, in the mean of the picture. */
   batches: number[][];
-  /** What the tracer says of itself. */
+  /** The tracer's own figures. */
   samples: number;
 }>;
 

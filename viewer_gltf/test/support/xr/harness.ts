@@ -80,7 +80,7 @@ class Stand {
     choose: () => undefined,
     drag: (_key, { direction }) => this.drags.push(direction.toArray()),
   };
-  /** Between the hands, as WebXR itself tells it. */
+  /** Distance between the hands, as WebXR itself gives it. */
   apart_m = Number.NaN;
   changes = 0;
   private readonly renderer = new WebGLRenderer({ antialias: true });
