@@ -88,7 +88,7 @@ export function pickHandle(
   return picked;
 }
 
-/** What dragging a handle to a ray (um) makes of the clip; null: nothing. */
+/** The clip after dragging a handle to a ray (um); null: no change. */
 export function dragHandle(id: ClipHandleId, ray: Ray, clip: Clip, shown: Box): Action | null {
   if (id === "plane-middle") return changePlane(clip, (plane) => slidePlane(plane, ray, shown));
   if (id === "plane-tip") {

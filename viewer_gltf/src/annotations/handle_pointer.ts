@@ -6,7 +6,7 @@ export type HandleTarget = Readonly<{
   /** Place in -1..1 of the picture, y up. */
   pick: (point: Vector2, pointing: Pointing) => HandleId | null;
   drag: (id: HandleId, point: Vector2) => void;
-  /** What is pointed at or held. */
+  /** The handle that is pointed at or held. */
   mean: (id: HandleId | null) => void;
 }>;
 

@@ -29,7 +29,7 @@ export class Label {
   draws = 0;
   private readonly canvas = document.createElement("canvas");
   private readonly texture = new CanvasTexture(this.canvas);
-  /** What was written last. */
+  /** The text that was written last. */
   text = "";
   private lines = 0;
 

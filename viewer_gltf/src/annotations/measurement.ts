@@ -85,7 +85,7 @@ export class MeasureMark {
     this.distance.place(this.middle, sight);
   }
 
-  /** What is written at a point. */
+  /** The text at a point. */
   valuesAt(index: 0 | 1): string {
     const { values } = this.ends[index];
     return values.sprite.visible ? values.text : "";

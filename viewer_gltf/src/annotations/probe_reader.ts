@@ -1,4 +1,4 @@
-/** What the specimen is where a ray meets it: surface, volume or tile, and the channels' values. */
+/** The specimen where a ray meets it: surface, volume or tile, and the channels' values. */
 
 import { Box3, type Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";

@@ -29,7 +29,7 @@ export type Snapshot = Readonly<{
   discRadius_deg: number;
   /** Between two frames of a moving picture. */
   frame_ms: number;
-  /** What the last frame was drawn with. */
+  /** The settings of the last frame. */
   settings: QualitySettings;
   /** Of each measured point: each shown channel's value there. */
   measuredValues: readonly (readonly string[])[];

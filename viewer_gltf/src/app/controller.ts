@@ -43,7 +43,7 @@ const REFRESH_MS = 250;
 
 const LENS_KEY = "stereocell-lens";
 
-/** What the user's phone viewer is, from the visit before. */
+/** The user's phone viewer, from the visit before. */
 function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
   try {
     const { lenses, code } = JSON.parse(localStorage.getItem(LENS_KEY) ?? "{}");

@@ -87,7 +87,7 @@ export class FrameLoop {
     return this.pace.frame_ms;
   }
 
-  /** What the last frame was drawn with. */
+  /** The settings of the last frame. */
   get settings(): QualitySettings {
     return this.pace.settings;
   }

@@ -1,4 +1,4 @@
-/** What is shown of a bundle: its surfaces, its volumes, and the marks on them. */
+/** The visible parts of a bundle: its surfaces, its volumes, and the marks on them. */
 import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
@@ -110,7 +110,7 @@ export class Contents {
     this.marks.follow(state);
   }
 
-  /** What has failed is asked for again; then `follow`. */
+  /** Asks again for the parts that have failed; then `follow`. */
   retryFailed(): void {
     this.surfaces.retryFailed();
     this.volumes.retryFailed();

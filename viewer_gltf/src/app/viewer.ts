@@ -43,7 +43,7 @@ export class Viewer {
   readonly stereo: Stereo;
   readonly navigation: Navigation;
   state: ViewerState;
-  /** What a panel in the room shows; the owner of the panel sets it. */
+  /** The content of a panel in the room; the owner of the panel sets it. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
   /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;

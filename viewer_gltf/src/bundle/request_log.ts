@@ -1,4 +1,4 @@
-/** What was asked of the bundle's host so far, for a service worker that starts later. */
+/** The requests to the bundle's host so far, for a service worker that starts later. */
 
 /** `range`: the Range header. */
 export type Asked = Readonly<{ url: string; range: string | null }>;

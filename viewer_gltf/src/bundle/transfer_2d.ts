@@ -27,7 +27,7 @@ export type Shapes = readonly Shape[];
 export type Transfer2d = Readonly<Omit<ChannelTransfer2D, "functions" | "histogram" | "most">> &
   Readonly<{ functions: Readonly<Record<string, Shapes>> }>;
 
-/** What is wrong with a shape that came from outside; null: nothing. */
+/** The fault of a shape that came from outside; null: none. */
 export function faultOf(shape: Shape): string | null {
   if (shape.kind !== "rectangle" && shape.kind !== "triangle") return `kind is ${shape.kind}`;
   for (const name of ["values", "gradients"] as const) {

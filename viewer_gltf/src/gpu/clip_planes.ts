@@ -1,4 +1,4 @@
-/** What clip box and plane cut off, for the surfaces' shaders: planes in the room, by reference. */
+/** The cuts of clip box and plane for the surfaces' shaders: planes in the room, by reference. */
 import { type Matrix4, Vector3, Vector4 } from "three";
 import type { Clip } from "../math/clip";
 import type { MarchClip } from "./clip_uniforms";

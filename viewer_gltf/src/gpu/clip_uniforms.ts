@@ -1,4 +1,4 @@
-/** What cuts leave of the specimen, in the space of one box of texels. */
+/** The specimen after the cuts, in the space of one box of texels. */
 import { Matrix4, Vector3, type Vector4 } from "three";
 
 /** Of the specimen, um: what is left of it. `plane`: unit normal and offset. */

@@ -9,7 +9,7 @@ import { advanceDwell, type Dwell, dwellProgress, fire, NO_DWELL } from "./dwell
 export type RoomRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
 
 export type Hit = Readonly<{
-  /** What was met, unique among all targets; null: nothing that can be chosen. */
+  /** The name of the hit, unique among all targets; null: nothing that can be chosen. */
   key: string | null;
   distance_m: number;
   /**
@@ -55,9 +55,9 @@ export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null 
 }
 
 export class Pointer {
-  /** What the gaze meets. */
+  /** The hit of the gaze. */
   gaze: Met | null = null;
-  /** What each hand's ray meets, in the order given. */
+  /** The hit of each hand's ray, in the order given. */
   hands: readonly (Met | null)[] = [];
   private dwell: Dwell = NO_DWELL;
 

@@ -12,7 +12,7 @@ export function centerOf({ min, max }: Box): Vec3 {
 }
 
 /**
- * What is left of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
+ * The part of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
  * are the same. Every frame asks for thousands: nothing is made but the answer.
  */
 export function boxSpan(span: Span, { origin, direction }: Ray, { min, max }: Box): Span | null {

@@ -8,7 +8,7 @@ import { AXES, along, dot, type Ray, type Vec3, withPart } from "./vec3";
 
 /** Kept is where normal · p <= offset_um; the normal, of unit length, leads to what is cut away. */
 export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
-/** What is kept. null: not cut. */
+/** The kept part. null: not cut. */
 export type Clip = Readonly<{ box: Box | null; plane: ClipPlane | null }>;
 /** Nothing is cut. */
 export const WHOLE: Clip = { box: null, plane: null };
@@ -29,7 +29,7 @@ const THINNEST = 0.01;
 /** Least sine squared of the angle between a ray and a handle's axis that gives a place. */
 const PARALLEL = 1e-6;
 
-/** What is left of a ray's span inside box and plane; null: nothing. */
+/** The part of a ray's span inside box and plane; null: nothing. */
 export function clipSpan(span: Span, ray: Ray, { box, plane }: Clip): Span | null {
   const inBox = box === null ? span : boxSpan(span, ray, box);
   if (inBox === null) return null;

@@ -1,4 +1,4 @@
-/** What the offline store holds and when each entry was last used. Plain data. */
+/** The entries of the offline store, and the last use of each. Plain data. */
 
 export type Use = Readonly<{ bytes: number; used_ms: number }>;
 /** By key, in no order. */

@@ -16,7 +16,7 @@ import type { Grasp, Meant } from "./edit_shapes";
 /** Of the viewer that a phone is put into: Google's of 2014, of 2015, another. */
 export type Lenses = "v1" | "v2" | "own";
 
-/** What the panel keeps for itself: it changes what is listed or meant, never the picture. */
+/** The panel's own state: it changes what is listed or meant, never the picture. */
 export type PanelChange =
   | Readonly<{ panel: "find"; text: string }>
   | Readonly<{ panel: "page"; page: number }>
@@ -39,7 +39,7 @@ export type PanelChange =
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
-/** What a control or a key asks for. */
+/** The request of a control or a key. */
 export type Wish = Action | PanelChange | Command;
 
 export type PanelView = Readonly<{

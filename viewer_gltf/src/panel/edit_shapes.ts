@@ -143,7 +143,7 @@ export function shapeText({ kind, values, gradients, opacity, softness, color }:
   ].join(", ");
 }
 
-/** What has become of shapes, in words. */
+/** A change of shapes, in words. */
 export function changeText(before: Shapes, after: Shapes): string {
   if (after.length > before.length) return `Added a ${shapeText(after[after.length - 1])}`;
   if (after.length < before.length) return `Removed a shape: ${after.length} left`;

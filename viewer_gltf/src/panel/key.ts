@@ -1,4 +1,4 @@
-/** What a key is: its names, the words for it, and what it asks for. Pure. */
+/** A key: its names, the words for it, and its request. Pure. */
 import type { Box } from "../math/box";
 import { optionsOf, type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import type { ChannelState, ViewerState } from "../state/viewer_state";

@@ -1,4 +1,4 @@
-/** What the panel shows of a state: see controls.ts. Pure. */
+/** The panel's content for a state: see controls.ts. Pure. */
 import { distanceBetween, distanceText } from "../annotations/measure";
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
@@ -17,7 +17,7 @@ import { tileItems } from "./sections/tiles";
 
 export { chosenTile } from "./sections/tiles";
 
-/** What the state does not hold. */
+/** Facts outside the state. */
 export type Facts = StereoSupport &
   Readonly<{
     title: string;

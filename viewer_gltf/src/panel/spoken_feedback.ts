@@ -1,4 +1,4 @@
-/** What a key has done, in words: its user may not see the control that it stands for. Pure. */
+/** The effect of a key, in words: the user may not see the control that it stands for. Pure. */
 
 import type { Action } from "../state/actions";
 import type { SetAction } from "../state/parameters/kinds";

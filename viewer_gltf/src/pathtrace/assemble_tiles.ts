@@ -14,7 +14,7 @@ import { brickCounts } from "../volumes/skip_bricks";
  */
 export type Part = Readonly<{ at: Size3; whole: Size3; size: Size3; texels: Uint8Array }>;
 
-/** What the tiles are put into. */
+/** The target of the tiles. */
 export type Block = Readonly<{
   size: Size3;
   /** Bytes a texel. */
@@ -113,7 +113,7 @@ function readers(texel: number, count: number): readonly number[] {
   return found;
 }
 
-/** What a worker makes of tiles: see `assemble_worker.ts`. */
+/** A worker's result of tiles: see `assemble_worker.ts`. */
 export type AssembleRequest = Readonly<{
   id: number;
   size: Size3;

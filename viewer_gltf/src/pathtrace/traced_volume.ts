@@ -27,7 +27,7 @@ const FIRST_SAMPLES = 6;
 /** Most pixels while the picture moves: the denoiser fills in the rest. */
 const MOST_MOVING_PIXELS = 160_000;
 
-/** What of the volumes is used. */
+/** The part of the volumes that the tracer uses. */
 export type Volumes = Readonly<{
   sourcesOf: (channel: string) => Promise<ReadonlyMap<string, VolumeSource> | null>;
   appearance: (state: ViewerState, channel: string) => Appearance;
@@ -53,7 +53,7 @@ export class TracedVolume {
   /** Where texels come from as bricks; null: as files. */
   private brickTile: BrickTile | null = null;
   private packed: Packed | null = null;
-  /** What the medium was dressed in. */
+  /** The present look of the medium. */
   private dressed = "";
   private tables2d: readonly (TransferTable2d | null)[] = [];
   private settings: TraceSettings | null = null;

@@ -13,7 +13,7 @@ import type { Hybrid } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
 import type { Room } from "./scene";
 
-/** What there is to draw. */
+/** The things to draw. */
 export type Drawn = Readonly<{
   volumes: VolumeSet;
   traced: TracedVolume;
@@ -35,9 +35,9 @@ export class Picture {
   readonly eyes = new Eyes();
   private readonly cuts = new Cuts();
   private readonly depth = new DepthPass(this.cuts);
-  /** What all volumes share. */
+  /** The part of a frame that all volumes share. */
   readonly marchFrame = makeFrame(this.depth.texture, this.depth.paneTexture);
-  /** What all surfaces share. */
+  /** The part of a frame that all surfaces share. */
   readonly surfaceFrame = makeSurfaceFrame(this.marchFrame.uDisc, this.cuts);
   private readonly march = new MarchPass(this.marchFrame);
   private readonly point = new Vector3();

@@ -10,7 +10,7 @@ export const LONGEST_EDGE_M = 1.2;
 export const XR_DISTANCE_M = 1.1;
 /** Share of the picture that the specimen may fill at the start. */
 const FILL = 0.88;
-/** What is to be seen lies at least so far before the eye: farther than what it is turned about. */
+/** Least distance of the eye, as a multiple of the seen points' distance from the turning point. */
 const BEFORE = 1.25;
 
 export type Placement = Readonly<{

@@ -3,7 +3,7 @@ import { fromHex, toHex } from "../math/color";
 import { type Parameter, type SetAction, setTo, type Value } from "../state/parameters/kinds";
 import { readNumbers, written } from "./numbers";
 
-/** What a switch that is off, and one that is on, is called. */
+/** The words for a switch that is off and for one that is on. */
 export type SwitchWords = readonly [off: string, on: string];
 
 function wordOf<On>(row: Parameter<On>, on: On, words: SwitchWords): string {

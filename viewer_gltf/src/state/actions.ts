@@ -6,14 +6,14 @@ import type { Vec3 } from "../math/vec3";
 import type { SetAction } from "./parameters/kinds";
 
 export type Action =
-  /** What a user sets by a number, a switch, a choice or a colour: see parameters/. */
+  /** The user sets a number, a switch, a choice or a colour: see parameters/. */
   | SetAction
   | Readonly<{ type: "show"; channel: string; shown: boolean }>
   | Readonly<{ type: "window"; channel: string; window: readonly [number, number] }>
   | Readonly<{ type: "choose-transfer-function"; channel: string; name: string }>
   /** Other shapes for a transfer function, which is chosen by that; `own` may be a new one. */
   | Readonly<{ type: "set-shapes"; channel: string; name: string; shapes: Shapes }>
-  /** What the bundle has of a channel's two-dimensional functions has come. */
+  /** The bundle's two-dimensional functions of a channel have come. */
   | Readonly<{ type: "learn-transfer-2d"; channel: string; transfer2d: Transfer2d }>
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>

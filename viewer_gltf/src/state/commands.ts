@@ -1,4 +1,4 @@
-/** What a panel or a key can ask for that is no change of the state. */
+/** The requests of a panel or a key that are no change of the state. */
 export type Command =
   /** The whole specimen from the front again, and no tile isolated. */
   | "reset"
@@ -12,7 +12,7 @@ export type Command =
   | "share"
   /** Ask again for all that has failed. */
   | "retry"
-  /** What a tap does, in the middle of the view: for hands that have only keys. */
+  /** A tap in the middle of the view: for hands that have only keys. */
   | "press"
   /** To the panel's search among the channels that are not shown. */
   | "find"

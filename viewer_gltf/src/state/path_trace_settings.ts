@@ -25,7 +25,7 @@ export const ENOUGH_SAMPLES = 1024;
 
 type TraceNumber = Readonly<{
   label: string;
-  /** What a bundle opens with. */
+  /** The value in a bundle that has just opened. */
   start: number;
   limits: readonly [number, number];
   /** Equal steps are equal factors. */
@@ -40,7 +40,7 @@ const percent = (value: number) => `${Math.round(100 * value)} %`;
 const degrees = (value: number) => `${Math.round(value)}°`;
 const stops = (value: number) => `${value >= 0 ? "+" : ""}${value.toFixed(1)} stops`;
 
-/** What light goes through. */
+/** Numbers of the medium that light goes through. */
 export const MEDIUM_NUMBERS = {
   /** Added to the intensities before the transfer function. */
   bias: { label: "Bias", start: 0, limits: [-1, 1], text: plain },
@@ -60,7 +60,7 @@ export const ROOM_NUMBERS = {
   environmentTurn_deg: { label: "Room turned", start: 0, limits: [-180, 180], text: degrees },
 } as const satisfies TraceNumbers;
 
-/** What comes after the light. */
+/** Numbers of the post-processing. */
 export const POST_NUMBERS = {
   exposure: { label: "Exposure", start: 0, limits: [-4, 4], text: stops },
   hue: { label: "Hue", start: 0, limits: [-180, 180], text: degrees },
@@ -93,7 +93,7 @@ export type TraceSettings = NumbersOf<typeof MEDIUM_NUMBERS> &
     isMultiple: boolean;
     environment: EnvironmentName;
     lamps: readonly Lamp[];
-    /** What comes after the light; off: as it was gathered. */
+    /** The post-processing; off: the picture as it was gathered. */
     isPostOn: boolean;
     toneMap: (typeof TONE_MAPS)[number];
   }>;

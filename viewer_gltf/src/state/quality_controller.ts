@@ -115,7 +115,7 @@ export function withLevel(quality: Quality, level: QualityLevel): Quality {
   return level === quality.level ? quality : initialQuality(quality.timing, level);
 }
 
-/** What the viewer draws with; the same object as long as nothing has changed. */
+/** The settings that the viewer draws with; the same object as long as nothing has changed. */
 export function qualitySettings({ level, notch }: Quality): QualitySettings {
   return level === "auto" ? LADDER[notch] : level === "low" ? LOW : HIGH;
 }

@@ -1,4 +1,4 @@
-/** What an action makes of the state. Pure. */
+/** The state after an action. Pure. */
 import type { Action } from "./actions";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";

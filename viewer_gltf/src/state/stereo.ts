@@ -1,4 +1,4 @@
-/** What of stereo can be had here. */
+/** The stereo that this browser offers. */
 
 /** Whether it can be used, and if not, why, in words. */
 export type XrSupport = Readonly<{ isAvailable: boolean; reason: string }>;
@@ -9,6 +9,6 @@ export type StereoSupport = Readonly<{
   split: XrSupport | null;
   /** Whether the browser reads QR codes. */
   canScan: boolean;
-  /** What is wrong with the text of a phone viewer's code, in words; "": nothing. */
+  /** The fault of the text of a phone viewer's code, in words; "": none. */
   faultOfCode: (code: string) => string;
 }>;

@@ -29,7 +29,7 @@ export type Functions = Readonly<{
   transferFunctions2d: readonly string[];
   /** null: it has not come, as it is asked for only when something needs it. */
   transfer2d: Transfer2d | null;
-  /** What the user has made of functions, by name. */
+  /** The user's own versions of functions, by name. */
   shapes: Readonly<Record<string, Shapes>>;
 }>;
 

@@ -52,7 +52,7 @@ export type ViewerState = VolumeSettings &
     selected: string | null;
     /** The only tile that is shown; null: all are. */
     isolated: string | null;
-    /** What is left of the specimen, um. */
+    /** The part of the specimen that the cuts leave, um. */
     clip: Clip;
     /** The measured points, um: none, one, or two. */
     measured: readonly Vec3[];

@@ -41,7 +41,7 @@ type TileJson = Readonly<{
   children?: readonly TileJson[];
 }>;
 
-/** What the viewer reads of a tileset.json by itself; the renderer knows the rest. */
+/** The part of a tileset.json that the viewer reads itself; the renderer knows the rest. */
 export type Tileset = Readonly<{ asset: Readonly<{ version: string }>; root: TileJson }>;
 
 /** A tileset.json with a version and a root, which the renderer takes for granted. */

@@ -22,7 +22,7 @@ type Waiting = Readonly<{
   reject: (error: Error) => void;
 }>;
 
-/** What of the decoder three's loader uses. */
+/** The part of the decoder that three's loader uses. */
 export class MeshoptWorker {
   readonly supported = true;
   readonly ready = Promise.resolve();

@@ -175,7 +175,7 @@ export class SurfaceTileset {
     this.count(tile);
   }
 
-  /** What was given up is loaded anew where it is needed. */
+  /** Loads failed tiles anew where they are needed. */
   retryFailed(): void {
     if (this.tiles.root === null) this.total = null;
     for (const tile of this.failed) {

@@ -12,7 +12,7 @@ import type { Size3 } from "../bundle/ktx2";
 const INVISIBLE = 0.5;
 export const FAR = 255;
 
-/** What a table of skips is made of: entry c of `bricks` and of `alphas` is channel c's. */
+/** The input of a table of skips: entry c of `bricks` and of `alphas` is channel c's. */
 export type OccupancyRequest = Readonly<{
   /** Smallest and largest intensity of every brick, interleaved. */
   bricks: readonly Uint8Array[];

@@ -5,7 +5,7 @@
  */
 import type { OccupancyRequest } from "./empty_space";
 
-/** What of a Worker is used, so that tests need none. */
+/** The part of a Worker that the client uses, so that tests need none. */
 export type OccupancyPort = Pick<
   Worker,
   "postMessage" | "terminate" | "onmessage" | "onerror" | "onmessageerror"

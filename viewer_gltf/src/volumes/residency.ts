@@ -14,7 +14,7 @@ const WITH_OLD_LEVEL = 9 / 8;
 export type Resident = {
   readonly texture: TileTexture | BrickTile;
   march: TileMarch | null;
-  /** What the march's tables were made of. */
+  /** The source of the march's tables. */
   packed: Packed | null;
   wanted: WantedTile | null;
   /** 0..1 */

@@ -42,7 +42,7 @@ const OPAQUE = 0.99;
 /** Shortest step, in voxels. */
 const STEP_VOXELS = 1;
 
-/** What all tiles share in a frame: uniforms by reference. */
+/** Uniforms that all tiles share in a frame, by reference. */
 export type MarchFrame = Readonly<{
   uSceneDepth: { value: DepthTexture };
   /** Of the nearest translucent surface, if there is any. */
@@ -118,7 +118,7 @@ export class TileMarch {
   private readonly lut: DataTexture;
   /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
   private tables2d: DataArrayTexture | null = null;
-  /** What each layer holds; null: a table that knows no gradients. */
+  /** The content of each layer; null: a table that knows no gradients. */
   private readonly layers: (Uint8Array | null)[] = [];
   private readonly low: Vector3;
   private readonly toTile: Matrix4;

@@ -11,7 +11,7 @@ import { stride, volumeTexture } from "./volume_texture";
 
 export const LEVEL_FADE_S = 0.2;
 
-/** What has come: the texture's channels, in its order, and their bricks. */
+/** The loaded part: the texture's channels, in its order, and their bricks. */
 export type Packed = Readonly<{
   channels: readonly string[];
   level: number;
@@ -24,7 +24,7 @@ export type Packed = Readonly<{
 
 export class TileTexture {
   shown: Packed | null = null;
-  /** What `shown` takes the place of, while it fades in. */
+  /** The texture that `shown` replaces, while it fades in. */
   old: Packed | null = null;
   /** 0..1: share of `shown`. */
   fresh = 1;
@@ -37,7 +37,7 @@ export class TileTexture {
   /** After a fault, which was reported, a channel is not tried again until it is turned on anew. */
   private readonly failed = new Set<string>();
   private isDisposed = false;
-  /** What is being loaded now; aborted when it is no longer wanted. */
+  /** The present load; aborted when nothing wants it any longer. */
   private loading: Readonly<{
     channels: readonly string[];
     level: number;

@@ -218,7 +218,7 @@ export class VolumeSet {
     resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
   }
 
-  /** Said once: what is drawn is coarser than what there is. */
+  /** Announced once: the drawn level is coarser than the finest one there is. */
   private reportLimit({ volume }: VolumeSource): void {
     const { side } = this.limits;
     const longest = Math.max(...volume.size);

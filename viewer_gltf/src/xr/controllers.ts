@@ -133,7 +133,7 @@ export class Controllers {
     }
   }
 
-  /** What was pressed since it was last asked for. */
+  /** The buttons that were pressed since the last call. */
   take(): readonly HandEvent[] {
     return this.events.splice(0);
   }

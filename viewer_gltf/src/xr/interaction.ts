@@ -68,7 +68,7 @@ export class Hands {
   private readonly targets: readonly Target[];
   private readonly carry = new GazeCarry();
   private readonly presses = new Map<XRInputSource, Press>();
-  /** Who holds the specimen, and where their hands were in the frame before. */
+  /** The hands that hold the specimen, and their places in the frame before. */
   private held = new Map<XRInputSource, HandPose | null>();
   private gaze: RoomRay = gazeOf(new Matrix4());
   private taps = 0;
@@ -100,7 +100,7 @@ export class Hands {
     return [this.panel.group, this.controllers.group, ...this.overlays];
   }
 
-  /** What is met now, for tests and for the names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
+  /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
   get pointed(): string | null {
     return this.pointer.leading?.key ?? null;
   }
@@ -190,7 +190,7 @@ export class Hands {
     return this.controllers.hands.filter(({ isTracked }) => isTracked);
   }
 
-  /** What the gaze carries covers all else until it is put down. */
+  /** A carried thing covers all else until the gaze puts it down. */
   private get free(): readonly Target[] {
     return this.carry.isCarrying ? [this.carry] : this.targets;
   }

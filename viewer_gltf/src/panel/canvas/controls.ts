@@ -8,7 +8,7 @@ import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
 import { sliderRow, windowRow } from "./sliders";
 import { histogramBlock } from "./transfer_function_2d";
 
-/** What has no use in a headset: there is no keyboard, no clipboard, and stereo has begun. */
+/** Controls without use in a headset: it has no keyboard and no clipboard, and stereo has begun. */
 const ELSEWHERE: ReadonlySet<string> = new Set([
   "stereo",
   "split",

@@ -33,7 +33,7 @@ const CONTENT: Rect = {
   height: HEIGHT - HEADER - MARGIN,
 };
 
-/** What the plane remembers: which section, and which page of it. */
+/** The plane's memory: the open section, and the open page of it. */
 export type CanvasView = Readonly<{ tab: string; page: number }>;
 export const START_CANVAS: CanvasView = { tab: "channels", page: 0 };
 

@@ -1,4 +1,4 @@
-/** What lies over the picture: the progress bar, notices, and the page of a fatal error. */
+/** Elements over the picture: the progress bar, notices, and the page of a fatal error. */
 
 import { element, setText } from "../../dom/element";
 import type { ViewerState } from "../../state/viewer_state";

@@ -1,4 +1,4 @@
-/** What a control's element offers, and the attributes by which scripts find it. */
+/** The interface of a control's element, and the attributes by which scripts find it. */
 import type { Wish } from "../controls";
 
 export type Send = (wish: Wish) => void;

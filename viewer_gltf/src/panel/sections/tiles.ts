@@ -4,7 +4,7 @@ import { command } from "../control_templates";
 import type { Control } from "../controls";
 import { tileGrid } from "../tile_grid";
 
-/** What choosing a tile does: select it; again, isolate it; once more, show all. */
+/** The effect of choosing a tile: select it; again, isolate it; once more, show all. */
 export function chosenTile({ selected, isolated }: ViewerState, tile: string) {
   if (isolated === tile) return { type: "isolate", tile: null } as const;
   if (isolated !== null || selected === tile) return { type: "isolate", tile } as const;

@@ -19,7 +19,7 @@ const LATE = 1.3;
 export class Pace {
   /** Between the last two frames, smoothed. */
   frame_ms = 0;
-  /** What the last frame was drawn with. */
+  /** The settings of the last frame. */
   settings: QualitySettings;
   private readonly timer: GpuTimer | null;
   private quality: Quality;

@@ -8,7 +8,7 @@ const FRAME_MS = 60;
 const MOST = 16;
 const LEAST = 1 / 64;
 
-/** What of WebGL 2 is used, so that tests need none. */
+/** The part of WebGL 2 in use, so that tests need none. */
 export type FencedContext = Pick<
   WebGL2RenderingContext,
   "fenceSync" | "getSyncParameter" | "deleteSync" | "flush"

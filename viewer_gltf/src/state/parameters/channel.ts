@@ -8,7 +8,7 @@ import {
   type SwitchParameter,
 } from "./kinds";
 
-/** What a bundle opens with; a channel's colour is the bundle's. */
+/** A channel of a bundle that has just opened; its colour is the bundle's. */
 export const START_CHANNEL = {
   /** Factor to the opacity of its surface and of its volume, 0..1. */
   opacity: 1,

@@ -23,7 +23,7 @@ import {
 } from "./kinds";
 import { isTraced, type VolumeSettings } from "./volumes";
 
-/** What a bundle opens with. */
+/** The light of a bundle that has just opened. */
 export const START_LIGHT = {
   /** How the picture of the mode `traced` is made. */
   trace: START_TRACE,

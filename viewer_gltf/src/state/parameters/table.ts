@@ -16,7 +16,7 @@ export const PARAMETERS: readonly Parameter<ViewerState>[] = [
   LAMPS_SHOWN,
 ];
 
-/** What the page's address may ask for, by the names that links have. */
+/** The parameters that the page's address may set, by the names that links have. */
 export const IN_ADDRESS: readonly Parameter<ViewerState>[] = [
   MODE,
   QUALITY,

@@ -6,9 +6,9 @@ const TOOLS = ["select", "measure"] as const;
 /** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
 export type Tool = (typeof TOOLS)[number];
 
-/** What a bundle opens with. */
+/** The tools of a bundle that has just opened. */
 export const START_TOOLS = {
-  /** What a tap or a dwell on the specimen does. */
+  /** The effect of a tap or a dwell on the specimen. */
   tool: "select" as Tool,
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,

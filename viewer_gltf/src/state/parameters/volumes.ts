@@ -9,7 +9,7 @@ import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } 
 export const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
 export type Mode = (typeof MODES)[number];
 
-/** What a bundle opens with. */
+/** The volumes' parameters of a bundle that has just opened. */
 export const START_VOLUMES = {
   mode: "disc" as Mode,
   /** Metres of the room: nearer than a headset's specimen is at the start. */

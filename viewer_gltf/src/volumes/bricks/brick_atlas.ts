@@ -30,7 +30,7 @@ type Tree = {
   present: Uint8Array;
   /** Of each node that has come: its slot. */
   readonly slots: Map<number, number>;
-  /** What came before the atlas was made. */
+  /** Bricks that came before the atlas was made. */
   waiting: Brick[];
 };
 

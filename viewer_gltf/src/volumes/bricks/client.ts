@@ -76,7 +76,7 @@ export class BrickLink {
     if (this.takers.get(name) === taker) this.takers.delete(name);
   }
 
-  /** What is looked at now; to be called in every frame. */
+  /** Sets the present view; to be called in every frame. */
   look(view: BrickView, now_ms: number): void {
     if (!this.isOpen || this.takers.size === 0 || now_ms - this.asked_ms < VIEW_EVERY_MS) return;
     const text = JSON.stringify(view);

@@ -18,7 +18,7 @@ type Tree = {
   readonly name: string;
   readonly tile: string;
   readonly channel: string;
-  /** What the cache knows it by. */
+  /** Its key in the cache. */
   readonly volume: string;
   readonly hash: string;
   readonly raw: Uint8Array<ArrayBuffer>;
@@ -35,7 +35,7 @@ let address = "";
 let socket: WebSocket | null = null;
 let tries = 0;
 let hasOpened = false;
-/** What was asked for, to ask anew on another connection. */
+/** The requested volumes, to request them again on another connection. */
 const volumes = new Map<string, Volume>();
 /** ... and of these, what this connection was asked for. */
 const askedFor = new Set<string>();

@@ -105,7 +105,7 @@ export function haveBits(present: Uint8Array): string {
   return btoa(text);
 }
 
-/** What a cell is drawn from. */
+/** Mark of a cell without a node to draw it from. */
 export const NOTHING = 0xffffffff;
 
 /**

@@ -86,7 +86,7 @@ export class SplitSession {
     return this.running?.hasStarted ?? false;
   }
 
-  /** What this browser could not give, in words; empty if all is as it should be. */
+  /** The features that this browser refused, in words; empty if there are none. */
   get problems(): readonly string[] {
     return this.running?.problems ?? [];
   }
@@ -158,7 +158,7 @@ export class SplitSession {
   }
 }
 
-/** What lasts as long as one session, and is undone with it. */
+/** Changes that last as long as one session, and are undone with it. */
 class Running {
   readonly sensor = new HeadSensor();
   problems: readonly string[] = [];

@@ -11,7 +11,7 @@ export type Button = "none" | "magnet" | "touch" | "indirect-touch";
 
 export type Profile = LensModel & Readonly<{ vendor: string; model: string; button: Button }>;
 
-/** What is wrong with a profile's code, in words for the page. */
+/** A fault of a profile's code, in words for the page. */
 export class ProfileError extends BundleError {
   override readonly name = "ProfileError";
 }
@@ -78,7 +78,7 @@ export function parseProfile(text: string): Profile {
   throw new ProfileError(`The viewer's code has no parameter p: ${shortened(pasted)}. ${HOW}`);
 }
 
-/** What is wrong with a code's text, in words; "": nothing. */
+/** The fault of a code's text, in words; "": none. */
 export function faultOfCode(code: string): string {
   try {
     parseProfile(code);

@@ -38,7 +38,7 @@ export class RoomNotice {
     return this.quad.mesh;
   }
 
-  /** What can be read now. */
+  /** The texts that can be read now. */
   get texts(): readonly string[] {
     return this.announcements.texts;
   }

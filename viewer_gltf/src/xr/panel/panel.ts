@@ -38,7 +38,7 @@ export type RoomPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onWish: (wish: Action | Command) => void;
   onLeave: () => void;
-  /** What was asked for can't be done: why. */
+  /** Reports why a request can't be granted. */
   onAnnounce: (text: string) => void;
 }>;
 
@@ -58,7 +58,7 @@ export class RoomPanel {
   private openerYaw: number | null = null;
   /** It opens with the next frame, which knows where the eye is. */
   private wantsPlace = false;
-  /** What was last asked for: a button that is held still asks for nothing more. */
+  /** The last request: a button that is held still asks for nothing more. */
   private dragged = "";
 
   constructor(private readonly options: RoomPanelOptions) {
@@ -86,7 +86,7 @@ export class RoomPanel {
     return this.quad.mesh.visible;
   }
 
-  /** What can be pointed at now, for tests and for a program that reads it aloud. */
+  /** The regions to point at now, for tests and for a program that reads them aloud. */
   get regions(): readonly Region[] {
     return this.isOpen ? this.page.regions : [];
   }

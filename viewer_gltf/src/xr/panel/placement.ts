@@ -3,7 +3,7 @@ import { type Matrix4, Vector3 } from "three";
 
 /** From the eye: to the right of -z, and up. */
 export type Bearing = Readonly<{ yaw: number; pitch: number }>;
-/** What the specimen covers, as seen from the eye; yaw about that of the head. */
+/** The angles that the specimen covers, as seen from the eye; yaw about that of the head. */
 export type Extent = Readonly<{
   yaw: readonly [number, number];
   pitch: readonly [number, number];
