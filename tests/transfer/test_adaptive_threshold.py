@@ -12,6 +12,8 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 from skimage import filters
 
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.survey_file import read_survey
 from stereocell.building.tasks.window import statistics_from_json, statistics_to_json
 from stereocell.cli.__main__ import main
 from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
@@ -335,20 +337,22 @@ def manifest(bundle: Path) -> dict[str, object]:
 
 
 def test_the_adaptive_criterion_takes_it_in_every_tile(built: Path) -> None:
-    (entry,) = json.loads((built / "units" / "survey.json").read_text()).values()
-    threshold = entry["appearance"]["threshold"]
-    assert {iso["value"] for iso in entry["iso"].values()} == {threshold}
-    assert {iso["background"] for iso in entry["iso"].values()} == {0.0}
-    assert len(entry["iso"]) == 2
-    assert entry["appearance"]["iso_value"] == pytest.approx(threshold)
+    (found,) = read_survey(OutFolder(built)).values()
+    threshold = found.appearance.threshold
+    assert threshold is not None
+    assert {iso.value for iso in found.iso.values()} == {threshold}
+    assert {iso.background for iso in found.iso.values()} == {0.0}
+    assert len(found.iso) == 2
+    assert found.appearance.iso_value == pytest.approx(threshold)
     assert 250 < threshold < 850
 
 
 def test_the_threshold_reaches_the_bundle_and_check_finds_nothing(built: Path) -> None:
-    (entry,) = json.loads((built / "units" / "survey.json").read_text()).values()
-    low, high = entry["appearance"]["window"]
+    (found,) = read_survey(OutFolder(built)).values()
+    low, high = found.appearance.window
     channel = manifest(built / "bundle")
-    share = (entry["appearance"]["threshold"] - low) / (high - low)
+    assert found.appearance.threshold is not None
+    share = (found.appearance.threshold - low) / (high - low)
     assert channel["threshold_normalized"] == pytest.approx(share, abs=1e-6)
     assert THRESHOLD in channel["transfer_functions"]
     assert [line for line in check(built) if not line.ok] == []
@@ -361,8 +365,8 @@ def test_an_edited_threshold_reaches_the_bundle(
     built: Path, tmp_path: Path, edit: str, expected: float | None
 ) -> None:
     layer = tmp_path / "edit.usda"
-    (entry,) = json.loads((built / "units" / "survey.json").read_text()).values()
-    (name,) = json.loads((built / "units" / "survey.json").read_text())
+    ((name, found),) = read_survey(OutFolder(built)).items()
+    low, high = found.appearance.window
     layer.write_text(
         f"""#usda 1.0
         (
@@ -381,9 +385,8 @@ def test_an_edited_threshold_reaches_the_bundle(
         """
     )
     assert main(["bundle", str(built), "--stage", str(layer), "--workers", "0"]) == 0
-    low, high = entry["appearance"]["window"]
-    found = manifest(built / "bundle")["threshold_normalized"]
+    normalized = manifest(built / "bundle")["threshold_normalized"]
     if expected is None:
-        assert found is None
+        assert normalized is None
     else:
-        assert found == pytest.approx(max(0, (expected - low) / (high - low)), abs=1e-6)
+        assert normalized == pytest.approx(max(0, (expected - low) / (high - low)), abs=1e-6)
