@@ -8,7 +8,7 @@ export const HOW_TO_GET = `no Chromium at ${CHROMIUM}: apt-get install chromium,
 
 /** Features of the browser's own window, which nobody sees; and those of playwright's own list. */
 const WITHOUT = [
-  ...["PreloadTopChromeWebUI", "InitialWebUI", "WebUIReloadButton"],
+  ...["WebUIOmniboxPopup", "WebUIOmniboxAimPopup"],
   "SpareRendererForSitePerProcess",
   ...["AvoidUnnecessaryBeforeUnloadCheckSync", "DestroyProfileOnBrowserClose", "HttpsUpgrades"],
   ...["HttpsFirstBalancedModeAutoEnable", "LensOverlay", "MediaRouter", "PaintHolding"],
