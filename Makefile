@@ -150,7 +150,8 @@ lint: setup ## ruff, mypy, layers of imports, biome, tsc
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
-# a process for each core, and of each one thread: others would wait for one another, busily
+# two processes for each core, as tests often wait for servers and timers, and of each one thread:
+# others would wait for one another, busily. A file's tests share what it has built: they stay together
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
 SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
 VITEST := cd $(VIEWER) && npm run --silent types && npm exec --silent -- vitest run
@@ -173,7 +174,7 @@ test: setup browser ## All tests, in headless Chromium too
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
 test-python: setup
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n "$$WORKERS" --durations 25
+	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((2 * WORKERS)) --dist loadfile --durations 25
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
