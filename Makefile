@@ -150,8 +150,7 @@ lint: setup ## ruff, mypy, layers of imports, biome, tsc
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
-# two processes for each core, as tests often wait for servers and timers, and of each one thread:
-# others would wait for one another, busily. A file's tests share what it has built: they stay together
+# a process for each core, and of each one thread: others would wait for one another, busily
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
 SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
 VITEST := cd $(VIEWER) && npm run --silent types && npm exec --silent -- vitest run
@@ -173,6 +172,8 @@ test: setup browser ## All tests, in headless Chromium too
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
+# Two processes a core: builds, servers and clusters wait for one another. A file's tests share what
+# it has built, so they stay together
 test-python: setup
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((2 * WORKERS)) --dist loadfile --durations 25
 
