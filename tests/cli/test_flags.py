@@ -68,6 +68,17 @@ def test_a_setting_s_comment_is_its_flag_s_help(capsys: pytest.CaptureFixture[st
     assert made.parse_args(["--n", "7"]).n == 7
 
 
+def test_a_length_or_auto_can_have_a_flag(capsys: pytest.CaptureFixture[str]) -> None:
+    declared = setting("auto", "5 % of it, in um", Flag("--n"))
+    (field,) = fields(make_dataclass("O", [("n", float | str, declared)]))
+    made = argparse.ArgumentParser()
+    flags.declare_setting(made, field.metadata["flag"], field)
+    assert made.parse_args(["--n", "1.5"]).n == 1.5
+    assert made.parse_args(["--n", "auto"]).n == "auto"
+    made.print_help()
+    assert "5 % of it" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

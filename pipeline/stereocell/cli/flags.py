@@ -39,7 +39,7 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
 
 def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
     """Declare a setting's flag, whose text becomes the setting's type."""
-    about = {"help": flag.help or field.metadata["comment"]}
+    about = {"help": (flag.help or field.metadata["comment"]).replace("%", "%%")}
     kind = field.type
     if kind is bool:
         parser.add_argument(flag.name, action="store_const", const=True, **about)
@@ -51,7 +51,8 @@ def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
     elif flag.name == "--series":
         parser.add_argument(flag.name, metavar=flag.form, type=_series, **about)
     else:
-        parser.add_argument(flag.name, type=_number_or_auto if kind == int | str else kind, **about)
+        read_one = partial(_number_or_auto, get_args(kind)[0]) if get_args(kind) else kind
+        parser.add_argument(flag.name, type=read_one, **about)
 
 
 def _settings() -> Iterator[tuple[Flag, tuple[str, ...], Field[Any]]]:
@@ -110,11 +111,11 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def _number_or_auto(text: str) -> int | str:
+def _number_or_auto(kind: type[int] | type[float], text: str) -> float | str:
     try:
-        return text if text == AUTO else int(text)
+        return text if text == AUTO else kind(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"invalid int value: {text!r}") from None
+        raise argparse.ArgumentTypeError(f"invalid {kind.__name__} value: {text!r}") from None
 
 
 def _series(text: str) -> int | str:
