@@ -10,7 +10,6 @@ from stereocell.engine.run import Engine
 from stereocell.formats import tiles3d
 from stereocell.formats.tiles3d import content_hash
 from stereocell.formats.tiles3d_walk import walk
-from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
 from stereocell.verify.formats import check
 from support import spheres
@@ -23,16 +22,7 @@ FINER = f"{CHANNEL}/r0_c0/finer.json"
 def made(tmp_path_factory):
     """A tile of three LODs, in a bundle that takes one tile for many."""
     out = tmp_path_factory.mktemp("out")
-    tile = spheres.tile(0)
-    write_tile(out / "stage", tile)
-    appearances = (spheres.RED, spheres.BLUE)
-    write_stage(
-        out / "stage",
-        "one tile",
-        appearances=appearances,
-        tiles=[TileExtent.of(tile)],
-        provenance={},
-    )
+    spheres.write_one_tile(out / "stage")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tiles3d, "MOST_WHOLE_TILES", 0)
         write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)

@@ -1,11 +1,14 @@
 """Two tiles side by side, a sphere across their border: tiny content for stage and bundle."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.channel import Appearance
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tile_content import ChannelContent, TileContent
+from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 
 SPACING = (1.0, 0.5, 0.5)  # um, (z, y, x)
 OWN_SHAPE = (9, 20, 20)
@@ -89,3 +92,16 @@ def tile(column: int, appearances: tuple[Appearance, ...] = (RED, BLUE)) -> Tile
         for appearance in appearances
     )
     return TileContent(f"r0_c{column}", SPACING, first, last, OWN_SHAPE, contents)
+
+
+def write_one_tile(stage: Path) -> None:
+    """Write a stage of one tile, with both channels."""
+    content = tile(0)
+    write_tile(stage, content)
+    write_stage(
+        stage,
+        "one tile",
+        appearances=(RED, BLUE),
+        tiles=[TileExtent.of(content)],
+        provenance={},
+    )

@@ -26,16 +26,7 @@ VOLUME = "volumes/r0_c0/CD31.ktx2"
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
-    tile = spheres.tile(0)
-    write_tile(out / "stage", tile)
-    appearances = (spheres.RED, spheres.BLUE)
-    write_stage(
-        out / "stage",
-        "one tile",
-        appearances=appearances,
-        tiles=[TileExtent.of(tile)],
-        provenance={},
-    )
+    spheres.write_one_tile(out / "stage")
     write_list(out / "stage", {}, out / "stage")
     write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)
     return out
