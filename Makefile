@@ -194,11 +194,11 @@ ifdef STEREOCELL_EXHAUSTIVE
 	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/$(SHOWN)
 else
 	test -e out/samples/half.ome.zarr || $(RUN) sample cycif out/samples/half.ome.zarr --grid 5x1
-	$(MAKE) --no-print-directory report INPUT=out/samples/half.ome.zarr OUT=out/$(SHOWN) ARGS="--preset cycif --grid 5x1"
+	$(RUN) build out/samples/half.ome.zarr --out out/$(SHOWN) --workers="$$WORKERS" --preset cycif --grid 5x1
 	$(RUN) check out/$(SHOWN) --deep --workers="$$WORKERS"
 endif
 	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
-	$(MAKE) --no-print-directory bundle INPUT=out/samples/brain-cells.ome.tif OUT=out/brain-cells ARGS="--preset lightsheet --grid 2x2"
+	$(RUN) build out/samples/brain-cells.ome.tif --out out/brain-cells --workers="$$WORKERS" --preset lightsheet --grid 2x2
 	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
 	rm -rf out/f && $(SUPPORT).phantoms out/f

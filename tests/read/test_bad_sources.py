@@ -149,9 +149,12 @@ CASES: dict[str, tuple[Maker, str]] = {
     "flat TIFF": (tiff_of(SMALL[0], "YX", spacing=None), "at least 2 planes: found 1 along z"),
     "flat TIFF with channels": (tiff_of(SMALL, "CYX", spacing=None), "at least 2 planes"),
     "int8 TIFF": (tiff_of(SMALL.astype(np.int8)), "dtype of level 0: found int8"),
-    "TIFF, negative spacing": (tiff_of(SMALL, spacing=(-1.0, 1.0, 1.0)), "physical_size_z"),
-    "TIFF, zero spacing": (tiff_of(SMALL, spacing=(1.0, 0.0, 1.0)), "physical_size_y"),
-    "TIFF, NaN spacing": (tiff_of(SMALL, spacing=(1.0, 1.0, float("nan"))), "physical_size_x"),
+    "TIFF, negative spacing": (tiff_of(SMALL, spacing=(-1.0, 1.0, 1.0)), "voxel size z of level 0"),
+    "TIFF, zero spacing": (tiff_of(SMALL, spacing=(1.0, 0.0, 1.0)), "voxel size y of level 0"),
+    "TIFF, NaN spacing": (
+        tiff_of(SMALL, spacing=(1.0, 1.0, float("nan"))),
+        "voxel size x of level 0",
+    ),
     "TIFF, spacing in pixels": (tiff_of(SMALL, unit="pixel"), "voxel size: not found"),
     "no multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].pop("multiscales")),

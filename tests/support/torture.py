@@ -80,9 +80,11 @@ class Folder:
 
     def find(self) -> dict[str, object]:
         found: dict[str, object] = {}
-        for path in self.out.rglob("*"):
-            with suppress(FileNotFoundError):  # it was moved since
-                found[str(path.relative_to(self.out))] = path.stat().st_mtime_ns
+        for folder, _, files in os.walk(self.out):  # unlike rglob it passes by what was moved since
+            for file in files:
+                path = Path(folder, file)
+                with suppress(FileNotFoundError):
+                    found[str(path.relative_to(self.out))] = path.stat().st_mtime_ns
         return found
 
     def digests(self) -> dict[str, str]:

@@ -9,7 +9,6 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from json import JSONDecodeError
-from xml.etree.ElementTree import ParseError
 
 from pydantic import ValidationError
 from zarr.errors import NodeNotFoundError
@@ -39,8 +38,7 @@ _FAULTS = (
     ZstdError,
 )
 # Classes of libraries that take long to import: an error of theirs is raised once they are there
-_UNSUPPORTED = ("bioio_base.exceptions", "UnsupportedFileFormatError")
-_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"), _UNSUPPORTED)
+_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"))
 
 
 def _faults() -> tuple[type[BaseException], ...]:
@@ -86,12 +84,6 @@ def raise_if_short(
 
 
 def _reason(error: BaseException) -> str:
-    unsupported = _imported(*_UNSUPPORTED)
-    if unsupported is not None and isinstance(error, unsupported):
-        cause = error.__cause__ or error.__context__
-        if cause is not None:
-            return _reason(cause)
-        return _shortened(str(error).partition("'. ")[2])  # without "does not support '...'"
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         field = ".".join(str(step) for step in first["loc"])
@@ -108,8 +100,6 @@ def _reason(error: BaseException) -> str:
         return "it asks for more memory than there can be"
     if isinstance(error, RecursionError):
         return "metadata: nested too deeply"
-    if isinstance(error, ParseError):
-        return f"OME-XML: {error}"
     if isinstance(error, JSONDecodeError):
         return f"metadata: {error}"
     if isinstance(error, OSError) and error.strerror:

@@ -1,0 +1,122 @@
+"""OME-XML: the images of a file, their voxel spacing, and their channels' names and colours.
+
+Only what a build needs is read, by Python's own parser: a file whose instruments or annotations
+break the schema opens all the same.
+
+References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+from stereocell.model.errors import SourceError
+from stereocell.read.image import Color, linear_color
+from stereocell.read.spacing import Triple, um_per
+
+_DEFAULT_UNIT = "\u00b5m"  # of PhysicalSizeX, Y and Z, where none is named
+
+
+@dataclass(frozen=True, slots=True)
+class OmeImage:
+    """One image.
+
+    spacing_um  (z, y, x), um; None: not stated with a unit of length
+    names       one for each channel; None: not stated
+    colors      the same, linear RGB, 0..1
+    """
+
+    spacing_um: Triple | None
+    names: tuple[str | None, ...]
+    colors: tuple[Color | None, ...]
+
+
+def parse(text: str, where: str) -> ElementTree.Element:
+    """Return the root of OME-XML. `where` names the file in errors.
+
+    Raises SourceError where the text is none, or isn't well-formed, or declares entities: those
+    could name other files, or grow without end.
+    """
+    if not text.lstrip("\ufeff \t\r\n").startswith("<"):
+        raise SourceError(
+            f"{where}: OME-XML: found none in the first plane's ImageDescription; expected an "
+            "OME-TIFF file, whole, with its OME-XML"
+        )
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise SourceError(f"{where}: OME-XML: found a DOCTYPE, expected none")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        raise SourceError(
+            f"{where}: OME-XML: {error}; expected an OME-TIFF file, whole, with its OME-XML"
+        ) from error
+    if _local(root) != "OME":
+        raise SourceError(f"{where}: OME-XML: found <{_local(root):.40}>, expected <OME>")
+    return root
+
+
+def images_of(root: ElementTree.Element, where: str) -> list[OmeImage]:
+    """Return the images with their pixels' metadata.
+
+    Raises SourceError where the metadata lies in another file, or holds what is no number.
+    """
+    for other in _children(root, "BinaryOnly"):
+        raise SourceError(
+            f"{where}: OME-XML: BinaryOnly: its metadata is in "
+            f"{other.get('MetadataFile', '')!r:.100}; expected that file"
+        )
+    return [_image(image, where) for image in _children(root, "Image")]
+
+
+def _image(image: ElementTree.Element, where: str) -> OmeImage:
+    pixels = next(_children(image, "Pixels"), None)
+    if pixels is None:
+        return OmeImage(None, (), ())
+    channels = list(_children(pixels, "Channel"))
+    return OmeImage(
+        _spacing(pixels, where),
+        tuple((channel.get("Name") or "").strip() or None for channel in channels),
+        tuple(_color(channel, where) for channel in channels),
+    )
+
+
+def _spacing(pixels: ElementTree.Element, where: str) -> Triple | None:
+    lengths = []
+    for axis in "ZYX":
+        field = f"PhysicalSize{axis}"
+        given = pixels.get(field)
+        um = um_per(pixels.get(f"{field}Unit", _DEFAULT_UNIT))
+        if given is None or um is None:
+            return None
+        try:
+            lengths.append(float(given) * um)
+        except ValueError:
+            raise SourceError(
+                f"{where}: OME-XML: {field}: found {given!r:.40}, expected a number"
+            ) from None
+    z, y, x = lengths
+    return z, y, x
+
+
+def _color(channel: ElementTree.Element, where: str) -> Color | None:
+    """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A."""
+    given = channel.get("Color")
+    if given is None:
+        return None
+    try:
+        number = int(given)
+        red, green, blue, _ = (number & 0xFFFFFFFF).to_bytes(4, "big")
+    except ValueError:
+        raise SourceError(
+            f"{where}: OME-XML: Channel Color: found {given!r:.40}, expected a whole number"
+        ) from None
+    return linear_color((red, green, blue))
+
+
+def _children(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:
+    return (child for child in element if _local(child) == name)
+
+
+def _local(element: ElementTree.Element) -> str:
+    """Return an element's name without its namespace, which changes from version to version."""
+    return element.tag.rpartition("}")[2]

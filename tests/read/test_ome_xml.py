@@ -1,0 +1,61 @@
+"""OME-XML as other programs write it."""
+
+import pytest
+
+from stereocell.model.errors import SourceError
+from stereocell.read.ome_xml import images_of, parse
+
+NS = "http://www.openmicroscopy.org/Schemas/OME/2016-06"
+
+
+def images(inside: str, namespace: str = NS):  # type: ignore[no-untyped-def]
+    return images_of(parse(f'<OME xmlns="{namespace}">{inside}</OME>', "x.tif"), "x.tif")
+
+
+def test_spacing_names_and_colours_are_read() -> None:
+    first, second = images(
+        '<Instrument ID="Microscope"/>'  # an identifier that the schema forbids: Micro-Manager's
+        '<Image ID="0"><Pixels PhysicalSizeX="200" PhysicalSizeXUnit="nm" PhysicalSizeY="0.2" '
+        'PhysicalSizeZ="0.001" PhysicalSizeZUnit="mm">'
+        '<Channel Name=" DAPI " Color="65535"/><Channel Color="-16776961"/><Channel/>'
+        "</Pixels></Image><Image/>"
+    )
+    assert first.spacing_um == pytest.approx((1.0, 0.2, 0.2))
+    assert first.names == ("DAPI", None, None)
+    # R, G, B, A in a signed number: 0x0000ffff is blue, 0xff0000ff red
+    assert first.colors == ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), None)
+    assert (second.spacing_um, second.names, second.colors) == (None, (), ())
+
+
+@pytest.mark.parametrize("version", ["2016-06", "2013-06", "2008-09"])
+def test_every_version_s_namespace_is_one(version: str) -> None:
+    found = images('<Image><Pixels><Channel Name="A"/></Pixels></Image>', NS[:-7] + version)
+    assert found[0].names == ("A",)
+
+
+@pytest.mark.parametrize(
+    ("inside", "told"),
+    [
+        ('<BinaryOnly MetadataFile="first.ome.tif" UUID="u"/>', "is in 'first.ome.tif'"),
+        ('<Image><Pixels PhysicalSizeZ="deep"/></Image>', "PhysicalSizeZ: found 'deep'"),
+        ('<Image><Pixels><Channel Color="red"/></Pixels></Image>', "Channel Color: found 'red'"),
+    ],
+)
+def test_what_is_no_metadata_is_named(inside: str, told: str) -> None:
+    with pytest.raises(SourceError, match=told):
+        images(inside)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "OME-XML: found none"),
+        ("ImageJ=1.53\nimages=5", "OME-XML: found none"),
+        ("<OME>", "OME-XML: no element found"),
+        ("<html></html>", "found <html>, expected <OME>"),
+        ('<!DOCTYPE x [<!ENTITY a "b">]><OME/>', "found a DOCTYPE"),
+    ],
+)
+def test_text_that_is_none_is_refused(text: str, told: str) -> None:
+    with pytest.raises(SourceError, match=told):
+        parse(text, "x.tif")
