@@ -175,7 +175,7 @@ BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/
 # Two processes a core: builds, servers and clusters wait for one another. A file's tests share what
 # it has built, so they stay together
 test-python: setup
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((2 * WORKERS)) --dist loadfile --durations 25
+	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((2 * WORKERS)) --dist loadfile --no-loadscope-reorder --durations 25
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test

@@ -24,12 +24,16 @@ CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave sweeps to `make test-exhaustive`."""
-    if IS_EXHAUSTIVE:
-        return
-    of_sweeps = {item: item.get_closest_marker("exhaustive") is not None for item in items}
-    config.hook.pytest_deselected(items=[item for item in items if of_sweeps[item]])
-    items[:] = [item for item in items if not of_sweeps[item]]
+    """Leave sweeps to `make test-exhaustive`, and let files with slow tests begin.
+
+    A process takes files whole and in this order: a slow one at the end would run alone.
+    """
+    if not IS_EXHAUSTIVE:
+        of_sweeps = {item: item.get_closest_marker("exhaustive") is not None for item in items}
+        config.hook.pytest_deselected(items=[item for item in items if of_sweeps[item]])
+        items[:] = [item for item in items if not of_sweeps[item]]
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: -slow[item.path])  # stable: a file's tests stay together
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

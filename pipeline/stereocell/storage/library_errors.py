@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from json import JSONDecodeError
 
 from pydantic import ValidationError
-from zarr.errors import NodeNotFoundError
 from zstandard import ZstdError
 
 import stereocell.storage.location as location
@@ -38,7 +37,8 @@ _FAULTS = (
     ZstdError,
 )
 # Classes of libraries that take long to import: an error of theirs is raised once they are there
-_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"))
+_NO_NODE = ("zarr.errors", "NodeNotFoundError")
+_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"), _NO_NODE)
 
 
 def _faults() -> tuple[type[BaseException], ...]:
@@ -88,7 +88,8 @@ def _reason(error: BaseException) -> str:
         first = error.errors()[0]
         field = ".".join(str(step) for step in first["loc"])
         return f"field {field}: found {first['input']!r:.60}, {first['msg'].lower()}"
-    if isinstance(error, NodeNotFoundError):
+    no_node = _imported(*_NO_NODE)
+    if no_node is not None and isinstance(error, no_node):
         return "zarr.json, .zgroup or .zarray: not found, or not reachable"
     if isinstance(error, FileNotFoundError):
         return "not found, or not reachable"

@@ -18,7 +18,6 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 from scipy.special import erf
 
 from stereocell.model.channel import Shape, Shapes, TransferFunctions2d
@@ -187,11 +186,15 @@ class _Sum:
 
     def fit(self, without: int = -1) -> tuple[NDArray[np.float64], float]:
         """Return the voxels of each boundary, and the squares that are left; without one pair."""
+        from scipy.optimize import (
+            nnls,
+        )  # slow to import: every command and worker would wait for it
+
         used = np.ones(self.matrix.shape[1], bool)
         used[: len(self.pairs)] = self.pairs != without
         matrix = self.matrix[:, used]
         scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
-        found, left = optimize.nnls(matrix / scale, self.cells, maxiter=100 * len(scale))
+        found, left = nnls(matrix / scale, self.cells, maxiter=100 * len(scale))
         amounts = np.zeros(len(used))
         amounts[used] = found / scale
         return amounts[: len(self.pairs)] * self.seen, float(left) ** 2
