@@ -118,7 +118,7 @@ def test_what_is_lost_or_half_made_there_is_made_again(
     capsys.readouterr()
     assert main(["check", there]) == 1
     assert "FAIL hashes: index.html: not the bytes that files.json" in capsys.readouterr().out
-    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert make_assets(volume, there, GRID, "--workers", "0") == 0
     assert of_parts(kept(store, "bucket/there")) == before
     capsys.readouterr()
     assert main(["check", there, "--json"]) == 0
@@ -151,7 +151,7 @@ def test_flipped_bits_there_are_named_and_get_no_further(
         assert main([phase, there, "--workers", "0"]) == 1
         assert f"{there}/{key}: damaged" in capsys.readouterr().err
         fs.rm(f"bucket/there/{key}")
-        assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+        assert make_assets(volume, there, GRID, "--workers", "0") == 0
         assert of_parts(kept(store, "bucket/there")) == before
 
 
@@ -165,7 +165,7 @@ def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_
     phases["bundle"]["key"] = ""  # begun
     fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
     fs.rm(f"{out}/bundle/manifest.json")  # it comes last
-    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert make_assets(volume, there, GRID, "--workers", "0") == 0
     assert of_parts(kept(store, out)) == before
     fs.rm(f"{out}/bundle", recursive=True)
     del phases["bundle"]
@@ -177,7 +177,7 @@ def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_
         assert f"{there}/bundle: exists and is no bundle: no manifest" in capsys.readouterr().err
         assert fs.cat_file(f"{out}/bundle/thesis.tex") == b"years of work"
     fs.rm(f"{out}/bundle/thesis.tex")
-    assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
+    assert make_assets(volume, there, GRID, "--workers", "0") == 0
     assert of_parts(kept(store, out)) == before
 
 
