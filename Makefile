@@ -245,7 +245,7 @@ bench: setup ## Ratios of two things in one run, medians
 bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; the whole dataset
 	$(BIN)/python tests/bench/scale.py out/bench-scale
 
-bench-iso: setup ## Criteria for the iso-value, and peers, on tiles whose solids are known
+bench-iso: setup ## Levels for a surface over the corpus, and peers; volumes of nothing
 	$(BIN)/python tests/bench/iso.py
 
 bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head phantom

@@ -1,97 +1,210 @@
-"""Criteria for an iso-value on the family of tiles whose solids are known: a table of figures.
+"""Levels for a surface over the corpus: Dice, distance, empty volumes, neighbours, confidence.
 
-Peers are thresholds of scikit-image, on the voxels after the same Gaussian, and once more after the
-same median and with the same background subtracted.
+Every method sees the same denoised field. Peers are thresholds of scikit-image, one for the whole
+volume, and Sauvola's, which follows the surroundings. Criteria that go tile by tile are asked in
+every tile for themselves.
 """
 
+import argparse
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from skimage import filters
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from stereocell.filters.background import find_background
-from stereocell.filters.denoise import denoise, smooth
+from corpus import all_cases
+from corpus.case import Mask
+from corpus.sight import Sight, look_at
 from stereocell.isosurface.isovalue import find_iso_value
 from stereocell.isosurface.options import BY_TILE, IsoValueOptions
-from stereocell.model.tiling import Box
-from stereocell.model.volume import Volume
-from support.iso_value_family import SPACING, Mask, Member, boundary_distance_um, dice, family, make
+from stereocell.model.errors import NoSurfaceError
 
-SIGMA_UM = 0.14  # as `auto` has it: the finest spacing
-BLOCK_UM = 64 * 0.14
+OURS = "stereocell"
+RIGHT = 0.7  # Dice from which a surface counts as right
+BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of confidence
+_SAMPLE = 2_000_000  # voxels that a peer's threshold is found on
 PEERS: dict[str, Callable[[NDArray[np.float32]], float]] = {
     "Otsu": filters.threshold_otsu,
     "Li": filters.threshold_li,
     "isodata": filters.threshold_isodata,
+    "triangle": filters.threshold_triangle,
+    "multi-Otsu": lambda values: float(filters.threshold_multiotsu(values, 3)[0]),
 }
-Figures = dict[str, tuple[float, float]]  # Dice, mean distance of the boundaries in um
 
 
-def fields(counts: NDArray[np.uint16]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the smoothed voxels, and those that our criteria see: denoised, above background."""
-    volume = Volume(counts, SPACING)
-    region = Box((0, 0, 0), counts.shape)  # type: ignore[arg-type]
-    under = find_background(
-        counts.astype(np.float32), region, spacing_um=SPACING, block_um=BLOCK_UM
-    )
-    return smooth(volume, SIGMA_UM), denoise(volume, SIGMA_UM) - under.at(region)
+@dataclass
+class Found:
+    """One method on one case: the share of voxels inside, and how that fits the truth.
+
+    levels  of the tiles that have a surface
+    """
+
+    inside: float
+    dice: float = float("nan")
+    away: float = float("nan")  # mean distance of the boundaries, in finest voxels
+    levels: tuple[float, ...] = ()
 
 
-def find_solids(member: Member) -> tuple[Mask, dict[str, Mask]]:
-    """Return the solids of one member, and what every criterion and peer finds of them."""
-    truth, counts = make(member, seed=0)
-    plain, ours = fields(counts)
-    found = {name: plain > peer(plain) for name, peer in PEERS.items()}
-    found |= {f"{name}, background subtracted": ours > peer(ours) for name, peer in PEERS.items()}
+@dataclass
+class Figures:
+    """One case: what every method found, and ours tile by tile: (confidence, Dice)."""
+
+    name: str
+    group: str
+    held_out: bool
+    found: dict[str, Found] = field(default_factory=dict)
+    tiles: list[tuple[float, float]] = field(default_factory=list)
+    confidence: float = 0.0
+
+
+def dice(found: Mask, truth: Mask) -> float:
+    return float(2 * (found & truth).sum() / max(1, found.sum() + truth.sum()))
+
+
+def distance(found: Mask, truth: Mask, spacing: tuple[float, float, float]) -> float:
+    """Return the mean distance between two boundaries, both ways, in finest voxels."""
+    edges = [solid & ~ndimage.binary_erosion(solid, border_value=1) for solid in (found, truth)]
+    if not all(edge.any() for edge in edges):
+        return float("nan")
+    away = [ndimage.distance_transform_edt(~edge, spacing) for edge in edges]
+    mean = (away[1][edges[0]].mean() + away[0][edges[1]].mean()) / 2
+    return float(mean / min(spacing))
+
+
+def measure(number: int) -> Figures:
+    """Return the figures of all methods on one case."""
+    case = list(all_cases())[number]
+    sight = look_at(case)
+    result = Figures(case.name, case.group, case.held_out)
+    for name, inside, levels in _solids(sight):
+        found = Found(float(inside.mean()), levels=levels)
+        if sight.truth is not None:
+            found.dice = dice(inside, sight.truth)
+            found.away = distance(inside, sight.truth, case.spacing_um)
+        result.found[name] = found
+    clear = sight.found.clear
+    if clear and sight.truth is not None:
+        level = clear[min(case.rung, len(clear) - 1)]
+        result.confidence = level.confidence
+        for place, evidence in sight.tiles:
+            judged = sight.found.judge_tile(level, evidence)
+            if judged is not None:
+                inside = sight.values[place] > level.value
+                result.tiles.append((judged.confidence, dice(inside, sight.truth[place])))
+    return result
+
+
+def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
+    """Yield each method's name, what it finds inside, and the tiles' levels."""
+    case, values = sight.case, sight.field
+    clear = sight.found.clear
+    if clear:
+        level = clear[min(case.rung, len(clear) - 1)]
+        yield OURS, sight.values > level.value, (level.value,) * len(sight.tiles)
+    else:
+        yield OURS, np.zeros(values.shape, bool), ()
+    sample = values[~sight.padding] if not sight.padding.all() else values.ravel()
+    sample = sample[:: max(1, sample.size // _SAMPLE)]
+    for name, peer in PEERS.items():
+        value = float(peer(sample))
+        yield name, values > value, (value,)
+    window = max(3, 2 * round(8 * min(case.spacing_um) / case.spacing_um[1]) + 1)
+    local = np.stack([filters.threshold_sauvola(plane, 4 * window + 1) for plane in values])
+    yield "Sauvola", values > local, ()
     for criterion in BY_TILE:
-        options = IsoValueOptions(criterion=criterion)
-        found[f"stereocell {criterion}"] = ours > find_iso_value(ours, SPACING, options).value
-    return truth, found
-
-
-def measure(member: Member) -> Figures:
-    """Return the figures of every criterion and peer on one member."""
-    truth, found = find_solids(member)
-    return {name: (dice(s, truth), boundary_distance_um(s, truth)) for name, s in found.items()}
+        inside, levels = np.zeros(values.shape, bool), []
+        for place, _ in sight.tiles:
+            part = np.ascontiguousarray(sight.above[place])
+            options = IsoValueOptions(criterion=criterion)
+            try:
+                value = find_iso_value(part, case.spacing_um, options).value
+            except NoSurfaceError:
+                continue
+            inside[place] = part > value
+            levels.append(value)
+        yield f"{criterion}, by tile", inside, tuple(levels)
 
 
 def main() -> None:
-    members = list(family())
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", default="", help="cases whose name holds this")
+    parser.add_argument("--each", action="store_true", help="a line for each case, too")
+    options = parser.parse_args()
+    chosen = [n for n, case in enumerate(all_cases()) if options.only in case.name]
     with ProcessPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        figures = list(pool.map(measure, members))
-    print("| criterion | Dice, mean | min | boundary, median um | " + " | ".join(_SPLITS) + " |")
-    print("|---" * (4 + len(_SPLITS)) + "|")
-    for name in figures[0]:
-        scores = np.array([f[name][0] for f in figures])
-        away = np.median([f[name][1] for f in figures])
-        parts = [
-            np.mean([s for s, m in zip(scores, members, strict=True) if chosen(m)])
-            for chosen in _SPLITS.values()
-        ]
-        cells = [f"{scores.mean():.3f}", f"{scores.min():.2f}", f"{away:.2f}"]
-        print(f"| {name} | " + " | ".join(cells + [f"{part:.2f}" for part in parts]) + " |")
+        cases = list(pool.map(measure, chosen))
+    print_methods(cases)
+    print_confidence(cases)
+    if options.each:
+        print_cases(cases)
 
 
-_SPLITS: dict[str, Callable[[Member], bool]] = {
-    "balls": lambda m: m.kind == "balls",
-    "tubes": lambda m: m.kind == "tubes",
-    "membranes": lambda m: m.kind == "membranes",
-    "alike": lambda m: m.brightest == 1,
-    "x 1 to 8": lambda m: m.brightest > 1,
-    "even": lambda m: m.background == 0,
-    "uneven": lambda m: m.background > 0,
-    "1 %": lambda m: m.share == 0.01,
-    "40 %": lambda m: m.share == 0.4,
-    "10 photons": lambda m: m.photons == 10,
-    "200": lambda m: m.photons == 200,
-}
+def _groups(cases: list[Figures]) -> dict[str, list[Figures]]:
+    names = ["labelled", "outlined", "made"]
+    found = {name: [c for c in cases if c.group == name] for name in names}
+    found["held out"] = [c for c in cases if c.held_out and c.group != "empty"]
+    return {name: some for name, some in found.items() if some}
+
+
+def print_methods(cases: list[Figures]) -> None:
+    groups = _groups(cases)
+    empty = [c for c in cases if c.group == "empty"]
+    head = [f"{name} ({len(some)}): mean, least" for name, some in groups.items()]
+    head += ["boundary, median voxels", f"surface on {len(empty)} empty", "neighbours, 90 %"]
+    print("| method | " + " | ".join(head) + " |")
+    print("|---" * (1 + len(head)) + "|")
+    for method in cases[0].found:
+        cells = []
+        for some in groups.values():
+            scores = [c.found[method].dice for c in some]
+            cells.append(f"{np.mean(scores):.3f}, {np.min(scores):.2f}")
+        with_truth = [c.found[method] for c in cases if c.group != "empty"]
+        cells.append(f"{np.nanmedian([f.away for f in with_truth]):.2f}")
+        cells.append(f"{sum(c.found[method].inside > 0 for c in empty)}")
+        ratios = [_ratio(f.levels) for f in with_truth if len(f.levels) > 1]
+        cells.append(f"x {np.quantile(ratios, 0.9):.3g}" if ratios else "-")
+        print(f"| {method} | " + " | ".join(cells) + " |")
+
+
+def _ratio(levels: tuple[float, ...]) -> float:
+    """Return the largest over the least level of a case's tiles."""
+    least = min(levels)
+    return max(levels) / least if least > 0 else float("inf")
+
+
+def print_confidence(cases: list[Figures]) -> None:
+    print(f"\n| confidence of a tile | tiles | share with Dice > {RIGHT} | mean Dice |")
+    print("|---|---|---|---|")
+    tiles = [tile for case in cases for tile in case.tiles]
+    for low, high in pairwise(BINS):
+        inside = [d for c, d in tiles if low <= c < high or c == high == 1.0]
+        if inside:
+            right = np.mean([d > RIGHT for d in inside])
+            print(
+                f"| {low:.1f} to {high:.1f} | {len(inside)} | {right:.2f} | {np.mean(inside):.2f} |"
+            )
+
+
+def print_cases(cases: list[Figures]) -> None:
+    print()
+    for case in cases:
+        mine = case.found[OURS]
+        best = max(case.found.items(), key=lambda item: np.nan_to_num(item[1].dice))
+        print(
+            f"{case.group:9} {case.name:36} Dice {mine.dice:.3f} "
+            f"inside {mine.inside:.4f} confidence {case.confidence:.2f}; "
+            f"best {best[0]} {best[1].dice:.3f}"
+        )
+
 
 if __name__ == "__main__":
     main()

@@ -1,0 +1,1 @@
+"""Objects from label maps, in which each voxel holds its object's number."""

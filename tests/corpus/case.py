@@ -1,0 +1,35 @@
+"""One volume of the corpus: how it is loaded, and what is true of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+Group = Literal["labelled", "outlined", "made", "empty"]
+Kind = Literal["microscopy", "CT", "MR"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A volume of one channel.
+
+    group       labelled: a person or a model marked each voxel; outlined: physics or a plain
+                threshold says where the outside ends; made: by script; empty: nothing is there
+    spacing_um  (z, y, x)
+    load        returns the voxels (z, y, x) and the truth, bool (z, y, x); None: nothing is there
+    grid        rows and columns of the tiles it is cut into
+    held_out    whether it was kept from all choosing of constants
+    rung        which surface the truth is of: 0 the outer, 1 the next one within it
+    """
+
+    name: str
+    group: Group
+    spacing_um: tuple[float, float, float]
+    load: Callable[[], tuple[NDArray[Any], Mask | None]]
+    kind: Kind = "microscopy"
+    grid: tuple[int, int] = (2, 2)
+    held_out: bool = False
+    rung: int = 0

@@ -1,0 +1,247 @@
+"""Volumes made by script: bodies under the faults of cameras and stages, and fields of nothing."""
+
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from corpus.case import Case, Mask
+from support import iso_value_family
+
+SHAPE = (48, 160, 160)
+SPACING = (0.28, 0.14, 0.14)  # um, (z, y, x)
+BLUR = (1.25, 1.15, 1.15)  # sigma of the microscope, in voxels
+Field = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """How photons become numbers."""
+
+    gain: float
+    offset: float
+    read_noise: float  # electrons
+    excess: float = 1.0  # factor on the variance of counting
+    largest: int = 65535
+
+    def shoot(self, photons: Field, rng: np.random.Generator) -> NDArray[np.uint16]:
+        """Return numbers for mean photons (z, y, x)."""
+        counted = rng.poisson(np.maximum(photons, 0) / self.excess) * self.excess
+        electrons = counted + rng.normal(0, self.read_noise, photons.shape)
+        return np.clip(np.rint(electrons * self.gain + self.offset), 0, self.largest).astype(
+            np.uint16
+        )
+
+
+CAMERAS = {
+    "scmos": Camera(gain=2.2, offset=100, read_noise=1.6),
+    "emccd": Camera(gain=18.0, offset=400, read_noise=0.3, excess=2.0),
+    "detector": Camera(gain=3.0, offset=0, read_noise=0.2, largest=255),
+}
+
+
+def _rng(name: str) -> np.random.Generator:
+    return np.random.default_rng(zlib.crc32(name.encode()))
+
+
+def _axes() -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    z, y, x = np.ogrid[: SHAPE[0], : SHAPE[1], : SHAPE[2]]
+    return z * SPACING[0], y * SPACING[1], x * SPACING[2]
+
+
+def _balls(rng: np.random.Generator, count: int, radius: tuple[float, float]) -> Mask:
+    """Return balls with radii in um, none beyond the volume."""
+    z, y, x = _axes()
+    mask = np.zeros(SHAPE, bool)
+    for _ in range(count):
+        r = rng.uniform(*radius)
+        c = [rng.uniform(r, n * h - r) for n, h in zip(SHAPE, SPACING, strict=True)]
+        mask |= (z - c[0]) ** 2 + (y - c[1]) ** 2 + (x - c[2]) ** 2 < r**2
+    return mask
+
+
+def _seen(mask: Mask, height: Field | float, background: Field | float) -> Field:
+    """Return mean photons: bodies of a height over a background, blurred."""
+    field = np.where(mask, height, 0.0).astype(np.float64)
+    return np.asarray(ndimage.gaussian_filter(field, BLUR) + background, np.float64)
+
+
+def _texture(rng: np.random.Generator, sigma: float) -> Field:
+    """Return a smooth random field of mean 0 and deviation 1; sigma in voxels in plane."""
+    field = ndimage.gaussian_filter(rng.normal(size=SHAPE), (sigma / 2, sigma, sigma))
+    return np.asarray((field - field.mean()) / field.std(), np.float64)
+
+
+def _empty(camera: str, fault: str) -> NDArray[np.uint16]:
+    """Return a tile without tissue, as a camera sees it."""
+    rng = _rng(f"empty {camera} {fault}")
+    photons = np.full(SHAPE, 3.0)
+    if fault == "vignetting":
+        _, y, x = _axes()
+        off = ((y - y.mean()) ** 2 + (x - x.mean()) ** 2) / (y.mean() ** 2 + x.mean() ** 2)
+        photons = photons * (1 - 0.5 * off)
+    voxels = CAMERAS[camera].shoot(photons, rng)
+    if fault == "hot pixels":
+        hot = rng.uniform(size=SHAPE[1:]) < 2e-4
+        voxels[:, hot] = np.minimum(voxels[:, hot] + 40 * CAMERAS[camera].gain, 65535).astype(
+            np.uint16
+        )
+        voxels[rng.uniform(size=SHAPE) < 2e-5] = CAMERAS[camera].largest
+    if fault == "zero padding":
+        voxels[:, :40] = 0
+        voxels[:6] = 0
+    if fault == "black border":
+        voxels[:, :12] = voxels[:, -12:] = voxels[:, :, :12] = voxels[:, :, -12:] = 0
+    if fault == "black corner":
+        _, y, x = np.ogrid[: SHAPE[0], : SHAPE[1], : SHAPE[2]]
+        voxels[np.broadcast_to(x + y < 90, SHAPE)] = 0
+    return voxels
+
+
+FAULTS = ("plain", "hot pixels", "vignetting", "zero padding", "black border", "black corner")
+
+
+def _inside_tissue(camera: str, sigma: float) -> NDArray[np.uint16]:
+    """Return a tile wholly inside tissue: soft texture, no boundary anywhere."""
+    rng = _rng(f"inside {camera} {sigma}")
+    return CAMERAS[camera].shoot(40 * np.exp(0.12 * _texture(rng, sigma)), rng)
+
+
+def _two_classes() -> tuple[NDArray[np.uint16], Mask]:
+    """Two kinds of cells, one ten times as bright."""
+    rng = _rng("two classes")
+    dim, bright = _balls(rng, 40, (1.0, 1.7)), _balls(rng, 12, (1.0, 1.7))
+    height = np.where(bright, 400.0, 40.0)
+    return CAMERAS["scmos"].shoot(_seen(dim | bright, height, 6.0), rng), dim | bright
+
+
+def _blob() -> tuple[NDArray[np.uint16], Mask]:
+    """One bright blob in an empty field: .1 % of the voxels."""
+    rng = _rng("blob")
+    z, y, x = _axes()
+    mask = (z - 6.5) ** 2 + (y - 8.0) ** 2 + (x - 14.0) ** 2 < 1.6**2
+    return CAMERAS["scmos"].shoot(_seen(mask, 200.0, 5.0), rng), mask
+
+
+def _steep_background() -> tuple[NDArray[np.uint16], Mask]:
+    """Bodies on a ground that rises to three times their own height."""
+    rng = _rng("steep")
+    mask = _balls(rng, 45, (1.0, 1.8))
+    _, _, x = _axes()
+    ground = 10 + 180 * (x / x.max()) ** 2 * np.ones(SHAPE)
+    return CAMERAS["scmos"].shoot(_seen(mask, 60.0, ground), rng), mask
+
+
+def _saturated() -> tuple[NDArray[np.uint16], Mask]:
+    """Bodies that drive the detector to its end."""
+    rng = _rng("saturated")
+    mask = _balls(rng, 45, (1.0, 1.8))
+    camera = Camera(gain=40.0, offset=100, read_noise=1.6, largest=4095)
+    height = 60 * np.exp(0.8 * _texture(rng, 10.0))
+    return camera.shoot(_seen(mask, height, 5.0), rng), mask
+
+
+def _eight_bit() -> tuple[NDArray[np.uint8], Mask]:
+    """A confocal's 8 bits, most of the ground at 0."""
+    rng = _rng("eight bit")
+    mask = _balls(rng, 45, (1.0, 1.8))
+    voxels = CAMERAS["detector"].shoot(_seen(mask, 18.0, 0.6), rng)
+    return voxels.astype(np.uint8), mask
+
+
+def _stitched() -> tuple[NDArray[np.uint16], Mask]:
+    """Two fields of view side by side, one taken with 1.6 times the light."""
+    rng = _rng("stitched")
+    mask = _balls(rng, 45, (1.0, 1.8))
+    light = np.where(np.arange(SHAPE[2]) < SHAPE[2] // 2, 1.0, 1.6)[None, None]
+    return CAMERAS["scmos"].shoot(_seen(mask, 60.0, 12.0) * light, rng), mask
+
+
+def _tissue(share_of_light: float) -> tuple[NDArray[np.uint16], Mask]:
+    """A piece of tissue with a rim, texture inside, weak autofluorescence outside."""
+    rng = _rng(f"tissue {share_of_light}")
+    z, y, x = _axes()
+    rim = 11 + 2.5 * np.sin(y / 3) + 1.5 * np.cos(z / 2)
+    mask = np.broadcast_to(x < rim, SHAPE).copy()
+    height = 40 * np.exp(0.35 * _texture(rng, 6.0)) * share_of_light
+    return CAMERAS["scmos"].shoot(_seen(mask, height, 4.0), rng), mask
+
+
+def _shells() -> tuple[NDArray[np.uint16], Mask]:
+    """Membranes a voxel and a half thick round touching cells."""
+    rng = _rng("shells")
+    seeds = rng.uniform(0, 1, (60, 3)) * (np.array(SHAPE) * SPACING)
+    z, y, x = _axes()
+    away = np.full((2, *SHAPE), np.inf)
+    for seed in seeds:
+        d = np.sqrt((z - seed[0]) ** 2 + (y - seed[1]) ** 2 + (x - seed[2]) ** 2)
+        nearer = d < away[0]
+        away[1] = np.where(nearer, away[0], np.minimum(away[1], d))
+        away[0] = np.where(nearer, d, away[0])
+    mask = away[1] - away[0] < 0.42
+    return CAMERAS["scmos"].shoot(_seen(mask, 90.0, 8.0), rng), mask
+
+
+def _case_of(name: str, make: Callable[[], tuple[NDArray[Any], Mask]], held_out: bool) -> Case:
+    return Case(name, "made", SPACING, make, held_out=held_out)
+
+
+def made_cases() -> Iterator[Case]:
+    """Yield the volumes with bodies."""
+    for name, make, held_out in (
+        ("two classes", _two_classes, False),
+        ("one blob", _blob, False),
+        ("steep background", _steep_background, False),
+        ("saturated", _saturated, True),
+        ("eight bit", _eight_bit, False),
+        ("stitched", _stitched, True),
+        ("tissue", lambda: _tissue(1.0), False),
+        ("dim tissue", lambda: _tissue(0.4), True),
+        ("shells", _shells, False),
+    ):
+        yield _case_of(name, make, held_out)
+
+
+def family_cases() -> Iterator[Case]:
+    """Yield a third of the family of balls, tubes and membranes, and a third that is held out."""
+    for number, member in enumerate(iso_value_family.family()):
+        if number % 3 == 2:
+            continue
+
+        def load(member: iso_value_family.Member = member) -> tuple[NDArray[Any], Mask]:
+            truth, counts = iso_value_family.make(member, seed=0)
+            return counts, truth
+
+        name = (
+            f"{member.kind}, {member.share:.0%}, x {member.brightest:g}, {member.photons:g} photons"
+            f"{', uneven' if member.background else ''}"
+        )
+        yield Case(name, "made", iso_value_family.SPACING, load, held_out=number % 3 == 1)
+
+
+def empty_cases() -> Iterator[Case]:
+    """Yield the volumes of nothing; every other one is held out."""
+    count = 0
+    for camera in CAMERAS:
+        for fault in FAULTS:
+            yield Case(
+                f"empty, {camera}, {fault}",
+                "empty",
+                SPACING,
+                lambda c=camera, f=fault: (_empty(c, f), None),
+                held_out=count % 2 == 1,
+            )
+            count += 1
+        for sigma in (2.0, 6.0):
+            yield Case(
+                f"inside tissue, {camera}, {sigma:g}",
+                "empty",
+                SPACING,
+                lambda c=camera, s=sigma: (_inside_tissue(c, s), None),
+                held_out=count % 2 == 1,
+            )
+            count += 1

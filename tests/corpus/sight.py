@@ -1,0 +1,111 @@
+"""A case as the product sees it: the denoised field, the evidence of its tiles, its levels."""
+
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus.case import Case, Mask
+from stereocell.filters.background import find_background
+from stereocell.filters.denoise import denoise
+from stereocell.isosurface.channel_level import ChannelLevels, find_levels
+from stereocell.isosurface.level_evidence import (
+    HALO,
+    Slices,
+    TileEvidence,
+    denoising_reach,
+    find_padding,
+    gather_evidence,
+)
+from stereocell.isosurface.level_histogram import Scale
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One case.
+
+    field       denoised, float32 (z, y, x); above is it above the background, `field` where none is
+    tiles       each tile's place and evidence
+    """
+
+    case: Case
+    truth: Mask | None
+    field: NDArray[np.float32]
+    above: NDArray[np.float32]
+    padding: Mask
+    tiles: tuple[tuple[Slices, TileEvidence], ...]
+    scale: Scale
+    found: ChannelLevels
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """The field that the levels are of."""
+        return self.above if self.found.subtracts else self.field
+
+
+def look_at(case: Case) -> Sight:
+    """Return a case with its levels."""
+    voxels, truth = case.load()
+    sigma = min(case.spacing_um)
+    field = denoise(Volume(voxels, case.spacing_um), sigma)
+    darkest = float(voxels.min())
+    padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um))
+    own = voxels[~padding] if not padding.all() else voxels
+    scale, scale_above, above, under = Scale.of(own), None, field, None
+    if case.kind == "microscopy":
+        whole = Box((0, 0, 0), voxels.shape)
+        lattice = find_background(
+            voxels, whole, spacing_um=case.spacing_um, block_um=64 * sigma, padding=padding
+        )
+        under = np.broadcast_to(lattice.at(whole), field.shape)
+        above = field - under
+        scale_above = scale.above(lattice)
+    tiles = tuple(
+        (
+            place,
+            gather_evidence(
+                np.ascontiguousarray(field[window]),
+                padding[window],
+                own,
+                spacing_um=case.spacing_um,
+                scale=scale,
+                background=None if under is None else under[window],
+                scale_above=scale_above,
+            ),
+        )
+        for place in _places(voxels.shape, case.grid)
+        for window, own in [_with_halo(place, voxels.shape)]
+    )
+    found = find_levels(
+        [evidence for _, evidence in tiles],
+        scale=scale,
+        scale_above=scale_above,
+        darkest=darkest,
+        finest_um=sigma,
+        modality={"CT": "CT", "MR": "MR"}.get(case.kind, ""),
+    )
+    return Sight(case, truth, field, above, padding, tiles, scale, found)
+
+
+def _places(shape: tuple[int, ...], grid: tuple[int, int]) -> list[Slices]:
+    ends = [
+        np.linspace(0, n, k + 1).astype(int).tolist() for n, k in zip(shape[1:], grid, strict=True)
+    ]
+    rows, columns = ([slice(a, b) for a, b in pairwise(axis)] for axis in ends)
+    return [(slice(0, shape[0]), row, column) for row, column in product(rows, columns)]
+
+
+def _with_halo(place: Slices, shape: tuple[int, ...]) -> tuple[Slices, Slices]:
+    """Return the window around a tile, and the tile in the window."""
+    sides = [
+        (max(s.start - halo, 0), min(s.stop + halo, n))
+        for s, halo, n in zip(place, HALO, shape, strict=True)
+    ]
+    z, y, x = (slice(*side) for side in sides)
+    own_z, own_y, own_x = (
+        slice(s.start - low, s.stop - low) for s, (low, _) in zip(place, sides, strict=True)
+    )
+    return (z, y, x), (own_z, own_y, own_x)

@@ -1,0 +1,117 @@
+"""A channel's levels: on volumes with a truth, on volumes of nothing, however they are cut."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from corpus import all_cases
+from corpus.case import Case
+from corpus.made import CAMERAS, FAULTS, empty_cases, made_cases
+from corpus.sight import Sight, look_at
+from stereocell.isosurface.channel_level import find_levels
+from stereocell.isosurface.level_evidence import find_padding
+from support.exhaustive import sweep
+
+MADE = {case.name: case for case in made_cases()}
+EMPTY = {case.name: case for case in empty_cases()}
+# the least Dice that a person would call a fit; those that are not here are hard
+EASY = {"one blob": 0.9, "tissue": 0.95, "dim tissue": 0.95, "shells": 0.8, "eight bit": 0.9}
+
+
+def dice(sight: Sight, rung: int = 0) -> float:
+    inside = sight.values > sight.found.clear[rung].value
+    return float(2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()))
+
+
+@pytest.mark.parametrize("name", EASY)
+def test_finds_the_bodies(name: str) -> None:
+    assert dice(look_at(MADE[name])) > EASY[name]
+
+
+@pytest.mark.parametrize(
+    "name",
+    sweep(
+        list(EMPTY),
+        kept=[f"empty, {c}, {f}" for c, f in zip(CAMERAS, FAULTS[1::2], strict=True)]
+        + ["empty, scmos, zero padding", "inside tissue, detector, 6", "inside tissue, scmos, 2"],
+    ),
+)
+def test_finds_nothing_where_nothing_is(name: str) -> None:
+    assert look_at(EMPTY[name]).found.clear == ()
+
+
+def test_the_cut_into_tiles_changes_no_level() -> None:
+    case = MADE["shells"]
+    cuts = [look_at(replace(case, grid=grid)).found for grid in ((1, 1), (3, 2), (1, 5))]
+    whole = [level.value for level in cuts[0].ladder]
+    assert len(whole) >= 3
+    for found in cuts[1:]:
+        assert [level.value for level in found.ladder] == whole
+        assert found.noise == cuts[0].noise
+        for a, b in zip(found.ladder, cuts[0].ladder, strict=True):
+            assert a.sharpness == pytest.approx(b.sharpness, rel=1e-9)
+
+
+def test_a_tile_without_both_sides_is_said_to_hold_nothing() -> None:
+    sight = look_at(replace(MADE["tissue"], grid=(1, 8)))
+    level = sight.found.clear[0]
+    judged = [sight.found.judge_tile(level, evidence) for _, evidence in sight.tiles]
+    assert judged[0] is None
+    assert judged[-1] is None
+    at_rim = [found for found in judged if found is not None]
+    assert at_rim
+    assert max(found.confidence for found in at_rim) > 0.7
+
+
+def test_of_ct_no_background_is_taken_and_bone_lies_within_skin() -> None:
+    rng = np.random.default_rng(3)
+    z, y, x = np.mgrid[:40, :96, :96]
+    away = np.sqrt((2 * (z - 20.3)) ** 2 + (y - 47.7) ** 2 + (x - 48.1) ** 2)
+    hu = np.select([away < 22, away < 27, away < 38], [40.0, 900.0, 60.0], -1000.0)
+    hu = ndimage.gaussian_filter(hu, (0.4, 0.8, 0.8))
+    voxels = (hu + rng.normal(0, 12, hu.shape)).round().astype(np.int16)
+    case = Case("ct", "made", (1000.0, 500.0, 500.0), lambda: (voxels, away < 38), kind="CT")
+    sight = look_at(case)
+    assert not sight.found.subtracts
+    outer, inner = sight.found.clear[:2]
+    assert -900 < outer.value < 0 < 200 < inner.value < 850
+    assert dice(sight) > 0.96
+
+
+def test_equal_voxels_have_no_level() -> None:
+    case = Case(
+        "flat", "empty", (1.0, 1.0, 1.0), lambda: (np.full((8, 32, 32), 9, np.uint16), None)
+    )
+    assert look_at(case).found.clear == ()
+
+
+def test_padding_is_runs_of_the_darkest_and_not_a_noisy_dark_end() -> None:
+    rng = np.random.default_rng(5)
+    noisy = rng.poisson(0.7, (6, 64, 64)).astype(np.uint8)
+    assert not find_padding(noisy, 0.0, (2, 4, 4)).any()
+    padded = noisy + 3
+    padded[:, :20] = 0
+    found = find_padding(padded, 0.0, (2, 4, 4))
+    assert found[:, :20].all()
+    assert not found[:, 25:].any()
+
+
+def test_held_out_cases_are_not_all_easy_and_none_is_named_twice() -> None:
+    names = [case.name for case in all_cases()]
+    assert len(names) == len(set(names))
+    assert {case.group for case in all_cases() if case.held_out} >= {"made", "empty"}
+
+
+def test_without_evidence_there_is_no_level() -> None:
+    sight = look_at(EMPTY["empty, scmos, plain"])
+    bare = [replace(tile, plain=_none(tile.plain), padding=_none(tile.padding), above=None)
+            for _, tile in sight.tiles]  # fmt: skip
+    found = find_levels(bare, scale=sight.scale, scale_above=None, darkest=0.0, finest_um=1.0)
+    assert found.ladder == ()
+    assert found.clear == ()
+
+
+def _none(sums):  # type: ignore[no-untyped-def]
+    return replace(sums, counts=0 * sums.counts, slopes=0 * sums.slopes)

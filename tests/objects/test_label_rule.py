@@ -1,0 +1,83 @@
+"""Label maps are told from images: made ones, and real ones of both kinds."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from corpus import all_cases
+from corpus.real import data_folder
+from stereocell.objects.label_rule import recognise
+
+RNG = np.random.default_rng(2)
+SHAPE = (24, 96, 96)
+
+
+def cells(count: int, share: float = 1.0) -> np.ndarray:
+    """Cells of a Voronoi diagram with random numbers, some left out."""
+    places = np.stack(np.mgrid[tuple(slice(n) for n in SHAPE)], -1).reshape(-1, 3)
+    number = cKDTree(RNG.uniform(0, SHAPE, (count, 3))).query(places)[1].reshape(SHAPE)
+    names = RNG.permutation(count * 3)[:count] + 1
+    return np.where(RNG.uniform(size=count) < share, names, 0)[number]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16, np.uint32, np.int64])
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_cells_are_labels_whatever_their_numbers(dtype: type, share: float) -> None:
+    voxels = cells(60, share)
+    found = recognise(voxels.astype(dtype))
+    assert found.kind == "labels"
+    assert found.values == len(np.unique(voxels[voxels > 0]))
+
+
+def test_classes_in_many_pieces_are_labels() -> None:
+    field = ndimage.gaussian_filter(RNG.normal(size=SHAPE), 5)
+    classes = np.digitize(field, np.quantile(field, [0.3, 0.6, 0.9])).astype(np.uint8)
+    assert recognise(classes).kind == "labels"
+
+
+def test_two_values_are_a_mask_and_one_is_an_image() -> None:
+    mask = (cells(40, 0.5) > 0).astype(np.uint8)
+    assert recognise(mask).kind == "mask"
+    assert recognise(mask * np.uint8(255)).kind == "mask"
+    assert recognise(mask * np.uint8(50) + np.uint8(20)).kind == "mask"
+    assert recognise(np.zeros(SHAPE, np.uint8)).kind == "image"
+    assert recognise(np.full(SHAPE, 7, np.uint8)).kind == "image"
+
+
+def test_numbers_below_zero_and_real_ones_are_an_image_s() -> None:
+    voxels = cells(60)
+    assert recognise((voxels - 100).astype(np.int16)).kind == "image"
+    assert recognise(voxels.astype(np.float32)).kind == "image"
+
+
+@pytest.mark.parametrize("levels", [64, 255])
+def test_a_smooth_image_of_few_levels_is_one(levels: int) -> None:
+    field = ndimage.gaussian_filter(RNG.normal(size=SHAPE), 6)
+    field = levels * (field - field.min()) / np.ptp(field)
+    assert recognise(field.astype(np.uint8)).kind == "image"
+
+
+CASES = [case for case in all_cases() if not case.name.startswith(("balls", "tubes", "membranes"))]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_no_image_of_the_corpus_is_refused(case) -> None:  # type: ignore[no-untyped-def]
+    voxels, _ = case.load()
+    middle = tuple(slice(max(0, n // 2 - 64), n // 2 + 64) for n in voxels.shape)
+    assert recognise(voxels[middle]).kind == "image"
+
+
+@pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
+def test_real_label_maps_are_labels() -> None:
+    import h5py
+    import tifffile
+
+    folder = data_folder()
+    assert folder is not None
+    nuclei = tifffile.imread(folder / "nuclei_stardist/mask3d.tif")
+    assert recognise(nuclei).kind == "labels"
+    assert recognise((nuclei > 0).astype(np.uint8)).kind == "mask"
+    with h5py.File(folder / "ovule_plantseg/sample_ovule.h5") as file:
+        assert recognise(file["label"][:]).kind == "labels"
+        assert recognise(file["raw"][:]).kind == "image"
