@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -158,7 +159,8 @@ def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
 
 
 def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):
-    write_bundle(stage, tmp_path / "again", None, run=Engine(2).run)
+    with closing(Engine(2)) as engine:
+        write_bundle(stage, tmp_path / "again", None, run=engine.run)
     assert files(tmp_path / "again") == files(bundle)
 
 
