@@ -21,6 +21,8 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--time": (["3"], "plan", "time", 3),
     "--series": (["4"], "plan", "series", 4),
     "--spacing-um": (["2,.5,.5"], "plan", "spacing_um", (2.0, 0.5, 0.5)),
+    "--as": (["intensity"], "plan", "taken_as", "intensity"),
+    "--neurological": ([], "plan", "neurological", True),
     "--iso-criterion": (["adaptive"], "isovalue", "criterion", "adaptive"),
     "--wrap": (["alpha-wrap"], "surface", "wrap", "alpha-wrap"),
     "--closed-tiles": ([], "surface", "closed_tiles", True),

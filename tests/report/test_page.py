@@ -27,7 +27,6 @@ from stereocell.model.tiling import Box, Tile
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.preview.draw_slices import (
     OUTLINE,
-    VIEWS,
     Slice,
     cross_section,
     cut_unit,
@@ -139,8 +138,8 @@ def test_field_minus_iso_value_is_zero_on_a_ramps_own_level() -> None:
         ramp, lattice, first_um=(0, 0, 0), spacing_um=(1, 1, 1), mesh=None, sigma_um=0.7,
         iso_at=lambda box: np.full(box.shape, 70, np.float32),
     )  # fmt: skip
-    by_name = {s.name: s.above for s in slices}
-    assert list(by_name) == list(VIEWS)
+    by_name = {s.view.name: s.above for s in slices}
+    assert list(by_name) == ["xy", "xz", "yz"]
     xy, yz = by_name["xy"], by_name["yz"]
     assert xy is not None
     assert yz is not None

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
+from stereocell.building.intensities import require_intensities
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
 from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
-from stereocell.building.settings import Settings, to_dict, to_toml
+from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
 from stereocell.building.survey_file import read_survey
 from stereocell.building.tasks import iso_value, unit, window
@@ -77,6 +78,8 @@ def settle(source: str, settings: Settings) -> Plan:
     modality = dataset.modality or options.modality
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(len(dataset.channels)) if indices is None else indices
+    if options.taken_as != INTENSITY:
+        require_intensities(dataset, chosen)
     channels = [
         Channel(
             index,

@@ -24,6 +24,7 @@ from stereocell.transfer.options import WindowOptions
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+INTENSITY = "intensity"  # what voxels may be taken for, whatever they look like
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length
 _MAX_BYTES, _MAX_LINE = 1 << 17, 2000
@@ -91,6 +92,16 @@ class PlanOptions:
             "three numbers z,y,x",
         ),
     )
+    taken_as: str = setting(
+        "",
+        "intensity: build what looks like a label map all the same",
+        Flag("--as", "intensity: build what looks like a label map all the same"),
+    )
+    neurological: bool = setting(
+        False,
+        "pictures of a patient have right on the right, and not as radiologists do",
+        Flag("--neurological", "pictures of a patient with right on the right"),
+    )
     modality: str = setting(
         "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
     )
@@ -106,6 +117,10 @@ class PlanOptions:
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(
                 f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0 (--spacing-um)"
+            )
+        if self.taken_as not in ("", INTENSITY):
+            raise UsageError(
+                f"plan.taken_as is {self.taken_as!r:.40}, expected {INTENSITY}, or nothing (--as)"
             )
         if self.modality and self.modality not in MODALITIES:
             raise UsageError(

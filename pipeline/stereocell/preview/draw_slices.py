@@ -1,4 +1,4 @@
-"""Mid-slices of a unit in xy, xz and yz, with the extracted surface drawn on them.
+"""Mid-slices of a unit across its three axes, with the extracted surface drawn on them.
 
 The amber line is the cross-section of the LOD0 mesh with the plane: the actual surface, not the
 intended one. The dashed line is where the smoothed 8-bit field meets the iso-value. Where the two
@@ -22,9 +22,8 @@ from stereocell.filters.denoise import SMOOTHING_REACH, smooth
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
+from stereocell.preview.views import MICROSCOPE, View
 
-# name -> axes (of z, y, x): the cut one, the picture's rows, the picture's columns
-VIEWS = {"xy": (0, 1, 2), "xz": (1, 0, 2), "yz": (2, 1, 0)}
 Color = tuple[int, int, int]
 OUTLINE = (255, 190, 40)  # sRGB, 0..255
 FIELD = (70, 190, 255)
@@ -38,7 +37,7 @@ _SHOWN_PX = 330  # pixels, width of display for which lines and text have weight
 
 @dataclass(frozen=True, slots=True)
 class Slice:
-    """One plane through a unit; row and column are the picture's.
+    """One plane through a unit, as the picture has it: rows downwards, columns to the right.
 
     grey        uint8 (rows, columns), windowed
     spacing_um  (row, column), um
@@ -48,7 +47,7 @@ class Slice:
                 solid
     """
 
-    name: str
+    view: View
     grey: NDArray[np.uint8]
     spacing_um: tuple[float, float]
     outline: NDArray[np.float64]
@@ -65,6 +64,7 @@ def cut_unit(
     mesh: Mesh | None,
     sigma_um: float,
     iso_at: Callable[[Box], NDArray[np.float32]] | None,
+    views: Sequence[View] = MICROSCOPE,
 ) -> list[Slice]:
     """Return the three mid-slices of a unit.
 
@@ -74,12 +74,13 @@ def cut_unit(
     mesh       the finest, in world um; None: no surface
     sigma_um   of the Gaussian before surface extraction
     iso_at     returns the iso-value on the scale of 8 bits at the voxels of a box of the dataset
+    views      ways to look at it
     """
     points = None if mesh is None else voxels_of(mesh, first_um, spacing_um)
     slices = []
-    for name, (axis, down, right) in VIEWS.items():
+    for view in views:
+        order = axis, down, right = view.order
         k = lattice.shape[axis] // 2
-        order = (axis, down, right)
         turned = volume.transpose(order)
         spacing = tuple(spacing_um[i] for i in order)
         above = None
@@ -88,11 +89,13 @@ def cut_unit(
             slab = turned[max(0, k - reach) : k + reach + 1]
             field = smooth(Volume(slab, (spacing[0], spacing[1], spacing[2])), sigma_um)
             plane = iso_at(_plane(lattice, axis, k)).transpose(order)[0]
-            above = field[min(k, reach)] - plane
+            above = view.plane(field[min(k, reach)] - plane)
         outline = np.zeros((0, 2, 2))
         if points is not None and mesh is not None:
-            outline = cross_section(points, mesh.triangles, axis, float(k))[:, :, [down, right]]
-        slices.append(Slice(name, turned[k], (spacing[1], spacing[2]), outline, above))
+            cut = cross_section(points, mesh.triangles, axis, float(k))[:, :, [down, right]]
+            outline = view.points(cut, (lattice.shape[down], lattice.shape[right]))
+        grey = view.plane(turned[k])
+        slices.append(Slice(view, grey, (spacing[1], spacing[2]), outline, above))
     return slices
 
 
@@ -140,28 +143,28 @@ def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
 def paint_slices(
     slices: Sequence[Slice], longest_px: int, shown_px: int = _SHOWN_PX
 ) -> Image.Image:
-    """Return a picture of the slices: yz to the right of xy, xz below it.
+    """Return a picture of three slices: the second below the first, the third on its right.
 
     longest_px  longest side of a slice
     shown_px    width of display; lines and text scale with it
 
-    All three slices have one scale, in the specimen's own proportions; rows of xy run downwards.
+    All three slices have one scale, in the specimen's own proportions.
     """
     longest = max(um for s in slices for um in _extent(s))
     scale = longest_px / longest
-    shapes = {s.name: [max(2, round(um * scale)) for um in _extent(s)] for s in slices}
-    (down, right), (deep, _) = shapes["xy"], shapes["xz"]
-    width, height = right + _GAP_PX + shapes["yz"][1], down + _GAP_PX + deep
+    shapes = [tuple(max(2, round(um * scale)) for um in _extent(s)) for s in slices]
+    (down, right), (deep, _), (_, wide) = shapes
+    width, height = right + _GAP_PX + wide, down + _GAP_PX + deep
     weight = max(1.0, width / shown_px)
-    corners = {"xy": (0, 0), "xz": (0, down + _GAP_PX), "yz": (right + _GAP_PX, 0)}
+    corners = ((0, 0), (0, down + _GAP_PX), (right + _GAP_PX, 0))
     picture = Image.new("RGB", (width, height), _GROUND)
     draw = ImageDraw.Draw(picture)
-    for part in slices:
-        rows, columns = shapes[part.name]
-        corner = corners[part.name]
+    for part, (rows, columns), corner in zip(slices, shapes, corners, strict=True):
         picture.paste(_panel(part, (columns, rows), weight), corner)
         if min(rows, columns) >= 24 * weight:
-            _write(draw, (corner[0] + 4, corner[1] + 2), part.name, weight)
+            _write(draw, (corner[0] + 4, corner[1] + 2), part.view.name, weight)
+        if min(rows, columns) >= 60 * weight:
+            _write_ends(draw, part.view.ends, corner, (columns, rows), weight)
     if min(down, right) >= 60 * weight:
         _scale_bar(draw, (right, down), scale, weight)
     return picture
@@ -238,9 +241,34 @@ def _averaged(mask: NDArray[np.bool_], weight: float) -> Image.Image:
     return Image.fromarray(wide).reduce(_FINE)
 
 
-def _write(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, weight: float) -> None:
+def _write(
+    draw: ImageDraw.ImageDraw,
+    at: tuple[float, float],
+    text: str,
+    weight: float,
+    anchor: str = "la",
+) -> None:
     font = find_font(round(10 * weight))
-    draw.text(at, text, (255, 255, 255), font, stroke_width=1, stroke_fill=(0, 0, 0))
+    draw.text(at, text, (255, 255, 255), font, anchor, stroke_width=1, stroke_fill=(0, 0, 0))
+
+
+def _write_ends(
+    draw: ImageDraw.ImageDraw,
+    ends: tuple[str, str, str, str],
+    corner: tuple[int, int],
+    size: tuple[int, int],
+    weight: float,
+) -> None:
+    """Write what stands at the middle of each edge of a panel: size is (columns, rows)."""
+    (x, y), (width, height), gap = corner, size, round(3 * weight)
+    places = (
+        ((x + gap, y + height / 2), "lm"),
+        ((x + width - gap, y + height / 2), "rm"),
+        ((x + width / 2, y + gap), "ma"),
+        ((x + width / 2, y + height - gap), "md"),
+    )
+    for text, (at, anchor) in zip(ends, places, strict=True):
+        _write(draw, at, text, weight, anchor)
 
 
 @cache
@@ -260,4 +288,9 @@ def _scale_bar(draw: ImageDraw.ImageDraw, xy: tuple[int, int], scale: float, wei
     y = xy[1] - 7
     draw.rectangle((5, y - 2, 7 + length * scale, y + 2), fill=(0, 0, 0))
     draw.rectangle((6, y - 1, 6 + length * scale, y + 1), fill=(255, 255, 255))
-    _write(draw, (6, y - 4 - 12 * weight), f"{length:g} µm", weight)
+    _write(
+        draw,
+        (6, y - 4 - 12 * weight),
+        f"{length:g} µm" if length < 1000 else f"{length / 1000:g} mm",
+        weight,
+    )

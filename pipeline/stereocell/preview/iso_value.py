@@ -23,7 +23,8 @@ from stereocell.isosurface.isovalue import IsoValue
 from stereocell.isosurface.options import ADAPTIVE, BY_TILE, CRITERIA
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Tile
-from stereocell.preview.draw_slices import VIEWS, Color, Slice, find_font, paint_slices
+from stereocell.preview.draw_slices import Color, Slice, find_font, paint_slices
+from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing
 
 COLORS: dict[str, Color] = {
@@ -167,20 +168,24 @@ def _slices(
     """Return the tile's mid-slices, windowed, with the candidates' contours."""
     low, high = window
     slices = []
-    for name, order in VIEWS.items():
+    neurological = plan.settings.plan.neurological
+    for view in views_of(plan.placement, is_neurological=neurological):
+        order = view.order
         k = field.values.shape[order[0]] // 2
         voxels = field.volume.voxels.transpose(order)[k].astype(np.float32)
         plane = field.values.transpose(order)[k]
         slices.append(
             Slice(
-                name,
-                np.round(np.clip((voxels - low) / (high - low), 0, 1) * 255).astype(np.uint8),
+                view,
+                view.plane(
+                    np.round(np.clip((voxels - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+                ),
                 (plan.spacing_um[order[1]], plan.spacing_um[order[2]]),
                 np.zeros((0, 2, 2)),
                 None,
                 # the chosen one last: on top
                 tuple(
-                    (COLORS.get(c.name, _OTHER), plane - np.float32(c.level))
+                    (COLORS.get(c.name, _OTHER), view.plane(plane - np.float32(c.level)))
                     for c in reversed(candidates)
                 ),
             )

@@ -16,7 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import smoothed_plan
+from stereocell.building.plan import Plan, smoothed_plan
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
 from stereocell.model.identifiers import from_identifier
 from stereocell.model.lattice_field import LatticeField, make_iso_field
@@ -25,6 +25,7 @@ from stereocell.model.tiling import Box, Tile
 from stereocell.model.version import GENERATOR
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.preview.draw_slices import cut_unit, draw_slices
+from stereocell.preview.views import View, views_of
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scenes
 from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
@@ -180,7 +181,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
         if figure is None or share is None:
             continue
         volume = load_volume(unit.directory)[inner, inner, inner]
-        picture = _inline(draw_cut(volume, facts.plan.spacing_um, share))
+        picture = _inline(draw_cut(volume, facts.plan.spacing_um, share, _views(facts.plan)))
         rows.append(
             {
                 "name": unit.channel.name,
@@ -216,6 +217,7 @@ def _card(
         iso_at=None
         if iso is None
         else partial(_in_eight_bits, iso, statistics.background, low, high),
+        views=_views(plan),
     )
     curve = read_curve(out_folder.out, unit)
     levels, found = curve.get("levels"), curve.get("found")
@@ -229,6 +231,10 @@ def _card(
         "ends": (levels[0], levels[-1]) if levels else None,
         "found": found,
     }
+
+
+def _views(plan: Plan) -> tuple[View, View, View]:
+    return views_of(plan.placement, is_neurological=plan.settings.plan.neurological)
 
 
 def _in_eight_bits(

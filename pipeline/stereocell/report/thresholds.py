@@ -8,6 +8,7 @@ Li & Tam, "An iterative algorithm for minimum cross entropy thresholding", Patte
 Letters 19(8), 1998, https://doi.org/10.1016/S0167-8655(98)00057-9
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from skimage import filters
 
-from stereocell.preview.draw_slices import VIEWS, Slice, draw_slices
+from stereocell.preview.draw_slices import Slice, draw_slices
+from stereocell.preview.views import View
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
@@ -101,7 +103,10 @@ def find_peers(histogram: Histogram) -> tuple[float, float]:
 
 
 def draw_cut(
-    volume: NDArray[np.uint8], spacing_um: tuple[float, float, float], threshold: float
+    volume: NDArray[np.uint8],
+    spacing_um: tuple[float, float, float],
+    threshold: float,
+    views: Sequence[View],
 ) -> Picture:
     """Return a volume's mid-slices in which voxels below the threshold are hidden.
 
@@ -109,11 +114,12 @@ def draw_cut(
     threshold  0..1 in the window
     """
     slices = []
-    for name, order in VIEWS.items():
-        plane = volume.transpose(order)[volume.shape[order[0]] // 2]
+    for view in views:
+        order = view.order
+        plane = view.plane(volume.transpose(order)[volume.shape[order[0]] // 2])
         grey = np.where(plane >= 255 * threshold, plane, 0).astype(np.uint8)
         spacing = (spacing_um[order[1]], spacing_um[order[2]])
-        slices.append(Slice(name, grey, spacing, np.zeros((0, 2, 2)), None))
+        slices.append(Slice(view, grey, spacing, np.zeros((0, 2, 2)), None))
     return Picture(*draw_slices(slices))
 
 

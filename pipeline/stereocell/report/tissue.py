@@ -15,7 +15,8 @@ from stereocell.building.plan import Plan
 from stereocell.building.tissue_files import FOLDER, read_record
 from stereocell.model.color import to_srgb8
 from stereocell.model.tiling import Box
-from stereocell.preview.draw_slices import VIEWS, encode
+from stereocell.preview.draw_slices import encode
+from stereocell.preview.views import views_of
 
 SHOWN_PX = 330  # pixels, longest side of a plane
 _GAP_PX = 6  # pixels between planes
@@ -48,11 +49,13 @@ def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
 
     middle = _middle(read, plan.region)
     panels = []
-    for axis, down, right in VIEWS.values():
+    neurological = plan.settings.plan.neurological
+    for view in views_of(plan.placement, is_neurological=neurological):
+        axis, down, right = view.order
         shares = read(_plane(plan.region, axis, middle[axis])).transpose(
             0, 1 + axis, 1 + down, 1 + right
         )[:, 0]
-        rgb = to_srgb8(np.einsum("kyx,kc->yxc", shares, colors))
+        rgb = np.ascontiguousarray(view.plane(to_srgb8(np.einsum("kyx,kc->yxc", shares, colors))))
         extent = [n * plan.spacing_um[k] for n, k in zip(rgb.shape, (down, right), strict=False)]
         panels.append((Image.fromarray(rgb), extent))
     return TissueFacts(record, _paint(panels))

@@ -1,0 +1,34 @@
+"""Hold a source's channels to be intensities: of a label map no iso-surface is meant."""
+
+from collections.abc import Sequence
+
+from stereocell.model.errors import UsageError
+from stereocell.model.tiling import Box
+from stereocell.objects.label_rule import LabelEvidence, recognise
+from stereocell.read import Dataset
+
+_SIDE = 128  # voxels: largest edge of the block that is looked at
+_MOST = 4  # channels that are looked at: a label map comes alone, or with few others
+
+
+def require_intensities(dataset: Dataset, channels: Sequence[int]) -> None:
+    """Raise UsageError where a channel looks like a label map.
+
+    A block in the middle of the first channels is read, at full resolution.
+    """
+    if dataset.dtype.kind not in "iu":
+        return
+    sides = [((n - min(n, _SIDE)) // 2, (n + min(n, _SIDE)) // 2) for n in dataset.levels[0].shape]
+    start, stop = zip(*sides, strict=True)
+    for index in channels[:_MOST]:
+        found = recognise(dataset.read(index, Box(start, stop)).voxels)
+        if found.kind == "labels":
+            raise UsageError(_told(dataset, index, found))
+
+
+def _told(dataset: Dataset, index: int, found: LabelEvidence) -> str:
+    return (
+        f"{dataset.shown}: channel {dataset.channels[index].name!r} looks like a label map: found "
+        f"{found.values} values in {found.pieces} pieces of equal voxels in the middle, expected "
+        "intensities: objects can't be built yet; --as intensity takes it for an image"
+    )

@@ -1,0 +1,44 @@
+"""A label map is not built as an image, unless it is said to be one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+from stereocell.cli.__main__ import main
+
+
+@pytest.fixture
+def labels(tmp_path: Path) -> Path:
+    z, y, x = np.mgrid[:24, :64, :64] // 8
+    numbers = np.random.default_rng(0).permutation(1000)[: 3 * 8 * 8].astype(np.uint16) + 1
+    path = tmp_path / "cells of mine.ome.tif"
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    voxels = numbers[(z * 8 + y) * 8 + x]
+    tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+    return path
+
+
+def test_a_label_map_ends_the_plan_by_a_line_that_names_both_ways(
+    labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    for command in (["plan"], ["build", "--workers", "0"]):
+        assert main([command[0], str(labels), "-o", str(out), *command[1:]]) == 2
+        told = capsys.readouterr().err.strip()
+        assert told.count("\n") == 0
+        assert f"{labels}: channel 'Channel0' looks like a label map: found 192 values" in told
+        assert "--as intensity" in told
+        assert not out.exists() or not list(out.iterdir())
+
+
+def test_it_is_built_where_it_is_said_to_be_an_image(labels: Path, tmp_path: Path) -> None:
+    assert main(["plan", str(labels), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
+
+
+def test_it_is_taken_for_nothing_else(
+    labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", str(labels), "-o", str(tmp_path / "out"), "--as", "labels"]) == 2
+    assert "plan.taken_as is 'labels', expected intensity" in capsys.readouterr().err
