@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skimage import filters
 
 from stereocell.preview.draw_slices import Slice, draw_slices
-from stereocell.preview.views import View
+from stereocell.preview.views import MICROSCOPE, View
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
@@ -106,12 +106,13 @@ def draw_cut(
     volume: NDArray[np.uint8],
     spacing_um: tuple[float, float, float],
     threshold: float,
-    views: Sequence[View],
+    views: Sequence[View] = MICROSCOPE,
 ) -> Picture:
     """Return a volume's mid-slices in which voxels below the threshold are hidden.
 
     volume     uint8 (z, y, x), windowed
     threshold  0..1 in the window
+    views      ways to look at it
     """
     slices = []
     for view in views:
