@@ -118,7 +118,10 @@ def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
         value = float(peer(sample))
         yield name, values > value, (value,)
     window = max(3, 2 * round(8 * min(case.spacing_um) / case.spacing_um[1]) + 1)
-    local = np.stack([filters.threshold_sauvola(plane, 4 * window + 1) for plane in values])
+    spread = float(np.ptp(np.percentile(sample, (1, 99)))) / 2  # of uint8 it would be 128
+    local = np.stack(
+        [filters.threshold_sauvola(plane, 4 * window + 1, r=spread) for plane in values]
+    )
     yield "Sauvola", values > local, ()
     for criterion in BY_TILE:
         inside, levels = np.zeros(values.shape, bool), []
