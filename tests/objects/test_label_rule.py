@@ -58,6 +58,16 @@ def test_a_smooth_image_of_few_levels_is_one(levels: int) -> None:
     assert recognise(field.astype(np.uint8)).kind == "image"
 
 
+@pytest.mark.parametrize("ground", [5, 1000, 65535])
+def test_an_image_on_an_even_ground_is_one(ground: int) -> None:
+    """As a masked scan has it, or one in which all dark voxels were cut off at one value."""
+    voxels = np.full(SHAPE, ground, np.uint16)
+    bodies = cells(400, 0.05) > 0
+    voxels[bodies] = RNG.normal(4000, 300, np.count_nonzero(bodies)).astype(np.uint16)
+    assert np.count_nonzero(bodies) > 1000
+    assert recognise(voxels).kind == "image"
+
+
 CASES = [case for case in all_cases() if not case.name.startswith(("balls", "tubes", "membranes"))]
 
 

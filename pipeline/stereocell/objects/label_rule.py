@@ -2,7 +2,8 @@
 
 An intensity varies from voxel to voxel; a label is the same over all of its object, and the numbers
 of neighbours have nothing to do with one another. Looked at are the pairs of voxels that share a
-face and are both not 0, and the connected components of equal voxels.
+face, and the connected components of equal voxels; 0 is left out, and so is the commonest value,
+since the ground of an image may be even, whatever its value.
 
 Tried on 530 integer arrays, 504 of them images: of images at most .76 of the pairs are equal, of
 label maps at least .87; an image's components hold up to 7.5 voxels, a label map's at least 23. An
@@ -34,7 +35,7 @@ class LabelEvidence:
 
     kind    mask: two values in all, whatever they are
     values  the number of values besides 0
-    pieces  their connected components
+    pieces  the connected components of what is no ground
     """
 
     kind: Kind
@@ -49,16 +50,19 @@ def recognise(voxels: NDArray[Any]) -> LabelEvidence:
 
     >>> z, y, x = np.mgrid[:8, :16, :16] // 4
     >>> recognise((1 + z + 10 * y + 100 * x).astype(np.uint16))
-    LabelEvidence(kind='labels', values=32, pieces=32)
+    LabelEvidence(kind='labels', values=32, pieces=31)
     """
     if voxels.dtype.kind not in "iu" or not voxels.size or voxels.min() < 0:
         return LabelEvidence("image", 0)
-    found, places = np.unique(voxels, return_inverse=True)
+    found, places, counts = np.unique(voxels, return_inverse=True, return_counts=True)
     values = len(found) - int(found[0] == 0)
     if len(found) <= 2:
         return LabelEvidence("mask" if len(found) == 2 else "image", values)
-    # as small numbers, with 0 for what is 0
-    compact = places.reshape(voxels.shape).astype(np.uint32) + np.uint32(found[0] != 0)
+    # as small numbers, with 0 for the ground
+    compact = 1 + places.reshape(voxels.shape).astype(np.uint32)
+    compact[voxels == 0] = 0
+    if values > LEAST_OBJECTS:  # of a few classes each counts
+        compact[voxels == found[counts.argmax()]] = 0
     pairs, equal, one_off = np.zeros(3), np.zeros(3), 0
     for axis in range(3):
         ahead, behind = (np.moveaxis(compact, axis, 0)[part] for part in (_FIRST, _LAST))
