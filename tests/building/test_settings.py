@@ -73,7 +73,10 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("[plan]\nlevle = 1\n", "unknown key 'levle'; did you mean 'level'"),
-        ("[surfaces]\n", "unknown section 'surfaces'; did you mean 'surface'"),
+        ("[sufaces]\n", "unknown section 'sufaces'; did you mean 'surfaces'"),
+        ('[iso_values]\nCD31 = "90+c"\n', "iso_values.CD31 is '90+c', expected a voxel value"),
+        ('[isovalue]\nscope = "slide"\n', "isovalue.scope is 'slide', expected one of channel"),
+        ('[isovalue]\nrung = "4"\n', "isovalue.rung is '4', expected one of outer, inner"),
         ("[plan]\nlevel = 1.5\n", "plan.level is 1.5, expected a whole number or 'auto'"),
         ("[window]\nlow_percentile = true\n", "low_percentile is True, expected a number"),
         ("[window]\nlow_percentile = 100\n", "expected 0 <= low < high <= 100"),
@@ -124,6 +127,6 @@ def test_auto_lengths_follow_the_spacing() -> None:
 
 def test_whole_number_without_end_is_wrong_usage(tmp_path: Path) -> None:
     file = tmp_path / "huge.toml"
-    file.write_text("[isovalue]\nmin_confidence = " + "9" * 400)
-    with pytest.raises(UsageError, match=r"isovalue\.min_confidence is 9"):
+    file.write_text("[isovalue]\nmin_area_share = " + "9" * 400)
+    with pytest.raises(UsageError, match=r"isovalue\.min_area_share is 9"):
         settings_module.load(None, file, flags={})

@@ -12,6 +12,8 @@ from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level_evidence import (
     HALO,
+    MOST_PADDING,
+    Counting,
     Slices,
     TileEvidence,
     denoising_reach,
@@ -51,10 +53,11 @@ def look_at(case: Case) -> Sight:
     voxels, truth = case.load()
     sigma = min(case.spacing_um)
     field = denoise(Volume(voxels, case.spacing_um), sigma)
-    darkest = float(voxels.min())
+    darkest: float | None = float(voxels.min())
     padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um))
-    own = voxels[~padding] if not padding.all() else voxels
-    scale, scale_above, above, under = Scale.of(own), None, field, None
+    if padding.mean() > MOST_PADDING:
+        padding[...], darkest = False, None
+    scale, scale_above, above, under = Scale.of(voxels, padding), None, field, None
     if case.kind == "microscopy":
         whole = Box((0, 0, 0), voxels.shape)
         lattice = find_background(
@@ -63,6 +66,7 @@ def look_at(case: Case) -> Sight:
         under = np.broadcast_to(lattice.at(whole), field.shape)
         above = field - under
         scale_above = scale.above(lattice)
+    counting = Counting(scale, scale_above, darkest)
     tiles = tuple(
         (
             place,
@@ -71,9 +75,8 @@ def look_at(case: Case) -> Sight:
                 padding[window],
                 own,
                 spacing_um=case.spacing_um,
-                scale=scale,
+                counting=counting,
                 background=None if under is None else under[window],
-                scale_above=scale_above,
             ),
         )
         for place in _places(voxels.shape, case.grid)
@@ -81,9 +84,7 @@ def look_at(case: Case) -> Sight:
     )
     found = find_levels(
         [evidence for _, evidence in tiles],
-        scale=scale,
-        scale_above=scale_above,
-        darkest=darkest,
+        counting=counting,
         finest_um=sigma,
         modality={"CT": "CT", "MR": "MR"}.get(case.kind, ""),
     )

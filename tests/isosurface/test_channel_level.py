@@ -11,7 +11,7 @@ from corpus.case import Case
 from corpus.made import CAMERAS, FAULTS, empty_cases, made_cases
 from corpus.sight import Sight, look_at
 from stereocell.isosurface.channel_level import find_levels
-from stereocell.isosurface.level_evidence import find_padding
+from stereocell.isosurface.level_evidence import Counting, find_padding
 from support.exhaustive import sweep
 
 MADE = {case.name: case for case in made_cases()}
@@ -108,10 +108,12 @@ def test_without_evidence_there_is_no_level() -> None:
     sight = look_at(EMPTY["empty, scmos, plain"])
     bare = [replace(tile, plain=_none(tile.plain), padding=_none(tile.padding), above=None)
             for _, tile in sight.tiles]  # fmt: skip
-    found = find_levels(bare, scale=sight.scale, scale_above=None, darkest=0.0, finest_um=1.0)
+    found = find_levels(bare, counting=Counting(sight.scale, None, 0.0), finest_um=1.0)
     assert found.ladder == ()
     assert found.clear == ()
 
 
 def _none(sums):  # type: ignore[no-untyped-def]
-    return replace(sums, counts=0 * sums.counts, slopes=0 * sums.slopes)
+    return replace(
+        sums, **{name: 0 * getattr(sums, name) for name in ("counts", "slopes", "squares")}
+    )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from skimage.filters import threshold_li
 
 from stereocell.isosurface.level_histogram import BINS, LevelHistogram, Scale
@@ -9,9 +10,13 @@ from stereocell.isosurface.level_histogram import BINS, LevelHistogram, Scale
 RNG = np.random.default_rng(1)
 
 
+def scale_of(voxels: NDArray[np.generic]) -> Scale:
+    return Scale.of(voxels, np.zeros(voxels.shape, bool))
+
+
 def histogram_of(values: np.ndarray) -> LevelHistogram:
     values = values.astype(np.float32)
-    scale = Scale.of(values)
+    scale = scale_of(values)
     return LevelHistogram(
         np.bincount(scale.bins_of(values), minlength=BINS).astype(np.float64), scale.edges()
     )
@@ -20,7 +25,7 @@ def histogram_of(values: np.ndarray) -> LevelHistogram:
 def test_bins_are_narrow_where_most_values_are_and_hold_all() -> None:
     usual = RNG.normal(100, 3, 100_000)
     values = np.concatenate([usual, [60_000.0] * 40]).astype(np.float32)
-    scale = Scale.of(values)
+    scale = scale_of(values)
     edges, bins = scale.edges(), scale.bins_of(values)
     assert (np.diff(edges) > 0).all()
     assert edges[0] < values.min()

@@ -49,7 +49,7 @@ def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
     distance = _distance()
     sums = sum_components(distance > 0, SPACING, 1.0)
     assert (sums.count, sums.kept) == (3, 2)
-    options = choose(_plan_with(max_fragment_um=4.0), "clear", [asdict(sums)])
+    options = choose(_plan_with(max_fragment_um=4.0), [asdict(sums)])
     dropped = repair(distance, SPACING, options)
     assert dropped.fragments_dropped == 1
     assert dropped.distance[32, 60, 100] < 0  # the small one's centre
@@ -60,7 +60,7 @@ def test_rule_ends_where_the_halo_does_and_can_be_left_out() -> None:
     sums = asdict(sum_components(_distance() > 0, SPACING, 1.0))
     # what would go is larger than what a unit is sure to see whole
     for length in (3.0, 0.0):
-        options = choose(_plan_with(max_fragment_um=length), "clear", [sums])
+        options = choose(_plan_with(max_fragment_um=length), [sums])
         assert repair(_distance(), SPACING, options).fragments_dropped == 0
         assert options.min_diagonal_um <= max(1.5, length)
 
@@ -77,26 +77,24 @@ def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:
     plan = _plan_with(max_alpha_um=2.0)
     plain = {"count": 4, "faces": 4 * 4000, "diagonal_um": 4 * 12.0}
     plain |= {"kept": 4, "kept_faces": 4 * 4000, "kept_diagonal_um": 4 * 12.0}
-    alpha = choose(plan, "clear", [plain]).alpha_um
+    alpha = choose(plan, [plain]).alpha_um
     assert alpha == pytest.approx(6 * 12 / 4000**0.5)
     # the same over two tiles
     halves = [{key: value / 2 for key, value in plain.items()}] * 2
-    assert choose(plan, "clear", halves).alpha_um == pytest.approx(alpha)
+    assert choose(plan, halves).alpha_um == pytest.approx(alpha)
     frayed = plain | {"kept_faces": 4 * 10_000}
-    assert choose(plan, "clear", [frayed]).alpha_um == pytest.approx(6 * 12 / 100)
-    assert choose(plan, "clear", [plain | {"kept_faces": 10**9}]).alpha_um == 0.5
-    assert choose(plan, "clear", [plain | {"kept_faces": 4}]).alpha_um == 2.0
-    assert choose(plan, "clear", []).alpha_um == 2.0
+    assert choose(plan, [frayed]).alpha_um == pytest.approx(6 * 12 / 100)
+    assert choose(plan, [plain | {"kept_faces": 10**9}]).alpha_um == 0.5
+    assert choose(plan, [plain | {"kept_faces": 4}]).alpha_um == 2.0
+    assert choose(plan, []).alpha_um == 2.0
 
 
 def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
-    assert choose(_plan_with(alpha_um=0.8), "clear", []).alpha_um == 0.8
-    assert choose(_plan_with(alpha_um=0.8), "clear", []).offset_um == 0.0
-    tenth = choose(_plan_with(alpha_um=0.8, offset_um="auto"), "clear", []).offset_um
+    assert choose(_plan_with(alpha_um=0.8), []).alpha_um == 0.8
+    assert choose(_plan_with(alpha_um=0.8), []).offset_um == 0.0
+    tenth = choose(_plan_with(alpha_um=0.8, offset_um="auto"), []).offset_um
     assert tenth == pytest.approx(0.08)
-    assert choose(_plan_with(alpha_um=0.8, offset_um=0.3), "clear", []).offset_um == 0.3
-    # nothing is bridged where no gap is known to be one
-    assert choose(_plan_with(alpha_um=0.8), "unclear", []).alpha_um == 0.0
+    assert choose(_plan_with(alpha_um=0.8, offset_um=0.3), []).offset_um == 0.3
 
 
 def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:

@@ -1,5 +1,6 @@
 """`stereocell iso`: a picture and a table of one tile's candidates, and nothing else."""
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,6 @@ from PIL import Image
 
 from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
-from stereocell.isosurface.options import BY_TILE
 from stereocell.preview.iso_value import COLORS, Candidate, preview, table
 from support import phantoms
 
@@ -35,36 +35,51 @@ def _iso(source: Path, *flags: str) -> int:
     return main(["iso", str(source), "--tile-size", "24,32,32", *flags])
 
 
-def test_the_table_names_every_criterion_with_levels_and_shares(
+def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "ball.png"
     assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(out)) == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert rows[0][0] == "candidate"
-    assert rows[1][:2] == ["edges", "*"]
-    assert {row[0] for row in rows[1:-2]} == set(BY_TILE)
-    assert " ".join(rows[-2]) == "* found; a build may draw it towards its neighbours'"
+    assert rows[1][:2] == ["outer", "*"]
+    assert " ".join(rows[-2]) == "* a build takes it; found on all tiles"
     assert rows[-1] == ["wrote", str(out)]
-    _, _, above, raw, inside, confidence = rows[1]
+    _, _, level, raw, inside, confidence = rows[1]
     ball = 4 / 3 * np.pi * 8**3 / (24 * 32 * 32)
     # a ball blurred by s has .5 - s / (R sqrt(2 pi)) of its height at R; the smoothing adds 1 um
     height = 0.5 - BLUR_UM / (RADIUS_UM * np.sqrt(2 * np.pi))
-    assert float(above) == pytest.approx(1000 * height, rel=0.1)
-    assert float(raw) - float(above) == pytest.approx(100, abs=10)
+    assert float(level) == float(raw)  # no background is subtracted where the ground is even
+    assert float(level) == pytest.approx(LOW + HEIGHT * height, rel=0.1)
     assert float(inside.rstrip("%")) / 100 == pytest.approx(ball, rel=0.1)
-    assert float(confidence) > 0.9
+    assert float(confidence) > 0.8
+    flags = [word for row in rows[2:-2] for word in row if word.startswith("--")]
+    assert len(flags) == 3
+    assert set(flags) <= {"--surfaces", "--iso-value", "--iso-criterion"}
+
+
+def test_a_setting_of_the_table_takes_its_level(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ball.png"))
+    assert _iso(source, *where) == 0
+    rows = capsys.readouterr().out.splitlines()[2:-2]
+    for row in rows:
+        _, _, setting = row.partition("--")
+        level = next(float(word) for word in row.split() if word.replace(".", "").isdigit())
+        assert _iso(source, *where, *shlex.split(f"--{setting}")) == 0
+        taken = next(line for line in capsys.readouterr().out.splitlines() if " * " in line)
+        assert float(taken.split("*")[1].split()[0]) == pytest.approx(level, rel=1e-3), row
 
 
 def test_the_legend_has_every_candidate_s_colour_and_nothing_else_is_written(
     source: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "ball.png"
-    flags = ("--iso-value", "0=600", "--iso-criterion", "pekar-mean")
-    assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(out), *flags) == 0
+    assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(out)) == 0
     assert list(tmp_path.iterdir()) == [out]
     legend = np.asarray(Image.open(out))[SLICES_AT[0] + round((32 + 24) * SCALE) :]
-    assert set(COLORS.values()) <= {tuple(p) for p in legend.reshape(-1, 3).tolist()}
+    assert set(COLORS[:4]) <= {tuple(p) for p in legend.reshape(-1, 3).tolist()}
 
 
 def _radius_um(candidate: Candidate) -> float:
@@ -77,23 +92,24 @@ def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
     source: Path, tmp_path: Path
 ) -> None:
     """Each candidate's line is a circle, whole, in its own colour, and at its own radius."""
-    flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 800.0}}
+    flags = {"plan": {"tile_size": [24, 32, 32]}}
     settings = load(None, None, flags=flags)
-    candidates, path = preview(
+    result, path = preview(
         str(source), "0", tile_id="r0_c0", out=tmp_path / "a.png", settings=settings
     )
     top, left = SLICES_AT
     xy = np.asarray(Image.open(path))[top : top + 900, left : left + 900]
-    outlining = [c for c in candidates if 0.01 < c.inside < 0.5]  # others hardly cut this plane
-    assert {"given", "edges"} < {c.name for c in outlining}
+    colors = {c.name: color for c, color in zip(result.candidates, COLORS, strict=False)}
+    outlining = [c for c in result.candidates if 0.01 < c.inside < 0.5]
+    assert len(outlining) > 1
     radii = {c.name: _radius_um(c) for c in outlining}
-    assert np.ptp(list(radii.values())) > 1
+    assert np.ptp(list(radii.values())) > 0.5
     for name, radius in radii.items():
-        rows, columns = np.nonzero((xy == COLORS[name]).all(axis=-1))
+        rows, columns = np.nonzero((xy == colors[name]).all(axis=-1))
         down, right = (pixels + 0.5 - 16.5 * SCALE for pixels in (rows, columns))
         away = np.hypot(down, right)
         # words, the scale bar and the brightest voxels are white too
-        beside = (away > 6 * SCALE) & (away < 11 * SCALE)
+        beside = (away > 4 * SCALE) & (away < 11 * SCALE)
         assert beside.any(), name
         assert np.abs(away[beside] - radius * SCALE).max() < 8, name
         assert away[beside].mean() == pytest.approx(radius * SCALE, abs=4), name
@@ -105,17 +121,17 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     source: Path, tmp_path: Path
 ) -> None:
     flags = {"plan": {"tile_size": [24, 32, 32]}, "iso_values": {"0": 600.0}}
-    candidates, _ = preview(
+    result, _ = preview(
         str(source),
         "0",
         tile_id="r0_c0",
         out=tmp_path / "a.png",
         settings=load(None, None, flags=flags),
     )
-    chosen = next(c for c in candidates if c.is_chosen)
+    (chosen,) = result.candidates
     assert (chosen.name, chosen.level, chosen.raw, chosen.confidence) == ("given", 600, 600, None)
-    assert [c.is_chosen for c in candidates].count(True) == 1
-    assert table(candidates)[-1] == "* given; a build takes it"
+    assert chosen.is_chosen
+    assert table(result)[-1] == "* a build takes it; given"
 
 
 def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:
@@ -144,7 +160,11 @@ def test_picture_is_named_by_channel_and_tile_unless_told(
             2,
             "--tile is 'r1_c0', expected a tile from r0_c0 to r0_c1",
         ),
-        (("--channel", "1", "--tile", "r0_c0"), 1, "every voxel is 100: no surface to look at"),
+        (
+            ("--channel", "1", "--tile", "r0_c0"),
+            1,
+            "all voxels are nearly equal: no surface",
+        ),
         (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg', expected a file"),
     ],
 )

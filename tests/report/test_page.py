@@ -1,8 +1,6 @@
 """The report: its cross-sections against geometry, its choices, and the page as a whole."""
 
 import io
-import json
-import re
 import shutil
 import sys
 from dataclasses import replace
@@ -21,6 +19,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel
 from stereocell.building.unit_files import is_whole
 from stereocell.cli.__main__ import main
+from stereocell.model.channel import SurfaceLevel
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, Tile
@@ -191,20 +190,12 @@ def test_thinning_out_keeps_the_share_and_all_channels() -> None:
 # --- curves
 
 
-def test_curve_marks_what_was_taken_and_what_was_found() -> None:
-    svg = charts.criterion([0.0, 50.0, 100.0], [0.0, 1.0, 0.0], taken=75.0, found=25.0)
-    assert 'class="mark" d="M240.0,' in svg
+def test_ladder_marks_what_was_taken_and_what_else_was_found() -> None:
+    svg = charts.ladder([0.0, 1.0, 0.0], taken=[0.75], others=[0.25, 2.0])
+    assert svg.count('class="mark" d="M240.0,') == 1
     assert 'class="found" d="M80.0,' in svg
-    assert "found" not in charts.criterion([0.0, 100.0], [0.0, 1.0], taken=75.0, found=75.0)
-    refused = charts.criterion([0.0, 100.0], [0.0, 1.0], taken=None, found=25.0)
-    assert "found" in refused
-    assert "mark" not in refused
-
-
-def test_value_beyond_the_axis_is_marked_at_its_end() -> None:
-    assert 'class="mark" d="M320.0,' in charts.criterion(
-        [0.0, 1.0], [0.0, 1.0], taken=9.0, found=None
-    )
+    assert 'class="found" d="M320.0,' in svg  # beyond the axis: at its end
+    assert "mark" not in charts.ladder([0.0, 1.0], taken=[], others=[0.5])
 
 
 def test_histogram_draws_every_transfer_function() -> None:
@@ -221,11 +212,9 @@ def _unit(**changed: object) -> UnitFacts:
         "tile": Tile("r0_c0", Box((0, 0, 0), (2, 2, 2))),
         "channel": Channel(0, "CD31", (1.0, 0.0, 0.0)),
         "directory": Path("unit"),
-        "iso_file": "iso.json",
         "iso_value": 100.0,
         "background": 0.0,
         "confidence": 0.5,
-        "iso_reason": "",
         "reason": "",
         "lods": (LodFacts(10, 0.1, 1000), LodFacts(5, 0.3, 400)),
         "voxels": (4, 4, 4),
@@ -316,10 +305,14 @@ def test_page_tells_of_each_unit(built: Path) -> None:
     for channel in (NASTY, "twin", "empty"):
         for tile in ("r0_c0", "r0_c1"):
             assert f"Slices of {channel} in tile {tile}" in parsed.alts
-    assert any(re.match(r"\(given; found [\d.]+\)", text) for text in parsed.texts)
-    assert any(text.startswith("above a background of") for text in parsed.texts)
-    assert "1 channel without a surface in any tile" in parsed.texts
-    assert "empty: every voxel is 300" in parsed.texts
+    assert "at 500" in parsed.texts
+    assert "given" in parsed.texts
+    assert "the same in all tiles" in parsed.texts
+    assert "1 channel without a surface" in parsed.texts
+    nothing = "empty: no clear surface: nothing stands out: no level has more than a few voxels"
+    assert any(text.startswith(nothing) for text in parsed.texts)
+    assert any(text.startswith("--surfaces twin=") for text in parsed.texts)  # if it is wrong
+    assert any(alt.startswith("Contour of twin at ") for alt in parsed.alts)
     assert "as the test has it" not in html  # it starts a sentence
     assert "As the test has it." in html
     assert "there is no bundle yet" in html
@@ -354,26 +347,6 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
         # one value is one material, and a boundary takes two
         "none: materials found: 1, expected at least 2",
     ]
-
-
-@pytest.mark.usefixtures("no_drawing")
-@pytest.mark.parametrize(("factor", "is_drawn"), [(1 + 1e-9, False), (1.1, True)])
-def test_value_is_said_to_be_drawn_if_that_shows(
-    built: Path, tmp_path: Path, factor: float, is_drawn: bool
-) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(built, out)
-    survey = OutFolder(out).survey()
-    iso = survey["twin"]["iso"]["r0_c0"]
-    found = json.loads((out / iso["file"]).read_text())["found"]
-    for tile in survey["twin"]["iso"].values():
-        other = json.loads((out / tile["file"]).read_text())["found"]
-        tile["value"] = other * (factor if tile is iso else 1)
-    OutFolder(out).save_survey(survey)
-    texts = _write(out)[1].texts
-    said = [text for text in texts if "drawn to its neighbours" in text]
-    assert len(said) == is_drawn
-    assert all(f"found {found:.5g}, drawn" in text for text in said)
 
 
 @pytest.mark.usefixtures("no_drawing")
@@ -429,24 +402,35 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
     assert [step.name for step in facts.steps][:2] == ["read", "volume"]
     assert all(isinstance(step, StepFacts) for step in facts.steps)
     units = (
-        _unit(confidence=0.1),
-        _unit(iso_value=None, iso_reason="every voxel is 3"),
-        _unit(reason="no voxel crosses the iso-value", iso_reason="every voxel is 4"),
+        _unit(),
+        _unit(reason="no voxel crosses the iso-value"),
         _unit(reason="dark", channel=Channel(2, "dim", (0.0, 0.0, 1.0))),
         _unit(fragments_dropped=1200, cavities_filled=3),
     )
-    doubtful = replace(facts, units=units)
-    titles = {r.title: r.lines for r in find_remarks(doubtful)}
+    channels = (units[0].channel, units[2].channel)
+    looks = {
+        name: replace(
+            facts.survey["empty"].appearance,
+            surface_reason=reason,
+            level=level,
+            iso_confidence=0.1,
+        )
+        for name, reason, level in (
+            ("CD31", "", SurfaceLevel(100.0, None, 1.0)),
+            ("dim", "no clear surface: as the test has it", None),
+        )
+    }
+    survey = {name: replace(facts.survey["empty"], appearance=look) for name, look in looks.items()}
+    plan = replace(facts.plan, channels=channels)
+    titles = {
+        r.title: r.lines
+        for r in find_remarks(replace(facts, units=units, survey=survey, plan=plan))
+    }
     assert titles == {
-        "1 channel without a surface in any tile": ("dim: dark",),
+        "1 channel without a surface": ("dim: no clear surface: as the test has it",),
+        "1 channel with low confidence in their surface (below 0.4)": ("CD31: 0.10 at 100",),
         "1 unit without a surface, in channels that have some": (
-            "r0_c0/CD31: no voxel crosses the iso-value (every voxel is 4)",
-        ),
-        "1 unit without an iso-value of their own": (
-            "r0_c0/CD31: every voxel is 3; built with the mean of the channel's other tiles",
-        ),
-        "1 unit with low confidence in their iso-value (below 0.2)": (
-            "r0_c0/CD31: 0.10 at iso-value 100",
+            "r0_c0/CD31: no voxel crosses the iso-value",
         ),
         "1,200 fragments dropped": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
         "3 cavities filled": ("CD31: 3 in 1 tile, most in r0_c0 (3)",),
@@ -462,11 +446,15 @@ def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
         )
         for i, angle in enumerate(angles)
     )
-    (remark,) = find_remarks(replace(gather(OutFolder(built)), units=units))
+    facts = gather(OutFolder(built))
+    named = Channel(0, "CD31", (1.0, 0.0, 0.0))
+    survey = {"CD31": next(iter(facts.survey.values()))}
+    facts = replace(facts, plan=replace(facts.plan, channels=(named,)), survey=survey)
+    (remark,) = find_remarks(replace(facts, units=units))
     assert remark.is_note
     assert remark.title.startswith("1 channel with thin triangles in lod0")
     assert remark.lines == ("CD31: 9.5° in r0_c2, 2 tiles below",)
-    assert not find_remarks(replace(gather(OutFolder(built)), units=units[:1]))
+    assert not find_remarks(replace(facts, units=units[:1]))
 
 
 @pytest.mark.usefixtures("no_drawing")

@@ -7,7 +7,6 @@ from stereocell.building import settings as settings_module
 from stereocell.building.plan import Channel, Plan, choose_level, make_plan
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair
-from stereocell.model.channel import SurfaceConfidence
 from stereocell.read import Level
 
 LEVELS = (
@@ -40,14 +39,8 @@ def plan_of(
     )
 
 
-def choose(
-    plan: Plan, surface_confidence: SurfaceConfidence, tiles: Iterable[Mapping[str, Any]]
-) -> RepairOptions:
+def choose(plan: Plan, tiles: Iterable[Mapping[str, Any]]) -> RepairOptions:
     """What is cleaned of a channel's surface by a plan."""
     return choose_repair(
-        tiles,
-        plan.repair,
-        surface=plan.settings.surface,
-        spacing_um=plan.spacing_um,
-        surface_confidence=surface_confidence,
+        tiles, plan.repair, surface=plan.settings.surface, spacing_um=plan.spacing_um
     )

@@ -14,8 +14,11 @@ from skimage import filters
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
-from stereocell.building.tasks.window import statistics_from_json, statistics_to_json
+from stereocell.building.tasks.window import Window, window_from_json, window_to_json
 from stereocell.cli.__main__ import main
+from stereocell.isosurface.level_evidence import Counting
+from stereocell.isosurface.level_histogram import Scale
+from stereocell.model.channel import SurfaceLevel
 from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
@@ -249,9 +252,9 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
         "MR",
         (1, 1, 1),
         statistics=statistics,
-        iso_values={"a": 500.0},
+        level=SurfaceLevel(500.0, None, 1.0),
         confidence=0.9,
-        surface="clear",
+        doubt="",
     )
     assert appearance.threshold is not None
     assert 250 < appearance.threshold < 850
@@ -261,11 +264,17 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     assert (table[levels <= appearance.threshold_normalized - 1e-3] == 0).all()
     assert table[np.searchsorted(levels, appearance.threshold_normalized) + 2] > 0
     assert (np.diff(table) >= 0).all()
-    again = statistics_from_json(json.loads(json.dumps(statistics_to_json(statistics))))
-    assert again == statistics
+    window = Window(statistics, Counting(Scale(0.0, 9.0, 4.0), None, 1.0))
+    again = window_from_json(json.loads(json.dumps(window_to_json(window))))
+    assert again == window
     flat = find_statistics(np.full(100, 7, np.uint8), WindowOptions())
     bare = make_appearance(
-        "MR", (1, 1, 1), statistics=flat, iso_values={}, confidence=0.0, surface="none"
+        "MR",
+        (1, 1, 1),
+        statistics=flat,
+        level=SurfaceLevel(7.0, None, 1.0),
+        confidence=1.0,
+        doubt="",
     )
     assert bare.threshold is None
     assert THRESHOLD not in bare.transfer_functions

@@ -8,6 +8,8 @@ import pytest
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.tasks import window as window_task
 from stereocell.cli.__main__ import main
+from stereocell.model.channel import SurfaceLevel
+from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import NAMES, evaluate, make_transfer_functions
 from stereocell.transfer.options import WindowOptions
@@ -119,34 +121,40 @@ def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
         assert evaluate(functions[name])[30] == 0, name
 
 
-def test_look_means_over_the_tiles_that_have_a_surface() -> None:
+def test_look_has_the_level_with_the_backgrounds_mean() -> None:
     statistics = find_statistics(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
-    values = {"a": 20.0, "b": 40.0, "c": None}
+    knots = ((0.0,), (0.0,), (0.0, 9.0))
+    background = LatticeField(knots, np.array([[[5.0, 15.0]]]))
     appearance = make_appearance(
         "CD31",
         (0, 1, 0),
         statistics=statistics,
-        iso_values=values,
+        level=SurfaceLevel(20.0, background, 1.0),
         confidence=0.75,
-        surface="clear",
+        doubt="",
     )
+    assert appearance.surface == "clear"
     assert appearance.iso_value == 30
     assert appearance.iso_confidence == 0.75
     assert appearance.iso_normalized == pytest.approx(0.3)
+    assert appearance.level is not None
+    assert appearance.level.words == "20 above a background of 5 to 15"
 
 
-def test_opacity_of_an_unclear_channel_does_not_begin_at_its_level() -> None:
-    statistics = find_statistics(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
-    clear, unclear, none = (
+def test_without_a_surface_nothing_begins_at_a_level_or_a_threshold() -> None:
+    rng = np.random.default_rng(0)
+    peaks = np.concatenate([rng.normal(60, 8, 20_000), rng.normal(180, 8, 9000)])
+    statistics = find_statistics(peaks.round().astype(np.uint8), WindowOptions(0, 100))
+    assert statistics.threshold is not None
+    clear, none = (
         make_appearance(
-            "CD31",
-            (0, 1, 0),
-            statistics=statistics,
-            iso_values={"a": value},
-            confidence=0.3,
-            surface=surface_confidence,
-        ).transfer_functions
-        for value, surface_confidence in ((30.0, "clear"), (30.0, "unclear"), (None, "none"))
+            "CD31", (0, 1, 0), statistics=statistics, level=level, confidence=0.3, doubt=doubt
+        )
+        for level, doubt in ((SurfaceLevel(120.0, None, 1.0), ""), (None, "no clear surface"))
     )
-    assert unclear == none
-    assert unclear["sharp"] != clear["sharp"]
+    assert none.surface == "none"
+    assert none.surface_reason == "no clear surface"
+    assert none.threshold is None
+    assert clear.threshold is not None
+    assert set(clear.transfer_functions) - set(none.transfer_functions) == {"threshold"}
+    assert none.transfer_functions["sharp"] != clear.transfer_functions["sharp"]

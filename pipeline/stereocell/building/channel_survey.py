@@ -1,12 +1,17 @@
-"""Survey the channels: the statistics and iso-values of each, on which its tiles have to agree.
+"""Survey the channels: the window and the level of each, one for all its tiles.
 
-It is the first pass over the units, and its result, survey.json, steers the second one.
+Three passes go before the units. Windows: each channel's window, background and scale. Evidence:
+each tile's sums, which add up to the channel's levels. Solids: what lies above the chosen level,
+which decides how the surface is cleaned. The result, survey.json, steers the units.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+
+import numpy as np
 
 from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import OutFolder
@@ -20,148 +25,280 @@ from stereocell.building.source_tasks import (
 )
 from stereocell.building.survey_file import (
     AGAIN,
-    ISO_VALUE,
+    EVIDENCE,
+    SOLIDS,
     WINDOW,
     ChannelSurvey,
+    Curve,
     Survey,
     TileIso,
     save_survey,
 )
-from stereocell.building.tasks import iso_value as iso_maker
+from stereocell.building.tasks import evidence as evidence_maker
+from stereocell.building.tasks import solids as solids_maker
 from stereocell.building.tasks import window as window_maker
-from stereocell.building.tasks.iso_value import IsoTask, write_iso
+from stereocell.building.tasks.evidence import EvidenceTask, evidence_from_json, write_evidence
+from stereocell.building.tasks.solids import SolidsTask, write_solids
 from stereocell.building.tasks.window import (
     StatisticsTask,
-    statistics_from_json,
-    write_statistics,
+    Window,
+    window_from_json,
+    write_window,
 )
 from stereocell.engine.run import Engine
-from stereocell.isosurface.neighbour_consensus import (
-    Reconciled,
-    find_neighbours,
-    reconcile_iso_values,
-)
-from stereocell.isosurface.options import CRITERIA
+from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
+from stereocell.isosurface.level_evidence import TileEvidence
+from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, RUNGS, parse_level
 from stereocell.isosurface.repair_rules import choose_repair
+from stereocell.model.channel import SurfaceLevel
+from stereocell.model.lattice_field import LatticeField, make_iso_field
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
-from stereocell.transfer.channel_statistics import ChannelStatistics, make_appearance
+from stereocell.transfer.channel_statistics import make_appearance
+
+APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
+Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What is known of a channel's level before its solids are.
+
+    window    of the channel
+    levels    what its tiles add up to; None where the level was given
+    evidence  each tile's; empty where the level was given
+    rungs     the levels that may have the surface: the given one, or clear ones; the first is
+              taken, unless its solids speak against it
+    doubt     why there is none
+    """
+
+    window: Window
+    levels: ChannelLevels | None
+    evidence: Mapping[str, TileEvidence]
+    rungs: tuple[Level | float, ...]
+    subtracts: bool
+    doubt: str
+
+    @property
+    def background(self) -> LatticeField | None:
+        """The background that is subtracted, voxel values."""
+        return self.window.statistics.background if self.subtracts else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Result:
+    """What a pass leaves: its content, and its file relative to OUT."""
+
+    content: Mapping[str, Any]
+    file: str
 
 
 def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey:
-    """Return (and write) each channel's statistics, iso-values and transfer functions."""
-    all_statistics, windows = _all_statistics(out_folder, plan, engine)
-    isos = _isos(out_folder, plan, engine, all_statistics)
-    neighbours = find_neighbours(plan.tiles)
+    """Return (and write) each channel's window, level, repair and transfer functions."""
+    windows, files = _windows(out_folder, plan, engine)
+    evidence = _evidence(out_folder, plan, engine, windows)
     survey = {}
-    for channel in plan.channels:
-        found = {tile.id: isos[tile.id, channel.id] for tile in plan.tiles}
-        reconciled = (
-            _as_given(found)
-            if _is_given(plan, channel)
-            else reconcile_iso_values(neighbours, found, plan.settings.isovalue.min_confidence)
-        )
-        statistics, painter = all_statistics[channel.id], plan.painter(channel)
-        appearance = make_appearance(
-            channel.name,
-            channel.color,
-            statistics=statistics,
-            iso_values={
-                tile: None if value is None else value + found[tile]["background"]
-                for tile, value in reconciled.values.items()
-            },
-            confidence=reconciled.confidence,
-            surface=reconciled.surface_confidence,
-        )
-        survey[channel.id] = ChannelSurvey(
-            statistics,
-            windows[channel.id].relative_to(out_folder.out).as_posix(),
+    found = {
+        channel.id: find_level(
+            plan,
+            channel,
+            windows[channel.id],
             {
-                tile: TileIso(
-                    reconciled.values[tile],
-                    f["background"],
-                    reconciled.confidences[tile],
-                    f["reason"] or _reason(f, reconciled.confidences[tile], plan),
-                    f["file"],
-                )
-                for tile, f in found.items()
+                tile.id: evidence_from_json(evidence[tile.id, channel.id].content)
+                for tile in plan.tiles
+                if (tile.id, channel.id) in evidence
             },
-            choose_repair(
-                [f["solids"] for f in found.values() if "solids" in f],
-                plan.repair,
-                surface=plan.settings.surface,
-                spacing_um=plan.spacing_um,
-                surface_confidence=reconciled.surface_confidence,
-            ),
-            replace(appearance, painted_by=painter.id if painter else ""),
+        )
+        for channel in plan.channels
+    }
+    solids = [
+        _solids(out_folder, plan, engine, found, rung)
+        for rung in range(max((len(one.rungs) for one in found.values()), default=0))
+    ]
+    for channel in plan.channels:
+        one = found[channel.id]
+        of_rungs = [
+            {tile.id: rung[tile.id, channel.id].content["solids"] for tile in plan.tiles}
+            for rung in solids[: len(one.rungs)]
+        ]
+        chosen = choose_rung(of_rungs)
+        iso = {
+            tile.id: _tile_iso(
+                plan,
+                tile,
+                one,
+                chosen,
+                {
+                    what: result[tile.id, channel.id].file
+                    for what, result in (
+                        ("evidence", evidence),
+                        ("solids", solids[chosen] if one.rungs else {}),
+                    )
+                    if (tile.id, channel.id) in result
+                },
+            )
+            for tile in plan.tiles
+        }
+        survey[channel.id] = _of_channel(
+            plan, channel, one, chosen, iso, of_rungs[chosen] if of_rungs else {}, files[channel.id]
         )
     save_survey(out_folder, survey)
     return survey
 
 
-def _as_given(found: Mapping[str, Mapping[str, Any]]) -> Reconciled:
-    """Return the values that the user gave: who gives one is sure of it."""
-    values = {tile: f["value"] for tile, f in found.items()}
-    is_known = any(value is not None for value in values.values())
-    confidences = {tile: f["confidence"] for tile, f in found.items()}
-    return Reconciled(values, confidences, float(is_known), "clear" if is_known else "none")
-
-
-def _reason(found: Mapping[str, Any], confidence: float, plan: Plan) -> str:
-    """Return why a tile's surface is not clear; empty if it is."""
-    least = plan.settings.isovalue.min_confidence
-    if confidence >= least:
-        return ""
-    return (
-        f"no clear surface: confidence {confidence:.2f}, expected at least {least:g}: at "
-        f"{found['value']:.5g} the gradient is {found['sharpness']:.2f} times the tile's median, "
-        f"{found['raggedness']:.0%} of the surface is ragged"
+def _of_channel(
+    plan: Plan,
+    channel: Channel,
+    found: Found,
+    chosen: int,
+    iso: dict[str, TileIso],
+    solids: Solids,
+    file: str,
+) -> ChannelSurvey:
+    level = found.rungs[chosen] if found.rungs else None
+    confidence = level.confidence if isinstance(level, Level) else float(level is not None)
+    values = {tile: one.value for tile, one in iso.items()}
+    known = [value for value in values.values() if value is not None]
+    painter, surface = plan.painter(channel), None
+    statistics = replace(found.window.statistics, background=found.background)
+    if known:
+        surface = SurfaceLevel(
+            float(np.mean(known)),
+            found.background,
+            float(plan.settings.surface.smoothing_um),
+            make_iso_field(plan.tiles, values) if len(set(known)) > 1 else None,
+        )
+    appearance = make_appearance(
+        channel.name,
+        channel.color,
+        statistics=statistics,
+        level=surface,
+        confidence=confidence,
+        doubt=found.doubt,
     )
+    return ChannelSurvey(
+        statistics,
+        file,
+        iso,
+        choose_repair(
+            solids.values(),
+            plan.repair,
+            surface=plan.settings.surface,
+            spacing_um=plan.spacing_um,
+        ),
+        replace(appearance, painted_by=painter.id if painter else ""),
+        () if found.levels is None else found.levels.ladder,
+        None if found.levels is None else Curve(*found.levels.curve()),
+    )
+
+
+def find_level(
+    plan: Plan, channel: Channel, window: Window, evidence: Mapping[str, TileEvidence]
+) -> Found:
+    """Return a channel's level; `evidence` by tile ID, empty where the level is given."""
+    given = given_level(plan, channel)
+    if given is not None:
+        return Found(window, None, {}, (given[0],), given[1], "")
+    options = plan.settings.isovalue
+    levels = find_levels(
+        list(evidence.values()),
+        counting=window.counting,
+        finest_um=min(plan.spacing_um),
+        modality=plan.modality,
+        options=options if options.criterion in CRITERIA else None,
+    )
+    clear = levels.clear
+    doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
+    if options.criterion == ADAPTIVE and clear:
+        threshold = window.statistics.threshold
+        if threshold is None:
+            nothing = "no clear surface: the channel's histogram has no threshold"
+            return Found(window, levels, evidence, (), False, nothing)
+        plain = replace(levels, subtracts=False)
+        return Found(window, plain, evidence, (threshold.value,), False, "")
+    rung = channel.rung or options.rung
+    if clear and rung != APART:
+        place = RUNGS[rung]
+        if place >= len(clear):
+            doubt = f"no clear surface: {len(clear)} clear levels, none that is the {rung}"
+        clear = clear[place : place + 1]
+    return Found(window, levels, evidence, clear, levels.subtracts, doubt)
+
+
+def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
+    """Return the iso-value that the user gives for a channel, and whether above the background."""
+    if channel.rung and channel.rung not in RUNGS:
+        return float(channel.rung), False
+    given = plan.settings.iso_values.get(channel.name)
+    return None if given is None else parse_level(f"--iso-value {channel.name}", given)
+
+
+def choose_rung(of_rungs: Sequence[Solids]) -> int:
+    """Return the first rung whose solids are many; the outermost where none has many.
+
+    of_rungs  the ComponentSums of each tile at each rung, outermost first
+    """
+    if len(of_rungs) < 2:
+        return 0
+    for place, solids in enumerate(of_rungs):
+        # over the tiles: what fills all of them is the largest in each
+        largest = sum(one["largest"] for one in solids.values())
+        if largest < APART_SHARE * sum(one["voxels"] for one in solids.values()):
+            return place
+    return 0
+
+
+def _tile_iso(plan: Plan, tile: Tile, found: Found, chosen: int, files: dict[str, str]) -> TileIso:
+    if not found.rungs:
+        return TileIso(None, 0.0, None, files)
+    level, below = found.rungs[chosen], 0.0
+    if found.background is not None:
+        under = np.broadcast_to(found.background.at(tile.box), tile.box.shape)
+        below = float(np.mean(under, dtype=np.float64))
+    if found.levels is None or not isinstance(level, Level):
+        value = level.value if isinstance(level, Level) else level
+        return TileIso(value, below, None, files)
+    tile_evidence, value = found.evidence[tile.id], level.value
+    judged = found.levels.judge_tile(level, tile_evidence)
+    if plan.settings.isovalue.scope == "tile":
+        value = found.levels.level_of_tile(level, tile_evidence)
+    return TileIso(value, below, None if judged is None else judged.confidence, files)
 
 
 def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
     """Return the task that finds a channel's window and background."""
-    settings = plan.settings
-    # a value that is given speaks of the voxels as they are
-    subtracts = not _is_given(plan, channel) and settings.surface.background_um != 0
+    settings, given = plan.settings, given_level(plan, channel)
+    # CT and MR have values that mean something; so has a value that is given of voxels as they are
+    subtracts = plan.modality not in ("CT", "MR") if given is None else given[1]
+    subtracts = subtracts and settings.surface.background_um != 0
     level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
     ref = source_of(plan, channel)
     return StatisticsTask(ref, level, channel.index, plan.region, settings, subtracts, window)
 
 
-def iso_task(plan: Plan, tile: Tile, *, channel: Channel, statistics: ChannelStatistics) -> IsoTask:
-    """Return the task that finds one unit's iso-value."""
-    return IsoTask(
+def evidence_task(plan: Plan, tile: Tile, *, channel: Channel, window: Window) -> EvidenceTask:
+    """Return the task that gathers one tile's evidence."""
+    criterion = plan.settings.isovalue.criterion
+    return EvidenceTask(
         source_of(plan, channel),
         plan.level_of(channel),
         channel.index,
         tile.box,
-        plan.settings,
-        _given(plan, channel, statistics),
-        around(statistics.background, tile.box),
+        plan.region,
+        float(plan.settings.surface.smoothing_um),
+        window.counting,
+        around(window.statistics.background, tile.box.grown(plan.halo, plan.region)),
+        criterion if criterion in CRITERIA else "",
     )
 
 
-def _is_given(plan: Plan, channel: Channel) -> bool:
-    """Whether a channel's iso-value is not sought tile by tile: the user's, or its threshold."""
-    settings = plan.settings
-    return channel.name in settings.iso_values or not CRITERIA[settings.isovalue.criterion].by_tile
-
-
-def _given(plan: Plan, channel: Channel, statistics: ChannelStatistics) -> float | None:
-    given = plan.settings.iso_values.get(channel.name)
-    if given is None and _is_given(plan, channel) and statistics.threshold is not None:
-        return statistics.threshold.value
-    return given
-
-
-def _all_statistics(
+def _windows(
     out_folder: OutFolder, plan: Plan, engine: Engine
-) -> tuple[dict[str, ChannelStatistics], dict[str, Path]]:
-    """Return each channel's statistics, and the file that holds them, by channel id."""
+) -> tuple[dict[str, Window], dict[str, str]]:
+    """Return each channel's window, and the file that holds it, by channel id."""
     files: dict[str, Path] = {}
-    tasks = []
+    tasks: dict[Path, tuple[str, Any]] = {}
     for channel in plan.channels:
         task = statistics_task(plan, channel)
         depends = [
@@ -169,52 +306,116 @@ def _all_statistics(
             channel.index,
             box_to_json(plan.region),
             asdict(plan.settings.window),
+            plan.settings.surface.smoothing_um,
             plan.settings.surface.background_um if task.subtracts else 0,
         ]
         file = out_folder.statistics_file(
-            channel.id, key_of(depends, window_maker, reader_module(plan, channel))
+            channel.voxels_id, key_of(depends, window_maker, reader_module(plan, channel))
         )
         files[channel.id] = file
         if find_sealed(file, WINDOW) is None:
-            tasks.append((channel.id, (task, file)))
-    run_on_input(plan, engine, "windows", write_statistics, tasks)
-    found = {}
-    for channel_id, file in files.items():
-        content = read_sealed(file, WINDOW, AGAIN)
-        found[channel_id] = statistics_from_json(content["statistics"])
-    return found, files
+            tasks[file] = (channel.base or channel.name, (task, file))
+    run_on_input(plan, engine, "windows", write_window, list(tasks.values()))
+    return {
+        id_: window_from_json(read_sealed(file, WINDOW, AGAIN)) for id_, file in files.items()
+    }, {id_: file.relative_to(out_folder.out).as_posix() for id_, file in files.items()}
 
 
-def _isos(
+def _evidence(
+    out_folder: OutFolder, plan: Plan, engine: Engine, windows: Mapping[str, Window]
+) -> dict[tuple[str, str], _Result]:
+    """Return the evidence of each tile of the channels whose level is looked for."""
+
+    def task_of(tile: Tile, channel: Channel) -> tuple[EvidenceTask, list[Any]] | None:
+        if given_level(plan, channel) is not None:
+            return None
+        task = evidence_task(plan, tile, channel=channel, window=windows[channel.id])
+        return task, [
+            [box_to_json(box) for box in (task.box, task.region)],
+            task.smoothing_um,
+            asdict(task.counting),
+            None if task.background is None else task.background.to_json(),
+            task.criterion,
+        ]
+
+    return _by_tile(
+        out_folder, plan, engine,
+        task_of=task_of, name="evidence", write=write_evidence, schema=EVIDENCE,
+        maker=evidence_maker,
+    )  # fmt: skip
+
+
+def _solids(
+    out_folder: OutFolder, plan: Plan, engine: Engine, found: Mapping[str, Found], rung: int
+) -> dict[tuple[str, str], _Result]:
+    """Return the sums over the solids of each tile, of the channels that have such a rung."""
+
+    def task_of(tile: Tile, channel: Channel) -> tuple[SolidsTask, list[Any]] | None:
+        one = found[channel.id]
+        if rung >= len(one.rungs):
+            return None
+        iso = _tile_iso(plan, tile, one, rung, {}).value
+        if iso is None:
+            return None
+        surface = plan.settings.surface
+        task = SolidsTask(
+            source_of(plan, channel),
+            plan.level_of(channel),
+            channel.index,
+            tile.box,
+            float(surface.smoothing_um),
+            iso,
+            around(one.background, tile.box),
+            float(surface.min_diagonal_um),
+        )
+        return task, [
+            box_to_json(tile.box),
+            task.smoothing_um,
+            task.min_diagonal_um,
+            iso,
+            None if task.background is None else task.background.to_json(),
+        ]
+
+    return _by_tile(
+        out_folder, plan, engine,
+        task_of=task_of, name="solids", write=write_solids, schema=SOLIDS, maker=solids_maker,
+    )  # fmt: skip
+
+
+def _by_tile(
     out_folder: OutFolder,
     plan: Plan,
     engine: Engine,
-    all_statistics: Mapping[str, ChannelStatistics],
-) -> dict[tuple[str, str], dict[str, Any]]:
-    files, tasks = {}, []
-    settings = plan.settings
+    *,
+    task_of: Callable[[Tile, Channel], tuple[Any, list[Any]] | None],
+    name: str,
+    write: Callable[[tuple[Any, Path]], None],
+    schema: str,
+    maker: ModuleType,
+) -> dict[tuple[str, str], _Result]:
+    """Run a pass over the tiles; return each one's result, by tile and channel ID.
+
+    task_of  returns a task and what its result depends on besides the voxels; None: there is none
+    """
+    files: dict[tuple[str, str], Path] = {}
+    tasks: dict[Path, tuple[str, Any]] = {}
     for tile in plan.tiles:
         for channel in plan.channels:
-            task = iso_task(plan, tile, channel=channel, statistics=all_statistics[channel.id])
-            depends = [
-                input_key(plan, channel),
-                channel.index,
-                box_to_json(tile.box),
-                asdict(settings.isovalue) | {"min_confidence": None},  # nothing to this pass
-                settings.surface.smoothing_um,
-                settings.surface.min_diagonal_um,
-                task.given,
-                None if task.background is None else task.background.to_json(),
-            ]
-            file = out_folder.iso_file(
-                tile.id, channel.id, key_of(depends, iso_maker, reader_module(plan, channel))
+            made = task_of(tile, channel)
+            if made is None:
+                continue
+            task, depends = made
+            key = key_of(
+                [input_key(plan, channel), channel.index, *depends],
+                maker,
+                reader_module(plan, channel),
             )
+            file = out_folder.tile_result(name, tile.id, channel.voxels_id, key)
             files[tile.id, channel.id] = file
-            if find_sealed(file, ISO_VALUE) is None:
-                tasks.append((f"{tile.id}/{channel.name}", (task, file)))
-    run_on_input(plan, engine, "iso-values", write_iso, tasks)
+            if find_sealed(file, schema) is None:
+                tasks[file] = (f"{tile.id}/{channel.base or channel.name}", (task, file))
+    run_on_input(plan, engine, name, write, list(tasks.values()))
     return {
-        unit: read_sealed(file, ISO_VALUE, AGAIN)
-        | {"file": file.relative_to(out_folder.out).as_posix()}
+        unit: _Result(read_sealed(file, schema, AGAIN), file.relative_to(out_folder.out).as_posix())
         for unit, file in files.items()
     }

@@ -107,9 +107,9 @@ class OutFolder:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
-    def iso_file(self, tile_id: str, channel_id: str, key: str) -> Path:
-        """Return the path of one unit's iso-value and curve."""
-        return self.out / "units" / tile_id / channel_id / f"iso-{key}.json"
+    def tile_result(self, what: str, tile_id: str, channel_id: str, key: str) -> Path:
+        """Return the path of what a pass before the units found of one tile: evidence, solids."""
+        return self.out / "units" / tile_id / channel_id / f"{what}-{key}.json"
 
     def unit_dir(self, tile_id: str, channel_id: str, key: str) -> Path:
         """Return the folder of one unit's meshes and volume."""

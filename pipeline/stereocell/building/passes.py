@@ -1,7 +1,7 @@
-"""The two passes over the units: first what neighbours must agree on, then the units themselves.
+"""The passes over the units: first what all of a channel's tiles share, then the units themselves.
 
-Pass one finds each channel's window, dataset-wide, and an iso-value for each (tile, channel).
-Pass two builds meshes and volumes. Every result lies under a name that says what it depends on.
+The survey finds each channel's window and level, dataset-wide (channel_survey.py). Then meshes and
+volumes are built. Every result lies under a name that says what it depends on.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from dataclasses import asdict
 from stereocell.building.channel_survey import survey_channels
 from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel, Plan, smoothed_plan
+from stereocell.building.plan import Channel, Plan
 from stereocell.building.source_tasks import (
     around,
     box_to_json,
@@ -28,7 +28,7 @@ from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import UsageError
 from stereocell.model.lattice import Lattice
-from stereocell.model.lattice_field import LatticeField, make_iso_field
+from stereocell.model.lattice_field import LatticeField
 from stereocell.storage.cache_key import key_of
 from stereocell.transfer.channel_statistics import (
     ChannelStatistics,
@@ -68,20 +68,15 @@ def unit_tasks(
     out_folder: OutFolder, plan: Plan, survey: Survey
 ) -> Iterator[tuple[str, UnitTask, str]]:
     """Yield `<tile>/<channel>`, task and key of every unit."""
-    fields = {
-        channel_id: make_iso_field(plan.tiles, {t: f.value for t, f in found.iso.items()})
-        for channel_id, found in survey.items()
-    }
-    plans = {id_: smoothed_plan(plan, found.appearance.surface) for id_, found in survey.items()}
     for tile_id, channel in _select(plan, None):
         statistics = survey[channel.id].statistics
         painter = plan.painter(channel)
         painted = None if painter is None else (painter.index, survey[painter.id].statistics.window)
-        as_built = plans[channel.id]
-        field = fields[channel.id]
+        level = survey[channel.id].appearance.level
+        field = None if level is None else level.field
         repair = survey[channel.id].repair
         task, key = _unit_task(
-            out_folder, as_built, tile_id, channel, field, repair, statistics, painted
+            out_folder, plan, tile_id, channel, field, repair, statistics, painted
         )
         yield f"{tile_id}/{channel.id}", task, key
 

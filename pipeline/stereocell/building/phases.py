@@ -7,7 +7,6 @@ import hashlib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,18 @@ from stereocell.building.intensities import require_intensities
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
-from stereocell.building.plan import Channel, Plan, choose_color, choose_level, make_plan
+from stereocell.building.plan import (
+    Channel,
+    Plan,
+    choose_color,
+    choose_level,
+    make_plan,
+    with_surfaces,
+)
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
-from stereocell.building.survey_file import read_survey
-from stereocell.building.tasks import iso_value, unit, window
+from stereocell.building.survey_file import appearance_to_json, read_survey
+from stereocell.building.tasks import evidence, solids, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
@@ -88,6 +94,7 @@ def settle(source: str, settings: Settings) -> Plan:
         )
         for place, index in enumerate(chosen)
     ]
+    channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)
     origin = dataset.levels[level[0]].origin_um
     return make_plan(
@@ -114,7 +121,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
-        "libraries": libraries_of(window, iso_value, unit, stage_tasks, *readers),
+        "libraries": libraries_of(window, evidence, solids, unit, stage_tasks, *readers),
         **_added(plan),
     }
 
@@ -126,7 +133,7 @@ def _added(plan: Plan) -> dict[str, Any]:
 
 
 def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
-    """Find windows and iso-values for all units, then build the units, or `only` one of them.
+    """Find windows and levels for all units, then build the units, or `only` one of them.
 
     only  `<tile>/<channel>`; None: all units
 
@@ -162,7 +169,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         names = [plan.name, plan.modality]
         depends = [
             index,
-            [asdict(appearance) for appearance in appearances],
+            [appearance_to_json(appearance) for appearance in appearances],
             about,
             names,
             list(plan.placement),

@@ -12,8 +12,8 @@ from typing import Protocol, TypeVar
 
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import SMOOTHING_REACH
+from stereocell.isosurface.options import RUNGS
 from stereocell.isosurface.repair import RepairOptions
-from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.rigid_transform import IDENTITY, Matrix
@@ -42,6 +42,7 @@ PALETTE = (
 
 
 # colour (linear RGB) of MR and CT: warm and neutral, as bone and tissue are usually drawn
+_PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
 FLESH = (0.78, 0.66, 0.55)
 BODY_MODALITIES = ("MR", "CT")
 
@@ -51,6 +52,56 @@ def choose_color(place: int, modality: str) -> tuple[float, float, float]:
     if place == 0 and modality in BODY_MODALITIES:
         return FLESH
     return PALETTE[place % len(PALETTE)]
+
+
+def with_surfaces(channels: Sequence["Channel"], wanted: Mapping[str, str]) -> list["Channel"]:
+    """Return the channels, with one for each surface that the settings ask for.
+
+    wanted  `surfaces` of the settings: rungs or voxel values between commas, by name or index
+
+    Raises UsageError.
+    """
+    by_name = _by_name("--surfaces", wanted, channels)
+    found: list[Channel] = []
+    for channel in channels:
+        rungs = [part.strip() for part in by_name.get(channel.name, "").split(",")]
+        for rung in rungs:
+            if rung and rung not in RUNGS:
+                parse_surface(channel.name, rung)
+        if len(set(rungs)) < len(rungs):
+            found_twice = ",".join(rungs)
+            raise UsageError(f"--surfaces {channel.name}: found {found_twice}, expected each once")
+        if len(rungs) == 1:
+            found.append(replace(channel, rung=rungs[0]))
+            continue
+        for place, rung in enumerate(rungs):
+            # towards white from surface to surface inwards, or towards black where it is white
+            share, end = place / len(rungs), float(min(channel.color) < _PALE)
+            red, green, blue = (part + share * (end - part) for part in channel.color)
+            found.append(
+                replace(
+                    channel,
+                    name=f"{channel.name} {rung}",
+                    color=(red, green, blue),
+                    rung=rung,
+                    base=channel.name,
+                )
+            )
+    return found
+
+
+def parse_surface(name: str, rung: str) -> float:
+    """Return the voxel value that a surface is asked for at. Raises UsageError."""
+    try:
+        value = float(rung)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise UsageError(
+            f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)} or voxel values, "
+            "between commas"
+        )
+    return value
 
 
 class LevelLike(Protocol):
@@ -69,6 +120,9 @@ class Channel:
     source       a source for this channel alone, which a command added to the plan: one level, the
                  planned one, and voxels uint8 with the window 0..255; empty: the plan's source
     fingerprint  of that source
+    rung         which level of the ladder has the surface, or a voxel value; empty: the settings'
+    base         the name of the channel whose voxels these are, where it has several surfaces;
+                 empty: its own
     """
 
     index: int
@@ -76,6 +130,13 @@ class Channel:
     color: tuple[float, float, float]
     source: str = ""
     fingerprint: str = ""
+    rung: str = ""
+    base: str = ""
+
+    @property
+    def voxels_id(self) -> str:
+        """The ID under which results of the voxels alone lie, whatever surface is made of them."""
+        return to_identifier(self.base or self.name)
 
     @property
     def id(self) -> str:
@@ -390,23 +451,3 @@ def _repair_options(settings: Settings) -> RepairOptions:
 
 def _by(numbers: Sequence[float]) -> str:
     return " x ".join(f"{n:.15g}" for n in numbers)
-
-
-def smoothed_plan(plan: Plan, surface_confidence: SurfaceConfidence) -> Plan:
-    """Return the plan by which a channel is built; an unclear surface is smoothed more.
-
-    An unclear surface can't be distinguished from noise: its field is frayed, and parts join into
-    one. A tile of a real brain's autofluorescence (30 x 510 x 512 voxels) had 1.42 million
-    triangles after 376 s of simplifying, where cells have 0.14 million after 10 s. No gap in such a
-    field is known to be real, so none is closed, and the reach of closing is spent on smoothing:
-    the unit reads no more voxels, neighbours still see the same field, and that tile has 65
-    thousand triangles after 4.5 s.
-    """
-    if surface_confidence != "unclear":
-        return plan
-    surface = plan.settings.surface
-    repair, step = plan.repair, plan.spacing_um
-    closing = repair.reach_um(step) - replace(repair, alpha_um=0.0).reach_um(step)
-    sigma = float(surface.smoothing_um) + closing / SMOOTHING_REACH
-    smoothed = replace(surface, smoothing_um=sigma)
-    return replace(plan, settings=replace(plan.settings, surface=smoothed))

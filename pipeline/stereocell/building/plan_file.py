@@ -26,7 +26,7 @@ def to_json(plan: Plan) -> dict[str, Any]:
     for tile in content["tiles"]:
         tile |= tile.pop("box")
     for channel in content["channels"]:
-        for key in ("source", "fingerprint"):
+        for key in ("source", "fingerprint", "rung", "base"):
             if not channel[key]:
                 del channel[key]
     return {"format": _FORMAT, "version": _VERSION, **content}

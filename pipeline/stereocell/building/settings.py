@@ -13,7 +13,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions
+from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions, parse_level
 from stereocell.meshes.options import LodOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
@@ -139,13 +139,24 @@ class Settings:
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     lod: LodOptions = field(default_factory=LodOptions)
     unwrap: UnwrapOptions = field(default_factory=UnwrapOptions)
-    iso_values: Mapping[str, float] = setting(
+    iso_values: Mapping[str, float | str] = setting(
         {},
-        "channel = voxel value, instead of the iso-value that is found",
+        "channel = voxel value, or one above the background as 162+b, instead of what is found",
         Flag(
             "--iso-value",
-            "use this iso-value (voxel values) for a channel, by name or index; may be repeated",
+            "use this iso-value (a voxel value, or one above the background as 162+b) for a "
+            "channel, by name or index; may be repeated",
             "CHANNEL=VALUE",
+        ),
+    )
+    surfaces: Mapping[str, str] = setting(
+        {},
+        "channel = the surfaces built of it: outer, inner, third, or voxel values, between commas",
+        Flag(
+            "--surfaces",
+            "which surfaces are built of a channel: outer, inner, third, or voxel values, between "
+            "commas; may be repeated",
+            "CHANNEL=SURFACE,...",
         ),
     )
     paint: Mapping[str, str] = setting(
@@ -158,6 +169,10 @@ class Settings:
             "CHANNEL=CHANNEL",
         ),
     )
+
+    def __post_init__(self) -> None:
+        for channel, value in self.iso_values.items():
+            parse_level(f"iso_values.{channel}", value)
 
 
 # What is expected where pydantic finds another type

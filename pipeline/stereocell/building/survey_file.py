@@ -6,44 +6,54 @@ file for other readers.
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from pydantic import TypeAdapter
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.isosurface.channel_level import Level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
 # The files that the first pass leaves beside survey.json, and the remedy for a damaged one
-WINDOW, ISO_VALUE = "units.schema.json#Window", "units.schema.json#IsoValue"
+WINDOW = "units.schema.json#Window"
+EVIDENCE, SOLIDS = "units.schema.json#Evidence", "units.schema.json#Solids"
 AGAIN = "run `stereocell units OUT` again"
 
 
 @dataclass(frozen=True, slots=True)
 class TileIso:
-    """One tile's iso-value.
+    """One tile's part of its channel's level.
 
-    value       above the background, voxel values, reconciled with the neighbours'; None: the tile
-                has none, and is built with the mean of the others
+    value       above the background, voxel values; None: the channel has none
     background  mean over the tile, voxel values; 0: none is subtracted
-    confidence  0..1
-    reason      the reason for a low confidence; empty: the value is certain
-    file        the tile's own result, relative to OUT
+    confidence  0..1, of the tile by itself; None: nothing is there, or nobody asked
+    files       the tile's own results, relative to OUT, by what they hold
     """
 
     value: float | None
     background: float
-    confidence: float
-    reason: str
-    file: str
+    confidence: float | None
+    files: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A channel's histogram for a chart: voxel values, and heights up to 1."""
+
+    values: tuple[float, ...]
+    heights: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelSurvey:
-    """The first pass's results for one channel.
+    """The first passes' results for one channel.
 
-    statistics_file  the file of the statistics, relative to OUT
+    statistics_file  the file of the window, relative to OUT
     iso              by tile ID
+    ladder           all levels that were found, outermost first; empty where one was given
+    curve            what they were found on; None where one was given
     """
 
     statistics: ChannelStatistics
@@ -51,6 +61,8 @@ class ChannelSurvey:
     iso: dict[str, TileIso]
     repair: RepairOptions
     appearance: Appearance
+    ladder: tuple[Level, ...]
+    curve: Curve | None
 
 
 Survey = dict[str, ChannelSurvey]  # by channel ID
@@ -64,6 +76,16 @@ def read_survey(out_folder: OutFolder) -> Survey:
 def save_survey(out_folder: OutFolder, survey: Survey) -> None:
     """Write survey.json."""
     out_folder.save_survey(_surveys().dump_python(survey, mode="json"))
+
+
+def appearance_to_json(appearance: Appearance) -> dict[str, Any]:
+    """Return an appearance as plain values."""
+    return dict(_appearances().dump_python(appearance, mode="json"))
+
+
+@cache
+def _appearances() -> TypeAdapter[Appearance]:
+    return TypeAdapter(Appearance)
 
 
 @cache

@@ -241,6 +241,8 @@ def describe_channel(
         "iso_normalized": appearance.iso_normalized,
         "threshold_normalized": appearance.threshold_normalized,
         "surface": "none" if tileset is None else appearance.surface,
+        "surface_reason": appearance.surface_reason,
+        "level": None if appearance.level is None else asdict(appearance.level),
         "transfer_function": appearance.chosen,
         "transfer_functions": list(appearance.transfer_functions),
         "transfer_functions_2d": {

@@ -139,12 +139,12 @@ def iso(options: argparse.Namespace) -> Answer:
     from stereocell.preview import iso_value as iso_preview
 
     wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
-    candidates, path = iso_preview.preview(
+    found, path = iso_preview.preview(
         options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
-    print_unless_json(options, "\n".join(iso_preview.table(candidates)))
+    print_unless_json(options, "\n".join(iso_preview.table(found)))
     print_unless_json(options, f"wrote {path}")
-    return Answer({"picture": str(path), "candidates": [asdict(one) for one in candidates]})
+    return Answer({"picture": str(path), **asdict(found)})
 
 
 def run_phases(options: argparse.Namespace, *names: str) -> Answer:

@@ -151,13 +151,19 @@ def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
     """Return a channel and what is given for it."""
     name, _, value = text.rpartition("=")
     try:
-        given = kind(value)
+        given = kind(value) if isinstance(kind, type) else _number_or_text(value)
     except ValueError:
         given = ""
     if not name or given == "":
         example = ", as CD31=MART1" if kind is str else ""
         raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}{example}")
     return name, given
+
+
+def _number_or_text(text: str) -> float | str:
+    """Return a number, or a text of a number and more, as 162+b. Raises ValueError."""
+    number, plus, more = text.partition("+")
+    return text if float(number) == float(number) and plus and more else float(text)
 
 
 def flags_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from stereocell.storage.cache_key import key_of, libraries_of
 # modules whose code must be equal on all workers; by name, since this package stands below them
 _MAKERS = (
     "stereocell.building.tasks.window",
-    "stereocell.building.tasks.iso_value",
+    "stereocell.building.tasks.evidence",
+    "stereocell.building.tasks.solids",
     "stereocell.building.tasks.unit",
     "stereocell.building.stage_tasks",
     "stereocell.read.ome_zarr",

@@ -11,13 +11,17 @@ changes nothing.
   and outside, since a blurred edge has its place there. The same again on the voxels above it finds
   the next one.
 
+Where the bodies are alike, the level then moves to the edges nearby (`_refined`). Dim bodies that
+have no peak beside the ground's are looked for beneath the first valley too.
+
 A level is clear where what is inside differs from what is outside by several times the noise,
-where voxels at the level lie on slopes and not in flat noise, and where it separates two groups of
-voxels better than a level can in noise or in texture without an end: by a valley, or by the share
-of the variance that lies between the groups (Otsu's criterion). At half height that share is .64 in
-a normal distribution, .66 to .69 in gamma, log-normal, Pareto and exponential ones, and in every
-tail of them; .74 in an even one. The channel's surface is the first clear level; without one it has
-none.
+where voxels at the level lie on slopes and not in flat noise, and where one of three things tells
+it from a level in noise or in texture without an end: it lies in a valley; or the share of the
+variance between the two groups of voxels (Otsu's criterion) is high: at half height it is .64 in a
+normal distribution, .66 to .69 in gamma, log-normal, Pareto and exponential ones, and in every tail
+of them; .74 in an even one; or its slope is steep beside what voxels a few apart differ by:
+contrast / noise x sharpness was .58 to .81 in noise, textures and uneven grounds. The channel's
+surface is the first clear level; without one it has none.
 
 A smooth background is subtracted where the field alone shows no valley and edges above the
 background are steeper, and never of CT or MR, whose values mean something as they are. Padding,
@@ -29,31 +33,47 @@ References
 N. Otsu, IEEE Trans. Systems, Man, and Cybernetics 9, 1979. doi:10.1109/TSMC.1979.4310076
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
-from stereocell.isosurface.level_evidence import Sums, TileEvidence, noise_edges
+from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges
+from stereocell.isosurface.level_evidence import Counting, Sums, TileEvidence, noise_edges
 from stereocell.isosurface.level_histogram import DIP, INSIDE, OUTSIDE, LevelHistogram, Scale
+from stereocell.isosurface.options import IsoValueOptions
 
 LEAST_SNR = 3.0  # contrast over noise of a clear level
 LEAST_SHARPNESS = 0.04  # share of the contrast that the finest spacing crosses at a clear level
 LEAST_SEPARATION = 0.70  # share of the variance between the groups at a level in no valley
-# ... or a little less where edges are as steep and as high as in no texture
-WEAKER = {"separation": 0.66, "sharpness": 0.12, "snr": 6.0}
+LEAST_STEEPNESS = 0.95  # ... unless the level lies on steeper slopes than there are in texture
+# ... and less again within a clear level, where something is for sure: bone in a head's skin, in
+# planes 5 mm apart, has .67, .11 and 157
+WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
 LEAST_CONTRAST = 0.1  # share of the values' range: what a valley's level parts is more than this
-BACKGROUND_SNR = 6.0  # contrast over noise from which a background may be subtracted
+# Of a level that is an edge beyond doubt, as that of bodies much dimmer than others. An edge of its
+# own is no sharper than a step after a Gaussian of one voxel, 1 / sqrt(2 pi): a sharper level lies
+# on the flank of something brighter.
+EDGE_SNR, EDGE_STEEPNESS, EDGE_SHARPNESS = 6.0, 1.5, 0.4
+BACKGROUND_SNR = 3.0  # contrast over noise from which a background may be subtracted
 BACKGROUND_GAIN = 1.1  # times as sharp above it: what a background must gain without valleys
 VALLEY_GAIN = 2.0  # ... and where the field has a valley
 PADDING_SHARE = 0.5  # share of the outside's distance from padding within which padding is outside
 HALF_HEIGHTS = 3  # levels looked for above the last valley
-LEAST_VOXELS = 500  # voxels above a level
+# voxels above a level: this share of all, within these bounds
+LEAST_SHARE, LEAST_VOXELS = 0.002, (100, 500)
 FEW_VOXELS = 100  # voxels below which nothing is said of a slope, or of a side of a level in a tile
+FEW_SHARE = 2e-3  # ... and share of a tile's voxels, where that is more
 WIDTH_SHARE = 0.05  # half of the range around a level, as a share of its contrast, judged there
 TENTH = 0.1  # share of the contrast by which a level is moved to see what depends on it
+# Bodies are alike where their BRIGHTEST quantile is above their usual height by at most so much of
+# the contrast; then the level is the best of _TRIED between these multiples of its height
+BRIGHTEST, ALIKE, NEAR = 0.95, 0.4, (0.75, 1.5)
+_TRIED, _BLUR = 128, 8  # levels, and the sigma that smooths their scores
+TILE_FACTOR = 2.0  # a tile's own level is at most so many times as high above the outside
 LEAST_NOISE = 1e-3  # share of the values' range: noise-free data is given so much
 
 
@@ -94,12 +114,50 @@ class Level:
         return max(0.0, 1.0 - 2.0 / self.snr) * self.stability if self.snr > 0 else 0.0
 
     @property
+    def steepness(self) -> float:
+        """The slope at the level, over what voxels a few apart usually differ by."""
+        return self.snr * self.sharpness
+
+    @property
+    def is_edge(self) -> bool:
+        """Whether the level is that of edges beyond doubt, however low they are."""
+        is_steep = self.snr >= EDGE_SNR and self.steepness >= EDGE_STEEPNESS
+        return is_steep and self.sharpness <= EDGE_SHARPNESS
+
+    @property
     def is_clear(self) -> bool:
-        if self.snr < LEAST_SNR or self.sharpness < LEAST_SHARPNESS:
-            return False
+        return not self.doubt
+
+    @property
+    def doubt(self) -> str:
+        """The reason why no surface can be relied on here; empty: one can."""
+        if self.snr < LEAST_SNR:
+            return (
+                f"at {self.value:.5g} inside and outside differ by {self.snr:.1f} times the noise, "
+                f"expected at least {LEAST_SNR:g}"
+            )
+        if self.sharpness < LEAST_SHARPNESS:
+            return (
+                f"at {self.value:.5g} the edges rise by {self.sharpness:.1%} of their height a "
+                f"voxel, expected at least {LEAST_SHARPNESS:.0%}"
+            )
         if self.dip <= DIP or self.separation >= LEAST_SEPARATION:
-            return True
-        return all(getattr(self, name) >= least for name, least in WEAKER.items())
+            return ""
+        if self.steepness >= LEAST_STEEPNESS:
+            return ""
+        return (
+            f"no level parts two groups of voxels better than in noise: at {self.value:.5g} "
+            f"{self.separation:.0%} of the variance lies between them, expected at least "
+            f"{LEAST_SEPARATION:.0%}"
+        )
+
+    @property
+    def is_clear_within(self) -> bool:
+        """Whether the level is clear, given that it lies within one that is."""
+        return self.is_clear or self._reaches(WITHIN)
+
+    def _reaches(self, bounds: Mapping[str, float]) -> bool:
+        return all(getattr(self, name) >= least for name, least in bounds.items())
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +169,8 @@ class ChannelLevels:
     has_padding  whether padding took no part
     noise        sigma of the denoised field, voxel values
     finest_um    the finest voxel spacing
-    histogram    of the field, or of the field above the background
+    sums         of the field, or of the field above the background
+    histogram    of the same
     """
 
     ladder: tuple[Level, ...]
@@ -119,68 +178,132 @@ class ChannelLevels:
     has_padding: bool
     noise: float
     finest_um: float
+    sums: Sums
     histogram: LevelHistogram
 
     @property
     def clear(self) -> tuple[Level, ...]:
-        """The clear ones, outermost first."""
-        return tuple(level for level in self.ladder if level.is_clear)
+        """The clear ones, outermost first: the rungs of the ladder that have surfaces."""
+        found: list[Level] = []
+        for level in self.ladder:
+            if level.is_clear or (found and level.is_clear_within):
+                found.append(level)
+        return tuple(found)
+
+    @property
+    def doubt(self) -> str:
+        """The reason why the channel has no clear level; empty: it has one."""
+        if self.clear:
+            return ""
+        if not self.ladder:
+            return "nothing stands out: no level has more than a few voxels above it"
+        return max(self.ladder, key=lambda level: level.confidence).doubt
+
+    def judge(self, value: float) -> Level:
+        """Return what speaks for a level that was found otherwise, voxel values."""
+        valleys = self._sight.histogram.find_valleys(self.noise)
+        dips = [valley.dip for valley in valleys if valley.low <= value <= valley.high]
+        return self._sight.judge(value, self._sight.histogram, min(dips, default=1.0))
 
     def judge_tile(self, level: Level, tile: TileEvidence) -> Level | None:
         """Return a level with what speaks for it in one tile; None: it parts nothing there."""
+        sight = self._sight_of(tile)
+        if not sight.parts(level.value):
+            return None
+        return sight.judge(level.value, sight.histogram, level.dip)
+
+    def level_of_tile(self, level: Level, tile: TileEvidence) -> float:
+        """Return a tile's own level by half height, drawn to the channel's by what speaks for it.
+
+        Its height above the outside is at most TILE_FACTOR times the channel's, and at least the
+        same part of it. A tile with nothing on one side keeps the channel's level.
+        """
+        sight = self._sight_of(tile)
+        if not sight.parts(level.value):
+            return level.value
+        own = sight.histogram.half_height(level.value)
+        if not np.isfinite(own) or not sight.parts(own):
+            return level.value
+        weight = sight.judge(own, sight.histogram, level.dip).confidence
+        height = level.value - level.outside
+        drawn = level.value + weight * (own - level.value) - level.outside
+        return level.outside + min(max(drawn, height / TILE_FACTOR), height * TILE_FACTOR)
+
+    def curve(self, points: int = 256) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return voxel values and the share of the voxels around each, highest 1, for a chart."""
+        return self._sight.histogram.outline(self.noise, points)
+
+    @property
+    def _sight(self) -> "_Sight":
+        return _Sight(self.sums, self.histogram.edges, self.noise, self.finest_um)
+
+    def _sight_of(self, tile: TileEvidence) -> "_Sight":
         sums = tile.above if self.subtracts and tile.above is not None else tile.plain
         if not self.subtracts and not self.has_padding:
             sums = sums + tile.padding
-        sight = _Sight(sums, self.histogram.edges, self.noise, self.finest_um)
-        above = sight.histogram.above(level.value).total
-        if min(above, sight.histogram.total - above) < FEW_VOXELS:
-            return None
-        return sight.judge(level.value, sight.histogram, level.dip)
+        return _Sight(sums, self.histogram.edges, self.noise, self.finest_um)
 
 
 def find_levels(
     tiles: Sequence[TileEvidence],
     *,
-    scale: Scale,
-    scale_above: Scale | None,
-    darkest: float,
+    counting: Counting,
     finest_um: float,
     modality: str = "",
+    options: IsoValueOptions | None = None,
 ) -> ChannelLevels:
     """Return a channel's levels.
 
-    tiles        of the whole dataset
-    scale        of the values, as the tiles were counted; scale_above: above the background
-    darkest      the channel's least value
-    finest_um    the finest voxel spacing
-    modality     DICOM's code; of CT and MR no background is subtracted
+    tiles      of the whole dataset
+    counting   how they were counted
+    finest_um  the finest voxel spacing
+    modality   DICOM's code; of CT and MR no background is subtracted
+    options    of a criterion that scores edges, whose level is then the only rung; None: the ladder
     """
+    scale = counting.scale
     plain = reduce(Sums.__add__, (tile.plain for tile in tiles))
     padding = reduce(Sums.__add__, (tile.padding for tile in tiles))
     noise = _noise(tiles, scale, plain)
     sight = _Sight(plain, scale.edges(), noise, finest_um)
-    ladder = sight.ladder()
+    is_body = modality in ("CT", "MR")
+    ladder = sight.ladder(beneath=not is_body)
     has_padding = bool(padding.counts.any())
-    if has_padding and (modality == "MR" or _is_outside(darkest, sight.histogram, ladder)):
+    if has_padding and (modality == "MR" or _is_outside(counting.darkest, sight.histogram, ladder)):
         has_padding = False
         sight = _Sight(plain + padding, scale.edges(), noise, finest_um)
-        ladder = sight.ladder()
-    above = [tile.above for tile in tiles if tile.above is not None]
-    if above and scale_above is not None and modality not in ("CT", "MR"):
-        raised = _Sight(reduce(Sums.__add__, above), scale_above.edges(), noise, finest_um)
+        ladder = sight.ladder(beneath=not is_body)
+    above, subtracts = [tile.above for tile in tiles if tile.above is not None], False
+    if above and counting.scale_above is not None and not is_body:
+        edges = counting.scale_above.edges()
+        raised = _Sight(reduce(Sums.__add__, above), edges, noise, finest_um)
         other = raised.ladder()
-        if _gains(_first(ladder), _first(other)):
-            return ChannelLevels(other, True, has_padding, noise, finest_um, raised.histogram)
-    return ChannelLevels(ladder, False, has_padding, noise, finest_um, sight.histogram)
+        subtracts = _gains(_first(ladder), _first(other))
+        if subtracts:
+            sight, ladder = raised, other
+    found = ChannelLevels(
+        ladder, subtracts, has_padding, noise, finest_um, sight.sums, sight.histogram
+    )
+    return found if options is None else _by_edges(found, tiles, options)
+
+
+def _by_edges(
+    found: ChannelLevels, tiles: Sequence[TileEvidence], options: IsoValueOptions
+) -> ChannelLevels:
+    """Return the same channel with the one level that a criterion of edges chooses."""
+    sums = [tile.edges[found.subtracts] for tile in tiles if tile.edges is not None]
+    value = None
+    if known := [one for one in sums if one is not None]:
+        value = choose_by_edges(reduce(EdgeSums.__add__, known), found.histogram, options)
+    return replace(found, ladder=() if value is None else (found.judge(value),))
 
 
 def _first(ladder: Sequence[Level]) -> Level | None:
     return next((level for level in ladder if level.is_clear), None)
 
 
-def _is_outside(darkest: float, histogram: LevelHistogram, ladder: Sequence[Level]) -> bool:
+def _is_outside(darkest: float | None, histogram: LevelHistogram, ladder: Sequence[Level]) -> bool:
     """Whether padding is dark ground: no gap in the histogram parts it from the rest."""
-    if not ladder:
+    if darkest is None or not ladder:
         return True
     return histogram.quantile(0.001) - darkest <= PADDING_SHARE * (ladder[0].outside - darkest)
 
@@ -192,8 +315,8 @@ def _gains(plain: Level | None, above: Level | None) -> bool:
     if plain is None:
         return True
     if plain.dip <= DIP:
-        return above.dip <= DIP and above.sharpness >= VALLEY_GAIN * plain.sharpness
-    return above.dip <= DIP or above.sharpness >= BACKGROUND_GAIN * plain.sharpness
+        return above.dip <= DIP and above.steepness >= VALLEY_GAIN * plain.steepness
+    return above.dip <= DIP or above.steepness >= BACKGROUND_GAIN * plain.steepness
 
 
 class _Sight:
@@ -203,34 +326,88 @@ class _Sight:
         self, sums: Sums, edges: NDArray[np.float64], noise: float, finest_um: float
     ) -> None:
         self.histogram = LevelHistogram(sums.counts.astype(np.float64), edges)
-        self.slopes, self.noise, self.finest_um = sums.slopes, noise, finest_um
+        self.sums, self.noise, self.finest_um = sums, noise, finest_um
 
-    def ladder(self) -> tuple[Level, ...]:
-        """Return the levels, outermost first."""
+    def parts(self, value: float) -> bool:
+        """Whether a level has voxels on both sides, and not just a few."""
+        above, total = self.histogram.above(value).total, self.histogram.total
+        return min(above, total - above) >= max(FEW_VOXELS, FEW_SHARE * total)
+
+    def ladder(self, *, beneath: bool = True) -> tuple[Level, ...]:
+        """Return the levels, outermost first.
+
+        beneath  whether dim bodies are looked for beneath the first valley too
+        """
         whole = self.histogram
         if not whole.total:
             return ()
         valleys = whole.find_valleys(self.noise)
         span = whole.quantile(0.999) - whole.quantile(0.05)
-        found = []
+        found: list[Level] = []
+        if valleys and beneath:
+            found += self._beneath(whole.below(valleys[0].value))
         ends = [-np.inf, *(valley.value for valley in valleys), np.inf]
         for valley, low, high in zip(valleys, ends, ends[2:], strict=False):
             outside = whole.between(low, valley.value).quantile(0.5)
             value = float(np.clip((valley.peak + outside) / 2, valley.low, valley.high))
-            level = self.judge(value, whole.between(low, high), valley.dip)
-            if (
-                level.contrast >= LEAST_CONTRAST * span
-                and level.share * whole.total >= LEAST_VOXELS
-            ):
+            level = self._refined(value, whole.between(low, high), valley.dip)
+            is_high = level.contrast >= LEAST_CONTRAST * span or (beneath and level.is_edge)
+            if is_high and level.share * whole.total >= self._least_voxels:
                 found.append(level)
-        rest = whole.above(ends[-2])
+        last = max([ends[-2], *(level.value for level in found)])
+        return (*found, *self._half_heights(whole.above(last)))
+
+    @property
+    def _least_voxels(self) -> float:
+        """How many voxels a level must have above it."""
+        low, high = LEAST_VOXELS
+        return min(max(low, LEAST_SHARE * self.histogram.total), high)
+
+    def _half_heights(self, rest: LevelHistogram) -> list[Level]:
+        """Return levels at half height, each of the voxels above the one before."""
+        found = []
         for _ in range(HALF_HEIGHTS):
-            value = rest.half_height() if rest.total >= LEAST_VOXELS else np.nan
+            value = rest.half_height() if rest.total >= self._least_voxels else np.nan
             if not np.isfinite(value):
                 break
-            found.append(self.judge(value, rest, 1.0))
+            found.append(self._refined(value, rest, 1.0))
             rest = rest.above(value)
-        return tuple(found)
+        return found
+
+    def _refined(self, value: float, part: LevelHistogram, dip: float) -> Level:
+        """Return a level that follows the edges near `value`, where the bodies are alike.
+
+        It is the one with the largest total gradient over the square root of its area: r f(r) is a
+        blur in one dimension, so |f'| r has its maximum at a ball's true radius, and half the
+        height of a small or thin body, blurred, lies further in. Bodies of every brightness have no
+        level in common that could be better.
+        """
+        level = self.judge(value, part, dip)
+        above = part.above(value)
+        if above.quantile(BRIGHTEST) - above.quantile(INSIDE) > ALIKE * level.contrast:
+            return level
+        height = value - level.outside
+        low, high = (level.outside + factor * height for factor in NEAR)
+        step = (high - low) / _TRIED
+        beyond = 3 * _BLUR  # so that smoothing has no end within the range
+        edges = low + step * np.arange(-beyond, _TRIED + beyond + 1)
+        area, total = (
+            ndimage.gaussian_filter1d(
+                np.diff(np.interp(edges, self.histogram.edges[1:], np.cumsum(sums))), _BLUR
+            )[beyond:-beyond]
+            for sums in (self.sums.slopes, self.sums.squares)
+        )
+        if not area.max() > 0:
+            return level
+        score = np.where(area > 0, total / np.sqrt(np.maximum(area, 1e-30)), 0.0)
+        return self.judge(float(low + (int(score.argmax()) + 0.5) * step), part, dip)
+
+    def _beneath(self, part: LevelHistogram) -> list[Level]:
+        """Return the level of dim bodies, if any: too few for a peak beside the ground's."""
+        for level in self._half_heights(part):
+            if level.is_edge:
+                return [level]
+        return []
 
     def judge(self, value: float, part: LevelHistogram, dip: float) -> Level:
         """Return a level with what speaks for it; `part` holds the voxels that it separates."""
@@ -261,7 +438,7 @@ class _Sight:
             near = away <= factor * width
             count = float(self.histogram.counts[near].sum())
             if count >= FEW_VOXELS:
-                return float(self.slopes[near].sum()) / count
+                return float(self.sums.slopes[near].sum()) / count
         return 0.0
 
 

@@ -3,7 +3,8 @@
 Every number is a sum over voxels, so that tiles, in any cut, add up to the whole dataset.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,15 @@ from scipy import ndimage
 
 from stereocell.filters.denoise import MEDIAN_REACH, SMOOTHING_REACH
 from stereocell.isosurface.distance_field import gradient_magnitude
+from stereocell.isosurface.edge_criteria import EdgeSums, gather_edges
 from stereocell.isosurface.level_histogram import BINS, Scale
+from stereocell.isosurface.options import Criterion
 
+MOST_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
 LAG = 4  # voxels along x between the two values whose difference is noise: beyond the denoising
 HALO = (1, 1, LAG)  # voxels (z, y, x) around a tile that its evidence reads
 NOISE_BINS = 1024
+_PLANES = 16  # planes counted at once
 Slices = tuple[slice, slice, slice]
 _NOISE_LEAST = 1e-6  # share of the scale's range: the first bin of differences
 
@@ -25,15 +30,19 @@ _NOISE_LEAST = 1e-6  # share of the scale's range: the first bin of differences
 class Sums:
     """Sums over a tile's voxels in the bins of a scale, but for its padding.
 
-    counts  int64 (BINS,), voxels
-    slopes  float64 (BINS,), gradient magnitudes, voxel values per um
+    counts   int64 (BINS,), voxels
+    slopes   float64 (BINS,), gradient magnitudes, voxel values per um
+    squares  float64 (BINS,), squares of their shares of the scale, per um^2
     """
 
     counts: NDArray[np.int64]
     slopes: NDArray[np.float64]
+    squares: NDArray[np.float64]
 
     def __add__(self, other: "Sums") -> "Sums":
-        return Sums(self.counts + other.counts, self.slopes + other.slopes)
+        return Sums(
+            self.counts + other.counts, self.slopes + other.slopes, self.squares + other.squares
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +53,37 @@ class TileEvidence:
     padding      of its padding, in the same field
     above        of the field above the background; None: the channel has none
     differences  int64 (NOISE_BINS,), how often the field differs by so much LAG voxels further
+    edges        of the field, and of that above the background, where a criterion scores edges
     """
 
     plain: Sums
     padding: Sums
     above: Sums | None
     differences: NDArray[np.int64]
+    edges: tuple[EdgeSums, EdgeSums | None] | None = None
+
+    def __add__(self, other: "TileEvidence") -> "TileEvidence":
+        both = None if self.above is None or other.above is None else self.above + other.above
+        return TileEvidence(
+            self.plain + other.plain,
+            self.padding + other.padding,
+            both,
+            self.differences + other.differences,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Counting:
+    """How all tiles of a channel are counted.
+
+    scale        of the values
+    scale_above  of the values above the background; None: none is tried
+    darkest      the channel's least value, that of its padding; None: it has none
+    """
+
+    scale: Scale
+    scale_above: Scale | None
+    darkest: float | None
 
 
 def denoising_reach(
@@ -61,18 +95,18 @@ def denoising_reach(
 
 
 def find_padding(
-    voxels: NDArray[Any], darkest: float, reach: tuple[int, int, int]
+    voxels: NDArray[Any], darkest: float | None, reach: tuple[int, int, int]
 ) -> NDArray[np.bool_]:
     """Return which voxels are padding, or so near to it that denoising mixes them, bool (z, y, x).
 
     voxels   (z, y, x), as read
-    darkest  the channel's least value
+    darkest  the channel's least value; None: the channel has no padding
     reach    voxels (z, y, x) that denoising reaches
 
     Padding are runs of the darkest value as long as the reach on both sides in plane: a stitched
     mosaic's corners, a scanner's circle, a border. Single dark voxels of a noisy dark end are none.
     """
-    dark = voxels == darkest
+    dark = np.zeros(voxels.shape, bool) if darkest is None else voxels == darkest
     if not dark.any():
         return dark
     size = (1, *(min(2 * r + 1, n) for r, n in zip(reach[1:], voxels.shape[1:], strict=True)))
@@ -90,9 +124,9 @@ def gather_evidence(
     own: Slices,
     *,
     spacing_um: tuple[float, float, float],
-    scale: Scale,
+    counting: Counting,
     background: NDArray[np.float32] | None = None,
-    scale_above: Scale | None = None,
+    criterion: Criterion | None = None,
 ) -> TileEvidence:
     """Return a tile's evidence.
 
@@ -101,41 +135,77 @@ def gather_evidence(
     padding      bool, the same window, as `find_padding` returns it
     own          the tile in the window
     spacing_um   (z, y, x)
-    scale        of the channel's values, the same for all its tiles
     background   float32, broadcasts over the window, voxel values; None: none is tried
-    scale_above  of the values above the background
+    criterion    the one that scores edges; None: none does
 
     With the halo, the sums over all tiles are those of the whole dataset, however it is cut.
     """
+    if background is not None:
+        background = np.broadcast_to(background, field.shape)
+    parts = []
+    first, stop = own[0].start, own[0].stop
+    for z in range(first, stop, _PLANES):  # copies of the whole would be five times the field
+        low = max(z - HALO[0], 0)
+        part = slice(low, min(z + _PLANES + HALO[0], len(field)))
+        inner = (slice(z - low, min(z + _PLANES, stop) - low), *own[1:])
+        under = None if background is None else background[part]
+        parts.append(_gather(field[part], padding[part], inner, spacing_um, counting, under))
+    found = reduce(TileEvidence.__add__, parts)
+    if criterion is None:
+        return found
+    edges = _edges(field, padding, own, spacing_um, counting.scale, criterion)
+    above = None
+    if background is not None and counting.scale_above is not None:
+        above = _edges(
+            field - background, padding, own, spacing_um, counting.scale_above, criterion
+        )
+    return replace(found, edges=(edges, above))
+
+
+def _gather(
+    field: NDArray[np.float32],
+    padding: NDArray[np.bool_],
+    own: Slices,
+    spacing_um: tuple[float, float, float],
+    counting: Counting,
+    background: NDArray[np.float32] | None,
+) -> TileEvidence:
     kept = ~padding[own]
     above = None
-    if background is not None and scale_above is not None:
-        above = _sums(field - background, own, kept, spacing_um, scale_above)
+    if background is not None and counting.scale_above is not None:
+        raised = field - background
+        slopes = gradient_magnitude(raised, spacing_um)[own]
+        above = _binned(raised[own][kept], slopes[kept], counting.scale_above)
     slopes = gradient_magnitude(field, spacing_um)[own]
-    bins = scale.bins_of(field[own])
+    inner = field[own]
     return TileEvidence(
-        _binned(bins[kept], slopes[kept]),
-        _binned(bins[~kept], slopes[~kept]),
+        _binned(inner[kept], slopes[kept], counting.scale),
+        _binned(inner[~kept], slopes[~kept], counting.scale),
         above,
-        _differences(field, padding, own, scale),
+        _differences(field, padding, own, counting.scale),
     )
 
 
-def _sums(
+def _edges(
     field: NDArray[np.float32],
+    padding: NDArray[np.bool_],
     own: Slices,
-    kept: NDArray[np.bool_],
     spacing_um: tuple[float, float, float],
     scale: Scale,
-) -> Sums:
+    criterion: Criterion,
+) -> EdgeSums:
+    kept = ~padding[own]
     slopes = gradient_magnitude(field, spacing_um)[own]
-    return _binned(scale.bins_of(field[own])[kept], slopes[kept])
+    return gather_edges(field[own][kept], slopes[kept], scale=scale, criterion=criterion)
 
 
-def _binned(bins: NDArray[np.int16], slopes: NDArray[np.float32]) -> Sums:
+def _binned(field: NDArray[np.float32], slopes: NDArray[np.float32], scale: Scale) -> Sums:
+    bins = scale.bins_of(field)
     counts = np.bincount(bins, minlength=BINS).astype(np.int64)
     summed = np.bincount(bins, weights=slopes, minlength=BINS).astype(np.float64)
-    return Sums(counts, summed)
+    shares = slopes / np.float32(scale.high - scale.low)  # squares of large values overflow float32
+    squares = np.bincount(bins, weights=shares * shares, minlength=BINS).astype(np.float64)
+    return Sums(counts, summed, squares)
 
 
 def _differences(

@@ -45,13 +45,16 @@ class Scale:
     middle: float
 
     @classmethod
-    def of(cls, voxels: NDArray[Any]) -> "Scale":
+    def of(cls, voxels: NDArray[Any], padding: NDArray[np.bool_]) -> "Scale":
         """Return the scale for fields whose voxels these represent, any shape, any number type.
+
+        padding  bool, the same shape; the middle is that of the others
 
         The field is smoother than its voxels, so nearly all of it lies within their range; a few
         hot voxels lie beyond, and count at the end.
         """
-        low, middle, high = (float(v) for v in np.percentile(voxels, (0.001, 50.0, 99.999)))
+        low, high = (float(v) for v in np.percentile(voxels, (0.001, 99.999)))
+        middle = float(np.median(voxels[~padding] if padding.any() else voxels))
         margin = 0.05 * (high - low) or max(1.0, 1e-6 * abs(low))
         return cls(low - margin, high + margin, middle)
 
@@ -156,13 +159,13 @@ class LevelHistogram:
             level = found
         return level + least
 
-    def half_height(self) -> float:
+    def half_height(self, start: float | None = None) -> float:
         """Return the level half-way between what it has inside and outside; NaN where none has.
 
-        The search begins at Li's threshold. Each step goes half of the way, so that it doesn't
-        swing between two levels.
+        The search begins at `start`, by default Li's threshold. Each step goes half of the way, so
+        that it doesn't swing between two levels.
         """
-        level = self.li_threshold()
+        level = self.li_threshold() if start is None else start
         for _ in range(_STEPS):
             inside = self.above(level).quantile(INSIDE)
             outside = self.below(level).quantile(OUTSIDE)
@@ -183,35 +186,54 @@ class LevelHistogram:
         like width: near the dark end it is even, far from it a logarithm. A peak counts where the
         histogram falls to DIP of it on the way to a higher one.
         """
+        values, height = self._smoothed(noise)
+        widths = np.gradient(values) if len(values) > 1 else values
+        valleys = []
+        for left, right in pairwise(_peaks(height)):
+            part = height[left : right + 1]
+            least = float(part.min())
+            # by voxels a step of value: a blurred edge has as many at every height
+            density = part / widths[left : right + 1]
+            flat = left + np.flatnonzero(
+                (density <= _FLAT * density.min()) | (part <= _FLAT * least)
+            )
+            valleys.append(
+                Valley(
+                    float(values[left + int(part.argmin())]),
+                    float(values[flat[0]]),
+                    float(values[flat[-1]]),
+                    float(values[right]),
+                    least / float(min(height[left], height[right])),
+                )
+            )
+        return valleys
+
+    def outline(self, noise: float, points: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return the histogram along that axis for a chart: voxel values, and heights up to 1."""
+        values, height = self._smoothed(noise)
+        if not len(height):
+            return (), ()
+        places = np.unique(np.linspace(0, len(values) - 1, points).round().astype(int))
+        height = height[places] / height.max()
+        return (
+            tuple(float(f"{value:.6g}") for value in values[places]),
+            tuple(round(float(share), 5) for share in height),
+        )
+
+    def _smoothed(self, noise: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return voxel values and smoothed heights along that axis; empty where it is none."""
+        nothing = np.zeros(0)
         dark = self.quantile(DARK)
         axis = np.arcsinh((self.edges - dark) / (2 * noise))
         ends = np.array([self.quantile(share) for share in _ENDS])
         low, high = np.arcsinh((ends - dark) / (2 * noise))
         if not high > low:
-            return []
+            return nothing, nothing
         count = int(np.clip((high - low) / _STEP, 50, 3000))
         step = (high - low) / count
         sums = np.interp(np.linspace(low, high, count + 1), axis[1:], np.cumsum(self.counts))
         height = ndimage.gaussian_filter1d(np.diff(sums), _SIGMA / step, mode="nearest")
-
-        def value(place: int) -> float:
-            return float(dark + 2 * noise * np.sinh(low + (place + 0.5) * step))
-
-        valleys = []
-        for left, right in pairwise(_peaks(height)):
-            part = height[left : right + 1]
-            least = float(part.min())
-            flat = left + np.flatnonzero(part <= _FLAT * least)
-            valleys.append(
-                Valley(
-                    value(left + int(part.argmin())),
-                    value(int(flat[0])),
-                    value(int(flat[-1])),
-                    value(right),
-                    least / float(min(height[left], height[right])),
-                )
-            )
-        return valleys
+        return dark + 2 * noise * np.sinh(low + (np.arange(count) + 0.5) * step), height
 
 
 def _peaks(height: NDArray[np.float64]) -> list[int]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
 
 from stereocell.model.errors import UsageError
@@ -10,29 +11,48 @@ from stereocell.model.settings import AUTO, Flag, length_um, setting
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """A way to choose the iso-value: the level with the largest score.
+    """A way to choose the iso-value by edges: the level with the largest score.
 
     score            of a level's surface, by its total gradient and its area, float64 (bins,) each
     discounts_noise  whether noise's part is taken out of the gradients first, and levels with a
                      small total can't be chosen
-    by_tile          False: the channel's threshold is the level of all tiles, the curve only shown
     """
 
     score: Callable[[Any, Any], Any]
     discounts_noise: bool = False
-    by_tile: bool = True
 
 
-ADAPTIVE = "adaptive"
+LADDER, ADAPTIVE = "ladder", "adaptive"
 CRITERIA = {
     "edges": Criterion(lambda total, area: total / area**0.5, discounts_noise=True),
     "compromise": Criterion(lambda total, area: total / area**0.5),
     "pekar-mean": Criterion(lambda total, area: total / area),
     "pekar-total": Criterion(lambda total, area: total),
     "pekar-area": Criterion(lambda total, area: area),
-    ADAPTIVE: Criterion(lambda total, area: total / area**0.5, discounts_noise=True, by_tile=False),
 }
-BY_TILE = tuple(name for name, criterion in CRITERIA.items() if criterion.by_tile)
+RUNGS = {"outer": 0, "inner": 1, "third": 2}  # names of the ladder's levels, outermost first
+APART = "apart"  # the first rung whose solids are many: that of cells in their tissue
+SCOPES = ("channel", "tile")
+
+
+def parse_level(where: str, given: float | str) -> tuple[float, bool]:
+    """Return a given iso-value, and whether it counts from the background: `162+b`.
+
+    Raises UsageError for what is neither.
+    """
+    if not isinstance(given, str):
+        return float(given), False
+    number, plus, rest = given.replace(" ", "").partition("+")
+    try:
+        value = float(number)
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value) or (plus and rest != "b"):
+        raise UsageError(
+            f"{where} is {given!r:.60}, expected a voxel value, or one above the "
+            "background as 162+b"
+        )
+    return value, bool(plus)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +63,36 @@ class IsoValueOptions:
     """
 
     criterion: str = setting(
-        "edges",
-        f"{', '.join(BY_TILE)}; {ADAPTIVE}: the channel's threshold",
-        Flag("--iso-criterion", "how iso-values are found: edges (default), adaptive, ..."),
+        LADDER,
+        f"{LADDER}: by histograms of all tiles; {', '.join(CRITERIA)}: by edges; {ADAPTIVE}: the "
+        "channel's threshold",
+        Flag("--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."),
     )
-    bins: int = setting(256, "levels tried over the range of a tile's voxels")
-    clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out")
-    min_area_share: float = setting(0.02, "of the largest surface; leaves out specks")
-    min_confidence: float = setting(0.4, "of a clear surface, 0 to 1; see the report")
+    scope: str = setting(
+        "channel",
+        "channel: one level for all tiles; tile: each tile's own, near the channel's",
+        Flag("--iso-scope", "channel (default): one level for all tiles; tile: each its own"),
+    )
+    rung: str = setting(
+        "outer",
+        f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the first whose largest "
+        "solid holds under a quarter of all",
+    )
+    bins: int = setting(256, "levels that a criterion of edges tries")
+    clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out there")
+    min_area_share: float = setting(0.02, "of the largest surface; leaves out specks there")
 
     def __post_init__(self) -> None:
-        if self.criterion not in CRITERIA:
-            raise UsageError(
-                f"isovalue.criterion is {self.criterion!r}, expected one of {', '.join(CRITERIA)}"
-            )
+        known = (LADDER, *CRITERIA, ADAPTIVE)
+        for name, found, expected in (
+            ("criterion", self.criterion, known),
+            ("scope", self.scope, SCOPES),
+            ("rung", self.rung, (*RUNGS, APART)),
+        ):
+            if found not in expected:
+                raise UsageError(
+                    f"isovalue.{name} is {found!r}, expected one of {', '.join(expected)}"
+                )
         if not 16 <= self.bins <= 65536:
             raise UsageError(
                 f"isovalue.bins is {self.bins}, expected at least 16 and at most 65536"
@@ -68,8 +104,6 @@ class IsoValueOptions:
             )
         if not 0 <= self.min_area_share <= 1:
             raise UsageError(f"isovalue.min_area_share is {self.min_area_share:g}, expected 0 to 1")
-        if not 0 <= self.min_confidence <= 1:
-            raise UsageError(f"isovalue.min_confidence is {self.min_confidence:g}, expected 0 to 1")
 
 
 WRAPS = ("voxels", "alpha-wrap")

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
-from stereocell.model.channel import SurfaceConfidence
 from stereocell.model.settings import AUTO
 
 SHARE = 0.5  # share of a mean below which a fragment goes
@@ -34,7 +33,10 @@ OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
 @dataclass(frozen=True, slots=True)
 class ComponentSums:
-    """Sums over a tile's connected components: over all of them, and over those the rule keeps."""
+    """Sums over a tile's connected components: over all of them, and over those the rule keeps.
+
+    voxels, largest  of all components, specks included; of the largest
+    """
 
     count: int
     faces: int
@@ -42,6 +44,8 @@ class ComponentSums:
     kept: int
     kept_faces: int
     kept_diagonal_um: float
+    voxels: int
+    largest: int
 
 
 def sum_components(
@@ -57,8 +61,10 @@ def sum_components(
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
+    sizes = np.bincount(components.labels.ravel())[1:]
+    voxels, largest = int(sizes.sum()), int(sizes.max(initial=0))
     if not len(faces):
-        return ComponentSums(0, 0, 0.0, 0, 0, 0.0)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
     return ComponentSums(
         len(faces),
@@ -67,6 +73,8 @@ def sum_components(
         int(kept.sum()),
         int(faces[kept].sum()),
         float(diagonal[kept].sum()),
+        voxels,
+        largest,
     )
 
 
@@ -76,16 +84,12 @@ def choose_repair(
     *,
     surface: SurfaceOptions,
     spacing_um: tuple[float, float, float],
-    surface_confidence: SurfaceConfidence,
 ) -> RepairOptions:
     """Return how a channel's surface is repaired.
 
     tiles       the ComponentSums of each tile, as dictionaries
     most        the upper bounds: the units' halo covers them
     spacing_um  (z, y, x)
-
-    No gaps are closed in an unclear surface, by either wrap: a gap in noise is no gap of a body
-    (building.plan.smoothed_plan).
     """
     sums = list(tiles)
     count, kept = (sum(tile[key] for tile in sums) for key in ("count", "kept"))
@@ -105,8 +109,6 @@ def choose_repair(
             alpha = ALPHA_SIDES * diagonal / faces**0.5
         least = LEAST_ALPHA * max(spacing_um)
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
-    if surface_confidence == "unclear":
-        options = replace(options, alpha_um=0.0)
     wraps_triangles = surface.wrap == "alpha-wrap"  # that wrap knows no offset of 0
     if surface.offset_um == AUTO or (wraps_triangles and not options.offset_um):
         options = replace(options, offset_um=OFFSET_SHARE * options.alpha_um)

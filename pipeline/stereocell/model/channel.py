@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.identifiers import to_identifier
+from stereocell.model.lattice_field import LatticeField
 
-# `unclear`: a surface is built where a level was found, and nothing to rely on
-SurfaceConfidence = Literal["clear", "unclear", "none"]
+SurfaceConfidence = Literal["clear", "none"]
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 ShapeKind = Literal["rectangle", "triangle"]
 
@@ -39,6 +39,43 @@ Shapes = tuple[Shape, ...]
 
 
 @dataclass(frozen=True, slots=True)
+class SurfaceLevel:
+    """Where a channel's surface lies: level(x) = background(x) + iso, in the denoised voxels.
+
+    iso           voxel values above the background; the mean of `by_tile`
+    background    voxel values, knots in voxels of the level that is built; None: 0 everywhere
+    smoothing_um  sigma of the Gaussian after the median of 3 x 3 voxels in each plane
+    by_tile       where tiles have levels of their own (`--iso-scope tile`): the field of them
+    """
+
+    iso: float
+    background: LatticeField | None
+    smoothing_um: float
+    by_tile: LatticeField | None = None
+
+    @property
+    def field(self) -> LatticeField:
+        """The iso-value as a field, above the background."""
+        if self.by_tile is not None:
+            return self.by_tile
+        return LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), self.iso))
+
+    @property
+    def background_range(self) -> tuple[float, float] | None:
+        """The background's least and largest value; None: there is none."""
+        if self.background is None:
+            return None
+        return float(self.background.values.min()), float(self.background.values.max())
+
+    @property
+    def words(self) -> str:
+        """The level for a reader: `162 above a background of 90 to 210`."""
+        span = self.background_range
+        above = "" if span is None else f" above a background of {span[0]:.4g} to {span[1]:.4g}"
+        return f"{self.iso:.5g}{above}"
+
+
+@dataclass(frozen=True, slots=True)
 class TransferFunctions2d:
     """A channel's 2D transfer functions, and the numbers that they are read by.
 
@@ -59,13 +96,15 @@ class Appearance:
 
     color             linear RGB, 0..1
     window            the voxel values that become 0 and 1 in the 8-bit volumes
-    iso_value         mean over the tiles, in voxel values; None: no tile has a surface
+    iso_value         with the background's mean, in voxel values; None: there is no surface
     iso_confidence    0..1, of the channel
-    surface           how clear it is
+    surface           whether there is one
     painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
     transfer_2d       those functions that are two-dimensional
     threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
+    surface_reason    why there is no surface; empty: there is one
+    level             where exactly the surface lies; None: there is none
     """
 
     name: str
@@ -78,6 +117,8 @@ class Appearance:
     painted_by: str = ""
     transfer_2d: TransferFunctions2d = field(default_factory=TransferFunctions2d)
     threshold: float | None = None
+    surface_reason: str = ""
+    level: SurfaceLevel | None = None
 
     @property
     def id(self) -> str:

@@ -1,44 +1,54 @@
-"""Preview one tile's iso-value before a build: slices with contours, the curve, a table.
+"""Preview a channel's level before a build, in one tile: slices with contours, histogram, table.
 
-The candidates are every criterion's level, and a value that the user gives. The field is the one
-in which a build of the same settings searches the iso-value. The result covers one tile: a build
-also considers the neighbours and may draw a found value towards theirs (`agreement`); it takes a
-given value as is.
+The level is that of the whole channel, as a build of the same settings finds it. Of a large dataset
+it is found on tiles spread evenly, and the table says so.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from stereocell.building.channel_survey import iso_task, statistics_task
+from stereocell.building.channel_survey import (
+    Found,
+    Solids,
+    choose_rung,
+    evidence_task,
+    find_level,
+    given_level,
+    statistics_task,
+)
+from stereocell.building.open_source import open_source, source_of
+from stereocell.building.other_levels import find_other_levels, take
 from stereocell.building.phases import settle
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.settings import Settings
-from stereocell.building.tasks.iso_value import IsoField, read_iso_field
-from stereocell.building.tasks.window import measure_statistics
-from stereocell.isosurface.isovalue import IsoValue
-from stereocell.isosurface.options import ADAPTIVE, BY_TILE, CRITERIA
+from stereocell.building.tasks.evidence import measure_evidence
+from stereocell.building.tasks.window import Window, measure_window
+from stereocell.filters.denoise import denoise
+from stereocell.isosurface.channel_level import ChannelLevels, Level
+from stereocell.isosurface.options import CRITERIA
+from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.preview.draw_slices import Color, Slice, find_font, paint_slices
 from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing
 
-COLORS: dict[str, Color] = {
-    "edges": (255, 190, 40),
-    "compromise": (70, 190, 255),
-    "pekar-mean": (255, 90, 150),
-    "pekar-total": (110, 220, 110),
-    "pekar-area": (190, 140, 255),
-    "given": (255, 255, 255),
-    ADAPTIVE: (255, 255, 255),
-}
-_OTHER: Color = (160, 160, 160)  # of a criterion without a colour of its own
+COLORS: tuple[Color, ...] = (
+    (255, 190, 40),
+    (70, 190, 255),
+    (255, 90, 150),
+    (110, 220, 110),
+    (190, 140, 255),
+    (255, 255, 255),
+)
+LOOKED_AT = 100_000_000  # voxels that the level is found on; a build takes all
 _LONGEST_PX = 900  # pixels, longest side of a slice
-_CHART_PX = 200  # pixels, height of the curve
+_CHART_PX = 200  # pixels, height of the histogram
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
 _MARGIN_PX, _TEXT_PX = 14, 14
 
@@ -47,81 +57,115 @@ _MARGIN_PX, _TEXT_PX = 14, 14
 class Candidate:
     """A level at which the surface could be taken.
 
-    level       above the background, in voxel values; `raw`: with the background's mean added
+    level       in voxel values; `above`: above the background
+    raw         with the mean of the tile's background added
     inside      share of the tile's voxels above it
-    confidence  from this tile alone, 0..1; None: not rated
-    is_chosen   given, or found by the criterion of the settings: a build starts from it
+    confidence  of the channel, 0..1; None: not rated
+    is_chosen   a build takes it
+    setting     the flag that takes it; empty: none is needed
     """
 
     name: str
     level: float
+    above: bool
     raw: float
     inside: float
     confidence: float | None
     is_chosen: bool
+    setting: str
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """What was found: the candidates, why a build makes no surface, and what it rests on."""
+
+    candidates: list[Candidate]
+    doubt: str
+    basis: str
 
 
 def preview(
     source: str, channel_name: str, *, tile_id: str, out: Path | None, settings: Settings
-) -> tuple[list[Candidate], Path]:
-    """Write the picture; return the candidates and the picture's path. Nothing else is written.
+) -> tuple[Preview, Path]:
+    """Write the picture; return what was found and the picture's path. Nothing else is written.
 
     channel_name  name, ID or index
     out           a .png; None: iso_<channel>_<tile>.png in the current folder
 
-    Raises UsageError for a channel or tile that the plan lacks, NoSurfaceError where no level
-    separates anything, SourceError where the source can't be read.
+    Raises UsageError for a channel or tile that the plan lacks, NoSurfaceError where all voxels are
+    alike, SourceError where the source can't be read.
     """
     if out is not None and out.suffix.lower() != ".png":
         raise UsageError(f"-o is {str(out)!r}, expected a file named .png")
     plan = settle(source, settings)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
-    statistics = measure_statistics(statistics_task(plan, channel))
-    task = iso_task(plan, tile, channel=channel, statistics=statistics)
-    field = read_iso_field(task)
-    try:
-        chosen = field.find_iso_value(plan.settings.isovalue)
-        criterion = plan.settings.isovalue.criterion
-        found = {criterion if CRITERIA[criterion].by_tile else BY_TILE[0]: chosen}
-        for name in BY_TILE:
-            if name not in found:
-                options = replace(plan.settings.isovalue, criterion=name)
-                found[name] = field.find_iso_value(options)
-    except NoSurfaceError as error:
-        raise NoSurfaceError(f"{tile.id}/{channel.name}: {error}: no surface to look at") from None
-    is_users = channel.name in plan.settings.iso_values
-    candidates = _candidates(field, found, task.given, "given" if is_users else ADAPTIVE)
+    window = measure_window(statistics_task(plan, channel))
+    tiles = _spread(plan, tile)
+    evidence = {
+        one.id: measure_evidence(evidence_task(plan, one, channel=channel, window=window))
+        for one in (() if given_level(plan, channel) else tiles)
+    }
+    found = find_level(plan, channel, window, evidence)
+    volume = open_source(source_of(plan, channel)).read(channel.index, tile.box, plan.level)
+    field = denoise(volume, float(plan.settings.surface.smoothing_um))
+    under = np.zeros((1, 1, 1), np.float32)
+    if window.statistics.background is not None:
+        under = window.statistics.background.at(tile.box)
+    chosen = _choose(plan, found, field, under)
+    candidates = _candidates(plan, channel, found, chosen, field, under)
+    if not candidates:
+        raise NoSurfaceError(
+            f"{tile.id}/{channel.name}: all voxels are nearly equal: no surface to look at"
+        )
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
+    basis = "given" if found.levels is None else "found on all tiles"
+    if len(tiles) < len(plan.tiles) and found.levels is not None:
+        basis = f"found on {len(tiles)} of {len(plan.tiles)} tiles; a build takes all"
+    result = Preview(candidates, found.doubt, basis)
     picture = _compose(
-        paint_slices(_slices(field, candidates, statistics.window, plan), _LONGEST_PX, _LONGEST_PX),
+        paint_slices(
+            _slices(volume.voxels, field, under, candidates, window, plan), _LONGEST_PX, _LONGEST_PX
+        ),
         f"{channel.name}, tile {tile.id} of {plan.name}",
-        candidates,
-        chosen,
+        result,
+        found.levels,
     )
     with replacing(path) as temporary:
         picture.save(temporary, "PNG")
-    return candidates, path
+    return result, path
 
 
-def table(candidates: Sequence[Candidate]) -> list[str]:
-    """Return the candidates as lines of text; a star marks the one that a build starts from."""
-    lines = [
-        f"{'candidate':<14}{'above background':>17}{'raw':>12}{'inside':>10}{'confidence':>12}"
-    ]
-    for c in candidates:
+def _spread(plan: Plan, tile: Tile) -> list[Tile]:
+    """Return all tiles, or so many of them, evenly chosen and the one that is shown."""
+    voxels = int(np.prod(plan.region.shape, dtype=np.int64))
+    count = max(1, len(plan.tiles) * LOOKED_AT // voxels)
+    if count >= len(plan.tiles):
+        return list(plan.tiles)
+    places = np.linspace(0, len(plan.tiles) - 1, count).round().astype(int)
+    chosen = {plan.tiles[place].id for place in places} | {tile.id}
+    return [one for one in plan.tiles if one.id in chosen]
+
+
+def table(result: Preview) -> list[str]:
+    """Return the candidates as lines of text; a star marks the one that a build takes."""
+    head = f"{'candidate':<18}{'level':>12}{'raw':>12}{'inside':>10}{'confidence':>12}"
+    lines = [f"{head}  take it by"]
+    for c in result.candidates:
         confidence = "-" if c.confidence is None else f"{c.confidence:.2f}"
+        level = f"{c.level:.5g}{'+b' if c.above else ''}"
         lines.append(
-            f"{c.name + (' *' if c.is_chosen else ''):<14}{c.level:>17.5g}{c.raw:>12.5g}"
-            f"{c.inside:>10.2%}{confidence:>12}"
+            f"{c.name + (' *' if c.is_chosen else ''):<18}{level:>12}{c.raw:>12.5g}"
+            f"{c.inside:>10.2%}{confidence:>12}  {c.setting}"
         )
-    return [*lines, _note(candidates)]
+    return [*lines, _note(result)]
 
 
-def _note(candidates: Sequence[Candidate]) -> str:
-    """Return the star's meaning; a build also considers the neighbours, which are not read here."""
-    if any(c.is_chosen and c.confidence is None for c in candidates):
-        return "* given; a build takes it"
-    return "* found; a build may draw it towards its neighbours'"
+def _note(result: Preview) -> str:
+    """Return what a build does, and what that rests on."""
+    if not any(c.is_chosen for c in result.candidates):
+        return f"a build makes no surface: {result.doubt}; {result.basis}"
+    marks = " (b: the background)" if any(c.above for c in result.candidates) else ""
+    return f"* a build takes it{marks}; {result.basis}"
 
 
 def _find_channel(plan: Plan, name: str) -> Channel:
@@ -141,52 +185,95 @@ def _find_tile(plan: Plan, tile_id: str) -> Tile:
     raise UsageError(f"--tile is {tile_id!r}, expected {known}")
 
 
+def _choose(
+    plan: Plan, found: Found, field: NDArray[np.float32], under: NDArray[np.float32]
+) -> Level | float | None:
+    """Return the rung that a build would take if all tiles were like this one."""
+    if len(found.rungs) < 2:
+        return next(iter(found.rungs), None)
+    values = field - under if found.subtracts else field
+    least = float(plan.settings.surface.min_diagonal_um)
+    solids: list[Solids] = [
+        {"": asdict(sum_components(values > rung.value, plan.spacing_um, least))}
+        for rung in found.rungs
+        if isinstance(rung, Level)
+    ]
+    return found.rungs[choose_rung(solids)]
+
+
 def _candidates(
-    field: IsoField, found: dict[str, IsoValue], given: float | None, by: str
+    plan: Plan,
+    channel: Channel,
+    found: Found,
+    chosen: Level | float | None,
+    field: NDArray[np.float32],
+    under: NDArray[np.float32],
 ) -> list[Candidate]:
-    levels: list[tuple[str, float, float | None]] = [
-        (name, value.value, value.confidence) for name, value in found.items()
-    ]
-    if given is not None:
-        levels.insert(0, (by, given, None))
-    return [
-        Candidate(
-            name=name,
-            level=level,
-            raw=level + field.below,
-            inside=float(np.count_nonzero(field.values > level)) / field.values.size,
-            confidence=confidence,
-            is_chosen=index == 0,
+    below = float(under.mean(dtype=np.float64))
+
+    def candidate(
+        name: str, level: float, above: bool, confidence: float | None, setting: str, chosen: bool
+    ) -> Candidate:
+        inside = np.count_nonzero(field - under > level if above else field > level) / field.size
+        raw = level + below if above else level
+        return Candidate(name, level, above, raw, float(inside), confidence, chosen, setting)
+
+    ladder = () if found.levels is None else found.levels.ladder
+    value = chosen.value if isinstance(chosen, Level) else chosen
+    candidates = []
+    if value is not None:
+        name = "given" if found.levels is None else plan.settings.isovalue.criterion
+        if isinstance(chosen, Level) and name not in CRITERIA:
+            name = channel.rung or plan.settings.isovalue.rung
+        confidence = chosen.confidence if isinstance(chosen, Level) else None
+        setting = take(channel, value, found.subtracts) if found.levels is None else ""
+        candidates.append(candidate(name, value, found.subtracts, confidence, setting, True))
+    threshold = found.window.statistics.threshold
+    for other in find_other_levels(
+        plan,
+        channel,
+        ladder,
+        subtracts=False if found.levels is None else found.levels.subtracts,
+        taken=value,
+        threshold=None if threshold is None or found.doubt else threshold.value,
+    ):
+        candidates.append(
+            candidate(other.name, other.value, other.above, other.confidence, other.setting, False)
         )
-        for index, (name, level, confidence) in enumerate(levels)
-    ]
+    return candidates
 
 
 def _slices(
-    field: IsoField, candidates: Sequence[Candidate], window: tuple[float, float], plan: Plan
+    voxels: NDArray[np.generic],
+    field: NDArray[np.float32],
+    under: NDArray[np.float32],
+    candidates: Sequence[Candidate],
+    window: Window,
+    plan: Plan,
 ) -> list[Slice]:
     """Return the tile's mid-slices, windowed, with the candidates' contours."""
-    low, high = window
+    low, high = window.statistics.window
+    under = np.broadcast_to(under, field.shape)
     slices = []
     neurological = plan.settings.plan.neurological
     for view in views_of(plan.placement, is_neurological=neurological):
         order = view.order
-        k = field.values.shape[order[0]] // 2
-        voxels = field.volume.voxels.transpose(order)[k].astype(np.float32)
-        plane = field.values.transpose(order)[k]
+        k = field.shape[order[0]] // 2
+        shown = voxels.transpose(order)[k].astype(np.float32)
+        plane, below = (values.transpose(order)[k] for values in (field, under))
         slices.append(
             Slice(
                 view,
                 view.plane(
-                    np.round(np.clip((voxels - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+                    np.round(np.clip((shown - low) / (high - low), 0, 1) * 255).astype(np.uint8)
                 ),
                 (plan.spacing_um[order[1]], plan.spacing_um[order[2]]),
                 np.zeros((0, 2, 2)),
                 None,
                 # the chosen one last: on top
                 tuple(
-                    (COLORS.get(c.name, _OTHER), view.plane(plane - np.float32(c.level)))
-                    for c in reversed(candidates)
+                    (color, view.plane((plane - below if c.above else plane) - np.float32(c.level)))
+                    for c, color in reversed(list(zip(candidates, COLORS, strict=False)))
                 ),
             )
         )
@@ -194,62 +281,62 @@ def _slices(
 
 
 def _compose(
-    slices: Image.Image, title: str, candidates: Sequence[Candidate], chosen: IsoValue
+    slices: Image.Image, title: str, result: Preview, levels: ChannelLevels | None
 ) -> Image.Image:
-    """Return a picture of the slices, the criterion's curve below them, and a legend."""
+    """Return a picture of the slices, the channel's histogram below them, and a legend."""
+    candidates = result.candidates
     line = round(1.5 * _TEXT_PX)
     legend = 2 * _MARGIN_PX + line * (len(candidates) + 1)
-    width = max(slices.width, 520) + 2 * _MARGIN_PX
+    width = max(slices.width, 700) + 2 * _MARGIN_PX
     top = 2 * _MARGIN_PX + line
-    height = top + slices.height + _MARGIN_PX + _CHART_PX + legend
+    chart_px = 0 if levels is None else _CHART_PX
+    height = top + slices.height + _MARGIN_PX + chart_px + legend
     picture = Image.new("RGB", (width, height), _GROUND)
     draw, font = ImageDraw.Draw(picture), find_font(_TEXT_PX)
     draw.text((_MARGIN_PX, _MARGIN_PX), title, _CURVE, find_font(round(1.2 * _TEXT_PX)))
     picture.paste(slices, (_MARGIN_PX, top))
     chart = (_MARGIN_PX, top + slices.height + _MARGIN_PX, width - _MARGIN_PX)
-    _draw_curve(draw, chart, candidates, chosen)
-    y = chart[1] + _CHART_PX + _MARGIN_PX
-    for candidate in candidates:
-        draw.rectangle(
-            (_MARGIN_PX, y + 3, _MARGIN_PX + 22, y + 13), fill=COLORS.get(candidate.name, _OTHER)
-        )
+    if levels is not None:
+        _draw_histogram(draw, chart, candidates, levels)
+    y = chart[1] + chart_px + _MARGIN_PX
+    for candidate, color in zip(candidates, COLORS, strict=False):
+        draw.rectangle((_MARGIN_PX, y + 3, _MARGIN_PX + 22, y + 13), fill=color)
         sure = "" if candidate.confidence is None else f", confidence {candidate.confidence:.2f}"
         star = " *" if candidate.is_chosen else ""
+        above = f" above the background, {candidate.raw:.5g} raw" if candidate.above else ""
         words = (
-            f"{candidate.name}{star}: {candidate.level:.5g} above the background, "
-            f"{candidate.raw:.5g} raw, {candidate.inside:.2%} inside{sure}"
+            f"{candidate.name}{star}: {candidate.level:.5g}{above}, {candidate.inside:.2%} "
+            f"inside{sure}"
         )
         draw.text((_MARGIN_PX + 32, y), words, _CURVE, font)
         y += line
-    draw.text((_MARGIN_PX + 32, y), _note(candidates), _CURVE, font)
+    draw.text((_MARGIN_PX + 32, y), _note(result)[: width // 7], _CURVE, font)
     return picture
 
 
-def _draw_curve(
+def _draw_histogram(
     draw: ImageDraw.ImageDraw,
     chart: tuple[int, int, int],
     candidates: Sequence[Candidate],
-    chosen: IsoValue,
+    levels: ChannelLevels,
 ) -> None:
-    """Draw score over levels into the box (left, top, right), a line for each candidate."""
+    """Draw the channel's histogram into the box (left, top, right), a line for each candidate."""
     left, top, right = chart
     bottom = top + _CHART_PX - _TEXT_PX - 8
-    low, high = float(chosen.levels[0]), float(chosen.levels[-1])
-
-    def x_of(level: float) -> float:
-        return left + (right - left) * min(max((level - low) / (high - low), 0.0), 1.0)
-
+    values, heights = levels.curve()
+    if len(values) < 2:
+        return
+    along = np.linspace(left, right, len(values))
     draw.line((left, bottom, right, bottom), fill=_AXIS)
-    for candidate in reversed(candidates):
-        x = x_of(candidate.level)
-        draw.line((x, top, x, bottom), fill=COLORS.get(candidate.name, _OTHER), width=2)
-    points = [
-        (x_of(float(level)), bottom - (bottom - top) * float(score))
-        for level, score in zip(chosen.levels, chosen.score, strict=True)
-    ]
+    for candidate, color in reversed(list(zip(candidates, COLORS, strict=False))):
+        if candidate.above == levels.subtracts:
+            x = float(np.interp(candidate.level, values, along))
+            draw.line((x, top, x, bottom), fill=color, width=2)
+    points = [(x, bottom - (bottom - top) * y) for x, y in zip(along, heights, strict=True)]
     draw.line(points, fill=_CURVE, width=2)
     font = find_font(_TEXT_PX)
-    draw.text((left, bottom + 4), f"{low:.4g}", _AXIS, font)
-    draw.text((right, bottom + 4), f"{high:.4g}", _AXIS, font, anchor="ra")
+    draw.text((left, bottom + 4), f"{values[0]:.4g}", _AXIS, font)
+    draw.text((right, bottom + 4), f"{values[-1]:.4g}", _AXIS, font, anchor="ra")
     middle = (left + right) / 2
-    draw.text((middle, bottom + 4), "criterion over levels", _AXIS, font, anchor="ma")
+    words = "voxels of the whole channel over levels, closer together where they are high"
+    draw.text((middle, bottom + 4), words, _AXIS, font, anchor="ma")

@@ -35,23 +35,16 @@ def histogram(
     return _svg("histogram with transfer functions", parts)
 
 
-def criterion(
-    levels: Sequence[float], score: Sequence[float], *, taken: float | None, found: float | None
-) -> Markup:
-    """Return the criterion's curve over the levels (voxel values).
+def ladder(heights: Sequence[float], *, taken: Sequence[float], others: Sequence[float]) -> Markup:
+    """Return the histogram that levels are found on.
 
-    taken  the iso-value, marked `mark`; None: the tile has none of its own
-    found  the criterion's optimum, marked `found` where it wasn't taken; None: there is none
+    heights        up to 1, evenly along the axis
+    taken, others  places on the axis, 0..1: the surface's level, and levels that were found besides
     """
-    low, high = levels[0], levels[-1]
-    span = (high - low) or 1.0
-    at = (np.asarray(levels) - low) / span
-    parts = [f'<path class="curve" d="{_path(at, score)}"/>']
-    if found is not None and found != taken:
-        parts.append(_rule("found", (found - low) / span))
-    if taken is not None:
-        parts.append(_rule("mark", (taken - low) / span))
-    return _svg("criterion over levels", parts)
+    parts = [f'<path class="curve" d="{_path(np.linspace(0, 1, len(heights)), heights)}"/>']
+    parts += [_rule("found", place) for place in others]
+    parts += [_rule("mark", place) for place in taken]
+    return _svg("histogram with levels", parts)
 
 
 def threshold(

@@ -11,10 +11,9 @@ import numpy as np
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
-from stereocell.building.survey_file import AGAIN, ISO_VALUE, Survey, TileIso, read_survey
+from stereocell.building.survey_file import Survey, TileIso, read_survey
 from stereocell.building.unit_files import find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile
-from stereocell.storage.json_files import read_sealed
 from stereocell.storage.workspace import sizes_below
 
 PHASES = ("plan", "units", "stage", "bundle")
@@ -45,11 +44,9 @@ class UnitFacts:
     """One finished (tile, channel).
 
     directory   the folder of its results
-    iso_file    the criterion's curve, relative to OUT
-    iso_value   above the background, voxel values; None: the tile has none of its own
+    iso_value   above the background, voxel values; None: the channel has none
     background  its mean over the tile, voxel values; 0: none was subtracted
-    confidence  0..1
-    iso_reason  the reason why the criterion found nothing; empty: it found a value
+    confidence  0..1, of the tile by itself; None: nothing is there, or the level was given
     reason      the reason for a missing surface; empty: there is one
     voxels      (x, y, z) of the stored volume, with its apron
     volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
@@ -59,11 +56,9 @@ class UnitFacts:
     tile: Tile
     channel: Channel
     directory: Path
-    iso_file: str
     iso_value: float | None
     background: float
-    confidence: float
-    iso_reason: str
+    confidence: float | None
     reason: str
     lods: tuple[LodFacts, ...]
     voxels: tuple[int, int, int]
@@ -174,11 +169,9 @@ def _unit(
         tile=tile,
         channel=channel,
         directory=directory,
-        iso_file=found.file,
         iso_value=found.value,
         background=found.background,
         confidence=found.confidence,
-        iso_reason=found.reason,
         reason=record["reason"],
         lods=tuple(lods),
         voxels=(x, y, z),
@@ -204,11 +197,6 @@ def _lod(record: dict[str, Any], size: int) -> LodFacts:
         angle_deg=q and q["angle_deg"],
         enclosed=q and q["enclosed"],
     )
-
-
-def read_curve(out: Path, unit: UnitFacts) -> dict[str, Any]:
-    """Return the first pass's result of a unit: levels, score, found (none if constant)."""
-    return read_sealed(out / unit.iso_file, ISO_VALUE, AGAIN)
 
 
 def sum_up(units: Iterable[UnitFacts]) -> Total:

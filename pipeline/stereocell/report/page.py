@@ -15,20 +15,23 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
+from stereocell.building.other_levels import OtherLevel, find_other_levels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan, smoothed_plan
+from stereocell.building.plan import Channel, Plan
+from stereocell.building.survey_file import ChannelSurvey
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
+from stereocell.model.channel import SurfaceLevel
 from stereocell.model.identifiers import from_identifier
-from stereocell.model.lattice_field import LatticeField, make_iso_field
+from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.version import GENERATOR
 from stereocell.model.volume import zyx_to_xyz
-from stereocell.preview.draw_slices import cut_unit, draw_slices
+from stereocell.preview.draw_slices import Slice, cut_unit, draw_slices
 from stereocell.preview.views import View, views_of
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scenes
-from stereocell.report.facts import Facts, UnitFacts, gather, read_curve, sum_up
+from stereocell.report.facts import Facts, UnitFacts, gather, sum_up
 from stereocell.report.remarks import find_remarks
 from stereocell.report.select_units import choose_level, choose_units, thin_out
 from stereocell.report.texture_facts import compare, sum_up_maps
@@ -66,10 +69,9 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
     scenes = [_scene(facts, None), *(_scene(facts, tile) for tile in tiles)]
     with ThreadPoolExecutor(1) as pool:  # the meshes are drawn by another process meanwhile
         drawing = pool.submit(draw_scenes, scenes)
-        iso_fields = _iso_fields(facts)
         cards = [
             [
-                _card(out_folder, facts, units[key], iso_fields[key[1]])
+                _card(facts, units[key])
                 for channel in channels
                 if (key := (plan.tiles[tile].id, plan.channels[channel].id)) in units
             ]
@@ -140,20 +142,24 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
         found = facts.survey[channel.id]
         appearance, suggested = found.appearance, found.statistics.suggested
         units = [unit for unit in facts.units if unit.channel == channel]
-        values = [u.iso_value + u.background for u in units if u.iso_value is not None]
+        levels = [u.iso_value for u in units if u.iso_value is not None]
         rows.append(
             {
                 "name": channel.name,
                 "color": css_color(channel.color),
                 "window": appearance.window,
                 "iso_value": appearance.iso_value,
+                "level": None if appearance.level is None else appearance.level.words,
+                "reason": appearance.surface_reason,
                 "confidence": appearance.iso_confidence,
-                "surface": appearance.surface,
                 "repair": found.repair,
-                "spread": (min(values), max(values)) if values else None,
+                "spread": (min(levels), max(levels)) if levels else None,
+                "above": found.statistics.background is not None,
+                "ladder": _ladder(found),
+                "others": _others(facts, channel, found),
                 "arcs": len(suggested.shapes),
                 "no_arcs": suggested.reason,
-                "given": channel.name in facts.plan.settings.iso_values,
+                "given": not found.ladder,
                 "histogram": charts.histogram(
                     found.statistics.histogram,
                     appearance.transfer_functions,
@@ -196,41 +202,83 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
     return rows
 
 
-def _card(
-    out_folder: OutFolder, facts: Facts, unit: UnitFacts, iso: LatticeField | None
-) -> dict[str, Any]:
-    """Return what the page shows of one unit: its slices and its curve."""
-    plan = facts.plan
-    lattice = unit.tile.lattice(plan.region)
-    inner = slice(APRON, -APRON)
-    volume = load_volume(unit.directory)[inner, inner, inner]
-    statistics = facts.survey[unit.channel.id].statistics
-    surface_confidence = facts.survey[unit.channel.id].appearance.surface
-    low, high = statistics.window
-    slices = cut_unit(
-        volume,
-        lattice,
-        first_um=plan.position_um(lattice.start),
-        spacing_um=plan.spacing_um,
-        mesh=load_lods(unit.directory)[0].mesh if unit.lods else None,
-        sigma_um=float(smoothed_plan(plan, surface_confidence).settings.surface.smoothing_um),
-        iso_at=None
-        if iso is None
-        else partial(_in_eight_bits, iso, statistics.background, low, high),
-        views=_views(plan),
-    )
-    curve = read_curve(out_folder.out, unit)
-    levels, found = curve.get("levels"), curve.get("found")
+def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
+    """Return the histogram that the channel's levels were found on; None: the level was given."""
+    curve, level = found.curve, found.appearance.level
+    if curve is None or len(curve.values) < 2:
+        return None
+    along = np.linspace(0, 1, len(curve.values))
+    places = {one.value: float(np.interp(one.value, curve.values, along)) for one in found.ladder}
+    taken = [] if level is None else [float(np.interp(level.iso, curve.values, along))]
+    return {
+        "chart": charts.ladder(curve.heights, taken=taken, others=list(places.values())),
+        "ends": (curve.values[0], curve.values[-1]),
+        "rows": [
+            {
+                "level": one,
+                "doubt": one.doubt,
+                "taken": level is not None and one.value == level.iso,
+            }
+            for one in found.ladder
+        ],
+    }
+
+
+def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[str, Any]]:
+    """Return the next-best levels of a channel, each with a picture of a tile in the middle."""
+    middle = facts.plan.tiles[len(facts.plan.tiles) // 2]
+    unit = next(u for u in facts.units if u.tile == middle and u.channel == channel)
+    return [
+        {
+            "name": other.name,
+            "value": f"{other.value:.5g}{' above the background' if other.above else ''}",
+            "setting": other.setting,
+            "confidence": other.confidence,
+            "tile": middle.id,
+            "picture": _inline(Picture(*draw_slices(_cut(facts, unit, other)))),
+        }
+        for other in find_other_levels(
+            facts.plan,
+            channel,
+            found.ladder,
+            subtracts=found.statistics.background is not None,
+            taken=None if found.appearance.level is None else found.appearance.level.iso,
+            threshold=found.appearance.threshold,
+        )
+    ]
+
+
+def _card(facts: Facts, unit: UnitFacts) -> dict[str, Any]:
+    """Return what the page shows of one unit: its slices."""
     return {
         "unit": unit,
         "color": css_color(unit.channel.color),
-        "slices": _inline(Picture(*draw_slices(slices))),
-        "chart": charts.criterion(levels, curve["score"], taken=unit.iso_value, found=found)
-        if levels
-        else None,
-        "ends": (levels[0], levels[-1]) if levels else None,
-        "found": found,
+        "slices": _inline(Picture(*draw_slices(_cut(facts, unit)))),
     }
+
+
+def _cut(facts: Facts, unit: UnitFacts, other: OtherLevel | None = None) -> list[Slice]:
+    """Return a unit's slices with its surface, or with the contour of another level."""
+    plan = facts.plan
+    lattice = unit.tile.lattice(plan.region)
+    inner = slice(APRON, -APRON)
+    found = facts.survey[unit.channel.id]
+    low, high = found.statistics.window
+    iso = None if found.appearance.level is None else found.appearance.level.field
+    background = found.statistics.background
+    if other is not None:
+        iso = SurfaceLevel(other.value, None, 0.0).field
+        background = background if other.above else None
+    return cut_unit(
+        load_volume(unit.directory)[inner, inner, inner],
+        lattice,
+        first_um=plan.position_um(lattice.start),
+        spacing_um=plan.spacing_um,
+        mesh=load_lods(unit.directory)[0].mesh if unit.lods and other is None else None,
+        sigma_um=float(plan.settings.surface.smoothing_um),
+        iso_at=None if iso is None else partial(_in_eight_bits, iso, background, low, high),
+        views=_views(plan),
+    )
 
 
 def _views(plan: Plan) -> tuple[View, View, View]:
@@ -242,17 +290,6 @@ def _in_eight_bits(
 ) -> NDArray[np.float32]:
     level = iso.at(box) if background is None else iso.at(box) + background.at(box)
     return (np.broadcast_to(level, box.shape) - np.float32(low)) * np.float32(255 / (high - low))
-
-
-def _iso_fields(facts: Facts) -> dict[str, LatticeField | None]:
-    """Return the iso-value as the units took it, by channel id."""
-    return {
-        channel.id: make_iso_field(
-            facts.plan.tiles,
-            {tile: f.value for tile, f in facts.survey[channel.id].iso.items()},
-        )
-        for channel in facts.plan.channels
-    }
 
 
 def _scene(facts: Facts, tile: Tile | None) -> Scene:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stereocell.report.facts import Facts, UnitFacts
 
-LOW_CONFIDENCE = 0.2  # confidence, 0..1; a unit below gets a remark
+LOW_CONFIDENCE = 0.4  # confidence, 0..1; a channel below gets a remark
 LEAST_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
 _MOST_LINES = 30  # lines printed of one remark
 
@@ -22,50 +22,23 @@ class Remark:
 def find_remarks(facts: Facts) -> list[Remark]:
     """Return the remarks, most severe first."""
     units = facts.units
+    looks = {channel.name: facts.survey[channel.id].appearance for channel in facts.plan.channels}
     with_surface = {u.channel.name for u in units if not u.reason}
-    empty = [u for u in units if u.channel.name not in with_surface]
     whole = [
-        f"{name}: {next(u.iso_reason or u.reason for u in empty if u.channel.name == name)}"
-        for name in dict.fromkeys(u.channel.name for u in empty)
+        f"{name}: {look.surface_reason or 'no voxel lies above its level'}"
+        for name, look in looks.items()
+        if name not in with_surface
     ]
-    bare = [
-        f"{u.name}: {u.reason}" + (f" ({u.iso_reason})" if u.iso_reason else "")
-        for u in units
-        if u.reason and u.channel.name in with_surface
+    unsure = [
+        f"{name}: {look.iso_confidence:.2f} at {look.level.words}"
+        for name, look in looks.items()
+        if look.level is not None and look.iso_confidence < LOW_CONFIDENCE
     ]
-    doubtful = {
-        channel.name: appearance.iso_confidence
-        for channel in facts.plan.channels
-        if (appearance := facts.survey[channel.id].appearance).surface == "unclear"
-    }
-    built = [
-        f"{name}: confidence {confidence:.2f}, expected at least "
-        f"{facts.plan.settings.isovalue.min_confidence:g}; built all the same, at the levels "
-        "found, and smoothed"
-        for name, confidence in doubtful.items()
-    ]
-    own = [
-        f"{u.name}: {u.iso_reason}; built with the mean of the channel's other tiles"
-        for u in units
-        if u.iso_reason and not u.reason and u.channel.name not in doubtful
-    ]
-    unsure = sorted(
-        (
-            u
-            for u in units
-            if u.iso_value is not None
-            and u.confidence < LOW_CONFIDENCE
-            and u.channel.name not in doubtful
-        ),
-        key=lambda u: u.confidence,
-    )
+    bare = [f"{u.name}: {u.reason}" for u in units if u.reason and u.channel.name in with_surface]
     found = [
-        _remark("without a surface in any tile", whole, "channel"),
-        _remark("with no clear surface", built, "channel"),
-        _remark("without an iso-value of their own", own),
+        _remark("without a surface", whole, "channel"),
         _remark(
-            f"with low confidence in their iso-value (below {LOW_CONFIDENCE:g})",
-            [f"{u.name}: {u.confidence:.2f} at iso-value {u.iso_value:.5g}" for u in unsure],
+            f"with low confidence in their surface (below {LOW_CONFIDENCE:g})", unsure, "channel"
         ),
         _remark("without a surface, in channels that have some", bare, is_note=True),
         _remark(

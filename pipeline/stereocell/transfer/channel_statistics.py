@@ -1,17 +1,16 @@
 """What must be known of the whole dataset before any unit: windows, histograms, transfer functions.
 
 8 bits mean the same in every tile, so a channel's window comes from all of the region, on a coarse
-level, and so does its threshold. Iso-values are found per tile; transfer functions need their mean.
+level, and so does its threshold.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.channel import Appearance, SurfaceConfidence, TransferFunctions2d
+from stereocell.model.channel import Appearance, SurfaceLevel, TransferFunctions2d
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
@@ -83,22 +82,33 @@ def make_appearance(
     color: tuple[float, float, float],
     *,
     statistics: ChannelStatistics,
-    iso_values: Mapping[str, float | None],
+    level: SurfaceLevel | None,
     confidence: float,
-    surface: SurfaceConfidence,
+    doubt: str,
 ) -> Appearance:
-    """Return how a channel is drawn; iso-values by tile id, both confidences for all."""
-    known = [value for value in iso_values.values() if value is not None]
-    iso_value = float(np.mean(known)) if known else None
-    found = statistics.threshold
-    appearance = replace(
-        Appearance(name, color, statistics.window, iso_value, confidence, surface, {}),
-        threshold=None if found is None else found.value,
+    """Return how a channel is drawn; `level`: where its surface lies, else why there is none."""
+    iso_value, threshold = None, None
+    if level is not None:
+        below = 0.0 if level.background is None else float(level.background.values.mean())
+        iso_value = level.iso + below
+        # where nothing tells a surface from noise, peaks of the histogram are noise too
+        threshold = statistics.threshold
+    appearance = Appearance(
+        name,
+        color,
+        statistics.window,
+        iso_value,
+        confidence,
+        "none" if level is None else "clear",
+        {},
+        threshold=None if threshold is None else threshold.value,
+        surface_reason=doubt,
+        level=level,
     )
-    # a level that nothing tells from noise is no place for opacity to begin
-    level = appearance.iso_normalized if surface == "clear" else None
     functions = make_transfer_functions(
-        np.asarray(statistics.histogram), level, appearance.threshold_normalized
+        np.asarray(statistics.histogram),
+        appearance.iso_normalized,
+        appearance.threshold_normalized,
     )
     transfer_2d = statistics.suggested.transfer_2d
     for name_2d, shapes in transfer_2d.functions.items():

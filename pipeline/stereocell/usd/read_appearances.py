@@ -34,12 +34,29 @@ _VOLUME_WINDOW = "stereocell:volumeWindow"
 
 
 @dataclass(frozen=True, slots=True)
+class StatedLevel:
+    """Where a surface was made, see model.channel.SurfaceLevel.
+
+    iso           voxel values above the background
+    background    its least and largest value; None: there is none
+    smoothing_um  sigma of the Gaussian
+    """
+
+    iso: float
+    background: tuple[float, float] | None
+    smoothing_um: float
+
+
+@dataclass(frozen=True, slots=True)
 class ComposedAppearance:
     """One channel as the stage draws it; see model.channel.Appearance.
 
     window         the voxel values to be shown as 0 and 1
     volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
-    surface        how clear it is
+    surface        whether there is one
+    surface_reason  why there is none, or empty
+    level          where the surface lies above the background, which is left out here but for its
+                   ends; None: not stated
     chosen         a transfer function
     transfer_2d    those functions that are two-dimensional
     threshold      where the body begins, in voxel values; None: it is not known
@@ -56,6 +73,8 @@ class ComposedAppearance:
     transfer_functions: dict[str, OpacityPoints]
     transfer_2d: TransferFunctions2d
     threshold: float | None = None
+    surface_reason: str = ""
+    level: StatedLevel | None = None
 
     @property
     def iso_normalized(self) -> float | None:
@@ -137,7 +156,20 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         functions,
         TransferFunctions2d(functions=shapes, **read_numbers(prim)),
         _number(prim, "stereocell:threshold"),
+        str(prim.GetAttribute("stereocell:surfaceReason").Get() or ""),
+        _level(prim),
     )
+
+
+def _level(prim: Usd.Prim) -> StatedLevel | None:
+    iso, smoothing = (_number(prim, f"stereocell:level{name}") for name in ("Iso", "Smoothing"))
+    if iso is None:
+        return None
+    background = None
+    if prim.GetAttribute(name := "stereocell:levelBackground").Get() is not None:
+        low, high = (shortest(number) for number in numbers_of(prim, name, 2))
+        background = low, high
+    return StatedLevel(iso, background, smoothing or 0.0)
 
 
 def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:

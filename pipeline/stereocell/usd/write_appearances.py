@@ -15,11 +15,14 @@ tried (usd-core's validators refuse every shader that a renderer knows), and suc
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
+from stereocell.filters.denoise import MEDIAN_REACH, SMOOTHING_REACH
 from stereocell.formats.exr import write_lut
-from stereocell.model.channel import Appearance, OpacityPoints, Shapes
+from stereocell.model.channel import Appearance, OpacityPoints, Shapes, SurfaceLevel
+from stereocell.storage.json_files import write_json
 from stereocell.usd.layer import (
     CHANNEL_API,
     CHANNELS,
@@ -36,7 +39,10 @@ _Types = Sdf.ValueTypeNames
 
 
 def write_appearances(folder: Path, appearances: Sequence[Appearance]) -> None:
-    """Write channels.usda and <channel>_<function>.exr into `folder`. Raises OutputError."""
+    """Write channels.usda, <channel>_<function>.exr and <channel>_level.json into `folder`.
+
+    Raises OutputError.
+    """
     stage = new_stage(".usda", ROOT.name)
     stage.OverridePrim(ROOT)
     UsdGeom.Scope.Define(stage, CHANNELS)
@@ -45,6 +51,8 @@ def write_appearances(folder: Path, appearances: Sequence[Appearance]) -> None:
         _author_appearance(material, appearance)
         _author_surface(material, appearance)
         _author_functions(material.GetPrim(), appearance)
+        if appearance.level is not None:
+            write_json(folder / _level_name(appearance), level_to_json(appearance.level))
         for name, points in appearance.transfer_functions.items():
             write_lut(folder / _lut_name(appearance, name), points)
     export(stage.GetRootLayer(), folder / "channels.usda")
@@ -52,6 +60,37 @@ def write_appearances(folder: Path, appearances: Sequence[Appearance]) -> None:
 
 def _lut_name(appearance: Appearance, function: str) -> str:
     return f"{appearance.id}_{function}.exr"
+
+
+def _level_name(appearance: Appearance) -> str:
+    return f"{appearance.id}_level.json"
+
+
+def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
+    """Return all that is needed to find the surface again in the source's voxels."""
+    return {
+        "format": "stereocell-level",
+        "version": 1,
+        "about": "The surface lies where the denoised voxels are background + iso. Axes z, y, x; "
+        "knots in voxels of the level that was built, values linear between them.",
+        "iso": level.iso,
+        "iso_by_tile": None if level.by_tile is None else level.by_tile.to_json(),
+        "background": None if level.background is None else level.background.to_json(),
+        "denoising": {
+            "median_voxels": [1, 2 * MEDIAN_REACH + 1, 2 * MEDIAN_REACH + 1],
+            "gaussian_sigma_um": level.smoothing_um,
+            "gaussian_truncate": SMOOTHING_REACH,
+        },
+    }
+
+
+def _author_level(prim: Usd.Prim, level: SurfaceLevel, name: str) -> None:
+    set_attribute(prim, "stereocell:levelIso", _Types.Float, level.iso)
+    set_attribute(prim, "stereocell:levelSmoothing", _Types.Float, level.smoothing_um)
+    set_attribute(prim, "stereocell:levelFile", _Types.String, f"./{name}")
+    if level.background_range is not None:
+        span = Gf.Vec2f(*level.background_range)
+        set_attribute(prim, "stereocell:levelBackground", _Types.Float2, span)
 
 
 def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> None:
@@ -63,6 +102,11 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*appearance.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, appearance.iso_confidence)
     set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, appearance.surface)
+    if appearance.surface_reason:
+        reason = appearance.surface_reason
+        set_attribute(prim, "stereocell:surfaceReason", _Types.String, reason)
+    if appearance.level is not None:
+        _author_level(prim, appearance.level, _level_name(appearance))
     write_numbers(prim, appearance.transfer_2d)
     if appearance.painted_by:
         set_attribute(

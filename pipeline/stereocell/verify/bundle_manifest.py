@@ -56,6 +56,7 @@ def _compare_channel(
     away = max(abs(a - b) for a, b in zip(appearance.color, channel["color"], strict=True))
     if away > COLOR_STEP:
         yield f"{appearance.id}: color is {channel['color']}, the stage's {list(appearance.color)}"
+    level = appearance.level
     expected = {
         "name": appearance.name,
         "window": list(appearance.window),
@@ -63,6 +64,8 @@ def _compare_channel(
         "iso_normalized": appearance.iso_normalized,
         "threshold_normalized": appearance.threshold_normalized,
         "surface": "none" if channel["tileset"] is None else appearance.surface,
+        "surface_reason": appearance.surface_reason,
+        "level": None if level is None else json.loads(json.dumps(asdict(level))),
         "transfer_function": appearance.chosen,
         "transfer_functions": list(appearance.transfer_functions),
     }

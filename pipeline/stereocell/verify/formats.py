@@ -19,7 +19,7 @@ from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
 from stereocell.building.out_folder import SURVEY, OutFolder
 from stereocell.building.phases import digest_of_manifest
-from stereocell.building.survey_file import ISO_VALUE, WINDOW
+from stereocell.building.survey_file import EVIDENCE, SOLIDS, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST
 from stereocell.formats.exr import check_exr
@@ -134,13 +134,16 @@ def _check_units(out_folder: OutFolder) -> str:
 
 
 def _spoilt_survey(out_folder: OutFolder) -> list[str]:
-    """Return the faults of the survey, and of its files of windows and iso-values."""
+    """Return the faults of the survey, and of its files of windows and levels."""
     survey = find_sealed(out_folder.survey_file, SURVEY)
     if survey is None:
         return [_fault_of(out_folder, out_folder.survey_file)]
     channels = survey["channels"].values()
     files = {channel["statistics_file"]: WINDOW for channel in channels}
-    files |= {tile["file"]: ISO_VALUE for channel in channels for tile in channel["iso"].values()}
+    schemas = {"evidence": EVIDENCE, "solids": SOLIDS}
+    for channel in channels:
+        for tile in channel["iso"].values():
+            files |= {file: schemas[what] for what, file in tile["files"].items()}
     spoilt = [name for name in files if find_sealed(out_folder.out / name, files[name]) is None]
     return [_fault_of(out_folder, out_folder.out / name) for name in spoilt]
 

@@ -20,6 +20,8 @@ const MANIFEST = {
       iso_normalized: null,
       threshold_normalized: null,
       surface: "none",
+      surface_reason: "",
+      level: null,
       transfer_function: "default",
       transfer_functions: ["default"],
       transfer_functions_2d: { names: [], file: FILE },

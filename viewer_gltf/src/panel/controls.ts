@@ -196,6 +196,8 @@ export type Group = Readonly<{
   id: string;
   label: string;
   tags: readonly string[];
+  /** What the tags mean, in a sentence; empty: nothing more. */
+  about: string;
   controls: readonly Control[];
   more: readonly Control[];
   isOpen: boolean;

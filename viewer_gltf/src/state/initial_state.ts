@@ -49,7 +49,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       transfer2d: null,
       shapes: {},
       hasSurface: channel.tileset !== null,
-      prefersVolume: channel.surface === "unclear",
+      surfaceReason: channel.surface_reason,
     })),
     tiles: manifest.tiles.map((tile) => ({
       id: tile.id,

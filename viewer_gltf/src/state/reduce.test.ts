@@ -17,7 +17,9 @@ import { MAX_CHANNELS, type Representation, type ViewerState } from "./viewer_st
 
 function unclear(given: Manifest, ...indices: number[]): Manifest {
   const channels = given.channels.map((channel, i) =>
-    indices.includes(i) ? { ...channel, surface: "unclear" as const } : channel,
+    indices.includes(i)
+      ? { ...channel, surface_reason: "no clear surface: all is noise" }
+      : channel,
   );
   return { ...given, channels };
 }

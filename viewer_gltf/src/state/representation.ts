@@ -33,6 +33,11 @@ export function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string 
   return state.selected ?? focusTiles.focusTile;
 }
 
+/** Whether a channel is drawn as a volume wherever that is possible. */
+function prefersVolume(channel: ChannelState): boolean {
+  return channel.surfaceReason !== "";
+}
+
 /** How a channel is drawn in a tile, once all has arrived; null: not at all. */
 export function representationOf(
   state: ViewerState,
@@ -44,7 +49,7 @@ export function representationOf(
   if (!channel.volume || state.mode === "off") return "mesh";
   if (state.mode === "stage" && tile.representation !== "mesh") return tile.representation;
   if (isTraced(state) || isMarched(state, tile.id, focusTiles)) return "volume";
-  if (!channel.prefersVolume) return "mesh";
+  if (!prefersVolume(channel)) return "mesh";
   const isSmall = state.tiles.length <= VOLUME_TILES_AT_START;
   return isSmall || tile.id === (focusTileOf(state, focusTiles) ?? state.middle) ? "volume" : null;
 }
@@ -66,7 +71,7 @@ function isMarched(state: ViewerState, tile: string, focusTiles: FocusTiles): bo
 
 /** Whether a channel's volumes show in the disc alone. */
 export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
-  return state.mode === "disc" && !channel.prefersVolume;
+  return state.mode === "disc" && !prefersVolume(channel);
 }
 
 /** The tiles that are marched, those in the disc first. */
@@ -97,7 +102,7 @@ export function wantedTiles(state: ViewerState, focusTiles: FocusTiles): readonl
 export function wantsSurface(state: ViewerState, channel: ChannelState): boolean {
   if (!channel.shown) return false;
   if (channel.volume && isTraced(state)) return false;
-  if (!channel.volume || !channel.prefersVolume || state.mode === "off") return true;
+  if (!channel.volume || !prefersVolume(channel) || state.mode === "off") return true;
   return state.mode === "stage" && state.tiles.some((tile) => tile.representation === "both");
 }
 
@@ -110,6 +115,6 @@ export function takenFrom(
   presence: number,
 ): number | null {
   const as = representationOf(state, channel, tile, focusTiles);
-  if (as === null || (as === "volume" && (channel.prefersVolume || isTraced(state)))) return null;
+  if (as === null || (as === "volume" && (prefersVolume(channel) || isTraced(state)))) return null;
   return as === "both" ? 0 : presence;
 }

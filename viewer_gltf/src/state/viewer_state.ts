@@ -31,8 +31,8 @@ export type ChannelState = Functions &
     /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
     window: readonly [number, number];
     hasSurface: boolean;
-    /** Its surface is as noise: as long as the volume is on, no surface is drawn. */
-    prefersVolume: boolean;
+    /** Why the build made no surface: its volume is drawn from afar too. Empty: it made one. */
+    surfaceReason: string;
   }>;
 
 export type Representation = Manifest["tiles"][number]["representation"];

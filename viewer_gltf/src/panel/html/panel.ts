@@ -71,6 +71,7 @@ function makeGroup(first: Group, send: Send): Widget<Group> {
       name.title = group.label;
       if (canOpen) name.ariaExpanded = String(group.isOpen);
       setText(tags, group.tags.join(", "));
+      tags.title = group.about;
       always.update(group.controls);
       more.root.hidden = !group.isOpen;
       more.update(group.isOpen ? group.more : []);

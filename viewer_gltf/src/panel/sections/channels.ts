@@ -20,9 +20,9 @@ const WINDOW_STEPS = 255;
 /** The voxel values of the source that are 0 and 255 in the volumes, by channel. */
 export type Ranges = ReadonlyMap<string, readonly [number, number]>;
 
-function tagsOf({ hasSurface, prefersVolume }: ChannelState): string[] {
-  if (!hasSurface) return ["no surface"];
-  return prefersVolume ? ["no clear surface"] : [];
+function tagsOf({ hasSurface, surfaceReason }: ChannelState): string[] {
+  if (surfaceReason !== "") return [surfaceReason.split(":", 1)[0]];
+  return hasSurface ? [] : ["no surface"];
 }
 
 function shownToggle({ id, name, shown }: ChannelState): Control {
@@ -58,6 +58,7 @@ function cardOf(
     id,
     label: name,
     tags: tagsOf(channel),
+    about: channel.surfaceReason,
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
     controls: [
@@ -138,6 +139,7 @@ function addingOf(state: ViewerState, view: PanelView): readonly (Control | Grou
       id: channel.id,
       label: channel.name,
       tags: tagsOf(channel),
+      about: channel.surfaceReason,
       controls: [shownToggle(channel)],
       more: [],
       isOpen: false,

@@ -21,6 +21,7 @@ function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelVi
     id,
     label: name,
     tags: [],
+    about: "",
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
     controls: [controlOf(color, state), controlOf(isOn, state)],

@@ -56,6 +56,8 @@ const MANIFEST: Manifest = {
       iso_normalized: null,
       threshold_normalized: null,
       surface: "clear",
+      surface_reason: "",
+      level: null,
       transfer_function: "linear",
       transfer_functions: ["linear"],
       transfer_functions_2d: { names: [], file: FILE },

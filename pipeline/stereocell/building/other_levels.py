@@ -1,0 +1,116 @@
+"""The levels that a channel's surface could lie at instead, each with the setting that takes it."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from stereocell.building.plan import Channel, Plan
+from stereocell.isosurface.channel_level import Level
+from stereocell.isosurface.options import ADAPTIVE, RUNGS
+
+MOST = 3
+_ASIDE = 0.25  # share of the contrast by which a level is moved where the ladder has no other
+_ALIKE = 0.03  # share of the contrast: levels nearer to one another are one
+
+
+@dataclass(frozen=True, slots=True)
+class OtherLevel:
+    """One level.
+
+    name        what it is: `inner`, `adaptive`, `a little lower`
+    value       of the denoised voxels, or of those above the background
+    above       whether it counts from the background
+    setting     the flag that takes it
+    confidence  0..1; None: not judged
+    """
+
+    name: str
+    value: float
+    above: bool
+    setting: str
+    confidence: float | None
+
+
+def find_other_levels(
+    plan: Plan,
+    channel: Channel,
+    ladder: Sequence[Level],
+    *,
+    subtracts: bool,
+    taken: float | None,
+    threshold: float | None,
+) -> list[OtherLevel]:
+    """Return the next-best levels, at most MOST, best first; none for a channel without a ladder.
+
+    ladder     all levels that were found; `subtracts`: above the background
+    taken      the surface's level; None: there is no surface
+    threshold  the adaptive one, voxel value; None: there is none
+
+    First the ladder's other rungs, clear ones before doubtful ones, then the adaptive threshold,
+    then levels a little lower and higher.
+    """
+    if not ladder:
+        return []
+    levels = [*_rungs(channel, ladder, subtracts)]
+    if threshold is not None and plan.settings.isovalue.criterion != ADAPTIVE:
+        flag = f"--iso-criterion {ADAPTIVE}"
+        levels.append(OtherLevel(ADAPTIVE, threshold, False, flag, None))
+    levels += _aside(channel, ladder, taken, subtracts)
+    contrast = max(level.contrast for level in ladder)
+    chosen: list[OtherLevel] = []
+    for level in levels:
+        near = [one.value for one in chosen if one.above == level.above]
+        if taken is not None and level.above == subtracts:
+            near.append(taken)
+        if all(abs(level.value - value) > _ALIKE * contrast for value in near):
+            chosen.append(level)
+    return chosen[:MOST]
+
+
+def take(channel: Channel, value: float, above: bool) -> str:
+    """Return the flag that takes a level."""
+    return "--iso-value " + shlex.quote(f"{channel.name}={value:.5g}{'+b' if above else ''}")
+
+
+def _rungs(channel: Channel, ladder: Sequence[Level], subtracts: bool) -> list[OtherLevel]:
+    clear = [level for place, level in enumerate(ladder) if _is_rung(ladder, place)]
+    doubtful = [level for level in ladder if level not in clear]
+    named = [
+        OtherLevel(
+            name,
+            clear[place].value,
+            subtracts,
+            "--surfaces " + shlex.quote(f"{channel.base or channel.name}={name}"),
+            clear[place].confidence,
+        )
+        for name, place in RUNGS.items()
+        if place < len(clear)
+    ]
+    doubtful.sort(key=lambda level: -level.confidence)
+    return named + [
+        OtherLevel(
+            "doubtful",
+            level.value,
+            subtracts,
+            take(channel, level.value, subtracts),
+            level.confidence,
+        )
+        for level in doubtful
+    ]
+
+
+def _is_rung(ladder: Sequence[Level], place: int) -> bool:
+    within = any(level.is_clear for level in ladder[:place])
+    return ladder[place].is_clear or (within and ladder[place].is_clear_within)
+
+
+def _aside(
+    channel: Channel, ladder: Sequence[Level], taken: float | None, subtracts: bool
+) -> list[OtherLevel]:
+    best = max(ladder, key=lambda level: level.confidence)
+    start = best.value if taken is None else taken
+    return [
+        OtherLevel(name, value, subtracts, take(channel, value, subtracts), None)
+        for name, share in (("a little lower", -_ASIDE), ("a little higher", _ASIDE))
+        for value in [start + share * best.contrast]
+    ]

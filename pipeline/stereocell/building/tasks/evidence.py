@@ -1,0 +1,129 @@
+"""Gather what one (tile, channel) tells about its channel's level, on a worker. Picklable."""
+
+import base64
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.open_source import SourceRef, open_source
+from stereocell.filters.denoise import denoise
+from stereocell.isosurface.edge_criteria import EdgeSums
+from stereocell.isosurface.level_evidence import (
+    HALO,
+    Counting,
+    Sums,
+    TileEvidence,
+    denoising_reach,
+    find_padding,
+    gather_evidence,
+)
+from stereocell.isosurface.options import CRITERIA
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tiling import Box
+from stereocell.storage.json_files import write_sealed
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceTask:
+    """One tile of a channel.
+
+    box, region  voxels of the level: the tile, and what is built
+    background   near the tile, voxel values; None: none is tried
+    criterion    the name of one that scores edges; empty: none does
+    """
+
+    ref: SourceRef
+    level: int
+    channel: int
+    box: Box
+    region: Box
+    smoothing_um: float
+    counting: Counting
+    background: LatticeField | None
+    criterion: str
+
+
+def measure_evidence(task: EvidenceTask) -> TileEvidence:
+    """Read a tile with its halo, and return its evidence."""
+    dataset = open_source(task.ref)
+    spacing = dataset.levels[task.level].spacing_um
+    reach = denoising_reach(task.smoothing_um, spacing)
+    z, y, x = (r + h for r, h in zip(reach, HALO, strict=True))
+    window = task.box.grown((z, y, x), task.region)
+    volume = dataset.read(task.channel, window, task.level)
+    inner_z, inner_y, inner_x = (
+        slice(a - start, b - start)
+        for a, b, start in zip(task.box.start, task.box.stop, window.start, strict=True)
+    )
+    return gather_evidence(
+        denoise(volume, task.smoothing_um),
+        find_padding(volume.voxels, task.counting.darkest, reach),
+        (inner_z, inner_y, inner_x),
+        spacing_um=spacing,
+        counting=task.counting,
+        background=None if task.background is None else task.background.at(window),
+        criterion=CRITERIA.get(task.criterion),
+    )
+
+
+def write_evidence(task_and_file: tuple[EvidenceTask, Path]) -> None:
+    """Measure a tile's evidence and write it."""
+    task, file = task_and_file
+    write_sealed(file, evidence_to_json(measure_evidence(task)))
+
+
+def evidence_to_json(evidence: TileEvidence) -> dict[str, Any]:
+    """Return a tile's evidence as texts and numbers."""
+    edges = evidence.edges
+    return {
+        "plain": _sums_to_json(evidence.plain),
+        "padding": _sums_to_json(evidence.padding),
+        "above": None if evidence.above is None else _sums_to_json(evidence.above),
+        "differences": _pack(evidence.differences),
+        "edges": None
+        if edges is None
+        else [
+            None if one is None else {"areas": _pack(one.areas), "totals": _pack(one.totals)}
+            for one in edges
+        ],
+    }
+
+
+def evidence_from_json(content: Mapping[str, Any]) -> TileEvidence:
+    """Return the evidence that `evidence_to_json` was given; `content` has passed its schema."""
+    edges = content["edges"]
+    plain, above = (
+        None if one is None else EdgeSums(_unpack(one["areas"]), _unpack(one["totals"]))
+        for one in edges or (None, None)
+    )
+    return TileEvidence(
+        _sums_from_json(content["plain"]),
+        _sums_from_json(content["padding"]),
+        None if content["above"] is None else _sums_from_json(content["above"]),
+        _unpack(content["differences"]).astype(np.int64),
+        None if plain is None else (plain, above),
+    )
+
+
+def _sums_to_json(sums: Sums) -> dict[str, str]:
+    names = ("counts", "slopes", "squares")
+    return {name: _pack(getattr(sums, name)) for name in names}
+
+
+def _sums_from_json(content: Mapping[str, str]) -> Sums:
+    slopes, squares = (_unpack(content[name]) for name in ("slopes", "squares"))
+    return Sums(_unpack(content["counts"]).astype(np.int64), slopes, squares)
+
+
+def _pack(values: NDArray[Any]) -> str:
+    """Return numbers as text: little-endian float64 by zlib, in base64. Counts are exact in it."""
+    return base64.b64encode(zlib.compress(values.astype("<f8").tobytes(), 6)).decode()
+
+
+def _unpack(text: str) -> NDArray[np.float64]:
+    return np.frombuffer(zlib.decompress(base64.b64decode(text)), "<f8").astype(np.float64)

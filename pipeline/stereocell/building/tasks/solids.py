@@ -1,0 +1,44 @@
+"""Sum up the solids of one (tile, channel) at its level, on a worker. Picklable."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from stereocell.building.open_source import SourceRef, open_source
+from stereocell.filters.denoise import denoise
+from stereocell.isosurface.repair_rules import sum_components
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tiling import Box
+from stereocell.storage.json_files import write_sealed
+
+
+@dataclass(frozen=True, slots=True)
+class SolidsTask:
+    """One tile of a channel.
+
+    iso              the tile's level, above the background, voxel values
+    background       near the tile, voxel values; None: none is subtracted
+    min_diagonal_um  smaller solids are left out
+    """
+
+    ref: SourceRef
+    level: int
+    channel: int
+    box: Box
+    smoothing_um: float
+    iso: float
+    background: LatticeField | None
+    min_diagonal_um: float
+
+
+def write_solids(task_and_file: tuple[SolidsTask, Path]) -> None:
+    """Sum up a tile's solids and write the sums."""
+    task, file = task_and_file
+    volume = open_source(task.ref).read(task.channel, task.box, task.level)
+    field = denoise(volume, task.smoothing_um)
+    if task.background is not None:
+        field -= task.background.at(task.box)
+    inside = field > np.float32(task.iso)
+    found = sum_components(inside, volume.spacing_um, task.min_diagonal_um)
+    write_sealed(file, {"solids": asdict(found)})

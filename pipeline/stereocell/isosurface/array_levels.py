@@ -1,0 +1,79 @@
+"""The levels of a volume that fits into memory, in one call: for a notebook or a script."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.filters.background import find_background
+from stereocell.filters.denoise import denoise
+from stereocell.isosurface.channel_level import ChannelLevels, find_levels
+from stereocell.isosurface.level_evidence import (
+    MOST_PADDING,
+    Counting,
+    denoising_reach,
+    find_padding,
+    gather_evidence,
+)
+from stereocell.isosurface.level_histogram import Scale
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+
+_BODIES = ("CT", "MR")
+_BLOCK = 64  # finest voxels: blocks of the background, as `surface.background_um` has them
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayLevels:
+    """The levels of one volume.
+
+    below   mean of the background that is subtracted, voxel values; 0: none is
+    field   float32 (z, y, x), voxel values: denoised, and above the background if
+            `levels.subtracts`; a surface lies where it has the value of a level
+    levels  `levels.clear` are those that a surface can be relied on at, outermost first
+    """
+
+    field: NDArray[np.float32]
+    levels: ChannelLevels
+    below: float
+
+
+def find_array_levels(
+    volume: Volume, *, smoothing_um: float | None = None, modality: str = ""
+) -> ArrayLevels:
+    """Return the levels of a volume as a build of it finds them.
+
+    volume        voxels (z, y, x) of any number type
+    smoothing_um  sigma of the Gaussian; None: the finest spacing
+    modality      DICOM's code; of CT and MR no background is subtracted
+
+    >>> z, y, x = np.mgrid[:32, :32, :32] - 15.5
+    >>> ball = np.where(z**2 + y**2 + x**2 < 100, 1000, 100).astype(np.uint16)
+    >>> noisy = ball + np.random.default_rng(0).normal(0, 20, ball.shape)
+    >>> found = find_array_levels(Volume(noisy.astype(np.float32), (1.0, 1.0, 1.0)))
+    >>> 400 < found.levels.clear[0].value < 700
+    True
+    """
+    spacing, voxels = volume.spacing_um, volume.voxels
+    sigma = min(spacing) if smoothing_um is None else smoothing_um
+    field = denoise(volume, sigma)
+    darkest: float | None = float(voxels.min())
+    padding = find_padding(voxels, darkest, denoising_reach(sigma, spacing))
+    if padding.mean() > MOST_PADDING:
+        padding[...], darkest = False, None
+    scale, scale_above, under = Scale.of(voxels, padding), None, None
+    if modality not in _BODIES:
+        whole = Box((0, 0, 0), voxels.shape)
+        lattice = find_background(
+            voxels, whole, spacing_um=spacing, block_um=_BLOCK * min(spacing), padding=padding
+        )
+        under, scale_above = lattice.at(whole), scale.above(lattice)
+    counting = Counting(scale, scale_above, darkest)
+    z, y, x = (slice(0, n) for n in voxels.shape)
+    evidence = gather_evidence(
+        field, padding, (z, y, x), spacing_um=spacing, counting=counting, background=under
+    )
+    levels = find_levels([evidence], counting=counting, finest_um=min(spacing), modality=modality)
+    if not levels.subtracts or under is None:
+        return ArrayLevels(field, levels, 0.0)
+    return ArrayLevels(field - under, levels, float(under.mean(dtype=np.float64)))

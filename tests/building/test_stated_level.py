@@ -1,0 +1,229 @@
+"""The level as a build states it: one a channel, and enough to find the surface again."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pxr import Usd
+from scipy import ndimage
+from skimage.measure import marching_cubes
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.unit_files import load_lods
+from stereocell.cli.__main__ import main
+from stereocell.report.facts import gather
+from stereocell.report.remarks import find_remarks
+from support import phantoms
+
+SPACING = (2.0, 1.0, 1.0)
+SHAPE = (20, 64, 96)
+NAMES = ("uneven", "noise", "flat", "even")
+SETTINGS = """
+[surface]
+alpha_um = 0.0
+max_fragment_um = 0.0
+min_diagonal_um = 4.0
+max_cavity_um = 0.0
+"""
+
+
+def _voxels() -> NDArray[np.uint16]:
+    """Return balls on a ground that rises, noise alone, one value, balls on an even ground."""
+    rng = np.random.default_rng(0)
+    field = np.zeros(SHAPE, np.float32)
+    for y in (16.0, 46.0):
+        for x in (14.0, 46.0, 80.0):
+            field += phantoms.blurred_ball(SHAPE, SPACING, (19.0, y, x), 8.0, 1.0)
+    rise = 200 + 400 * np.arange(SHAPE[2]) / SHAPE[2]
+    noise = ndimage.gaussian_filter(rng.normal(size=SHAPE), 1.0)
+    return np.stack(
+        [
+            (rise + 300 * field + rng.normal(0, 6, SHAPE)).round().astype(np.uint16),
+            np.rint(1000 + 200 * noise / noise.std()).astype(np.uint16),
+            np.full(SHAPE, 7, np.uint16),
+            phantoms.as_counts(field, 100, 1100, noise=10.0),
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return phantoms.write_ome_zarr(
+        tmp_path_factory.mktemp("stated") / "four.ome.zarr",
+        [_voxels()],
+        "czyx",
+        scales=[{"c": 1.0, **dict(zip("zyx", SPACING, strict=True))}],
+        channels=[{"label": name, "color": "FFFFFF"} for name in NAMES],
+    )
+
+
+@pytest.fixture(scope="module")
+def out(source: Path) -> Path:
+    settings = source.parent / "settings.toml"
+    settings.write_text(SETTINGS)
+    flags = ["-o", str(source.parent / "out"), "--grid", "3x2", "--workers", "0"]
+    assert main(["build", str(source), *flags, "--config", str(settings)]) == 0
+    return source.parent / "out"
+
+
+def _stated(out: Path, channel: str) -> dict[str, Any]:
+    """Return the file that the stage names, found as another program would."""
+    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
+    prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")
+    name = prim.GetAttribute("stereocell:levelFile").Get()
+    content: dict[str, Any] = json.loads((out / "stage" / "looks" / name).read_text())
+    assert content["iso"] == pytest.approx(prim.GetAttribute("stereocell:levelIso").Get())
+    return content
+
+
+def _again(voxels: NDArray[np.uint16], stated: dict[str, Any]) -> NDArray[np.float64]:
+    """Return the denoised voxels above the level, by scipy alone, from what the file says."""
+    denoising = stated["denoising"]
+    field = ndimage.median_filter(voxels, denoising["median_voxels"], mode="nearest")
+    sigma = denoising["gaussian_sigma_um"] / np.array(SPACING)
+    truncate = denoising["gaussian_truncate"]
+    field = ndimage.gaussian_filter(
+        field.astype(np.float64), sigma, mode="nearest", truncate=truncate
+    )
+    if stated["background"] is not None:
+        values = np.array(stated["background"]["values"])
+        for axis, centres in enumerate(stated["background"]["centres"]):
+            at = np.interp(np.arange(SHAPE[axis]), centres, np.arange(len(centres)))
+            low = np.minimum(at.astype(int), max(len(centres) - 2, 0))
+            high = np.minimum(low + 1, len(centres) - 1)
+            share = (at - low).reshape([-1 if k == axis else 1 for k in range(3)])
+            values = np.take(values, low, axis) * (1 - share) + np.take(values, high, axis) * share
+        field -= values
+    return field - stated["iso"]
+
+
+@pytest.mark.parametrize("channel", ["uneven", "even"])
+def test_scikit_image_finds_the_surface_where_the_stage_says(out: Path, channel: str) -> None:
+    stated = _stated(out, channel)
+    assert (stated["background"] is None) == (channel == "even")
+    above = _again(_voxels()[NAMES.index(channel)], stated)
+    theirs = marching_cubes(np.pad(above, 1, constant_values=-1e3), 0.0)[0] - 1  # voxels (z, y, x)
+    theirs = theirs[((theirs > 1) & (theirs < np.array(SHAPE) - 2)).all(axis=1)]
+    folder = OutFolder(out)
+    ours = np.concatenate(
+        [
+            load_lods(folder.unit_dir(*unit.split("/"), key))[0].mesh.positions
+            for unit, key in folder.index().items()
+            if unit.endswith(f"/{channel}") and load_lods(folder.unit_dir(*unit.split("/"), key))
+        ]
+    ).astype(np.float64)
+    ours = np.stack([ours[:, 2], -ours[:, 1], ours[:, 0]], axis=1) / SPACING
+    ours = ours[((ours > 1) & (ours < np.array(SHAPE) - 2)).all(axis=1)]
+    # the field at our vertices, over its slope: how far they lie from the level, in voxels
+    slopes = np.gradient(above)
+    value, *slope = (ndimage.map_coordinates(one, ours.T, order=1) for one in (above, *slopes))
+    away = np.abs(value) / np.linalg.norm(slope, axis=0)
+    assert len(ours) > 500
+    assert np.percentile(away, 95) < 0.1
+    # and all of theirs has some of ours nearby: nothing is missing
+    from scipy.spatial import cKDTree
+
+    assert cKDTree(ours).query(theirs)[0].max() < 3
+
+
+def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> None:
+    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+    remarks = {r.title: r.lines for r in find_remarks(gather(OutFolder(out)))}
+    reasons = {}
+    for channel in manifest["channels"]:
+        prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel['id']}")
+        has_surface = channel["name"] in ("uneven", "even")
+        assert channel["surface"] == ("clear" if has_surface else "none")
+        assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == channel["surface"]
+        assert (channel["tileset"] is None) == (not has_surface)
+        assert (channel["level"] is None) == (not has_surface)
+        assert channel["volumes"]  # what there is can be seen all the same
+        reason = prim.GetAttribute("stereocell:surfaceReason").Get() or ""
+        assert channel["surface_reason"] == reason
+        assert bool(reason) != has_surface
+        if reason:
+            assert reason.startswith("no clear surface: ")
+            reasons[channel["name"]] = reason
+    assert remarks["2 channels without a surface"] == tuple(
+        f"{name}: {reason}" for name, reason in reasons.items()
+    )
+    uneven = next(c for c in manifest["channels"] if c["name"] == "uneven")
+    low, high = uneven["level"]["background"]
+    assert 150 < low < 300 < 450 < high < 650
+    assert 100 < uneven["level"]["iso"] < 200
+
+
+def test_all_tiles_have_the_channel_s_level_and_say_what_they_hold(out: Path) -> None:
+    for name, channel in OutFolder(out).survey().items():
+        values = {tile["value"] for tile in channel["iso"].values()}
+        assert len(values) == 1, name
+        assert (values == {None}) == (name in ("noise", "flat"))
+
+
+def test_a_value_above_the_background_is_that_of_the_build(
+    source: Path, out: Path, tmp_path: Path
+) -> None:
+    iso = _stated(out, "uneven")["iso"]
+    settings = str(source.parent / "settings.toml")
+    flags = ["--grid", "3x2", "--channels", "uneven", "--config", settings]
+    given = [*flags, "--iso-value", f"uneven={iso!r}+b"]
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), *given]) == 0
+    assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
+    found = OutFolder(tmp_path / "out").index()
+    ours = {unit: key for unit, key in OutFolder(out).index().items() if unit.endswith("/uneven")}
+    assert found == ours  # the same keys: the very same surfaces
+
+
+def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
+    flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
+    surfaces = ["--surfaces", "even=outer,800"]
+    assert main(["build", str(source), *flags, *surfaces]) == 0
+    manifest = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text())
+    outer, inner = manifest["channels"]
+    assert (outer["name"], inner["name"]) == ("even outer", "even 800")
+    assert outer["level"]["iso"] < inner["level"]["iso"] == 800
+    assert outer["triangles"][0] > 0 < inner["triangles"][0]
+    assert outer["color"] != inner["color"]
+    # the voxels are read and counted once for both
+    windows = list((tmp_path / "out" / "units").glob("window-*.json"))
+    assert len(windows) <= 2
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "message"),
+    [
+        ("even=outer,outer", "--surfaces even: found outer,outer, expected each once"),
+        ("even=skin", "--surfaces even: found 'skin', expected outer, inner, third or voxel"),
+        ("odd=outer", "--surfaces names channel 'odd', expected one of uneven"),
+    ],
+)
+def test_a_surface_that_is_none_is_one_clear_line(
+    source: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    surfaces: str,
+    message: str,
+) -> None:
+    flags = ["-o", str(tmp_path / "out"), "--surfaces", surfaces]
+    assert main(["plan", str(source), *flags]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_tiles_of_their_own_level_state_it_as_a_field(source: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "it's a copy.ome.zarr"
+    shutil.copytree(source, copy)
+    flags = ["-o", str(tmp_path / "out"), "--channels", "even", "--grid", "3x1", "--workers", "0"]
+    assert main(["build", str(copy), *flags, "--iso-scope", "tile"]) == 0
+    stated = _stated(tmp_path / "out", "even")
+    values = np.array(stated["iso_by_tile"]["values"]).ravel()
+    assert len(values) == 3
+    assert np.ptp(values) > 0
+    assert values.mean() == pytest.approx(stated["iso"])
