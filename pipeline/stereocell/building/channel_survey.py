@@ -45,7 +45,7 @@ from stereocell.building.tasks.window import (
     window_from_json,
     write_window,
 )
-from stereocell.engine.run import Engine
+from stereocell.engine.run import Engine, console
 from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, RUNGS, parse_level
@@ -56,6 +56,7 @@ from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import make_appearance
+from stereocell.transfer.windows import parse_window
 
 APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
 Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
@@ -97,6 +98,11 @@ class _Result:
 def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey:
     """Return (and write) each channel's window, level, repair and transfer functions."""
     windows, files = _windows(out_folder, plan, engine)
+    held = {channel.base or channel.name: windows[channel.id].holder for channel in plan.channels}
+    for name, holder in held.items():
+        if holder is not None:
+            pieces = ", ".join(holder.pieces)
+            console.print(f"units: {name}: a table or holder is left out: {pieces}", markup=False)
     evidence = _evidence(out_folder, plan, engine, windows)
     survey = {}
     found = {
@@ -176,6 +182,7 @@ def _of_channel(
         level=surface,
         confidence=confidence,
         doubt=found.doubt,
+        modality="" if channel.source else plan.modality,
     )
     return ChannelSurvey(
         statistics,
@@ -190,6 +197,7 @@ def _of_channel(
         replace(appearance, painted_by=painter.id if painter else ""),
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),
+        found.window.holder,
     )
 
 
@@ -228,8 +236,8 @@ def find_level(
 
 def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
     """Return the iso-value that the user gives for a channel, and whether above the background."""
-    if channel.rung and channel.rung not in RUNGS:
-        return float(channel.rung), False
+    if channel.rung:
+        return None if channel.rung in RUNGS else (float(channel.rung), False)
     given = plan.settings.iso_values.get(channel.name)
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
 
@@ -273,8 +281,13 @@ def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
     subtracts = plan.modality not in ("CT", "MR") if given is None else given[1]
     subtracts = subtracts and settings.surface.background_um != 0
     level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
+    if channel.name in settings.windows:
+        window = parse_window(f"--window {channel.name}", settings.windows[channel.name])
     ref = source_of(plan, channel)
-    return StatisticsTask(ref, level, channel.index, plan.region, settings, subtracts, window)
+    finds_holder = plan.modality == "CT" and not channel.source and not settings.surface.keep_holder
+    return StatisticsTask(
+        ref, level, channel.index, plan.region, settings, subtracts, finds_holder, window
+    )
 
 
 def evidence_task(plan: Plan, tile: Tile, *, channel: Channel, window: Window) -> EvidenceTask:
@@ -308,6 +321,8 @@ def _windows(
             asdict(plan.settings.window),
             plan.settings.surface.smoothing_um,
             plan.settings.surface.background_um if task.subtracts else 0,
+            task.finds_holder,
+            task.window,
         ]
         file = out_folder.statistics_file(
             channel.voxels_id, key_of(depends, window_maker, reader_module(plan, channel))

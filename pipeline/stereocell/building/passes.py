@@ -24,6 +24,7 @@ from stereocell.building.tasks.unit import UnitTask, run_unit
 from stereocell.building.unit import UnitInput
 from stereocell.building.unit_files import is_whole
 from stereocell.engine.run import Engine
+from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import UsageError
@@ -75,8 +76,9 @@ def unit_tasks(
         level = survey[channel.id].appearance.level
         field = None if level is None else level.field
         repair = survey[channel.id].repair
+        holder = survey[channel.id].holder
         task, key = _unit_task(
-            out_folder, plan, tile_id, channel, field, repair, statistics, painted
+            out_folder, plan, tile_id, channel, field, repair, statistics, painted, holder
         )
         yield f"{tile_id}/{channel.id}", task, key
 
@@ -108,6 +110,7 @@ def _unit_task(
     repair: RepairOptions,
     statistics: ChannelStatistics,
     painted: tuple[int, tuple[float, float]] | None,
+    holder: Holder | None,
 ) -> tuple[UnitTask, str]:
     tile = plan.tile(tile_id)
     own = tile.lattice(plan.region)
@@ -121,6 +124,7 @@ def _unit_task(
         intensity_window=statistics.window,
         settings=plan.settings,
         painted=painted and painted[1],
+        holder=holder and holder.around(window),
     )
     depends = [
         input_key(plan, channel),
@@ -135,6 +139,7 @@ def _unit_task(
         given.step,
         asdict(plan.settings.unwrap),
         painted,
+        given.holder and given.holder.to_json(),
     ]
     key = key_of(depends, unit_maker, reader_module(plan, channel))
     directory = out_folder.unit_dir(tile_id, channel.id, key)

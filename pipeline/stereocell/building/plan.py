@@ -275,6 +275,7 @@ def make_plan(
         unwrap=settings.unwrap.resolved(chosen.spacing_um),
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
         iso_values=_by_name("--iso-value", settings.iso_values, channels),
+        windows=_of_all(settings.windows, channels),
         paint=_painted(settings.paint, channels),
     )
     _require_planes(settings, chosen.spacing_um)
@@ -393,6 +394,16 @@ def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> 
         if name in found:
             raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
         found[name] = value
+    return found
+
+
+def _of_all(windows: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
+    """Return windows by channel name; that of voxels with several surfaces goes to each."""
+    found: dict[str, str] = {}
+    for key, window in windows.items():
+        by_name = [channel.name for channel in channels if key in (channel.name, channel.base)]
+        names = by_name or [channel.name for channel in channels if key == str(channel.index)]
+        found |= dict.fromkeys(names or [_name("--window", key, channels)], window)
     return found
 
 

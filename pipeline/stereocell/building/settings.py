@@ -20,6 +20,7 @@ from stereocell.model.modality import MODALITIES
 from stereocell.model.settings import AUTO, Flag, setting
 from stereocell.textures.options import UnwrapOptions
 from stereocell.transfer.options import WindowOptions
+from stereocell.transfer.windows import parse_window
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -159,6 +160,16 @@ class Settings:
             "CHANNEL=SURFACE,...",
         ),
     )
+    windows: Mapping[str, str] = setting(
+        {},
+        "channel = LOW:HIGH, voxel values that become 0 and 255, or brain, bone, lung, soft (CT)",
+        Flag(
+            "--window",
+            "the voxel values of a channel that become 0 and 255, as CT=-160:240, or a CT's window "
+            "by name: brain, bone, lung, soft; may be repeated",
+            "CHANNEL=LOW:HIGH",
+        ),
+    )
     paint: Mapping[str, str] = setting(
         {},
         "channel = channel whose intensity is painted on its surface",
@@ -173,6 +184,8 @@ class Settings:
     def __post_init__(self) -> None:
         for channel, value in self.iso_values.items():
             parse_level(f"iso_values.{channel}", value)
+        for channel, window in self.windows.items():
+            parse_window(f"windows.{channel}", window)
 
 
 # What is expected where pydantic finds another type

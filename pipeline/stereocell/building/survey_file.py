@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.isosurface.channel_level import Level
+from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics
@@ -54,6 +55,7 @@ class ChannelSurvey:
     iso              by tile ID
     ladder           all levels that were found, outermost first; empty where one was given
     curve            what they were found on; None where one was given
+    holder           a CT's table or head holder, which is left out; None: there is none
     """
 
     statistics: ChannelStatistics
@@ -63,6 +65,7 @@ class ChannelSurvey:
     appearance: Appearance
     ladder: tuple[Level, ...]
     curve: Curve | None
+    holder: Holder | None = None
 
 
 Survey = dict[str, ChannelSurvey]  # by channel ID

@@ -11,6 +11,7 @@ from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.distance_field import signed_distance
 from stereocell.isosurface.extract import extract_surface
+from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
 from stereocell.meshes.alpha_wrap import alpha_wrap
 from stereocell.model.lattice import Lattice, Step
@@ -40,6 +41,7 @@ class UnitInput:
     repair      cleaning of the channel's surface
     step        voxels (z, y, x) between planes that carry the surface
     intensity_window  voxel values that become 0 and 255
+    holder      what is left out of the surface; None: nothing is
     painted     the same of the channel that is sampled onto the surface; None: none is
     """
 
@@ -51,6 +53,7 @@ class UnitInput:
     intensity_window: tuple[float, float]
     settings: Settings
     painted: tuple[float, float] | None = None
+    holder: Holder | None = None
 
 
 def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) -> Unit:
@@ -112,9 +115,12 @@ def _repaired(
         if given.background is not None:
             field -= given.background.at(given.lattice.window)
         field -= iso.at(given.lattice.window)
+        value_range = given.intensity_window[1] - given.intensity_window[0]
+        if given.holder is not None:
+            outside = np.float32(-value_range)
+            np.minimum(field, outside, out=field, where=given.holder.at(given.lattice.window))
         if given.step != (1, 1, 1):
             field = np.ascontiguousarray(field[given.lattice.slices_of_thinned(given.step)])
-        value_range = given.intensity_window[1] - given.intensity_window[0]
         distance = signed_distance(
             field, np.zeros(1, np.float32), spacing_um=spacing, value_range=value_range
         )

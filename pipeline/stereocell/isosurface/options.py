@@ -147,6 +147,10 @@ class SurfaceOptions:
             "also a closed STL of every tile and channel, for printing and booleans",
         ),
     )
+    keep_holder: bool = setting(
+        False,
+        "whether a CT's table and head holder, long pieces apart from the body, are built too",
+    )
     background_um: float | str = setting(
         AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
     )

@@ -48,10 +48,20 @@ def find_remarks(facts: Facts) -> list[Remark]:
             "channel",
             is_note=True,
         ),
+        _remark("with a table or a holder left out", _holders(facts), "channel", is_note=True),
         _counts("fragments dropped", units, lambda u: u.fragments_dropped),
         _counts("cavities filled", units, lambda u: u.cavities_filled),
     ]
     return [remark for remark in found if remark is not None]
+
+
+def _holders(facts: Facts) -> list[str]:
+    """Return a line for each channel whose CT's table or head holder is left out."""
+    return [
+        f"{channel.name}: {', '.join(holder.pieces)}; surface.keep_holder = true builds it too"
+        for channel in facts.plan.channels
+        if (holder := facts.survey[channel.id].holder) is not None
+    ]
 
 
 def _thin(units: Iterable[UnitFacts]) -> list[str]:

@@ -19,6 +19,7 @@ from stereocell.transfer.adaptive_threshold import (
     make_histogram,
 )
 from stereocell.transfer.boundaries import SuggestedShapes
+from stereocell.transfer.ct_tissues import tissue_functions
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
@@ -85,8 +86,12 @@ def make_appearance(
     level: SurfaceLevel | None,
     confidence: float,
     doubt: str,
+    modality: str = "",
 ) -> Appearance:
-    """Return how a channel is drawn; `level`: where its surface lies, else why there is none."""
+    """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
+
+    modality  DICOM's code; a CT has functions by tissue too
+    """
     iso_value, threshold = None, None
     if level is not None:
         below = 0.0 if level.background is None else float(level.background.values.mean())
@@ -110,6 +115,8 @@ def make_appearance(
         appearance.iso_normalized,
         appearance.threshold_normalized,
     )
+    if modality == "CT":
+        functions |= tissue_functions(statistics.window)
     transfer_2d = statistics.suggested.transfer_2d
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)

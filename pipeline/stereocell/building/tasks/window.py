@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.settings import Settings
 from stereocell.filters.background import find_background
+from stereocell.isosurface.holder import Holder, find_holder
 from stereocell.isosurface.level_evidence import (
     MOST_PADDING,
     Counting,
@@ -52,15 +53,21 @@ class StatisticsTask:
     region: Box
     settings: Settings
     subtracts: bool  # whether a background is looked for
+    finds_holder: bool = False  # whether it is a CT whose table is looked for
     window: tuple[float, float] | None = None  # voxel values; None: to be found
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """What the first pass finds of a channel: its statistics, and how its tiles are counted."""
+    """What the first pass finds of a channel.
+
+    counting  how its tiles are counted
+    holder    a CT's table or head holder, which is left out; None: there is none
+    """
 
     statistics: ChannelStatistics
     counting: Counting
+    holder: Holder | None = None
 
 
 @cache
@@ -75,7 +82,9 @@ def window_to_json(window: Window) -> dict[str, Any]:
 
 def window_from_json(content: Mapping[str, Any]) -> Window:
     """Return the window that `window_to_json` was given; `content` has passed its schema."""
-    return _adapter().validate_python({key: content[key] for key in ("statistics", "counting")})
+    return _adapter().validate_python(
+        {key: content[key] for key in ("statistics", "counting", "holder")}
+    )
 
 
 def write_window(task_and_file: tuple[StatisticsTask, Path]) -> None:
@@ -121,6 +130,10 @@ def measure_window(task: StatisticsTask) -> Window:
             block_um=float(surface.background_um),
             padding=padding if padding.any() else None,
         )
+    holder = None
+    if task.finds_holder:
+        z, y, x = dataset.levels[level].spacing_um
+        holder = find_holder(voxels, (step * z, y, x), task.region)
     counting = Counting(scale, None if background is None else scale.above(background), darkest)
     del padding
     statistics = find_statistics(
@@ -129,7 +142,7 @@ def measure_window(task: StatisticsTask) -> Window:
     if len(voxels) < task.region.shape[0] and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
         statistics = replace(statistics, values=_count_values(task, dataset, statistics.window))
     statistics = replace(statistics, suggested=_suggest(task, dataset, statistics.window))
-    return Window(statistics, counting)
+    return Window(statistics, counting, holder)
 
 
 def measure_statistics(task: StatisticsTask) -> ChannelStatistics:

@@ -1,0 +1,193 @@
+"""Find what a CT scanner holds a body with: its table, a head holder, straps; to be left out.
+
+At the level of skin such a piece is a solid like the body, and often touches it. But it is a sheet
+or a bar: thinner than the body, long, and joined to it by a small part of its surface. So the body
+is what lies near its own cores, voxels deep inside; what is left is apart where it is long and
+hardly joined. An ear or a nose is short, a face that the volume's end cuts is joined by its cut.
+"""
+
+import base64
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cc3d
+import edt
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.model.tiling import Box
+
+SKIN_HU = -300.0
+LEAST_HU = -500.0  # darkest voxel, at most: else the values are no Hounsfield units
+_DEPTH_UM, _DEPTH_SHARE = 12_000.0, 0.1  # depth of a core; at most this share of the body's side
+_CORE_SHARE = 0.02  # of the largest core's voxels: arms and legs have cores of their own
+_SLACK = 1.5  # coarsest spacings that the body reaches beyond a core's depth
+_LENGTH = 8.0  # depths: diagonal of the box of a piece that is apart, at least
+_JOINED = 0.18  # share of its surface that joins it to the body or to the volume's end, at most
+_CELLS = 1 << 20  # most cells of the mask that is kept
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """Pieces that are left out.
+
+    region  voxels (z, y, x) of the level that is built
+    mask    bool (z, y, x), cells that cover the region evenly: True near such a piece
+    pieces  each one's size, for people
+    """
+
+    region: Box
+    mask: NDArray[np.bool_]
+    pieces: tuple[str, ...]
+
+    def at(self, box: Box) -> NDArray[np.bool_]:
+        """Return which voxels of a box are left out, bool (z, y, x)."""
+        return np.asarray(self.mask[np.ix_(*self._cells(box))])
+
+    def around(self, box: Box) -> "Holder | None":
+        """Return the same if it leaves out voxels of a box, else None."""
+        return self if self.at(box).any() else None
+
+    def _cells(self, box: Box) -> list[NDArray[np.intp]]:
+        """Return the cell of each voxel along each axis."""
+        return [
+            np.clip((np.arange(a, b) - first) * cells // (last - first), 0, cells - 1)
+            for a, b, first, last, cells in zip(
+                box.start,
+                box.stop,
+                self.region.start,
+                self.region.stop,
+                self.mask.shape,
+                strict=True,
+            )
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the same as texts and numbers; the mask as bits by zlib in base64."""
+        packed = zlib.compress(np.packbits(self.mask).tobytes(), 6)
+        return {
+            "region": [list(self.region.start), list(self.region.stop)],
+            "shape": list(self.mask.shape),
+            "mask": base64.b64encode(packed).decode(),
+            "pieces": list(self.pieces),
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "Holder":
+        """Return what `to_json` was given."""
+        shape = tuple(content["shape"])
+        bits = np.frombuffer(zlib.decompress(base64.b64decode(content["mask"])), np.uint8)
+        count = int(np.prod(shape, dtype=np.int64))
+        start, stop = (tuple(end) for end in content["region"])
+        mask = np.unpackbits(bits, count=count).reshape(shape).astype(bool)
+        return cls(Box(start, stop), mask, tuple(content["pieces"]))
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, *_: Any) -> Any:
+        """Let pydantic read and write it as `from_json` and `to_json` do."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(
+            lambda value: value if isinstance(value, cls) else cls.from_json(value),
+            serialization=core_schema.plain_serializer_function_ser_schema(cls.to_json),
+        )
+
+
+def find_holder(
+    voxels: NDArray[Any], spacing_um: tuple[float, float, float], region: Box
+) -> Holder | None:
+    """Return what is to be left out of a CT; None: nothing is.
+
+    voxels      (z, y, x), Hounsfield units; they cover `region` at any resolution
+    spacing_um  (z, y, x), of these voxels
+    region      voxels of the level that is built
+    """
+    solid = voxels > SKIN_HU
+    if float(voxels.min()) > LEAST_HU or not solid.any():
+        return None
+    spacing = np.asarray(spacing_um)
+    (box,) = ndimage.find_objects(solid.astype(np.uint8))
+    side = min((s.stop - s.start) * step for s, step in zip(box, spacing, strict=True))
+    depth = min(_DEPTH_UM, _DEPTH_SHARE * side)
+    body = _body(solid, spacing, depth)
+    if body is None:
+        return None
+    labels = cc3d.connected_components(solid & ~body, connectivity=26)
+    found, pieces = np.zeros(voxels.shape, bool), []
+    boxes = cc3d.statistics(labels, no_slice_conversion=True)["bounding_boxes"]
+    for number, ends in enumerate(np.asarray(boxes, np.int64).reshape(-1, 3, 2)[1:], start=1):
+        size = (ends[:, 1] - ends[:, 0] + 1) * spacing
+        if np.linalg.norm(size) < _LENGTH * depth:
+            continue
+        near = tuple(
+            slice(max(a - 1, 0), min(b + 2, n))
+            for (a, b), n in zip(ends, voxels.shape, strict=True)
+        )
+        if _joined(labels[near] == number, body[near], solid[near], spacing) <= _JOINED:
+            found |= labels == number
+            pieces.append(" x ".join(f"{length / 1000:.0f}" for length in size) + " mm (z, y, x)")
+    if not pieces:
+        return None
+    # as far as it is blurred, and not into the body
+    wide = ndimage.binary_dilation(found, iterations=2) & ~ndimage.binary_dilation(body)
+    return Holder(region, _cells_of(wide | found, body), tuple(sorted(pieces)))
+
+
+def _body(
+    solid: NDArray[np.bool_], spacing: NDArray[np.float64], depth: float
+) -> NDArray[np.bool_] | None:
+    """Return what lies near the cores; None: nothing is so thick."""
+    inside = edt.edt(solid, anisotropy=tuple(spacing), black_border=False)
+    cores = cc3d.connected_components(inside > depth, connectivity=26)
+    sizes = np.bincount(cores.ravel())
+    sizes[0] = 0
+    if not sizes.any():
+        return None
+    core = (sizes >= _CORE_SHARE * sizes.max())[cores] & (cores > 0)
+    away = edt.edt(~core, anisotropy=tuple(spacing), black_border=False)
+    near = cc3d.connected_components(
+        solid & (away <= depth + _SLACK * spacing.max()), connectivity=26
+    )
+    holds = np.zeros(int(near.max()) + 1, bool)
+    holds[np.unique(near[core])] = True  # what is near and not joined is none of it
+    holds[0] = False
+    return np.asarray(holds[near])
+
+
+def _joined(
+    piece: NDArray[np.bool_],
+    body: NDArray[np.bool_],
+    solid: NDArray[np.bool_],
+    spacing: NDArray[np.float64],
+) -> float:
+    """Return the share of a piece's surface that lies at the body or at the volume's end."""
+    joined = free = 0.0
+    for axis in range(3):
+        area = float(np.prod(spacing) / spacing[axis])
+        along, others, air = (np.moveaxis(one, axis, 0) for one in (piece, body, ~solid))
+        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
+            joined += area * np.count_nonzero(along[here] & others[there])
+            free += area * np.count_nonzero(along[here] & air[there])
+        # the cut-out has a margin but where the volume ends
+        joined += area * (np.count_nonzero(along[0]) + np.count_nonzero(along[-1]))
+    return joined / (joined + free) if joined + free else 1.0
+
+
+def _cells_of(mask: NDArray[np.bool_], body: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the mask in fewer cells; one that holds a part of the body is left in."""
+    factor = 1
+    while np.prod([-(-n // factor) for n in mask.shape]) > _CELLS:
+        factor += 1
+    if factor == 1:
+        return mask
+    ends = [(-(-n // factor), n) for n in mask.shape]
+    index = [np.arange(n) * cells // n for cells, n in ends]
+    held, kept = np.zeros((2, *(cells for cells, _ in ends)), bool)
+    for place, target in ((mask, held), (body, kept)):
+        np.logical_or.at(
+            target, tuple(index[k][one] for k, one in enumerate(place.nonzero())), True
+        )
+    return held & ~kept

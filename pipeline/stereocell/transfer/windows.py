@@ -1,0 +1,31 @@
+"""Windows that are given by value, and those of CT that radiologists call by name."""
+
+from math import isfinite
+
+from stereocell.model.errors import UsageError
+
+# width and centre in Hounsfield units, as CT consoles have them
+NAMED = {
+    "brain": (80.0, 40.0),
+    "bone": (2000.0, 500.0),
+    "lung": (1500.0, -600.0),
+    "soft": (400.0, 40.0),
+}
+
+
+def parse_window(where: str, text: str) -> tuple[float, float]:
+    """Return the voxel values that become 0 and 255, of `LOW:HIGH` or a name. Raises UsageError."""
+    if text in NAMED:
+        width, centre = NAMED[text]
+        return centre - width / 2, centre + width / 2
+    low, colon, high = text.partition(":")
+    try:
+        ends = float(low), float(high)
+    except ValueError:
+        ends = (0.0, 0.0)
+    if not colon or not all(isfinite(end) for end in ends) or not ends[0] < ends[1]:
+        raise UsageError(
+            f"{where} is {text!r:.60}, expected LOW:HIGH in voxel values, as -160:240, or one of "
+            f"{', '.join(NAMED)} (CT)"
+        )
+    return ends

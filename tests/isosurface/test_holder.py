@@ -1,0 +1,98 @@
+"""A CT's table and head holder: found where there is one, and nothing of the body is lost."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.isosurface.holder import Holder, find_holder
+from stereocell.model.tiling import Box
+
+SPACING = (3000.0, 1500.0, 1500.0)  # um
+SHAPE = (60, 130, 130)
+WHOLE = Box((0, 0, 0), SHAPE)
+
+
+def _places() -> list[NDArray[np.float64]]:
+    """Return the voxels' places from the middle, mm."""
+    middle = [(n - 1) / 2 for n in SHAPE]
+    grid = np.indices(SHAPE)
+    return [(g - m) * s / 1000 for g, m, s in zip(grid, middle, SPACING, strict=True)]
+
+
+def _head(noise: float = 15.0) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+    """Return a head with ears, cut off at the volume's end, and where it is."""
+    z, y, x = _places()
+    head = (y / 75) ** 2 + (x / 62) ** 2 < 1
+    ears = (abs(abs(x) - 66) < 5) & (abs(y) < 8) & (abs(z) < 25)
+    body = head | ears
+    hu = np.where(body, 40.0, -1000.0) + np.random.default_rng(0).normal(0, noise, SHAPE)
+    return hu.round().astype(np.int16), body
+
+
+def _with(hu: NDArray[np.int16], piece: NDArray[np.bool_]) -> NDArray[np.int16]:
+    return np.where(piece, np.int16(-100), hu)
+
+
+def _cradle(gap_mm: float) -> NDArray[np.bool_]:
+    """Return a shell of 6 mm under the head, as long as the volume, wider than the head."""
+    _, y, x = _places()
+    away = np.hypot(y + 25 - gap_mm, x)
+    return (away > 99) & (away < 105) & (y > 35)
+
+
+@pytest.mark.parametrize("gap_mm", [8.0, 0.0])
+def test_a_cradle_is_left_out_whether_it_touches_or_not(gap_mm: float) -> None:
+    hu, body = _head()
+    cradle = _cradle(gap_mm) & ~body
+    holder = find_holder(_with(hu, cradle), SPACING, WHOLE)
+    assert holder is not None
+    out = holder.at(WHOLE)
+    assert (out & cradle).sum() > 0.7 * cradle.sum()
+    assert not (out & body).any()
+    assert len(holder.pieces) in (1, 2)  # two, where it touches in the middle
+    assert "mm" in holder.pieces[0]
+
+
+def test_nothing_of_a_body_alone_is_left_out() -> None:
+    assert find_holder(_head()[0], SPACING, WHOLE) is None
+
+
+def test_an_arm_beside_the_body_stays() -> None:
+    hu, _ = _head()
+    _, y, x = _places()
+    hu = hu.copy()
+    hu[:] = np.where(np.hypot(y / 55, (x + 30) / 40) < 1, 40, -1000)
+    arm = np.hypot(y, x - 70) < 22
+    assert find_holder(np.where(arm, np.int16(40), hu), SPACING, WHOLE) is None
+
+
+def test_other_units_than_hounsfield_s_have_no_holder() -> None:
+    hu, body = _head()
+    cradle = _cradle(8.0) & ~body
+    raw = (_with(hu, cradle) + 1024).clip(0).astype(np.uint16)
+    assert find_holder(raw, SPACING, WHOLE) is None
+    assert find_holder(np.full(SHAPE, -1000, np.int16), SPACING, WHOLE) is None
+
+
+def test_the_mask_of_a_part_and_of_a_file_is_the_same() -> None:
+    hu, body = _head()
+    holder = find_holder(_with(hu, _cradle(8.0) & ~body), SPACING, WHOLE)
+    assert holder is not None
+    again = Holder.from_json(json.loads(json.dumps(holder.to_json())))
+    np.testing.assert_array_equal(again.at(WHOLE), holder.at(WHOLE))
+    part = Box((10, 60, 20), (40, 130, 90))
+    np.testing.assert_array_equal(again.at(part), holder.at(WHOLE)[part.slices])
+    assert holder.around(Box((0, 0, 0), (60, 30, 130))) is None
+
+
+def test_a_coarser_sight_of_the_region_names_the_same_voxels() -> None:
+    hu, body = _head()
+    cradle = _cradle(8.0) & ~body
+    thinned = _with(hu, cradle)[::2]
+    holder = find_holder(thinned, (6000.0, *SPACING[1:]), WHOLE)
+    assert holder is not None
+    out = holder.at(WHOLE)
+    assert (out & cradle).sum() > 0.7 * cradle.sum()
+    assert not (out & body).any()
