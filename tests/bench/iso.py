@@ -24,9 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from corpus import all_cases
 from corpus.case import Mask
 from corpus.sight import Sight, look_at
-from stereocell.isosurface.isovalue import find_iso_value
-from stereocell.isosurface.options import BY_TILE, IsoValueOptions
-from stereocell.model.errors import NoSurfaceError
+from stereocell.isosurface.distance_field import gradient_magnitude
+from stereocell.isosurface.edge_criteria import choose_by_edges, gather_edges
+from stereocell.isosurface.level_histogram import BINS as BINS_OF_SCALE
+from stereocell.isosurface.level_histogram import LevelHistogram, Scale
+from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 
 OURS = "stereocell"
 RIGHT = 0.7  # Dice from which a surface counts as right
@@ -123,18 +125,27 @@ def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
         [filters.threshold_sauvola(plane, 4 * window + 1, r=spread) for plane in values]
     )
     yield "Sauvola", values > local, ()
-    for criterion in BY_TILE:
+    for criterion in CRITERIA:
         inside, levels = np.zeros(values.shape, bool), []
         for place, _ in sight.tiles:
             part = np.ascontiguousarray(sight.above[place])
-            options = IsoValueOptions(criterion=criterion)
-            try:
-                value = find_iso_value(part, case.spacing_um, options).value
-            except NoSurfaceError:
-                continue
-            inside[place] = part > value
-            levels.append(value)
+            value = _by_edges(part, case.spacing_um, criterion)
+            if value is not None:
+                inside[place] = part > value
+                levels.append(value)
         yield f"{criterion}, by tile", inside, tuple(levels)
+
+
+def _by_edges(
+    field: NDArray[np.float32], spacing_um: tuple[float, float, float], criterion: str
+) -> float | None:
+    """Return the level that a criterion of edges chooses in one tile alone."""
+    scale = Scale.of(field, np.zeros(field.shape, bool))
+    slopes = gradient_magnitude(field, spacing_um)
+    sums = gather_edges(field, slopes, scale=scale, criterion=CRITERIA[criterion])
+    counts = np.bincount(scale.bins_of(field).ravel(), minlength=BINS_OF_SCALE).astype(np.float64)
+    histogram = LevelHistogram(counts, scale.edges())
+    return choose_by_edges(sums, histogram, IsoValueOptions(criterion=criterion))
 
 
 def main() -> None:

@@ -23,13 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.filters.background import find_background
-from stereocell.filters.denoise import denoise
+from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.distance_field import signed_distance
 from stereocell.isosurface.extract import extract_surface
-from stereocell.isosurface.isovalue import find_iso_value
-from stereocell.isosurface.options import IsoValueOptions
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.simplify import compact
@@ -87,15 +84,8 @@ def inputs() -> Iterator[Input]:
 
 def prepare(name: str, volume: Volume, grid: float, error: float) -> Input:
     """Return a volume as the pipeline smooths it, and the iso-value that it finds."""
-    whole = Box((0, 0, 0), volume.voxels.shape)
-    spacing = volume.spacing_um
-    field = denoise(volume, min(spacing))
-    under = find_background(
-        volume.voxels.astype(np.float32), whole, spacing_um=spacing, block_um=64 * min(spacing)
-    )
-    field -= under.at(whole)
-    iso = find_iso_value(field, spacing, IsoValueOptions()).value
-    return Input(name, field, spacing, iso, grid, error)
+    found = find_array_levels(volume)
+    return Input(name, found.field, volume.spacing_um, found.levels.clear[0].value, grid, error)
 
 
 def wrap(given: Input) -> Mesh:
