@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 INTENSITY = "intensity"  # what voxels may be taken for, whatever they look like
+NO_PRESET = "none"  # names the defaults
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length
 _MAX_BYTES, _MAX_LINE = 1 << 17, 2000
@@ -206,12 +207,12 @@ def load(
     flags: Mapping[str, Any],
     where: str = "command line",
 ) -> Settings:
-    """Return the settings of a preset (name or TOML file), a TOML file and flags, in that order.
+    """Return the settings of a preset (name, TOML file or none), a TOML file and flags, in order.
 
     `flags` is nested as the TOML is: {"plan": {"level": 1}}; `where` they stand. Raises UsageError.
     """
     settings = Settings()
-    if preset is not None:
+    if preset not in (None, NO_PRESET):
         settings = apply(settings, _read(preset_path(preset)), f"preset {preset}")
     if config is not None:
         settings = apply(settings, _read(config), str(config))

@@ -114,9 +114,9 @@ def plan(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building import settings as settings_module
+    from stereocell.building.preset_choice import load_for
 
-    wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
+    wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
     made = phases.make(options.input, options.out, wanted)
     return Answer(
         {
@@ -135,10 +135,10 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
-    from stereocell.building import settings as settings_module
+    from stereocell.building.preset_choice import load_for
     from stereocell.preview import iso_value as iso_preview
 
-    wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
+    wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
     found, path = iso_preview.preview(
         options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
@@ -210,11 +210,11 @@ def slices(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building import settings as settings_module
+    from stereocell.building.preset_choice import load_for
     from stereocell.preview.png_slices import without_surface, write_slices
     from stereocell.storage.location import require_apart
 
-    wanted = settings_module.load(options.preset, options.config, flags=flags_of(options))
+    wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
     require_apart(options.input, options.out)
     count = write_slices(phases.settle(options.input, without_surface(wanted)), options.out)
     print_unless_json(options, f"wrote {count} slices to {options.out}")

@@ -190,7 +190,9 @@ def declare_settings(parser: argparse.ArgumentParser) -> None:
     from stereocell.building.settings import preset_names
 
     presets = ", ".join(preset_names())
-    parser.add_argument("--preset", help=f"{presets}, or a TOML file of your own")
+    parser.add_argument(
+        "--preset", help=f"{presets}, none, or a TOML file of your own (default: by the input)"
+    )
     parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
 
 

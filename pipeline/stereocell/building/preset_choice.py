@@ -1,0 +1,80 @@
+"""Choose the preset that suits a source, where the user names none."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.settings import NO_PRESET, Settings, load
+from stereocell.engine.run import console
+from stereocell.isosurface.holder import LEAST_HU
+from stereocell.model.errors import StereoCellError
+from stereocell.model.tiling import Box
+from stereocell.read import Dataset
+from stereocell.storage.location import Location
+
+_BY_MODALITY = {"MR": "mri", "CT": "ct"}
+_BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
+_SIDE = 64  # voxels: edge of the block that is looked at for Hounsfield units
+
+
+def load_for(
+    source: str | Path,
+    preset: str | None,
+    config: Path | None,
+    *,
+    flags: Mapping[str, Any],
+    where: str = "command line",
+) -> Settings:
+    """Return the settings of a build, by the preset that suits the source where none is given.
+
+    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The choice is
+    printed with its reason. A source that can't be read is left to whoever reads it next.
+    """
+    if preset is not None or config is not None:
+        return load(preset, config, flags=flags, where=where)
+    settings = load(None, None, flags=flags, where=where)
+    options = settings.plan
+    try:
+        location = Location.of(source).source
+        dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
+        chosen, reason = choose_preset(dataset, options.modality)
+    except StereoCellError:
+        return settings
+    console.print(f"plan: {reason}", markup=False)
+    return load(chosen, None, flags=flags, where=where)
+
+
+def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str]:
+    """Return the name of a preset, or None for the defaults, and the reason in a sentence.
+
+    modality  the settings', where the input says none
+    """
+    known = dataset.modality or modality
+    if known:
+        chosen = _BY_MODALITY.get(known)
+        return chosen, _told(chosen, f"the input is {known}")
+    finest = min(dataset.levels[0].spacing_um)
+    if finest < _BODY_UM:
+        return None, _told(None, f"voxels of {finest:.3g} um, as of a microscope")
+    chosen = "ct" if _has_hounsfield_units(dataset) else "mri"
+    looks = "values like Hounsfield units" if chosen == "ct" else "no Hounsfield units"
+    return chosen, _told(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
+
+
+def _told(chosen: str | None, reason: str) -> str:
+    if chosen is None:
+        return f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)"
+    return f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)"
+
+
+def _has_hounsfield_units(dataset: Dataset) -> bool:
+    if dataset.dtype.kind == "u":
+        return False
+    shape = dataset.levels[0].shape
+    z, y, x = (min(n, _SIDE) for n in shape)
+    corner = Box((0, 0, 0), (z, y, x))  # air
+    z0, y0, x0 = ((n - side) // 2 for n, side in zip(shape, (z, y, x), strict=True))
+    middle = Box((z0, y0, x0), (z0 + z, y0 + y, x0 + x))  # body
+    lowest = min(float(dataset.read(0, box).voxels.min()) for box in (corner, middle))
+    return lowest <= LEAST_HU

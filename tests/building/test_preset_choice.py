@@ -1,0 +1,91 @@
+"""Which preset a source is built by where the user names none, and what the plan says of it."""
+
+from pathlib import Path
+
+import nibabel
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.preset_choice import choose_preset, load_for
+from stereocell.cli.__main__ import main
+from stereocell.read.open_dataset import open as open_dataset
+from support import phantoms
+
+SHAPE = (24, 30, 32)
+
+
+def _body(air: float, tissue: float) -> NDArray[np.int16]:
+    z, y, x = np.indices(SHAPE)
+    away = np.sqrt((z - 12) ** 2 + (y - 15) ** 2 + (x - 16) ** 2)
+    noise = np.random.default_rng(0).normal(0, 4, SHAPE)
+    return (np.where(away < 9, tissue, air) + noise).round().astype(np.int16)
+
+
+def _nifti(path: Path, voxels: NDArray[np.int16]) -> Path:
+    image = nibabel.Nifti1Image(voxels, np.diag([1.0, 1.0, 1.0, 1.0]))
+    image.header.set_xyzt_units("mm")
+    nibabel.save(image, path)
+    return path
+
+
+def test_millimetres_with_hounsfield_units_are_a_ct(tmp_path: Path) -> None:
+    source = _nifti(tmp_path / "a b.nii.gz", _body(-1000, 40))
+    chosen, reason = choose_preset(open_dataset(source))
+    assert chosen == "ct"
+    assert "1 mm" in reason
+    assert "Hounsfield" in reason
+
+
+def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
+    chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400))))
+    assert chosen == "mri"
+    assert "no Hounsfield units" in reason
+
+
+def test_what_the_input_says_goes_first(tmp_path: Path) -> None:
+    dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400)))
+    assert choose_preset(dataset, "CT")[0] == "ct"
+    assert choose_preset(dataset, "PT")[0] is None
+
+
+def test_micrometres_follow_the_spacing(tmp_path: Path) -> None:
+    source = tmp_path / "a.ome.tif"
+    phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))
+    assert choose_preset(open_dataset(source))[0] is None
+
+
+def test_the_plan_says_which_and_why_and_flags_go_over_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = _nifti(tmp_path / "it's.nii.gz", _body(-1000, 40))
+    flags = ["-o", str(tmp_path / "out"), "--iso-value", "0=-500"]
+    assert main(["plan", str(source), *flags]) == 0
+    assert "plan: preset ct: voxels of 1 mm and values like Hounsfield units" in (
+        capsys.readouterr().err
+    )
+    plan = OutFolder(tmp_path / "out").plan()
+    assert plan.modality == "CT"
+    assert plan.settings.iso_values == {"NIfTI": -500}
+    assert plan.settings.windows == {"NIfTI": "-1024:2000"}
+
+
+@pytest.mark.parametrize("preset", ["none", "cycif"])
+def test_one_that_is_named_is_taken_without_a_word(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], preset: str
+) -> None:
+    source = _nifti(tmp_path / "a.nii", _body(-1000, 40))
+    flags = ["-o", str(tmp_path / "out"), "--preset", preset, "--region", "0:8,0:8,0:8"]
+    main(["plan", str(source), *flags])
+    assert "plan: preset" not in capsys.readouterr().err
+
+
+def test_a_source_that_cannot_be_read_is_told_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "a.nii"
+    source.write_bytes(b"no image")
+    assert load_for(source, None, None, flags={}).plan.modality == ""
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
