@@ -189,7 +189,14 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
     assert outer["level"]["iso"] < inner["level"]["iso"] == 800
     assert outer["triangles"][0] > 0 < inner["triangles"][0]
     assert outer["color"] != inner["color"]
-    # the voxels are read and counted once for both
+    # the voxels are shown once: the second is a surface within the first one's volume
+    shown = [
+        json.loads((tmp_path / "out" / "bundle" / channel["volumes"]["path"]).read_text())
+        for channel in (outer, inner)
+    ]
+    assert [len(one["volumes"]) for one in shown] == [1, 0]
+    assert main(["check", str(tmp_path / "out"), "--deep", "--workers", "0"]) == 0
+    # and they are read and counted once for both
     windows = list((tmp_path / "out" / "units").glob("window-*.json"))
     assert len(windows) <= 2
 

@@ -181,6 +181,17 @@ class Plan:
         """The step in voxels (z, y, x) between planes that carry the surface."""
         return _step(self.settings, self.spacing_um)
 
+    @property
+    def shared_volumes(self) -> frozenset[str]:
+        """IDs of the channels whose volume is that of an earlier one: further surfaces of it."""
+        seen: set[str] = set()
+        shared = set()
+        for channel in self.channels:
+            if channel.base and channel.base in seen:
+                shared.add(channel.id)
+            seen.add(channel.base)
+        return frozenset(shared)
+
     def level_of(self, channel: Channel) -> int:
         """Return the level of its source at which a channel is read."""
         return 0 if channel.source else self.level

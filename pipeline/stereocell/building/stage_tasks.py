@@ -30,6 +30,7 @@ class TileTask:
 
     content  the tile without its channels
     units    ID, unit folder and sampled colours of each channel
+    shared   IDs of those whose volume is another channel's: they have surfaces alone
     record   units/<tile>/stage.json: the key of the tile as written, and its files
     key      digest of the inputs of the tile to write
     """
@@ -39,6 +40,7 @@ class TileTask:
     units: tuple[tuple[str, Path, PaintColors | None], ...]
     record: Path
     key: str
+    shared: frozenset[str] = frozenset()
 
     @property
     def folder(self) -> Path:
@@ -82,9 +84,15 @@ def tile_task(
         channels=(),
     )
     made_of = [(channel_id, folder.name, paint) for channel_id, folder, paint in units]
-    depends = [asdict(content), [(*one, paint and asdict(paint)) for *one, paint in made_of]]
+    shared = plan.shared_volumes
+    depends = [
+        asdict(content),
+        [(*one, paint and asdict(paint)) for *one, paint in made_of],
+        sorted(shared),
+    ]
     key = key_of(depends, sys.modules[__name__])
-    return TileTask(out_folder.stage_dir, content, units, out_folder.tile_file(tile.id), key)
+    record = out_folder.tile_file(tile.id)
+    return TileTask(out_folder.stage_dir, content, units, record, key, shared)
 
 
 def run_tile(task: TileTask) -> None:
@@ -93,7 +101,11 @@ def run_tile(task: TileTask) -> None:
     with cached(*(folder for _, folder, _ in task.units)):
         channels = tuple(
             ChannelContent(
-                channel_id, load_lods(folder), load_volume(folder), paint, find_closed(folder)
+                channel_id,
+                load_lods(folder),
+                None if channel_id in task.shared else load_volume(folder),
+                paint,
+                find_closed(folder),
             )
             for channel_id, folder, paint in task.units
         )

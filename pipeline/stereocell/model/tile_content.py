@@ -19,14 +19,15 @@ class ChannelContent:
     """The result of one (tile, channel).
 
     lods    finest first; empty: no surface
-    volume  uint8 (z, y, x), window applied, with an apron of APRON voxels on every side
+    volume  uint8 (z, y, x), window applied, with an apron of APRON voxels on every side; None: this
+            is a further surface of another channel's voxels
     paint   colours of the channel that is sampled on the surface; None: no channel
     closed  STL file of a closed copy of the surface; None: no file
     """
 
     channel_id: str
     lods: tuple[Lod, ...]
-    volume: NDArray[np.uint8]
+    volume: NDArray[np.uint8] | None
     paint: PaintColors | None = None
     closed: Path | None = None
 

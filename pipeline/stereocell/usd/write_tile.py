@@ -98,7 +98,8 @@ def _compose(tile: TileContent) -> Sdf.Layer:
         _define_look(branch, tile, channel)
         if channel.lods:
             _define_mesh(branch, tile, channel)
-        _define_volume(branch, tile, channel)
+        if channel.volume is not None:
+            _define_volume(branch, tile, channel, channel.volume)
     _author_lods(root, tile)
     _author_representations(root, tile)
     return stage.GetRootLayer()
@@ -107,20 +108,22 @@ def _compose(tile: TileContent) -> Sdf.Layer:
 def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
     box = np.subtract(tile.last_um, tile.first_um) / tile.spacing_um
     expected = tuple(int(n) for n in np.rint(box).astype(int) + 1 + 2 * APRON)
+    if channel.volume is None:
+        return
     if channel.volume.shape != expected or channel.volume.dtype != np.uint8:
         found = f"{channel.volume.dtype} {channel.volume.shape}"
         raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected uint8 {expected}")
 
 
 def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> None:
-    own = channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)]
-    write_vdb(
-        folder / f"{channel.channel_id}.vdb",
-        own,
-        first_um=tile.first_um,
-        spacing_um=tile.spacing_um,
-    )
-    write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
+    if channel.volume is not None:
+        write_vdb(
+            folder / f"{channel.channel_id}.vdb",
+            channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)],
+            first_um=tile.first_um,
+            spacing_um=tile.spacing_um,
+        )
+        write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
     if channel.closed is not None:
         shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
     for level, lod in enumerate(channel.lods):
@@ -170,7 +173,9 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
 
 
-def _define_volume(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
+def _define_volume(
+    branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent, voxels: NDArray[np.uint8]
+) -> None:
     """Define the volume and its one field, nested below: clients read one file per volume."""
     stage = branch.GetPrim().GetStage()
     path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
@@ -186,7 +191,7 @@ def _define_volume(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelCon
     first, spacing = np.asarray(tile.first_um), np.asarray(tile.spacing_um)
     low, high = world_box(first - spacing / 2, first + (np.asarray(tile.own_shape) - 0.5) * spacing)
     volume.CreateExtentAttr(vec3f([low, high]))
-    depth, height, width = channel.volume.shape
+    depth, height, width = voxels.shape
     low, high = world_box(tile.first_um, tile.last_um)
     prim = volume.GetPrim()
     set_attribute(
@@ -270,17 +275,18 @@ def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, le
 
 def _author_representations(root: Usd.Prim, tile: TileContent) -> None:
     variants = root.GetVariantSets().AddVariantSet("representation")
-    hidden = {"mesh": ("_volume",), "volume": ("",), "both": ()}
-    for name, suffixes in hidden.items():
+    for name in ("mesh", "volume", "both"):
         variants.AddVariant(name)
         variants.SetVariantSelection(name)
         with variants.GetVariantEditContext():
             for channel in tile.channels:
-                branch = root.GetPath().AppendChild(channel.channel_id)
-                for suffix in suffixes:
-                    if suffix or channel.lods:
-                        path = branch.AppendChild(_leaf(tile, channel, suffix))
-                        root.GetStage().OverridePrim(path).SetActive(False)
+                if channel.volume is None or name == "both":
+                    continue  # a surface without a volume of its own stays
+                if name == "mesh" or channel.lods:
+                    suffix = "_volume" if name == "mesh" else ""
+                    branch = root.GetPath().AppendChild(channel.channel_id)
+                    path = branch.AppendChild(_leaf(tile, channel, suffix))
+                    root.GetStage().OverridePrim(path).SetActive(False)
     variants.SetVariantSelection("mesh")
 
 

@@ -130,6 +130,7 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
                 plan.spacing_um,
                 plan.placement,
                 plan.settings.lod.samples,
+                channel_id in plan.shared_volumes,
             ),
         )
 

@@ -52,6 +52,7 @@ class SourceTask:
     own_shape  (z, y, x), its voxels without apron
     placement  rows of a (4, 4) matrix for columns, um: from the voxels' world to the stage's tiles
     samples    points spread over each surface
+    shares_volume  whether its volume is another channel's
     """
 
     unit: UnitTask
@@ -63,6 +64,7 @@ class SourceTask:
     spacing_um: tuple[float, float, float]
     placement: Matrix
     samples: int
+    shares_volume: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +91,9 @@ def compare_unit(task: SourceTask) -> UnitFinding:
         levels, faults = _compare_lods(_placed(fine, task.placement), lods, record, task.samples)
         problems += faults
         problems += _compare_shading(lods, load_lods(task.unit.directory), task.placement)
-        if composed is None:
+        if composed is None and not task.shares_volume:
             problems.append("no volume in the stage")
-        else:
+        elif composed is not None:
             eight_bit = to_eight_bit(volume.voxels, given)
             problems += _compare_volume(eight_bit, composed, task)
     return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
