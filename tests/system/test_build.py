@@ -56,8 +56,8 @@ def test_empty_channel_has_no_surface_and_says_why(built: Path) -> None:
         tile, channel = name.split("/")
         record = load_record(out_folder.unit_dir(tile, channel, key))
         assert bool(record["reason"]) == (channel == "empty")
-    survey = out_folder.survey()
-    assert survey["empty"]["iso"]["r0_c0"]["reason"] == "every voxel is 300"
+    reason = out_folder.survey()["empty"]["appearance"]["surface_reason"]
+    assert reason.startswith("no clear surface: nothing stands out")
 
 
 def test_f_is_upright_and_not_mirrored_in_the_composed_stage(built: Path) -> None:
@@ -168,15 +168,18 @@ def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
     assert (kept / "unit.json").stat().st_mtime_ns == stamp
 
 
-def test_given_iso_value_is_used_and_the_found_one_kept(tmp_path: Path) -> None:
+def test_given_iso_value_is_used_in_voxels_as_they_are(tmp_path: Path) -> None:
     source, out = _source(tmp_path), tmp_path / "out"
     flags = ["--grid", "1x1", "--iso-value", "F body=400"]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    iso = OutFolder(out).survey()["F_x20_body"]["iso"]["r0_c0"]
+    channel = OutFolder(out).survey()["F_x20_body"]
+    iso = channel["iso"]["r0_c0"]
     assert iso["value"] == 400
     assert iso["background"] == 0
-    assert json.loads((out / iso["file"]).read_text())["found"] == pytest.approx(550, abs=250)
+    assert iso["confidence"] is None  # nobody asked the voxels
+    assert channel["appearance"]["iso_confidence"] == 1
+    assert channel["ladder"] == []
 
 
 # --- bad input: one line, exit code, nothing half-written
@@ -211,7 +214,7 @@ def test_build_of_another_input_into_a_used_out_is_refused(
         (["--spacing-um=-1,1,1"], 2, "found -1,1,1, expected z,y,x in um, each above 0"),
         (["--spacing-um", "0,1,1"], 2, "found 0,1,1"),
         (["--iso-value", "CD31"], 2, "expected CHANNEL=VALUE"),
-        (["--preset", "none"], 2, "expected one of cycif"),
+        (["--preset", "nobody"], 2, "expected one of ct, ct-bone, cycif"),
         (["--time", "3"], 2, "--time: found 3, expected 0 to 0"),
     ],
 )

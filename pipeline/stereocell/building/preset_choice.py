@@ -41,6 +41,8 @@ def load_for(
         chosen, reason = choose_preset(dataset, options.modality)
     except StereoCellError:
         return settings
+    if chosen is None:  # voxels as a microscope's: the defaults follow their spacing
+        return settings
     console.print(f"plan: {reason}", markup=False)
     return load(chosen, None, flags=flags, where=where)
 

@@ -58,6 +58,9 @@ LEAST_CONTRAST = 0.1  # share of the values' range: what a valley's level parts 
 # own is no sharper than a step after a Gaussian of one voxel, 1 / sqrt(2 pi): a sharper level lies
 # on the flank of something brighter.
 EDGE_SNR, EDGE_STEEPNESS, EDGE_SHARPNESS = 6.0, 1.5, 0.4
+# A valley's level as sharp as this is none between two materials: by central differences a step
+# rises by half of itself a voxel. It lies in the blurred edge of something much brighter.
+FLANK = 0.6
 BACKGROUND_SNR = 3.0  # contrast over noise from which a background may be subtracted
 BACKGROUND_GAIN = 1.1  # times as sharp above it: what a background must gain without valleys
 VALLEY_GAIN = 2.0  # ... and where the field has a valley
@@ -352,7 +355,8 @@ class _Sight:
             value = float(np.clip((valley.peak + outside) / 2, valley.low, valley.high))
             level = self._refined(value, whole.between(low, high), valley.dip)
             is_high = level.contrast >= LEAST_CONTRAST * span or (beneath and level.is_edge)
-            if is_high and level.share * whole.total >= self._least_voxels:
+            is_large = level.share * whole.total >= self._least_voxels
+            if is_high and is_large and level.sharpness <= FLANK:
                 found.append(level)
         last = max([ends[-2], *(level.value for level in found)])
         return (*found, *self._half_heights(whole.above(last)))
