@@ -138,6 +138,8 @@ def _open(location: Location) -> Any:
 def _dtype(stored: np.dtype[Any], slope: float, intercept: float) -> np.dtype[Any]:
     if stored.kind == "f":
         return np.dtype(np.float32)
+    if stored.itemsize >= 4 and (slope, intercept) == (1, 0):
+        return stored.newbyteorder("=")  # labels keep their numbers; read/cast.py has the rest
     limits = np.iinfo(stored)
     return dtype_for([(float(limits.min), float(limits.max), float(slope), float(intercept))])
 
