@@ -14,6 +14,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.read.acquired import Acquired
 from stereocell.read.cast import built_dtype, cast
 from stereocell.read.fingerprint import fingerprint_of
 from stereocell.read.spacing import Level
@@ -110,6 +111,7 @@ class Dataset:
                  of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
                  read/anatomical_axes.py
     remarks      changes and omissions of the reader, a sentence each
+    acquired     the source's own images: the axis across which they lie
     """
 
     source: str
@@ -126,6 +128,7 @@ class Dataset:
     modality: str = ""
     placement: Matrix = IDENTITY
     remarks: tuple[str, ...] = ()
+    acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
 
     def __post_init__(self) -> None:
         if self.on_close is not None:

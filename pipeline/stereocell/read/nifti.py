@@ -21,6 +21,7 @@ from nibabel.openers import ImageOpener
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
+from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Image
@@ -35,6 +36,7 @@ NAME = "NIfTI"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
+_WIDER = 1.05  # factor by which slices lie further apart than pixels
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _FAULTS = (
     nibabel.filebasedimages.ImageFileError,
@@ -98,9 +100,24 @@ def read_image(location: Location) -> Image:
         images=1,
         title=NAME,
         placement=canonical.placement,
+        acquired=Acquired(_image_axis(header, canonical)),
         notes=tuple(notes),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _image_axis(header: Any, canonical: Canonical) -> int:
+    """Return the axis (of z, y, x) across which the scanner's images lie.
+
+    The header's `dim_info` may name it; else it is the axis of the widest spacing, or where several
+    are as wide (a share of `_WIDER`), the last stored one: the slowest in the file.
+    """
+    named = header.get_dim_info()[2]
+    if named is not None:
+        return canonical.order.index(named)
+    spacing = canonical.spacing_um
+    wide = [axis for axis in range(3) if spacing[axis] * _WIDER >= max(spacing)]
+    return max(wide, key=lambda axis: canonical.order[axis])
 
 
 def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:

@@ -143,6 +143,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
             *filter(None, [cast_note(finest.array.dtype)]),
             *(image.notes_at(time) if image.notes_at is not None else ()),
         ),
+        acquired=image.acquired,
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.dicom.frame import Frame
@@ -25,6 +26,7 @@ from stereocell.read.dicom.header import NoPlaneError, is_dicom, read_frames
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.series import Stack, find_stacks
 from stereocell.read.image import Image
+from stereocell.read.plane_stack import StackLayout
 from stereocell.read.resample import resample_stack
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
@@ -76,6 +78,7 @@ def read_image(location: Location, series: int = 0) -> Image:
         title=modality or UNKNOWN,
         modality=modality,
         placement=canonical.placement,
+        acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
     )
 
@@ -164,6 +167,24 @@ def _load(
     if stack.layout is not None and stack.layout.is_resampled:
         planes = resample_stack(planes, stack.layout)
     return canonical.apply(planes)
+
+
+def _acquired(
+    stack: Stack,
+    layout: StackLayout,
+    canonical: Canonical,
+    paths: Sequence[Path],
+    dtype: np.dtype[Any],
+    shown: str,
+) -> Acquired:
+    axis = canonical.order.index(0)
+    if not layout.is_resampled:
+        return Acquired(axis)
+    plane_shape = stack.first.rows, stack.first.columns
+    first = turned_places(layout.places, plane_shape, layout.shape, canonical)
+    return Acquired(
+        axis, first, lambda time: canonical.apply(decode(stack.times[time], paths, dtype, shown))
+    )
 
 
 def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
