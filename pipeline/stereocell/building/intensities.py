@@ -1,5 +1,7 @@
 """Hold a source's channels to be intensities: of a label map no iso-surface is meant.
 
+The metadata go before the voxels: an image that is said to be of labels is one.
+
 Cameras don't count with 4 bytes and programs that number objects do. So of wide integers a block
 that holds one or two values, which tells nothing else, is taken for a part of a label map.
 """
@@ -21,6 +23,12 @@ def require_intensities(dataset: Dataset, channels: Sequence[int]) -> None:
 
     A block in the middle of the first channels is read, at full resolution.
     """
+    if dataset.labels:
+        raise UsageError(
+            f"{dataset.shown}: is a label map: found {dataset.labels}, expected intensities: "
+            "objects can't be built yet; --as intensity takes it for an image, as suits the mask "
+            "of one object"
+        )
     stored = dataset.stored_dtype
     if stored.kind not in "iu":
         return

@@ -112,6 +112,7 @@ class Dataset:
                  read/anatomical_axes.py
     remarks      changes and omissions of the reader, a sentence each
     acquired     the source's own images: the axis across which they lie
+    labels       what in the metadata says that the voxels number objects; empty: nothing does
     """
 
     source: str
@@ -128,6 +129,7 @@ class Dataset:
     modality: str = ""
     placement: Matrix = IDENTITY
     remarks: tuple[str, ...] = ()
+    labels: str = ""
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
 
     def __post_init__(self) -> None:

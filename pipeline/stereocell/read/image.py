@@ -21,7 +21,7 @@ class Image:
     images         the number of images in the source
     close          frees open files, or None
     title          the image's name; None: the file's name is used
-    modality, placement, acquired  as in Dataset
+    modality, placement, acquired, labels  as in Dataset
     notes          become Dataset's `remarks`
     notes_at       returns more notes, about one time point; it may read that point's voxels
     """
@@ -36,6 +36,7 @@ class Image:
     modality: str = ""
     placement: Matrix = IDENTITY
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
+    labels: str = ""
     notes: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None
 

@@ -36,6 +36,8 @@ NAME = "NIfTI"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
+_INTENT_LABEL = 1002
+_LABEL_TABLE = b"<LabelTable"  # of Connectome Workbench and TotalSegmentator
 _WIDER = 1.05  # factor by which slices lie further apart than pixels
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _FAULTS = (
@@ -100,10 +102,21 @@ def read_image(location: Location) -> Image:
         images=1,
         title=NAME,
         placement=canonical.placement,
+        labels=_labels(header),
         acquired=Acquired(_image_axis(header, canonical)),
         notes=tuple(notes),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _labels(header: Any) -> str:
+    """Return what in the header says that voxels number objects; of a table only its presence."""
+    if header["intent_code"] == _INTENT_LABEL:
+        return f"NIfTI's intent code {_INTENT_LABEL} (label)"
+    tables = (extension.get_content() for extension in header.extensions)
+    if any(isinstance(text, bytes) and _LABEL_TABLE in text for text in tables):
+        return "a table of labels in an extension of its header"
+    return ""
 
 
 def _image_axis(header: Any, canonical: Canonical) -> int:

@@ -144,6 +144,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
             *(image.notes_at(time) if image.notes_at is not None else ()),
         ),
         acquired=image.acquired,
+        labels=image.labels,
     )
 
 
@@ -190,7 +191,8 @@ def _check_arrays(where: str, image: Image) -> None:
             )
     if finest.shape[0] < 2:
         raise SourceError(
-            f"{where}: a volume needs at least 2 planes: found {finest.shape[0]} along z"
+            f"{where}: one plane (2D): a volume needs at least 2 planes: found "
+            f"{finest.shape[0]} along z"
             f"{_beside(finest)}; expected a stack, or a folder of planes (name the folder)"
         )
 
