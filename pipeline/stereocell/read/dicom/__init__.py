@@ -22,7 +22,7 @@ from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.dicom.frame import Frame
-from stereocell.read.dicom.header import NoPlaneError, is_dicom, read_frames
+from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.series import Stack, find_stacks
 from stereocell.read.image import Image
@@ -32,6 +32,7 @@ from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, is_own
 
+_INSTEAD = "objects can't be built yet: expected the image that it was drawn on"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -59,6 +60,12 @@ def read_image(location: Location, series: int = 0) -> Image:
             "(`--series list` shows them)"
         )
     stack = found.stacks[max(series, 1) - 1]
+    if stack.layout is None and stack.first.segments:
+        found_one = _labels(stack, len(found.stacks))
+        raise UsageError(
+            f"{location.shown}: is a label map: found {found_one}, of which this is no volume "
+            f"({stack.problem}); {_INSTEAD}"
+        )
     if stack.layout is None:
         raise SourceError(
             f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
@@ -78,6 +85,7 @@ def read_image(location: Location, series: int = 0) -> Image:
         title=modality or UNKNOWN,
         modality=modality,
         placement=canonical.placement,
+        labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
     )
@@ -119,6 +127,8 @@ def _find(location: Location) -> Found:
             frames[f"{frame.file} {frame.index}".encode()] = frame
     if not frames:
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
+        if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
+            raise UsageError(f"{location.shown}: is a label map: found {held}; {_INSTEAD}")
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
@@ -167,6 +177,14 @@ def _load(
     if stack.layout is not None and stack.layout.is_resampled:
         planes = resample_stack(planes, stack.layout)
     return canonical.apply(planes)
+
+
+def _labels(stack: Stack, stacks: int) -> str:
+    count = stack.first.segments
+    if not count:
+        return ""
+    each = " (each a series of --series list)" * (stack.first.segment > 0 and stacks > 1)
+    return f"a DICOM segmentation of {count} segment{'s' * (count != 1)}{each}"
 
 
 def _acquired(

@@ -44,6 +44,8 @@ class Frame:
     position           centre of the first pixel
     along_row          unit vector of growing column index; `along_column` of growing row index
     spacing            mm between (rows, columns)
+    segment            the number of the one that it shows, in a segmentation; 0: of none or all
+    segments           how many the file has; 0: it is no segmentation
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -63,3 +65,5 @@ class Frame:
     along_column: Vector
     spacing: tuple[float, float]
     encoding: Encoding
+    segment: int = 0
+    segments: int = 0

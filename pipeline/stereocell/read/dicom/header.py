@@ -15,7 +15,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pydicom
-from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
+from pydicom.uid import (
+    UID,
+    DeflatedExplicitVRLittleEndian,
+    SegmentationStorage,
+)
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
@@ -46,9 +50,12 @@ _TAGS: list[Any] = [
     "RescaleSlope",
     "RescaleIntercept",
     "ModalityLUTSequence",
+    "SegmentSequence",
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
 ]
+SEGMENTATION = "of a segmentation"  # how a reason begins
+_SEGMENTATIONS = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
@@ -95,7 +102,14 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             header = pydicom.dcmread(
                 opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
             )
-            return _frames(header, opened, path.stat().st_size, file)
+            segments = _segments(header)
+            try:
+                return _frames(header, opened, path.stat().st_size, file, segments)
+            except NoPlaneError as error:
+                if not segments:
+                    raise
+                many = f"{segments} segment{'s' * (segments != 1)}"
+                raise NoPlaneError(f"{SEGMENTATION} of {many}, {error}") from None
     except DICOM_FAULTS:
         raise NoPlaneError("damaged in their headers") from None
 
@@ -107,7 +121,7 @@ def _refuse_deflated(path: Path) -> None:
         raise NoPlaneError("deflated as a whole, which is not read")
 
 
-def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
+def _frames(header: Any, opened: BinaryIO, size: int, file: int, segments: int) -> list[Frame]:
     rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
     if opened.tell() >= size or rows < 1 or columns < 1:
         raise NoPlaneError(f"without pixels{_kind(header)}")
@@ -118,7 +132,7 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     count = int(header.get("NumberOfFrames") or 1)
-    is_float = _check_pixels(header, opened, size, rows * columns * count)
+    is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=segments > 0)
     series, instance, reference = (
         hashlib.sha256(str(header.get(key, "")).encode()).digest()
         for key in ("SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID")
@@ -135,6 +149,7 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
     for index in range(count):
         groups = [own[index] if own else None, shared]
         stack = _found({}, groups, "FrameContentSequence", "StackID")
+        segment = _found({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
         position, directions, spacing = _place(header, groups)
         frames.append(
             Frame(
@@ -152,9 +167,22 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
                 *directions,
                 spacing,
                 _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
+                int(segment or 0) if segments else 0,
+                segments,
             )
         )
     return frames
+
+
+def _segments(header: Any) -> int:
+    """Return how many segments a segmentation has, its background left out; 0: it is none.
+
+    References: DICOM PS3.3 C.8.20 (Segmentation).
+    """
+    if header.get("SOPClassUID") not in _SEGMENTATIONS and header.get("Modality") != "SEG":
+        return 0
+    listed = header.get("SegmentSequence") or ()
+    return max(1, sum(int(item.get("SegmentNumber") or 0) > 0 for item in listed))
 
 
 def _kind(header: Any) -> str:
@@ -185,11 +213,12 @@ def _padding(header: Any) -> tuple[int, int] | None:
     return min(ends), max(ends)
 
 
-def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
+def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_mask: bool) -> bool:
     """Return whether the pixels are floats. Raises NoPlaneError where they are cut short.
 
     opened  stands at the element of the pixels: tag, (VR, 2 bytes,) length
     size    of the file in bytes
+    is_mask  a pixel may be one bit
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -198,7 +227,7 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
     length = struct.unpack_from(f"{order}I", head, 4 if implicit else 8)[0]
     bits = int(header.get("BitsAllocated") or 0)
     is_float = element in (0x0008, 0x0009)
-    if bits not in (32, 64) if is_float else bits not in (8, 16, 32):
+    if bits not in (32, 64) if is_float else bits not in (1, 8, 16, 32)[not is_mask :]:
         raise NoPlaneError(f"of {bits} bits a pixel, not of 8, 16 or 32")
     syntax = header.file_meta.get("TransferSyntaxUID") if header.file_meta else None
     if is_compressed(syntax):
@@ -206,7 +235,7 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
             raise NoPlaneError("compressed in a way that is not read")
         return is_float
     begin = opened.tell() - (4 if implicit else 0)
-    if min(length, size - begin) < count * bits // 8:
+    if min(length, size - begin) < (count * bits + 7) // 8:
         raise NoPlaneError("cut short")
     return is_float
 
