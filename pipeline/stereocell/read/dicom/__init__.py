@@ -113,7 +113,7 @@ def _find(location: Location) -> Found:
     for index, path in enumerate(paths):
         try:
             for frame in read_frames(path, index):
-                key = frame.instance + frame.index.to_bytes(4)
+                key = frame.instance + frame.index.to_bytes(4) + frame.tile.to_bytes(4)
                 earlier = frames.setdefault(key, frame)
                 if earlier is not frame:
                     copies.append((earlier, frame))
@@ -124,7 +124,7 @@ def _find(location: Location) -> Found:
         if earlier.position == frame.position and compare(earlier, frame):
             left_out["copies of others"] += 1
         else:
-            frames[f"{frame.file} {frame.index}".encode()] = frame
+            frames[f"{frame.file} {frame.index} {frame.tile}".encode()] = frame
     if not frames:
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
         if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):

@@ -23,11 +23,13 @@ from pydicom.uid import (
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
 
 _TAGS: list[Any] = [
     "SOPClassUID",
+    "ImageType",
     "Modality",
     "SeriesInstanceUID",
     "SOPInstanceUID",
@@ -104,7 +106,7 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             )
             segments = _segments(header)
             try:
-                return _frames(header, opened, path.stat().st_size, file, segments)
+                return _frames(header, opened, path, file, segments)
             except NoPlaneError as error:
                 if not segments:
                     raise
@@ -121,8 +123,9 @@ def _refuse_deflated(path: Path) -> None:
         raise NoPlaneError("deflated as a whole, which is not read")
 
 
-def _frames(header: Any, opened: BinaryIO, size: int, file: int, segments: int) -> list[Frame]:
+def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int) -> list[Frame]:
     rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
+    size = path.stat().st_size
     if opened.tell() >= size or rows < 1 or columns < 1:
         raise NoPlaneError(f"without pixels{_kind(header)}")
     grey = ("MONOCHROME1", "MONOCHROME2")
@@ -150,8 +153,9 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int, segments: int) 
         groups = [own[index] if own else None, shared]
         stack = _found({}, groups, "FrameContentSequence", "StackID")
         segment = _found({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
-        position, directions, spacing = _place(header, groups)
-        frames.append(
+        directions, spacing = _axes(header, groups)
+        mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
+        frames += [
             Frame(
                 file,
                 index,
@@ -161,17 +165,49 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int, segments: int) 
                 hashlib.sha256(str(stack).encode()).digest(),
                 int(header.get("InstanceNumber") or 0),
                 modality if modality in MODALITIES else "",
-                rows,
-                columns,
-                position,
+                mosaic.rows,
+                mosaic.columns,
+                tile.position,
                 *directions,
                 spacing,
                 _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
+                number,
+                tile.corner,
                 int(segment or 0) if segments else 0,
                 segments,
             )
-        )
+            for number, tile in enumerate(mosaic.tiles)
+        ]
     return frames
+
+
+def _mosaic(
+    header: Any,
+    path: Path,
+    groups: Sequence[Any],
+    shape: tuple[int, int],
+    directions: tuple[Vector, Vector],
+    spacing: tuple[float, float],
+) -> Mosaic:
+    """Return the slices of an image of pixels (rows, columns): most hold one."""
+    stated = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+    position = None if stated is None else _vector(stated)
+    try:
+        found = find_mosaic(
+            path, header.get("ImageType") or (), shape, directions, spacing, position
+        )
+    except MosaicError as error:
+        raise NoPlaneError(str(error)) from None
+    if found is not None:
+        return found
+    if position is None:
+        raise NoPlaneError("without a place in the patient")
+    return Mosaic(*shape, (Tile((0, 0), position),))
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = _numbers(values, 3)
+    return x, y, z
 
 
 def _segments(header: Any) -> int:
@@ -268,13 +304,10 @@ def _numbers(value: Any, count: int) -> tuple[float, ...]:
     return numbers
 
 
-def _place(
-    header: Any, groups: Sequence[Any]
-) -> tuple[Vector, tuple[Vector, Vector], tuple[float, float]]:
-    position = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tuple[float, float]]:
+    """Return unit vectors along a row and along a column, and mm between (rows, columns)."""
     orientation = _found(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
     spacing = _found(header, groups, "PixelMeasuresSequence", "PixelSpacing")
-    x, y, z = _numbers(position, 3)
     between = _numbers(spacing, 2)
     cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
     lengths = np.linalg.norm(cosines, axis=1)
@@ -285,7 +318,7 @@ def _place(
         shown = " and ".join(f"{value:g}" for value in between)
         raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
     along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
-    return (x, y, z), (along_row, along_column), (between[0], between[1])
+    return (along_row, along_column), (between[0], between[1])
 
 
 def _encoding(

@@ -103,6 +103,9 @@ def _stack(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> St
     places = _places(group)
     counts = {len(place) for place in places}
     notes = list(neighbours)
+    slices = 1 + max(frame.tile for frame in group.frames)
+    if slices > 1:
+        notes.append(f"mosaics of {slices} slices in one image: taken apart")
     extra = len(group.frames) - len(places)
     times = 1
     if extra:
