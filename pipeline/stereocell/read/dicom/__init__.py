@@ -127,6 +127,8 @@ def _find(location: Location) -> Found:
             frames[f"{frame.file} {frame.index} {frame.tile}".encode()] = frame
     if not frames:
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
+        if not root.is_dir():
+            held = f"a file {next(iter(left_out), 'that is none')}"
         if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
             raise UsageError(f"{location.shown}: is a label map: found {held}; {_INSTEAD}")
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""

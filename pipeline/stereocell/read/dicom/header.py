@@ -10,6 +10,7 @@ import hashlib
 import math
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -18,6 +19,7 @@ import pydicom
 from pydicom.uid import (
     UID,
     DeflatedExplicitVRLittleEndian,
+    RTDoseStorage,
     SegmentationStorage,
 )
 
@@ -53,11 +55,15 @@ _TAGS: list[Any] = [
     "RescaleIntercept",
     "ModalityLUTSequence",
     "SegmentSequence",
+    "GridFrameOffsetVector",
+    "DoseGridScaling",
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _SEGMENTATIONS = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
+_NO_PLACE = "without a place in the patient"
+_ALONG = 0.999  # cosine between an axial plane's normal and z
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
@@ -108,6 +114,8 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             try:
                 return _frames(header, opened, path, file, segments)
             except NoPlaneError as error:
+                if not segments and str(error) == _NO_PLACE:
+                    raise NoPlaneError(f"{_NO_PLACE}{_kind(header)}") from None
                 if not segments:
                     raise
                 many = f"{segments} segment{'s' * (segments != 1)}"
@@ -131,7 +139,7 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
     grey = ("MONOCHROME1", "MONOCHROME2")
     kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
-        raise NoPlaneError("of colours, not of grey values")
+        raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     count = int(header.get("NumberOfFrames") or 1)
@@ -145,8 +153,9 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
     modality = str(header.get("Modality", "")).strip()
     shared = _first(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
-    if (own or count > 1) and len(own) != count:
-        raise NoPlaneError("of several frames without a place for each")
+    offsets = _dose_offsets(header, count)
+    if offsets is None and (own or count > 1) and len(own) != count:
+        raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
     frames = []
     padding = _padding(header)
     for index in range(count):
@@ -155,6 +164,8 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
         segment = _found({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
         directions, spacing = _axes(header, groups)
         mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
+        if offsets is not None:
+            mosaic = _shifted(mosaic, offsets[index], directions)
         frames += [
             Frame(
                 file,
@@ -201,8 +212,34 @@ def _mosaic(
     if found is not None:
         return found
     if position is None:
-        raise NoPlaneError("without a place in the patient")
+        raise NoPlaneError(_NO_PLACE)
     return Mosaic(*shape, (Tile((0, 0), position),))
+
+
+def _dose_offsets(header: Any, count: int) -> tuple[float, ...] | None:
+    """Return how far the planes of a dose lie from the first, mm along the normal; None: no dose.
+
+    References: DICOM PS3.3 C.8.8.3.2 (Grid Frame Offset Vector): the planes' places from the first
+    one's, or, where the first value isn't 0, along z of the patient.
+    """
+    if header.get("SOPClassUID") != RTDoseStorage or count < 2:
+        return None
+    values = _numbers(header.get("GridFrameOffsetVector"), count)
+    if values[0] == 0:
+        return values
+    _, _, along_z = np.cross(*np.array(_axes(header, [None])[0]))
+    if abs(along_z) < _ALONG:
+        raise NoPlaneError(f"of planes along z that are not axial{_kind(header)}")
+    return tuple((value - values[0]) * float(np.sign(along_z)) for value in values)
+
+
+def _shifted(mosaic: Mosaic, mm: float, directions: tuple[Vector, Vector]) -> Mosaic:
+    """Return an image's slices, moved along their normal."""
+    step = mm * np.cross(*np.array(directions))
+    tiles = tuple(
+        replace(tile, position=_vector(np.array(tile.position) + step)) for tile in mosaic.tiles
+    )
+    return replace(mosaic, tiles=tiles)
 
 
 def _vector(values: Any) -> Vector:
@@ -300,7 +337,7 @@ def _numbers(value: Any, count: int) -> tuple[float, ...]:
     except DICOM_FAULTS:
         numbers = ()
     if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
-        raise NoPlaneError("without a place in the patient")
+        raise NoPlaneError(_NO_PLACE)
     return numbers
 
 
@@ -313,7 +350,7 @@ def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tu
     lengths = np.linalg.norm(cosines, axis=1)
     is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
     if min(between) <= 0 or not is_frame:
-        raise NoPlaneError("without a place in the patient")
+        raise NoPlaneError(_NO_PLACE)
     if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
         shown = " and ".join(f"{value:g}" for value in between)
         raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
@@ -331,6 +368,8 @@ def _encoding(
     sequence = "PixelValueTransformationSequence"
     slope = _found(header, groups, sequence, "RescaleSlope")
     intercept = _found(header, groups, sequence, "RescaleIntercept")
+    if slope is None and header.get("SOPClassUID") == RTDoseStorage:
+        slope = header.get("DoseGridScaling")
     slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
     if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
         raise NoPlaneError("of values that no rescale slope gives")
