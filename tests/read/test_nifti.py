@@ -273,3 +273,18 @@ def test_labels_that_the_header_states_end_the_plan(
     assert ("intent code 1002" if said == "intent" else "a table of labels") in told
     assert "JANE" not in told
     assert main(["plan", source, "-o", out, "--as", "intensity"]) == 0
+
+
+def test_values_on_a_surface_are_told_as_such(tmp_path: Path) -> None:
+    axes = (
+        nibabel.cifti2.ScalarAxis(["a"]),
+        nibabel.cifti2.BrainModelAxis.from_surface(np.arange(5), 9, name="CortexLeft"),
+    )
+    image = nibabel.cifti2.Cifti2Image(np.ones((1, 5), np.float32), axes)
+    nibabel.save(image, tmp_path / "s.dscalar.nii")
+    with pytest.raises(SourceError, match="CIFTI, values on surfaces"):
+        read.open(tmp_path / "s.dscalar.nii")
+    gifti = nibabel.gifti.GiftiImage()
+    nibabel.save(gifti, tmp_path / "LEFT.SURF.gii")
+    with pytest.raises(SourceError, match="a surface"):
+        read.open(tmp_path / "LEFT.SURF.gii")

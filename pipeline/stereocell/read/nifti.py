@@ -16,6 +16,7 @@ from typing import Any
 
 import nibabel
 import numpy as np
+from nibabel.cifti2.cifti2 import Cifti2Image
 from nibabel.fileslice import fileslice
 from nibabel.openers import ImageOpener
 from numpy.typing import NDArray
@@ -146,6 +147,11 @@ def _open(location: Location) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image: Any = nibabel.load(location.source, mmap=False)
+            if isinstance(image, Cifti2Image):
+                raise SourceError(
+                    f"{location.shown}: CIFTI, values on surfaces and in greyordinates; expected "
+                    "NIfTI with a volume"
+                )
             if not isinstance(image, nibabel.nifti1.Nifti1Pair):
                 raise TypeError
             # an invalid quaternion, unit or type fails here rather than later

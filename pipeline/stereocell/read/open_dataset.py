@@ -18,6 +18,7 @@ from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
 
+_SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
 
@@ -91,6 +92,8 @@ def open(
         )
     if location.is_local and not Path(location.source).is_dir():
         require_own(location.source, [location.folder], named=location.shown)
+    if location.format is None and location.parts[-1].lower().endswith(_SURFACES):
+        raise SourceError(f"{location.shown}: a surface (a mesh), no volume; expected {_formats()}")
     if location.format is None:
         raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
     if not location.is_local:

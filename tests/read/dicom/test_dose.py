@@ -96,4 +96,4 @@ def test_what_has_no_place_is_told_by_its_kind(
     with pytest.raises(SourceError) as caught:
         read.open(path)
     assert told in str(caught.value)
-    assert "found a file" in str(caught.value)
+    assert "found one file, " in str(caught.value)

@@ -33,6 +33,7 @@ from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, is_own
 
 _INSTEAD = "objects can't be built yet: expected the image that it was drawn on"
+_LOOKED_AT = 1000  # entries of a folder
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -128,15 +129,26 @@ def _find(location: Location) -> Found:
     if not frames:
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
         if not root.is_dir():
-            held = f"a file {next(iter(left_out), 'that is none')}"
+            held = f"one file, {next(iter(left_out), 'which is none')}"
         if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
             raise UsageError(f"{location.shown}: is a label map: found {held}; {_INSTEAD}")
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'nothing'}; expected slices of MR, CT or the like"
+            f"{many}{held or 'nothing'}; expected slices of MR, CT or the like{_others(root)}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
+
+
+def _others(root: Path) -> str:
+    """Return a hint at sources of other formats that a folder holds; empty: there are none.
+
+    Their names may be private, and stay out.
+    """
+    paths = sorted(root.iterdir())[:_LOOKED_AT] if root.is_dir() else []
+    formats = Counter(Location.of(path).format for path in paths)
+    held = [f"{formats[kind]} {kind}" for kind in sorted(filter(None, formats)) if kind != "dicom"]
+    return f", or one of what the folder holds ({', '.join(held)})" if held else ""
 
 
 def _files(folder: Path) -> list[Path]:

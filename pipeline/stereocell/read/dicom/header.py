@@ -121,7 +121,7 @@ def read_frames(path: Path, file: int) -> list[Frame]:
                 many = f"{segments} segment{'s' * (segments != 1)}"
                 raise NoPlaneError(f"{SEGMENTATION} of {many}, {error}") from None
     except DICOM_FAULTS:
-        raise NoPlaneError("damaged in their headers") from None
+        raise NoPlaneError("with a damaged header") from None
 
 
 def _refuse_deflated(path: Path) -> None:
