@@ -108,6 +108,16 @@ def test_a_container_leads_nowhere_else(tmp_path: Path) -> None:
     assert "leads out of the group" in refusal(path)
 
 
+def test_a_container_in_itself_is_refused(tmp_path: Path) -> None:
+    path = group(tmp_path / "c.zarr", "0.5", {"bioformats2raw.layout": 3})
+    for series in (".", "0"):
+        group(path / "OME", "0.5", {"series": [series]})
+        group(path / "0", "0.5", {"bioformats2raw.layout": 3})
+        assert "no multiscales: found " in refusal(path)
+    group(path / "0" / "OME", "0.5", {"series": ["."]})
+    assert "found 1 image (.) in one container" in refusal(path)
+
+
 def test_a_container_of_one_image_is_opened_at_an_address(
     tmp_path: Path, serve: Callable[[Path], Server]
 ) -> None:

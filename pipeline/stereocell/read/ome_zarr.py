@@ -39,8 +39,10 @@ from stereocell.storage.location import Location
 _MAX_LEVELS = 64  # of the pyramid
 
 
-def read_image(location: Location) -> Image:
+def read_image(location: Location, *, is_part: bool = False) -> Image:
     """Return the first multiscale image of the group, or of the one image in a container of series.
+
+    is_part  it is the one image of a container, and no container itself
 
     Raises SourceError where there is none, or where there are several groups of images.
     """
@@ -57,8 +59,8 @@ def read_image(location: Location) -> Image:
     multiscales = ome.get("multiscales")
     if not isinstance(multiscales, list) or not multiscales:
         series = series_of(ome, tree)
-        if len(series) == 1:
-            return read_image(part_of(location, series[0]))
+        if len(series) == 1 and not is_part:
+            return read_image(part_of(location, series[0]), is_part=True)
         raise SourceError(
             f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
             "attribute `multiscales` of an image"
