@@ -19,12 +19,17 @@ import pydicom
 from pydicom.uid import (
     UID,
     DeflatedExplicitVRLittleEndian,
-    RTDoseStorage,
     SegmentationStorage,
 )
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.frame_offsets import (
+    frame_offsets,
+    has_offsets,
+    is_dose,
+    place_first,
+)
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
@@ -55,6 +60,10 @@ _TAGS: list[Any] = [
     "RescaleIntercept",
     "ModalityLUTSequence",
     "SegmentSequence",
+    "DetectorInformationSequence",
+    "SliceVector",
+    "SpacingBetweenSlices",
+    "SliceThickness",
     "GridFrameOffsetVector",
     "DoseGridScaling",
     "SharedFunctionalGroupsSequence",
@@ -63,7 +72,6 @@ _TAGS: list[Any] = [
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _SEGMENTATIONS = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
 _NO_PLACE = "without a place in the patient"
-_ALONG = 0.999  # cosine between an axial plane's normal and z
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
@@ -144,6 +152,7 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     count = int(header.get("NumberOfFrames") or 1)
     is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=segments > 0)
+    place_first(header)
     series, instance, reference = (
         hashlib.sha256(str(header.get(key, "")).encode()).digest()
         for key in ("SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID")
@@ -153,9 +162,13 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
     modality = str(header.get("Modality", "")).strip()
     shared = _first(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
-    offsets = _dose_offsets(header, count)
-    if offsets is None and (own or count > 1) and len(own) != count:
-        raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
+    offsets = None
+    if (own or count > 1) and len(own) != count:
+        if has_offsets(header):
+            normal = np.cross(*np.array(_axes(header, [None])[0]))
+            offsets = frame_offsets(header, count, normal)
+        if offsets is None:
+            raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
     frames = []
     padding = _padding(header)
     for index in range(count):
@@ -214,23 +227,6 @@ def _mosaic(
     if position is None:
         raise NoPlaneError(_NO_PLACE)
     return Mosaic(*shape, (Tile((0, 0), position),))
-
-
-def _dose_offsets(header: Any, count: int) -> tuple[float, ...] | None:
-    """Return how far the planes of a dose lie from the first, mm along the normal; None: no dose.
-
-    References: DICOM PS3.3 C.8.8.3.2 (Grid Frame Offset Vector): the planes' places from the first
-    one's, or, where the first value isn't 0, along z of the patient.
-    """
-    if header.get("SOPClassUID") != RTDoseStorage or count < 2:
-        return None
-    values = _numbers(header.get("GridFrameOffsetVector"), count)
-    if values[0] == 0:
-        return values
-    _, _, along_z = np.cross(*np.array(_axes(header, [None])[0]))
-    if abs(along_z) < _ALONG:
-        raise NoPlaneError(f"of planes along z that are not axial{_kind(header)}")
-    return tuple((value - values[0]) * float(np.sign(along_z)) for value in values)
 
 
 def _shifted(mosaic: Mosaic, mm: float, directions: tuple[Vector, Vector]) -> Mosaic:
@@ -368,7 +364,7 @@ def _encoding(
     sequence = "PixelValueTransformationSequence"
     slope = _found(header, groups, sequence, "RescaleSlope")
     intercept = _found(header, groups, sequence, "RescaleIntercept")
-    if slope is None and header.get("SOPClassUID") == RTDoseStorage:
+    if slope is None and is_dose(header):
         slope = header.get("DoseGridScaling")
     slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
     if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:

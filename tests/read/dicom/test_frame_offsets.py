@@ -1,12 +1,14 @@
-"""RT Dose: the planes of one multi-frame image lie where its vector of offsets says."""
+"""RT Dose and NM: the planes of one multi-frame image follow from the first one's place."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pydicom
 import pytest
 import SimpleITK as sitk
 from pydicom.uid import (
+    NuclearMedicineImageStorage,
     RTDoseStorage,
     SecondaryCaptureImageStorage,
     UltrasoundMultiFrameImageStorage,
@@ -68,8 +70,66 @@ def test_itk_finds_the_same_doses_at_the_same_places(tmp_path: Path) -> None:
 
 def test_absolute_places_of_oblique_planes_are_refused(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE, rotation=turn((1, 2, 3), 20))
-    with pytest.raises(SourceError, match=r"planes along z that are not axial \(RT Dose Storage\)"):
+    with pytest.raises(SourceError, match=r"without a place for each \(RT Dose Storage\)"):
         read.open(write_dose(tmp_path / "d.dcm", affine, "absolute"))
+
+
+def write_nm(path: Path, affine: np.ndarray[Any, Any], **values: Any) -> Path:
+    """Write reconstructed slices; the detector states the first one's place."""
+    stored = np.rint(sample(affine, SHAPE)).astype(np.uint16)
+    ds = image(stored[0], affine, 0, slope=None)
+    ds.PixelData = stored.tobytes()
+    ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = NuclearMedicineImageStorage
+    detector = pydicom.Dataset()
+    detector.ImagePositionPatient = ds.ImagePositionPatient
+    detector.ImageOrientationPatient = ds.ImageOrientationPatient
+    del ds.ImagePositionPatient, ds.ImageOrientationPatient
+    ds.DetectorInformationSequence = [detector]
+    ds.ImageType = ["ORIGINAL", "PRIMARY", "RECON TOMO", "EMISSION"]
+    ds.Modality, ds.NumberOfFrames = "NM", SHAPE[0]
+    normal = np.cross(affine[:3, 2], affine[:3, 1])
+    ds.SpacingBetweenSlices = float(affine[:3, 0] @ normal / np.linalg.norm(normal))
+    ds.SliceVector, ds.FrameIncrementPointer = list(range(1, SHAPE[0] + 1)), 0x00540080
+    for name, value in values.items():
+        setattr(ds, name, value)
+    return save(ds, path)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("downwards", [False, True])
+def test_slices_of_nuclear_medicine_are_stacked_by_the_sign_of_their_spacing(
+    tmp_path: Path, turned: bool, downwards: bool
+) -> None:
+    rotation = turn((1, 2, -0.5), 23.0) if turned else None
+    affine = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.0), rotation=rotation)
+    if downwards:
+        affine[:3, 3] += affine[:3, 0] * (SHAPE[0] - 1)
+        affine[:3, 0] *= -1
+    path = write_nm(tmp_path / "n.dcm", affine)
+    dataset = read.open(path)
+    assert error(dataset) < 0.51
+    assert dataset.modality == "NM"
+    if not downwards:  # ITK knows no spacing below 0
+        theirs = sitk.ReadImage(path)
+        points = lps_mm(dataset).reshape(-1, 3).tolist()
+        x, y, z = np.transpose([theirs.TransformPhysicalPointToIndex(point) for point in points])
+        assert np.array_equal(whole(dataset).ravel(), sitk.GetArrayFromImage(theirs)[z, y, x])
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"ImageType": ["ORIGINAL", "PRIMARY", "TOMO", "EMISSION"]},  # projections
+        {"SliceVector": [1, 2, 3] * 3},  # of several energies or phases
+        {"SpacingBetweenSlices": 0, "SliceThickness": 0},
+    ],
+)
+def test_other_frames_of_nuclear_medicine_are_refused(
+    tmp_path: Path, values: dict[str, Any]
+) -> None:
+    path = write_nm(tmp_path / "n.dcm", grid(shape=SHAPE), **values)
+    with pytest.raises(SourceError, match=r"for each \(Nuclear Medicine Image Storage\)"):
+        read.open(path)
 
 
 @pytest.mark.parametrize(
