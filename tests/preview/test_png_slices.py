@@ -11,6 +11,7 @@ import pytest
 from jsonschema import Draft202012Validator
 from PIL import Image
 
+from corpus.real import data_folder
 from stereocell import read
 from stereocell.building import phases
 from stereocell.building.open_source import open_source, source_of
@@ -99,6 +100,24 @@ def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
     assert places_lps_mm(about)[:, 0, 0] == pytest.approx(np.array(headers, float), abs=1e-4)
     across, _ = written(tmp_path / "s", tmp_path / "sides", "--plane", "coronal")
     assert across["shape"][0] > 30  # of the grid, onto which the tilted slices are moved
+
+
+@pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
+def test_a_real_ct_of_28_uneven_tilted_slices_gives_28_pictures(tmp_path: Path) -> None:
+    folder = data_folder()
+    assert folder is not None
+    about, shown = written(folder / "ct_head_ge", tmp_path / "out")
+    assert (about["plane"], about["shape"]) == ("axial", [28, 512, 512])
+    files = sorted((folder / "ct_head_ge").glob("*.dcm"))
+    headers = sorted(
+        (pydicom.dcmread(path) for path in files), key=lambda ds: -ds.ImagePositionPatient[2]
+    )
+    low, high = about["window"]
+    for picture, ds in zip(shown, headers, strict=True):
+        values = ds.pixel_array.astype(float) * ds.RescaleSlope + ds.RescaleIntercept
+        inside = ds.pixel_array != ds.get("PixelPaddingValue")
+        expected = 255 * np.clip((values - low) / (high - low), 0, 1)
+        assert np.abs(picture - expected)[inside].max() <= 0.5 + 1e-3
 
 
 @pytest.mark.parametrize(("order", "signs"), ORIENTATIONS)

@@ -242,6 +242,12 @@ CASES: dict[str, tuple[Maker, str]] = {
 }
 
 
+@pytest.mark.parametrize("name", ["scan.dcm.gz", "SCANS.ZIP", "all.tar"])
+def test_a_packed_file_is_to_be_unpacked(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"packed")
+    assert "a packed file: unpack it; expected" in refusal(tmp_path / name)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
     make, message = CASES[name]

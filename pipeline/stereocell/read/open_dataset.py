@@ -19,6 +19,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
+_PACKED = (".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz")
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
 
@@ -92,9 +93,14 @@ def open(
         )
     if location.is_local and not Path(location.source).is_dir():
         require_own(location.source, [location.folder], named=location.shown)
-    if location.format is None and location.parts[-1].lower().endswith(_SURFACES):
-        raise SourceError(f"{location.shown}: a surface (a mesh), no volume; expected {_formats()}")
     if location.format is None:
+        last = location.parts[-1].lower() if location.parts else ""
+        if last.endswith(_SURFACES):
+            raise SourceError(
+                f"{location.shown}: a surface (mesh), no volume; expected {_formats()}"
+            )
+        if last.endswith(_PACKED):
+            raise SourceError(f"{location.shown}: a packed file: unpack it; expected {_formats()}")
         raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
     if not location.is_local:
         with one_line(location.shown, "an address that fsspec opens"):
