@@ -102,6 +102,24 @@ def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
     assert across["shape"][0] > 30  # of the grid, onto which the tilted slices are moved
 
 
+@pytest.mark.parametrize("plane", ["axial", "coronal", "sagittal"])
+@pytest.mark.parametrize("flag", [(), ("--neurological",)])
+def test_images_of_a_tilted_gantry_lie_where_the_json_says(
+    tmp_path: Path, plane: str, flag: tuple[str, ...]
+) -> None:
+    shape = (12, 30, 26)
+    for number, sign in enumerate((1, -1)):
+        affine = tilted(grid(plane, shape, rotation=turn((1, 2, 3), 10)), shape, sign * 15)
+        write_series(
+            tmp_path / f"s{number}", affine, shape, indices=[0, 1, 2, 3.4, 5, 6, 8, 9.3, 11]
+        )
+        about, shown = written(tmp_path / f"s{number}", tmp_path / f"out{number}", *flag)
+        assert (about["plane"], about["shape"][0]) == (plane, 9)
+        low, high = about["window"]
+        expected = 255 * np.clip((scene(places_lps_mm(about)) - low) / (high - low), 0, 1)
+        assert np.abs(shown - expected).max() <= 1 + interpolation_bound(2.2) * 255 / (high - low)
+
+
 @pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
 def test_a_real_ct_of_28_uneven_tilted_slices_gives_28_pictures(tmp_path: Path) -> None:
     folder = data_folder()
