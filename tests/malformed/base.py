@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from support import dicom_mosaics
 from support.dicom_series import grid, write_enhanced, write_f_nifti, write_series
 from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
 
@@ -18,7 +19,7 @@ def write_base(folder: Path) -> None:
     v5.zarr, v4.zarr   two channels, F and G, in chunks; OME-Zarr 0.5 and 0.4
     f.ome.tif          strips and zlib; t.ome.tif: tiles
     f.nii, f.nii.gz    one volume
-    series/, e.dcm     DICOM: a series and one enhanced file
+    series/, e.dcm     DICOM: a series and one enhanced file; m.dcm: a mosaic of slices
     """
     both = np.stack([f_phantom(), f_phantom()[::-1]])
     labels = [{"label": "F", "color": "FF0000"}, {"label": "G", "color": "00FF00"}]
@@ -39,6 +40,8 @@ def write_base(folder: Path) -> None:
         write_f_nifti(folder / name, f_phantom(), SPACING)
     write_series(folder / "series", grid(shape=DICOM_SHAPE), DICOM_SHAPE)
     write_enhanced(folder / "e.dcm", grid(shape=(4, 8, 9)), (4, 8, 9))
+    mosaic = grid(shape=dicom_mosaics.SHAPE, spacing=dicom_mosaics.SPACING)
+    dicom_mosaics.write_mosaic(folder / "m.dcm", mosaic)
 
 
 BUILD = (

@@ -269,7 +269,7 @@ def _find_unsound(arguments: list[str]) -> str:
             return "an empty plan"
     elif arguments[0] == "slices":
         content = read_json(Path("out/slices.json"), "slices.schema.json", "")
-        if not all(Path("out", name).stat().st_size for name in content["slices"]):
+        if not all(Path("out", one["file"]).stat().st_size for one in content["slices"]):
             return "an empty slice"
     return ""
 

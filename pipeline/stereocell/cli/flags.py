@@ -23,6 +23,13 @@ def declare_input(parser: argparse.ArgumentParser) -> None:
 def declare_slices(parser: argparse.ArgumentParser) -> None:
     declare_source(parser)
     parser.add_argument("-o", "--out", type=_place, required=True, help="folder of the pictures")
+    parser.add_argument(
+        "--plane",
+        choices=["acquired", "axial", "coronal", "sagittal", "xy", "xz", "yz"],
+        default="acquired",
+        help="which planes: as the source's own images lie (default), of a patient axial, coronal "
+        "or sagittal, of microscopy xy, xz or yz",
+    )
 
 
 def declare_source(parser: argparse.ArgumentParser) -> None:

@@ -16,11 +16,13 @@ from typing import Any
 
 import nibabel
 import numpy as np
+from nibabel.cifti2.cifti2 import Cifti2Image
 from nibabel.fileslice import fileslice
 from nibabel.openers import ImageOpener
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
+from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Image
@@ -35,6 +37,9 @@ NAME = "NIfTI"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
+_INTENT_LABEL = 1002
+_LABEL_TABLE = b"<LabelTable"  # of Connectome Workbench and TotalSegmentator
+_WIDER = 1.05  # factor by which slices lie further apart than pixels
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _FAULTS = (
     nibabel.filebasedimages.ImageFileError,
@@ -98,9 +103,35 @@ def read_image(location: Location) -> Image:
         images=1,
         title=NAME,
         placement=canonical.placement,
+        labels=_labels(header),
+        acquired=Acquired(_image_axis(header, canonical)),
         notes=tuple(notes),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _labels(header: Any) -> str:
+    """Return what in the header says that voxels number objects; of a table only its presence."""
+    if header["intent_code"] == _INTENT_LABEL:
+        return f"NIfTI's intent code {_INTENT_LABEL} (label)"
+    tables = (extension.get_content() for extension in header.extensions)
+    if any(isinstance(text, bytes) and _LABEL_TABLE in text for text in tables):
+        return "a table of labels in an extension of its header"
+    return ""
+
+
+def _image_axis(header: Any, canonical: Canonical) -> int:
+    """Return the axis (of z, y, x) across which the scanner's images lie.
+
+    The header's `dim_info` may name it; else it is the axis of the widest spacing, or where several
+    are as wide (a share of `_WIDER`), the last stored one: the slowest in the file.
+    """
+    named = header.get_dim_info()[2]
+    if named is not None:
+        return canonical.order.index(named)
+    spacing = canonical.spacing_um
+    wide = [axis for axis in range(3) if spacing[axis] * _WIDER >= max(spacing)]
+    return max(wide, key=lambda axis: canonical.order[axis])
 
 
 def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:
@@ -116,6 +147,11 @@ def _open(location: Location) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image: Any = nibabel.load(location.source, mmap=False)
+            if isinstance(image, Cifti2Image):
+                raise SourceError(
+                    f"{location.shown}: CIFTI, values on surfaces and in greyordinates; expected "
+                    "NIfTI with a volume"
+                )
             if not isinstance(image, nibabel.nifti1.Nifti1Pair):
                 raise TypeError
             # an invalid quaternion, unit or type fails here rather than later
@@ -138,6 +174,8 @@ def _open(location: Location) -> Any:
 def _dtype(stored: np.dtype[Any], slope: float, intercept: float) -> np.dtype[Any]:
     if stored.kind == "f":
         return np.dtype(np.float32)
+    if stored.itemsize >= 4 and (slope, intercept) == (1, 0):
+        return stored.newbyteorder("=")  # labels keep their numbers; read/cast.py has the rest
     limits = np.iinfo(stored)
     return dtype_for([(float(limits.min), float(limits.max), float(slope), float(intercept))])
 

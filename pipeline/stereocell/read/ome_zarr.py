@@ -24,35 +24,46 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.read.zarr_collections import (
+    ZarrTree,
+    describe_group,
+    labels_evidence,
+    notes_on_labels,
+    part_of,
+    series_of,
+)
 from stereocell.read.zarr_store import GuardedStore, codec_name
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64  # of the pyramid
-# attribute of a group without an image of its own -> the group's kind, for messages
-_OTHERS = {
-    "plate": "a plate",
-    "well": "a well",
-    "labels": "a list of labels",
-    "bioformats2raw.layout": "several series (bioformats2raw.layout), of which one is at /0",
-}
 
 
-def read_image(location: Location) -> Image:
-    """Return the first multiscale image of the group. Raises SourceError where there is none."""
+def read_image(location: Location, *, is_part: bool = False) -> Image:
+    """Return the first multiscale image of the group, or of the one image in a container of series.
+
+    is_part  it is the one image of a container, and no container itself
+
+    Raises SourceError where there is none, or where there are several groups of images.
+    """
     where = location.shown
     with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
         store = _store(location)
-        metadata = zarr.open_group(GuardedStore(store, location), mode="r").metadata
+        guard = GuardedStore(store, location)
+        metadata = zarr.open_group(guard, mode="r").metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
     if not isinstance(ome, Mapping):
         raise SourceError(f"{where}: attribute `ome`: found {ome!r:.60}, expected a table")
+    tree = ZarrTree(location, guard, metadata.zarr_format)
     multiscales = ome.get("multiscales")
     if not isinstance(multiscales, list) or not multiscales:
-        found = next((f"found {_OTHERS[key]}" for key in _OTHERS if key in ome), "not found")
+        series = series_of(ome, tree)
+        if len(series) == 1 and not is_part:
+            return read_image(part_of(location, series[0]), is_part=True)
         raise SourceError(
-            f"{where}: no multiscales: {found}, expected the attribute `multiscales` of an image"
+            f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
+            "attribute `multiscales` of an image"
         )
     with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.4 and 0.5"):
         axes, units = _axes(multiscales[0])
@@ -67,7 +78,7 @@ def read_image(location: Location) -> Image:
     missing = [axis for axis in "zyx" if axis not in axes]
     if missing:
         raise SourceError(
-            f"{where}: a volume needs at least 2 planes: no axis {missing[0]} "
+            f"{where}: one plane (2D): a volume needs at least 2 planes: no axis {missing[0]} "
             f"among {', '.join(axes)}"
         )
     arrays = tuple(_open_array(location, store, path, axes, metadata.zarr_format) for path in paths)
@@ -78,7 +89,15 @@ def read_image(location: Location) -> Image:
     omero = ome.get("omero", {})
     channels = omero.get("channels", []) if isinstance(omero, Mapping) else omero
     names, colors = _channels(where, channels, arrays[0].size("c"))
-    return Image(arrays, grids, names, colors, len(multiscales))
+    return Image(
+        arrays,
+        grids,
+        names,
+        colors,
+        len(multiscales),
+        notes=notes_on_labels(tree),
+        labels=labels_evidence(ome, location),
+    )
 
 
 def _axes(multiscale: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[float | None, ...]]:

@@ -11,13 +11,15 @@ import fsspec
 import numpy as np
 
 from stereocell.model.errors import SourceError, UsageError
-from stereocell.read.dataset import ChannelInfo, Dataset
+from stereocell.read.cast import TAKEN, built_dtype, cast_note
+from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
 
-DTYPES = ("uint8", "uint16", "int16", "float32")
+_SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
+_PACKED = (".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz")
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
 
@@ -92,6 +94,13 @@ def open(
     if location.is_local and not Path(location.source).is_dir():
         require_own(location.source, [location.folder], named=location.shown)
     if location.format is None:
+        last = location.parts[-1].lower() if location.parts else ""
+        if last.endswith(_SURFACES):
+            raise SourceError(
+                f"{location.shown}: a surface (mesh), no volume; expected {_formats()}"
+            )
+        if last.endswith(_PACKED):
+            raise SourceError(f"{location.shown}: a packed file: unpack it; expected {_formats()}")
         raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
     if not location.is_local:
         with one_line(location.shown, "an address that fsspec opens"):
@@ -127,7 +136,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     return Dataset(
         source=location.source,
         name=image.title or _shown(location.name) or "dataset",
-        dtype=np.dtype(finest.array.dtype).newbyteorder("="),
+        dtype=built_dtype(finest.array.dtype) or np.dtype(finest.array.dtype),
         levels=levels_of(image.grids, spacing_um, where),
         channels=tuple(channels),
         time_points=finest.size("t"),
@@ -138,7 +147,13 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         on_close=image.close,
         modality=image.modality,
         placement=image.placement,
-        remarks=(*image.notes, *(image.notes_at(time) if image.notes_at is not None else ())),
+        remarks=(
+            *image.notes,
+            *filter(None, [cast_note(finest.array.dtype)]),
+            *(image.notes_at(time) if image.notes_at is not None else ()),
+        ),
+        acquired=image.acquired,
+        labels=image.labels,
     )
 
 
@@ -160,8 +175,8 @@ def _check_arrays(where: str, image: Image) -> None:
     finest = image.arrays[0]
     for index, level in enumerate(image.arrays):
         dtype = np.dtype(level.array.dtype)
-        if dtype.name not in DTYPES or dtype != np.dtype(finest.array.dtype):
-            expected = ", ".join(DTYPES[:-1]) + f" or {DTYPES[-1]}, the same in all levels"
+        if built_dtype(dtype) is None or dtype != np.dtype(finest.array.dtype):
+            expected = f"{', '.join(TAKEN)} or another real number type, the same in all levels"
             raise SourceError(
                 f"{where}: dtype of level {index}: found {dtype.name}, expected {expected}"
             )
@@ -185,8 +200,17 @@ def _check_arrays(where: str, image: Image) -> None:
             )
     if finest.shape[0] < 2:
         raise SourceError(
-            f"{where}: a volume needs at least 2 planes: found {finest.shape[0]} along z"
+            f"{where}: one plane (2D): a volume needs at least 2 planes: found "
+            f"{finest.shape[0]} along z"
+            f"{_beside(finest)}; expected a stack, or a folder of planes (name the folder)"
         )
+
+
+def _beside(flat: VoxelArray) -> str:
+    """Return the words for the axes that a flat image has beside y and x."""
+    counts = [(flat.size("c"), "channels"), (flat.size("t"), "points in time")]
+    found = " and ".join(f"{count} {noun}" for count, noun in counts if count > 1)
+    return f" (a flat image of {found})" if found else ""
 
 
 def _shown(name: str) -> str:
