@@ -28,7 +28,7 @@ def declare_slices(parser: argparse.ArgumentParser) -> None:
 def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
-        help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
+        help="OME-Zarr or TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
         "file) or NIfTI: a path",
     )
     declare_settings(parser)

@@ -19,7 +19,7 @@ _MAKERS = (
     "stereocell.building.tasks.unit",
     "stereocell.building.stage_tasks",
     "stereocell.read.ome_zarr",
-    "stereocell.read.ome_tiff",
+    "stereocell.read.tiff",
     "stereocell.read.nifti",
     "stereocell.read.dicom",
 )

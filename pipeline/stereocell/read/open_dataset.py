@@ -15,8 +15,9 @@ from stereocell.read.cast import TAKEN, built_dtype, cast_note
 from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple, levels_of
+from stereocell.storage.first_bytes import describe
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
+from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
@@ -45,7 +46,7 @@ class Reader:
 
 READERS = {
     "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr"),
-    "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif"),
+    "tiff": Reader("stereocell.read.tiff", "TIFF", "NAME.tif, NAME.ome.tif, NAME.lsm, NAME.stk"),
     "nifti": Reader("stereocell.read.nifti", "NIfTI", "NAME.nii, NAME.nii.gz"),
     "dicom": Reader(
         "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
@@ -59,6 +60,13 @@ def reader_of(source: str | Path) -> str:
     return "" if reader is None else reader.module
 
 
+def _found(location: Location) -> str:
+    """Return the words for what a file is of which no reader knows the format."""
+    if not location.is_local:
+        return ""
+    return f": found {describe(first_bytes(location.source))}"
+
+
 def _formats() -> str:
     """Return all formats, each with an example, as a phrase for messages."""
     *others, last = (f"{reader.title} ({reader.example})" for reader in READERS.values())
@@ -68,7 +76,7 @@ def _formats() -> str:
 def open(
     source: str | Path, *, time: int = 0, spacing_um: Triple | None = None, series: int = 0
 ) -> Dataset:
-    """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
+    """Open OME-Zarr 0.4 or 0.5, TIFF, NIfTI or DICOM (a folder or a file).
 
     source      a local path (the only form for DICOM and NIfTI) or an address (`http://`,
                 `https://`, `s3://`, or another one that fsspec knows)
@@ -87,12 +95,14 @@ def open(
     location = Location.of(source)
     if location.is_local and not Path(location.source).exists():
         raise SourceError(
-            f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
+            f"{location.shown}: not found, expected an OME-Zarr, TIFF or NIfTI file, or DICOM"
         )
     if location.is_local and not Path(location.source).is_dir():
         require_own(location.source, [location.folder], named=location.shown)
     if location.format is None:
-        raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
+        raise SourceError(
+            f"{location.shown}: unknown format{_found(location)}, expected {_formats()}"
+        )
     if not location.is_local:
         with one_line(location.shown, "an address that fsspec opens"):
             files, path = fsspec.url_to_fs(location.source, **location.storage_options)

@@ -1,0 +1,94 @@
+"""TIFF: OME-TIFF, and what ImageJ, Zeiss LSM, MetaMorph, Micro-Manager, tifffile and others write.
+
+read/tiff/ome.py reads what OME-XML describes, read/tiff/plain.py all else; both by tifffile.
+"""
+
+import logging
+import os
+from contextlib import ExitStack
+from dataclasses import replace
+
+from tifffile import TiffFile
+
+from stereocell.model.errors import SourceError
+from stereocell.read import ome_xml
+from stereocell.read.image import Image
+from stereocell.read.tiff.ome import read_ome
+from stereocell.read.tiff.open_file import open_tiff
+from stereocell.read.tiff.plain import kind_of, read_plain
+from stereocell.storage.library_errors import collected_log, one_line
+from stereocell.storage.location import Location, require_own
+
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised here
+_OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
+_HEAD = 4096  # characters of a description, in which OME-XML names itself
+_MAX_COMPANION = 64 << 20  # bytes of an OME-XML beside the TIFF files
+
+
+def read_image(location: Location) -> Image:
+    """Return the first image of the file. Raises SourceError where it can't be read as one."""
+    where = location.shown
+    stack = ExitStack()
+    try:
+        with collected_log("tifffile") as log:
+            tiff = open_tiff(location, stack)
+            with one_line(where, "a TIFF file, whole"):
+                text = tiff.pages.first.description
+            if not _is_ome(text):
+                image = read_plain(location, tiff, stack)
+                return _with_note(location, image)
+            try:
+                root = ome_xml.parse(text, where)
+            except SourceError as error:
+                raise SourceError(f"{error}{_otherwise(tiff)}") from error
+            companion = ome_xml.companion_of(root)
+            if companion:
+                text = _companion(location, companion)
+                root = ome_xml.parse(text, f"{where}: {companion!r:.100}")
+                tiff = open_tiff(location, stack, omexml=text)
+            return read_ome(location, tiff, stack, root=root, text=text, log=log)
+    except BaseException:
+        stack.close()
+        raise
+
+
+def _is_ome(description: str) -> bool:
+    head = description[:_HEAD]
+    is_xml = head.lstrip("\ufeff \t\r\n").startswith("<")
+    return is_xml and ("<OME" in head or "openmicroscopy.org" in head)
+
+
+def _with_note(location: Location, image: Image) -> Image:
+    if not location.parts[-1].lower().endswith(_OME_NAMES):
+        return image
+    note = "the name says OME-TIFF, but there is no OME-XML in it: read as plain TIFF"
+    return replace(image, notes=(note, *image.notes))
+
+
+def _otherwise(tiff: TiffFile) -> str:
+    """Return the words for what a file is whose OME-XML can't be read."""
+    try:
+        with one_line("", "pages"):
+            tiff.is_ome = False  # as tifffile's constructor does
+            found = kind_of(tiff.series[0])
+    except SourceError:
+        return ""
+    return (
+        f" (without it the file is {found}: saved anew as TIFF by ImageJ, say, it is read "
+        "without OME-XML)"
+    )
+
+
+def _companion(location: Location, name: str) -> str:
+    """Return the OME-XML of a set whose files refer to one beside them. Raises SourceError."""
+    named = f"{location.shown}: OME-XML: BinaryOnly MetadataFile {name!r:.100}"
+    if not location.is_local:
+        raise SourceError(f"{named}: beside an address, expected the set on this machine")
+    path = os.path.join(location.folder, name)
+    status = require_own(path, [location.folder], named=named)
+    if status is None:
+        raise SourceError(f"{named}: not found, expected it beside the TIFF file")
+    if status.st_size > _MAX_COMPANION:
+        raise SourceError(f"{named}: found {status.st_size} bytes, expected OME-XML")
+    with one_line(named, "OME-XML"), open(path, encoding="utf-8") as file:
+        return file.read().strip()
