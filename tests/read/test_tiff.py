@@ -9,10 +9,10 @@ import tifffile
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.model.errors import SourceError
+from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
 from stereocell.read.spacing import Triple
-from support.tiff_files import write_lsm, write_stk
+from support.tiff_files import write_lsm, write_ndtiff, write_stk
 
 GIVEN: Triple = (2.0, 1.0, 1.0)
 SIZES = {"T": 3, "Z": 5, "C": 2, "Y": 12, "X": 14, "S": 3}  # 3 or 4 planes tifffile takes for RGB
@@ -409,3 +409,56 @@ def test_a_companion_elsewhere_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "x.companion.ome").write_text(text)
     (folder / "x.companion.ome").symlink_to(tmp_path / "x.companion.ome")
     assert "expected a file in" in refusal(folder / "x-Z0.ome.tiff")
+
+
+def test_axes_are_those_that_the_user_names(tmp_path: Path) -> None:
+    stored = counted("ZCYX")
+    path = tmp_path / "x.tif"
+    tifffile.imwrite(path, stored[:, 0], imagej=True, metadata={"axes": "TYX"})
+    line = refusal(path, spacing_um=GIVEN)
+    assert "found 1 along z, and 5 points in time; expected slices: --axes zyx takes" in line
+    hold_voxels(read.open(path, axes="zyx", spacing_um=GIVEN), stored[:, 0], "ZYX")
+    tifffile.imwrite(path, stored, photometric="minisblack")
+    for axes in ("zcyx", "Z,C,Y,X"):
+        dataset = read.open(path, axes=axes, spacing_um=GIVEN)
+        assert dataset.notes == ()
+        hold_voxels(dataset, stored, "ZCYX")
+    dataset = read.open(path, axes="tzyx", time=3, spacing_um=GIVEN)
+    hold_voxels(dataset, stored, "TZYX")
+    sizes = {"PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 2.0}
+    ome = tmp_path / "x.ome.tif"
+    tifffile.imwrite(ome, stored[:, 0], ome=True, metadata={"axes": "TYX", **sizes})
+    assert "--axes zyx takes the points in time for slices" in refusal(ome)
+    hold_voxels(read.open(ome, axes="zyx"), stored[:, 0], "ZYX")
+
+
+@pytest.mark.parametrize("axes", ["zyx", "zzyx", "tcyx", "zcyq", "zcyxt"])
+def test_axes_that_do_not_fit_are_told(tmp_path: Path, axes: str) -> None:
+    tifffile.imwrite(tmp_path / "x.tif", counted("ZCYX"), photometric="minisblack")
+    with pytest.raises(UsageError, match=r"expected 4 letters.*axes are 5, 2, 12, 14 long"):
+        read.open(tmp_path / "x.tif", axes=axes, spacing_um=GIVEN)
+
+
+@pytest.mark.parametrize("option", [{"axes": "zyx"}, {"pattern": "{z}"}, {"series": 2}])
+def test_an_option_of_another_format_is_told(tmp_path: Path, option: dict[str, Any]) -> None:
+    (name,) = option
+    source = tmp_path / ("x.tif" if name != "axes" else "x.nii")
+    tifffile.imwrite(source, counted("ZYX"))
+    with pytest.raises(UsageError, match=f"--{name} .*: only"):
+        read.open(source, **option)
+
+
+def test_ndtiff_with_its_index(tmp_path: Path) -> None:
+    stored = counted("CZYX")
+    path = write_ndtiff(tmp_path / "x_NDTiffStack.tif", stored, ["DAPI", "GFP"])
+    with tifffile.TiffFile(path) as tiff:
+        assert tiff.series[0].kind == "ndtiff"
+        np.testing.assert_array_equal(tiff.asarray(), stored)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == (2.0, 0.5, 0.5)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "GFP"]
+    assert not dataset.notes
+    hold_voxels(dataset, stored, "CZYX")
+    index = tmp_path / "NDTiff.index"
+    index.write_bytes(index.read_bytes().replace(b"x_NDTiffStack.tif", b"../NDTiffStack.tif"[:17]))
+    assert "NDTiff.index: '../" in refusal(path)

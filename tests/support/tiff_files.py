@@ -1,8 +1,10 @@
-"""Files of Zeiss LSM and MetaMorph STK, of which no library writes one: by their published layout.
+"""Files of LSM, STK and NDTiff, of which no library at hand writes one: by their published layout.
 
-References: Zeiss, LSM 5 file format; MetaMorph, STK file format (UIC tags 33628 to 33630).
+References: Zeiss, LSM 5 file format; MetaMorph, STK file format (UIC tags 33628 to 33630);
+Micro-Manager, NDTiff specification.
 """
 
+import json
 import struct
 from pathlib import Path
 from typing import Any
@@ -87,4 +89,36 @@ def write_stk(
     at = put(struct.pack("<H", len(tags)) + entries + bytes(4))
     struct.pack_into("<I", content, 4, at)
     path.write_bytes(content)
+    return path
+
+
+def write_ndtiff(path: Path, voxels: NDArray[np.uint16], channels: list[str]) -> Path:
+    """Write a stack (c, z, y, x), and the index beside it, which alone names the axes."""
+    _, depth, height, width = voxels.shape
+    summary = json.dumps({"PixelSize_um": 0.5, "z-step_um": 2.0}).encode()
+    content = bytearray(b"II*\0\0\0\0\0")
+    content += struct.pack("<5I", 483729, 3, 2, 2355492, len(summary)) + summary
+    link, index = 4, b""
+    for number, plane in enumerate(voxels.reshape(-1, height, width)):
+        content += bytes(len(content) % 2)
+        pixels = len(content)
+        content += plane.astype("<u2").tobytes()
+        about = b'{"Camera": "none"}\0\0'
+        content += about
+        tags = {
+            256: (4, 1, width), 257: (4, 1, height), 258: (3, 1, 16), 259: (3, 1, 1),
+            262: (3, 1, 1), 273: (4, 1, pixels), 277: (3, 1, 1), 278: (3, 1, height),
+            279: (4, 1, 2 * height * width), 51123: (2, len(about), len(content) - len(about)),
+        }  # fmt: skip
+        struct.pack_into("<I", content, link, len(content))
+        entries = b"".join(struct.pack("<2H2I", tag, *entry) for tag, entry in tags.items())
+        content += struct.pack("<H", len(tags)) + entries
+        link = len(content)
+        content += bytes(4)
+        place = {"channel": channels[number // depth], "z": number % depth}
+        for text in (json.dumps(place).encode(), path.name.encode()):
+            index += struct.pack("<I", len(text)) + text
+        index += struct.pack("<8I", pixels, width, height, 1, 0, pixels, 0, 0)
+    path.write_bytes(content)
+    (path.parent / "NDTiff.index").write_bytes(index)
     return path

@@ -20,6 +20,7 @@ _MAKERS = (
     "stereocell.building.stage_tasks",
     "stereocell.read.ome_zarr",
     "stereocell.read.tiff",
+    "stereocell.read.planes",
     "stereocell.read.nifti",
     "stereocell.read.dicom",
 )

@@ -22,6 +22,8 @@ _TIFF_SUFFIXES = (
     *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
     *(".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
 )
+_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
+_MOST_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
@@ -97,16 +99,19 @@ class Location:
 
     @property
     def format(self) -> str | None:
-        """`ome-zarr`, `tiff`, `nifti`, `dicom`; None where neither name nor content fits one.
+        """`ome-zarr`, `tiff`, `planes`, `nifti`, `dicom`; None where none fits name and content.
 
-        DICOM is any other folder on this machine, and a file with DICOM's first bytes.
+        Planes are a folder of images without DICOM; DICOM is any other folder on this machine, and
+        a file with DICOM's first bytes.
         """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
-        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
-            return "tiff"
         if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
             return "ome-zarr"
+        if self.is_local and _holds_planes(self.source):
+            return "planes"
+        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
+            return "tiff"
         if not self.is_local or not self.parts:
             return None
         if self.parts[-1].lower().endswith(_NIFTI_SUFFIXES):
@@ -234,6 +239,26 @@ def require_apart(source: str | Path, out: Path) -> None:
             f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
             "it would write into the data"
         )
+
+
+def _holds_planes(folder: str) -> bool:
+    """Return whether a folder holds images of planes, and no DICOM beside them."""
+    are_there, others = False, 0
+    for at, folders, names in os.walk(folder):
+        folders.sort()
+        for name in sorted(names):
+            lower = name.lower()
+            if lower.startswith("."):
+                continue
+            if lower.endswith(_PLANE_SUFFIXES):
+                are_there = True
+            elif lower.endswith(_DICOM_SUFFIXES):
+                return False
+            elif others < _MOST_OTHERS:
+                others += 1
+                if first_bytes(os.path.join(at, name))[128:132] == b"DICM":
+                    return False
+    return are_there
 
 
 def first_bytes(path: str) -> bytes:

@@ -25,8 +25,14 @@ _HEAD = 4096  # characters of a description, in which OME-XML names itself
 _MAX_COMPANION = 64 << 20  # bytes of an OME-XML beside the TIFF files
 
 
-def read_image(location: Location) -> Image:
-    """Return the first image of the file. Raises SourceError where it can't be read as one."""
+def read_image(location: Location, axes: str = "") -> Image:
+    """Return the first image of the file.
+
+    axes  of those longer than 1, slowest first, as `zcyx`; empty: the file's own
+
+    Raises SourceError where the file can't be read as an image, UsageError where it has another
+    number of axes.
+    """
     where = location.shown
     stack = ExitStack()
     try:
@@ -35,7 +41,7 @@ def read_image(location: Location) -> Image:
             with one_line(where, "a TIFF file, whole"):
                 text = tiff.pages.first.description
             if not _is_ome(text):
-                image = read_plain(location, tiff, stack)
+                image = read_plain(location, tiff, stack, axes)
                 return _with_note(location, image)
             try:
                 root = ome_xml.parse(text, where)
@@ -46,7 +52,7 @@ def read_image(location: Location) -> Image:
                 text = _companion(location, companion)
                 root = ome_xml.parse(text, f"{where}: {companion!r:.100}")
                 tiff = open_tiff(location, stack, omexml=text)
-            return read_ome(location, tiff, stack, root=root, text=text, log=log)
+            return read_ome(location, tiff, stack, root=root, text=text, log=log, axes=axes)
     except BaseException:
         stack.close()
         raise

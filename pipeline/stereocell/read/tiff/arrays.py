@@ -7,7 +7,7 @@ import zarr
 from numpy.typing import NDArray
 from tifffile import TiffPage, TiffPageSeries
 
-from stereocell.model.errors import SourceError
+from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Color, linear_color
 
@@ -39,6 +39,41 @@ class FirstAlong:
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         return np.asarray(self._array[(*key[: self._axis], 0, *key[self._axis :])])
+
+
+def with_given_axes(where: str, arrays: list[VoxelArray], axes: str) -> list[VoxelArray]:
+    """Return arrays whose axes are the user's letters. Raises UsageError where those don't fit.
+
+    axes  of those longer than 1, slowest first, as `zcyx`
+    """
+    letters = axes.strip().lower().replace(",", "")
+    shape = [int(n) for n in arrays[0].array.shape]
+    long = [place for place, length in enumerate(shape) if length > 1]
+    is_sound = set(letters) <= set("tczyx") and len(set(letters)) == len(letters)
+    if not is_sound or not {"z", "y", "x"} <= set(letters) or len(letters) != len(long):
+        lengths = ", ".join(str(shape[place]) for place in long)
+        raise UsageError(
+            f"{where}: --axes is {axes!r:.40}, expected {len(long)} letters of t, c, z, y and x, "
+            f"each once, with z, y and x among them: the file's axes are {lengths} long"
+        )
+    names = dict(zip(long, letters, strict=True))
+    renamed = tuple(names.get(place, "_") for place in range(len(shape)))
+    return [VoxelArray(level.array, renamed) for level in arrays]
+
+
+def require_depth(where: str, finest: VoxelArray) -> None:
+    """Raise SourceError for a flat image whose times or channels may be slices after all."""
+    if finest.size("z") > 1:
+        return
+    for axis, noun in (("t", "points in time"), ("c", "channels")):
+        count = finest.size(axis)
+        if count > 1 and finest.axes[-1] != axis:  # else they are colours of pixels
+            lengths = {a: n for a, n in zip(finest.axes, finest.array.shape, strict=True) if n > 1}
+            asked = "".join("z" if a == axis else a for a in lengths)
+            raise SourceError(
+                f"{where}: a volume needs at least 2 planes: found 1 along z, and {count} {noun}; "
+                f"expected slices: --axes {asked} takes the {noun} for slices"
+            )
 
 
 def samples_as_channels(

@@ -22,7 +22,12 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.ome_xml import OmeImage
 from stereocell.read.spacing import Grid, grid_of
-from stereocell.read.tiff.arrays import array_of, samples_as_channels
+from stereocell.read.tiff.arrays import (
+    array_of,
+    require_depth,
+    samples_as_channels,
+    with_given_axes,
+)
 from stereocell.read.tiff.open_file import MAX_PLANES, require_pages
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
@@ -42,11 +47,13 @@ def read_ome(
     root: ElementTree.Element,
     text: str,
     log: Sequence[str],
+    axes: str,
 ) -> Image:
     """Return the first image of an open file.
 
     root, text  the OME-XML, of the file or of the one beside it
     log         grows by tifffile's messages
+    axes        of those longer than 1, slowest first; empty: as the OME-XML has them
 
     Raises SourceError where it can't be read as an image.
     """
@@ -65,6 +72,8 @@ def read_ome(
         )
     for index, level in enumerate(pages):
         require_pages(f"{where}: level {index}", tiff, level, len(level))
+    if axes:
+        arrays = with_given_axes(where, arrays, axes)
     return _image(where, images, arrays, page=series.keyframe, stack=stack)
 
 
@@ -119,6 +128,7 @@ def _image(
     if not images:
         raise SourceError(f"{where}: OME-XML: found no Image, expected one")
     arrays, names, colors, notes = samples_as_channels(where, arrays, page)
+    require_depth(where, arrays[0])
     first, count = images[0], len(names) or arrays[0].size("c")
     unnamed = [None] * (count - len(first.names))
     return Image(

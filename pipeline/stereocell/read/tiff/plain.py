@@ -16,7 +16,14 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.spacing import Grid, grid_of
-from stereocell.read.tiff.arrays import FirstAlong, array_of, notes_of, samples_as_channels
+from stereocell.read.tiff.arrays import (
+    FirstAlong,
+    array_of,
+    notes_of,
+    require_depth,
+    samples_as_channels,
+    with_given_axes,
+)
 from stereocell.read.tiff.open_file import MAX_PLANES, open_tiff, refuse_short, require_series
 from stereocell.read.tiff.stated import stated_by
 from stereocell.storage.library_errors import one_line
@@ -29,11 +36,14 @@ _INDEX, _MAX_INDEX = "NDTiff.index", 64 << 20  # of Micro-Manager's NDTiff: file
 _EXPECTED = "a TIFF of planes of one size"
 
 
-def read_plain(location: Location, tiff: TiffFile, stack: ExitStack) -> Image:
-    """Return the largest image of an open TIFF. Raises SourceError."""
+def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) -> Image:
+    """Return the largest image of an open TIFF. Raises SourceError, UsageError for the axes.
+
+    axes  of those longer than 1, slowest first; empty: what the file says, or a guess
+    """
     where = location.shown
     with one_line(where, _EXPECTED):
-        tiff = _with_index(location, tiff, stack)
+        tiff, indexed = _with_index(location, tiff, stack)
         _require_imagej_whole(where, tiff)
         found = list(tiff.series)
     if not found:
@@ -48,10 +58,14 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack) -> Image:
     notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
     arrays, more = _at_first_place(arrays)
     notes += more
-    arrays, more = _with_axes(where, arrays)
-    notes += more
+    if axes:
+        arrays = with_given_axes(where, arrays, axes)
+    else:
+        arrays, more = _with_axes(where, arrays)
+        notes += more
     arrays, names, colors, told = samples_as_channels(where, arrays, page)
     notes += [*told, *notes_of(page)]
+    require_depth(where, arrays[0])
     count = len(names) or arrays[0].size("c")
     if count > MAX_CHANNELS or arrays[0].size("z") * arrays[0].size("t") > MAX_PLANES:
         raise SourceError(
@@ -66,7 +80,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack) -> Image:
             grid_of(shape, stated.spacing_um, stated.hint),
             *(Grid(level.shape) for level in arrays[1:]),
         ),
-        names or (*stated.names, *unstated)[:count],
+        names or (*(stated.names or indexed), *unstated)[:count],
         colors or (*stated.colors, *unstated)[:count],
         1,
         stack.close,
@@ -80,19 +94,28 @@ def _left_out(others: int) -> list[str]:
     return [f"{others} other image{'s' * (others > 1)} in the file left out: the largest is built"]
 
 
-def _with_index(location: Location, tiff: TiffFile, stack: ExitStack) -> TiffFile:
-    """Return the file with its NDTiff index, which names axes and other files, where it has one."""
+def _with_index(
+    location: Location, tiff: TiffFile, stack: ExitStack
+) -> tuple[TiffFile, tuple[str, ...]]:
+    """Return the file with its NDTiff index, which names axes and other files, where it has one.
+
+    The second value is the names of channels in the index.
+    """
     folder = os.path.dirname(os.path.realpath(location.source))
     index = os.path.join(folder, _INDEX)
     if not location.is_local or not tiff.is_micromanager or not os.path.exists(index):
-        return tiff
+        return tiff, ()
     found = require_own(index, [location.folder], named=f"{location.shown}: {_INDEX}")
     if found is None or found.st_size > _MAX_INDEX:
-        return tiff
-    for name in dict.fromkeys(row[1] for row in tifffile.read_ndtiff_index(index)):
+        return tiff, ()
+    rows = list(tifffile.read_ndtiff_index(index))
+    for name in dict.fromkeys(row[1] for row in rows):
         named = f"{location.shown}: {_INDEX}: {name!r:.200}"
         require_own(os.path.join(folder, name), [location.folder], named=named)
-    return open_tiff(location, stack, is_ndtiff=None)
+    # tifffile numbers channels in the order of their first planes
+    channels = dict.fromkeys(row[0].get("channel") for row in rows)
+    names = tuple(name for name in channels if isinstance(name, str))
+    return open_tiff(location, stack, is_ndtiff=None), names
 
 
 def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
@@ -134,16 +157,17 @@ def _first_along(level: VoxelArray, axis: str) -> VoxelArray:
 def _with_axes(where: str, arrays: list[VoxelArray]) -> tuple[list[VoxelArray], list[str]]:
     """Return the arrays with z, and channels, in the place of unknown axes, and a note."""
     axes = arrays[0].axes
+    known = [axis for axis in axes if axis not in _UNKNOWN]
     unknown = [place for place, axis in enumerate(axes) if axis in _UNKNOWN]
-    if not unknown:
+    if not unknown and len(set(known)) == len(known):
         return arrays, []
     lengths = [int(arrays[0].array.shape[place]) for place in unknown]
-    meant = _meant(axes, lengths)
+    meant = _meant(axes, lengths) if len(set(known)) == len(known) else None
     if meant is None:
         shape = ", ".join(str(n) for n in arrays[0].array.shape)
         raise SourceError(
             f"{where}: axes: found {''.join(axes).upper()} of {shape}, expected pages whose axes "
-            "are named: ImageJ, OME-TIFF, or tifffile's metadata={'axes': 'CZYX'}"
+            "are named: by the file (ImageJ, OME-TIFF), or by --axes, as zcyx"
         )
     names = dict(zip(unknown, meant, strict=True))
     renamed = tuple(names.get(place, axis) for place, axis in enumerate(axes))
