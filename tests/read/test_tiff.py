@@ -1,5 +1,6 @@
 """TIFF without OME-XML: axes, spacings, names and colours of files that tifffile writes."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 import tifffile
 from numpy.typing import NDArray
 
+from conftest import Server
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
@@ -24,12 +26,12 @@ def counted(axes: str, dtype: str = "uint16") -> NDArray[Any]:
     return np.random.default_rng(5).integers(0, 250, shape).astype(dtype)
 
 
-def read_whole(source: Path, **options: Any) -> None:
+def read_whole(source: Path | str, **options: Any) -> None:
     dataset = read.open(source, **options)
     dataset.read(0, dataset.levels[0].box)
 
 
-def refusal(source: Path, **options: Any) -> str:
+def refusal(source: Path | str, **options: Any) -> str:
     with pytest.raises(SourceError) as caught:
         read_whole(source, **options)
     line = str(caught.value)
@@ -391,7 +393,7 @@ def test_a_set_of_files_with_its_ome_xml_beside_them(tmp_path: Path) -> None:
     names = [f"x-Z{index}.ome.tiff" for index in range(5)]
     text = companion_set(tmp_path, stored, names)
     (tmp_path / "x.companion.ome").write_text(text)
-    for name in names:
+    for name in [*names, "x.companion.ome"]:
         dataset = read.open(tmp_path / name)
         assert dataset.levels[0].spacing_um == (2.0, 1.0, 1.0)
         assert dataset.channels[0].name == "DAPI"
@@ -462,3 +464,31 @@ def test_ndtiff_with_its_index(tmp_path: Path) -> None:
     index = tmp_path / "NDTiff.index"
     index.write_bytes(index.read_bytes().replace(b"x_NDTiffStack.tif", b"../NDTiffStack.tif"[:17]))
     assert "NDTiff.index: '../" in refusal(path)
+
+
+def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
+    text = companion_set(tmp_path, counted("ZYX"), [f"x-Z{index}.ome.tiff" for index in range(5)])
+    source = tmp_path / "y.companion.ome"
+    for spoilt, told in (
+        (text.replace("x-Z0", "gone"), "FileName: found 'gone.ome.tiff'"),
+        (text.replace("x-Z0", "../x-Z0"), "leads to"),
+        (text[:200], "OME-XML:"),
+        ("", "OME-XML: found none"),
+    ):
+        source.write_text(spoilt)
+        assert told in refusal(source)
+
+
+def test_a_file_at_an_address_is_read_and_told_where_it_is_cut(
+    tmp_path: Path, serve: Callable[[Path], Server]
+) -> None:
+    stored = counted("ZYX")
+    with tifffile.TiffWriter(tmp_path / "x.tif") as writer:
+        for plane in stored:
+            writer.write(plane, metadata=None, contiguous=False)
+    content = (tmp_path / "x.tif").read_bytes()
+    server = serve(tmp_path)
+    hold_voxels(read.open(f"{server.url}/x.tif", spacing_um=GIVEN), stored, "ZYX")
+    for kept in (1, 5, 700, len(content) - 600, len(content) - 10):
+        (tmp_path / f"{kept}.tif").write_bytes(content[:kept])
+        assert f"{kept}.tif: " in refusal(f"{server.url}/{kept}.tif", spacing_um=GIVEN)

@@ -61,6 +61,13 @@ def companion_of(root: ElementTree.Element) -> str:
     return "" if other is None else other.get("MetadataFile", "")
 
 
+def files_of(root: ElementTree.Element) -> Iterator[str]:
+    """Yield the name of the file of each plane, or of a run of them."""
+    for element in root.iter():
+        if _local(element) == "UUID" and element.get("FileName"):
+            yield element.get("FileName", "")
+
+
 def images_of(root: ElementTree.Element, where: str) -> list[OmeImage]:
     """Return the images with their pixels' metadata.
 

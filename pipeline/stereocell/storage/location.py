@@ -20,7 +20,7 @@ from stereocell.storage.first_bytes import HEAD_BYTES, TIFF_MAGIC
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
 _TIFF_SUFFIXES = (
     *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
-    *(".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
+    *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
 )
 _PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
 _MOST_OTHERS = 200  # files without an image's name that are looked into for DICOM

@@ -120,6 +120,7 @@ def _find(location: Location) -> Found:
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
             f"{many}{held or 'nothing'}; expected slices of MR, CT or the like"
+            f"{', or planes of TIFF, PNG or JPEG' * root.is_dir()}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
 

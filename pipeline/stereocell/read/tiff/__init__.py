@@ -5,6 +5,8 @@ read/tiff/ome.py reads what OME-XML describes, read/tiff/plain.py all else; both
 
 import logging
 import os
+import re
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -14,13 +16,15 @@ from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.image import Image
 from stereocell.read.tiff.ome import read_ome
-from stereocell.read.tiff.open_file import open_tiff
+from stereocell.read.tiff.open_file import open_tiff, refuse_short
 from stereocell.read.tiff.plain import kind_of, read_plain
 from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location, require_own
 
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised here
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
+_COMPANION = ".companion.ome"
+_BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
 _HEAD = 4096  # characters of a description, in which OME-XML names itself
 _MAX_COMPANION = 64 << 20  # bytes of an OME-XML beside the TIFF files
 
@@ -33,6 +37,8 @@ def read_image(location: Location, axes: str = "") -> Image:
     Raises SourceError where the file can't be read as an image, UsageError where it has another
     number of axes.
     """
+    if location.parts[-1].lower().endswith(_COMPANION):
+        location = _first_of_set(location)
     where = location.shown
     stack = ExitStack()
     try:
@@ -42,6 +48,7 @@ def read_image(location: Location, axes: str = "") -> Image:
                 text = tiff.pages.first.description
             if not _is_ome(text):
                 image = read_plain(location, tiff, stack, axes)
+                _require_pages_read(location, tiff, log)
                 return _with_note(location, image)
             try:
                 root = ome_xml.parse(text, where)
@@ -56,6 +63,27 @@ def read_image(location: Location, axes: str = "") -> Image:
     except BaseException:
         stack.close()
         raise
+
+
+def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) -> None:
+    """Raise SourceError where tifffile left out pages behind the end of a file at an address."""
+    for message in log:
+        found = _BEYOND.search(message)
+        if found:
+            refuse_short(location.shown, tiff.filehandle.size, int(found[1]))
+
+
+def _first_of_set(location: Location) -> Location:
+    """Return the first TIFF file of a set that is named by its OME-XML. Raises SourceError."""
+    where = location.shown
+    if not location.is_local:
+        raise SourceError(f"{where}: found OME-XML at an address, expected the set on this machine")
+    root = ome_xml.parse(_text_of(location.source, where), where)
+    name = next(ome_xml.files_of(root), "")
+    path = os.path.join(location.folder, name)
+    if not name or require_own(path, [location.folder], named=f"{where}: {name!r:.200}") is None:
+        raise SourceError(f"{where}: FileName: found {name!r:.200}, expected a TIFF file beside it")
+    return Location(path, True)
 
 
 def _is_ome(description: str) -> bool:
@@ -94,7 +122,14 @@ def _companion(location: Location, name: str) -> str:
     status = require_own(path, [location.folder], named=named)
     if status is None:
         raise SourceError(f"{named}: not found, expected it beside the TIFF file")
-    if status.st_size > _MAX_COMPANION:
-        raise SourceError(f"{named}: found {status.st_size} bytes, expected OME-XML")
-    with one_line(named, "OME-XML"), open(path, encoding="utf-8") as file:
-        return file.read().strip()
+    return _text_of(path, named)
+
+
+def _text_of(path: str, named: str) -> str:
+    """Return the OME-XML of a file. Raises SourceError."""
+    with one_line(named, "OME-XML"):
+        size = os.path.getsize(path)
+        if size > _MAX_COMPANION:
+            raise SourceError(f"{named}: found {size} bytes, expected OME-XML")
+        with open(path, encoding="utf-8") as file:
+            return file.read().strip()
