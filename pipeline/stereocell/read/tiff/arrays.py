@@ -9,11 +9,11 @@ from tifffile import TiffPage, TiffPageSeries
 
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.image import Color, linear_color
+from stereocell.read.image import Color
 
 _RGB, _PALETTE, _WHITE_IS_ZERO = 2, 3, 0  # TIFF tag PhotometricInterpretation
-_RGB_NAMES = ("Red", "Green", "Blue")
-_RGB_COLORS = ((255, 0, 0), (0, 255, 0), (0, 0, 255))
+RGB_NAMES = ("Red", "Green", "Blue")
+RGB_COLORS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # linear
 
 
 def array_of(series: TiffPageSeries, level: int) -> VoxelArray:
@@ -99,11 +99,10 @@ def samples_as_channels(
         renamed.append(VoxelArray(level.array, axes))
     if page.photometric != _RGB:
         return renamed, (None,) * count, (None,) * count, ()
-    colors = tuple(linear_color(rgb) for rgb in _RGB_COLORS)
-    notes = [f"colour pixels: built as channels {', '.join(_RGB_NAMES)}"]
-    if count > len(_RGB_NAMES):
+    notes = [f"colour pixels: built as channels {', '.join(RGB_NAMES)}"]
+    if count > len(RGB_NAMES):
         notes.append("the alpha of its pixels is left out")
-    return renamed, _RGB_NAMES, colors, tuple(notes)
+    return renamed, RGB_NAMES, RGB_COLORS, tuple(notes)
 
 
 def notes_of(page: TiffPage) -> tuple[str, ...]:
