@@ -4,6 +4,7 @@ from malformed import (
     build_cases,
     dicom_cases,
     nifti_cases,
+    plane_cases,
     settings_cases,
     tiff_cases,
     usd_cases,
@@ -12,7 +13,8 @@ from malformed import (
 from malformed.cases import Case
 
 MODULES = (
-    zarr_cases, tiff_cases, nifti_cases, dicom_cases, settings_cases, build_cases, usd_cases,
+    zarr_cases, tiff_cases, plane_cases, nifti_cases, dicom_cases, settings_cases, build_cases,
+    usd_cases,
 )  # fmt: skip
 
 

@@ -105,8 +105,8 @@ def plain_tiff(folder: Path) -> Path:
 
 
 def rgb_tiff(folder: Path) -> Path:
-    pixels = np.zeros((4, 16, 16, 3), np.uint8)
-    options = {"axes": "ZYXS", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 1.0}
+    pixels = np.zeros((16, 16, 3), np.uint8)
+    options = {"axes": "YXS"}
     tifffile.imwrite(folder / "rgb.ome.tif", pixels, ome=True, photometric="rgb", metadata=options)
     return folder / "rgb.ome.tif"
 
@@ -148,8 +148,8 @@ CASES: dict[str, tuple[Maker, str]] = {
     "text as Zarr": (text_file("bad.zarr"), "not found"),
     "empty folder as Zarr": (folder_named("bad.zarr"), "zarr.json"),
     "folder as TIFF": (folder_named("bad.ome.tif"), "directory"),
-    "TIFF without OME-XML": (plain_tiff, "OME-XML"),
-    "RGB TIFF": (rgb_tiff, "SamplesPerPixel: found 3"),
+    "TIFF without spacing": (plain_tiff, "voxel size: not found.*--spacing-um z,y,x"),
+    "flat RGB TIFF": (rgb_tiff, r"at least 2 planes.*a flat image of 3 channels\)"),
     "TIFF with missing planes": (incomplete_tiff, "found 6 planes, expected 8"),
     "TIFF of one plane": (tiff_of(SMALL[:1]), "at least 2 planes: found 1 along z"),
     "flat TIFF": (tiff_of(SMALL[0], "YX", spacing=None), "at least 2 planes: found 1 along z"),

@@ -20,7 +20,7 @@ from stereocell.report import page
 from stereocell.storage import assets, cache_key
 
 ROOT = Path(__file__).parents[2]
-ZARR, TIFF = READERS["ome-zarr"].module, READERS["ome-tiff"].module
+ZARR, TIFF = READERS["ome-zarr"].module, READERS["tiff"].module
 MAKERS = {
     "window": (window, ZARR),
     "iso-value": (iso_value, ZARR),
@@ -112,7 +112,7 @@ PACKAGE = "pipeline/stereocell"
         ("isosurface/isovalue.py", {"iso-value"}),
         ("transfer/boundaries.py", {"window", "report"}),
         ("read/ome_zarr.py", TASKS - {"unit of a TIFF"}),
-        ("read/ome_tiff.py", {"unit of a TIFF"}),
+        ("read/tiff/ome.py", {"unit of a TIFF"}),
         ("read/dicom/frame.py", set()),
         ("read/nifti.py", set()),
         ("formats/exr.py", {"stage", "bundle"}),

@@ -75,12 +75,31 @@ class PlanOptions:
     time: int = setting(0, "index into a time series", Flag("--time"))
     series: int = setting(
         0,
-        "which series of DICOM, from 1 as --series list counts; 0: largest",
+        "which series of DICOM or planes, from 1 as --series list counts; 0: largest",
         Flag(
             "--series",
-            "which series of a DICOM folder (default: the largest); `list` shows them and does "
-            "nothing else",
+            "which series of a folder of DICOM or planes (default: the largest); `list` shows "
+            "them and does nothing else",
             "N|list",
+        ),
+    )
+    pattern: str = setting(
+        "",
+        "how the files of a folder of planes are named, as img_c{c}_z{z}.tif; empty: guessed",
+        Flag(
+            "--pattern",
+            "how the files of a folder of planes are named: {z} for the plane's number, {c} for "
+            "the channel, {t} for the time, * for anything else, as img_c{c}_z{z}.tif (default: "
+            "guessed)",
+        ),
+    )
+    axes: str = setting(
+        "",
+        "the axes of a TIFF file longer than 1, as zcyx, instead of the file's; empty: the file's",
+        Flag(
+            "--axes",
+            "the axes of a TIFF file longer than 1, slowest first, as zyx or zcyx, instead of what "
+            "it says of its pages",
         ),
     )
     spacing_um: tuple[float, ...] = setting(

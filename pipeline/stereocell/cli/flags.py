@@ -35,8 +35,8 @@ def declare_slices(parser: argparse.ArgumentParser) -> None:
 def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
-        help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
-        "file) or NIfTI: a path",
+        help="OME-Zarr or TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
+        "file), NIfTI or a folder of planes (TIFF, PNG, JPEG): a path",
     )
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")

@@ -20,7 +20,8 @@ _MAKERS = (
     "stereocell.building.tasks.unit",
     "stereocell.building.stage_tasks",
     "stereocell.read.ome_zarr",
-    "stereocell.read.ome_tiff",
+    "stereocell.read.tiff",
+    "stereocell.read.planes",
     "stereocell.read.nifti",
     "stereocell.read.dicom",
 )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import fsspec
 import numpy as np
@@ -15,8 +16,9 @@ from stereocell.read.cast import TAKEN, built_dtype, cast_note
 from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple, levels_of
+from stereocell.storage.first_bytes import describe
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
+from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
 _PACKED = (".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz")
@@ -30,24 +32,53 @@ class Reader:
     title       the format's usual name
     example     a typical source, for messages
     has_series  one source may hold several volumes: `read_image(location, series)`
+    has_pattern names of files tell what they hold: `read_image(location, series, pattern)`
+    has_axes    a file may not say what its planes are: `read_image(location, axes=axes)`
     """
 
     module: str
     title: str
     example: str
     has_series: bool = False
+    has_pattern: bool = False
+    has_axes: bool = False
 
-    def read_image(self, location: Location, series: int) -> Image:
-        """Return the image of a source; `series` counts where the format has series."""
+    def read_image(
+        self, location: Location, *, series: int = 0, pattern: str = "", axes: str = ""
+    ) -> Image:
+        """Return the image of a source. Raises UsageError for an option that it doesn't take."""
+        given: dict[str, Any] = {}
+        for has, name, value in (
+            (self.has_series, "series", series),
+            (self.has_pattern, "pattern", pattern),
+            (self.has_axes, "axes", axes),
+        ):
+            if has:
+                given[name] = value
+            elif value:
+                raise UsageError(f"{location.shown}: --{name} {value}: {_ONLY[name]}")
         # imported on use: each import takes up to 2 s, and a process needs one
-        read = import_module(self.module).read_image
-        image: Image = read(location, series) if self.has_series else read(location)
+        image: Image = import_module(self.module).read_image(location, **given)
         return image
 
 
+_ONLY = {
+    "series": "only DICOM and folders of planes hold series",
+    "pattern": "only folders of planes are told by their files' names",
+    "axes": "only a TIFF file may leave open what its planes are",
+}
 READERS = {
     "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr"),
-    "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif"),
+    "tiff": Reader(
+        "stereocell.read.tiff", "TIFF", "NAME.tif, NAME.ome.tif, NAME.lsm, NAME.stk", has_axes=True
+    ),
+    "planes": Reader(
+        "stereocell.read.planes",
+        "planes of TIFF, PNG or JPEG",
+        "a folder, on this machine",
+        has_series=True,
+        has_pattern=True,
+    ),
     "nifti": Reader("stereocell.read.nifti", "NIfTI", "NAME.nii, NAME.nii.gz"),
     "dicom": Reader(
         "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
@@ -61,6 +92,13 @@ def reader_of(source: str | Path) -> str:
     return "" if reader is None else reader.module
 
 
+def _found(location: Location) -> str:
+    """Return the words for what a file is of which no reader knows the format."""
+    if not location.is_local:
+        return ""
+    return f": found {describe(first_bytes(location.source))}"
+
+
 def _formats() -> str:
     """Return all formats, each with an example, as a phrase for messages."""
     *others, last = (f"{reader.title} ({reader.example})" for reader in READERS.values())
@@ -68,15 +106,25 @@ def _formats() -> str:
 
 
 def open(
-    source: str | Path, *, time: int = 0, spacing_um: Triple | None = None, series: int = 0
+    source: str | Path,
+    *,
+    time: int = 0,
+    spacing_um: Triple | None = None,
+    series: int = 0,
+    pattern: str = "",
+    axes: str = "",
 ) -> Dataset:
-    """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
+    """Open OME-Zarr 0.4 or 0.5, TIFF, a folder of planes, NIfTI or DICOM (a folder or a file).
 
-    source      a local path (the only form for DICOM and NIfTI) or an address (`http://`,
+    source      a local path (the only form but for OME-Zarr and TIFF) or an address (`http://`,
                 `https://`, `s3://`, or another one that fsspec knows)
     time        time point, from 0
     spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
-    series      series of a DICOM source, from 1 as `list_series` counts; 0: the largest
+    series      series of DICOM or of planes, from 1 as `list_series` counts; 0: the largest
+    pattern     how the files of a folder of planes are named, as `img_c{c}_z{z}.tif`; empty:
+                guessed
+    axes        the axes of a TIFF file that are longer than 1, as `zcyx`; empty: as the file has
+                them
 
     No voxels are read yet, with two exceptions: DICOM slices at the same place, to detect copies,
     and floats of NIfTI, to count NaN. Raises SourceError where the source can't be read as a
@@ -89,7 +137,7 @@ def open(
     location = Location.of(source)
     if location.is_local and not Path(location.source).exists():
         raise SourceError(
-            f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
+            f"{location.shown}: not found, expected an OME-Zarr, TIFF or NIfTI file, or DICOM"
         )
     if location.is_local and not Path(location.source).is_dir():
         require_own(location.source, [location.folder], named=location.shown)
@@ -101,7 +149,9 @@ def open(
             )
         if last.endswith(_PACKED):
             raise SourceError(f"{location.shown}: a packed file: unpack it; expected {_formats()}")
-        raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
+        raise SourceError(
+            f"{location.shown}: unknown format{_found(location)}, expected {_formats()}"
+        )
     if not location.is_local:
         with one_line(location.shown, "an address that fsspec opens"):
             files, path = fsspec.url_to_fs(location.source, **location.storage_options)
@@ -110,10 +160,7 @@ def open(
                 f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
             )
     reader = READERS[location.format]
-    if series and not reader.has_series:
-        titles = " and ".join(other.title for other in READERS.values() if other.has_series)
-        raise UsageError(f"{location.shown}: --series {series}: only {titles} holds series")
-    image = reader.read_image(location, series)
+    image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
     try:
         return _dataset(location, image, time, spacing_um)
     except BaseException:
@@ -148,7 +195,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         modality=image.modality,
         placement=image.placement,
         remarks=(
-            *image.notes,
+            *map(_shown, image.notes),  # which may name files
             *filter(None, [cast_note(finest.array.dtype)]),
             *(image.notes_at(time) if image.notes_at is not None else ()),
         ),
@@ -158,7 +205,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
 
 
 def list_series(source: str | Path) -> tuple[str, ...]:
-    """Return a line for each series of a DICOM folder or file; line i describes `series` = i.
+    """Return a line for each series of DICOM, or of planes; line i describes `series` = i.
 
     A line holds modality, orientation, size and spacing, and no description from the files.
     Raises SourceError where the source can't be read, UsageError where it has another format.
@@ -166,7 +213,7 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     location = Location.of(source)
     reader = READERS.get(location.format or "")
     if reader is None or not reader.has_series:
-        raise UsageError(f"{location.shown}: --series list: expected DICOM, which holds series")
+        raise UsageError(f"{location.shown}: --series list: {_ONLY['series']}")
     lines: tuple[str, ...] = import_module(reader.module).list_series(location)
     return lines
 

@@ -15,9 +15,15 @@ from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
+from stereocell.storage.first_bytes import HEAD_BYTES, TIFF_MAGIC
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
-_TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
+_TIFF_SUFFIXES = (
+    *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
+    *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
+)
+_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
+_MOST_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
@@ -93,22 +99,28 @@ class Location:
 
     @property
     def format(self) -> str | None:
-        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content fits one.
+        """`ome-zarr`, `tiff`, `planes`, `nifti`, `dicom`; None where none fits name and content.
 
-        DICOM is any other folder on this machine, and a file with DICOM's first bytes.
+        Planes are a folder of images without DICOM; DICOM is any other folder on this machine, and
+        a file with DICOM's first bytes.
         """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
-        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
-            return "ome-tiff"
         if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
             return "ome-zarr"
+        if self.is_local and _holds_planes(self.source):
+            return "planes"
+        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
+            return "tiff"
         if not self.is_local or not self.parts:
             return None
         if self.parts[-1].lower().endswith(_NIFTI_SUFFIXES):
             return "nifti"
+        begins = first_bytes(self.source)
+        if begins.startswith(TIFF_MAGIC):
+            return "tiff"
         is_named = self.parts[-1].lower().endswith(_DICOM_SUFFIXES)
-        if is_named or os.path.isdir(self.source) or _begins_as_dicom(self.source):
+        if is_named or os.path.isdir(self.source) or begins[128:132] == b"DICM":
             return "dicom"
         return None
 
@@ -229,14 +241,35 @@ def require_apart(source: str | Path, out: Path) -> None:
         )
 
 
-def _begins_as_dicom(path: str) -> bool:
+def _holds_planes(folder: str) -> bool:
+    """Return whether a folder holds images of planes, and no DICOM beside them."""
+    are_there, others = False, 0
+    for at, folders, names in os.walk(folder):
+        folders.sort()
+        for name in sorted(names):
+            lower = name.lower()
+            if lower.startswith("."):
+                continue
+            if lower.endswith(_PLANE_SUFFIXES):
+                are_there = True
+            elif lower.endswith(_DICOM_SUFFIXES):
+                return False
+            elif others < _MOST_OTHERS:
+                others += 1
+                if first_bytes(os.path.join(at, name))[128:132] == b"DICM":
+                    return False
+    return are_there
+
+
+def first_bytes(path: str) -> bytes:
+    """Return the head of a regular file; nothing where it can't be read."""
     if not os.path.isfile(path):
-        return False
+        return b""
     try:
         with open(path, "rb") as file:
-            return file.read(132)[128:] == b"DICM"
+            return file.read(HEAD_BYTES)
     except OSError:
-        return False
+        return b""
 
 
 def _stem(name: str) -> str:
