@@ -158,13 +158,16 @@ CASES: dict[str, tuple[Maker, str]] = {
     "TIFF, spacing in pixels": (tiff_of(SMALL, unit="pixel"), "voxel size: not found"),
     "no multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].pop("multiscales")),
-        "no multiscales: not found",
+        "voxel size: not found",
     ),
     "empty multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].update(multiscales=[])),
         "no multiscales",
     ),
-    "no attributes": (zarr_with(lambda content: content.pop("attributes")), "no multiscales"),
+    "no attributes": (
+        zarr_with(lambda content: content.pop("attributes")),
+        "voxel size: not found",
+    ),
     "plate": (
         zarr_with(lambda content: content.update(attributes={"ome": {"plate": {}}})),
         "no multiscales: found a plate",

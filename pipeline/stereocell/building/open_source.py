@@ -14,8 +14,9 @@ class SourceRef:
     """An address and the options of `read.open`.
 
     spacing_um   (z, y, x), um, or empty for the file's own
-    series       of DICOM, from 1; 0: the largest
+    series       of a source of several images, from 1; 0: the largest
     fingerprint  the planned one, since the address may hold another volume now; empty: any volume
+    axes         of an array that names none, as `czyx`
     """
 
     source: str
@@ -23,16 +24,20 @@ class SourceRef:
     spacing_um: tuple[float, ...]
     series: int = 0
     fingerprint: str = ""
+    axes: str = ""
 
 
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
     fetch(Path(ref.source))  # an added channel's source lies in OUT
-    if not ref.spacing_um:
-        return read.open(ref.source, time=ref.time, series=ref.series)
-    z, y, x = ref.spacing_um
-    return read.open(ref.source, time=ref.time, spacing_um=(z, y, x), series=ref.series)
+    spacing = None
+    if ref.spacing_um:
+        z, y, x = ref.spacing_um
+        spacing = (z, y, x)
+    return read.open(
+        ref.source, time=ref.time, spacing_um=spacing, series=ref.series, axes=ref.axes
+    )
 
 
 def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
@@ -41,5 +46,10 @@ def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
         return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
     options = plan.settings.plan
     return SourceRef(
-        plan.source, options.time, options.spacing_um, options.series, plan.fingerprint
+        plan.source,
+        options.time,
+        options.spacing_um,
+        options.series,
+        plan.fingerprint,
+        options.axes,
     )

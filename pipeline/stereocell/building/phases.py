@@ -72,7 +72,9 @@ def settle(source: str, settings: Settings) -> Plan:
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
-    dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
+    dataset = open_source(
+        SourceRef(location, options.time, options.spacing_um, options.series, axes=options.axes)
+    )
     for note in dataset.notes:
         console.print(f"plan: {note}", markup=False)
     modality = dataset.modality or options.modality

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions
 from stereocell.meshes.options import LodOptions
+from stereocell.model.axes import is_axes
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
 from stereocell.model.settings import AUTO, Flag, setting
@@ -75,13 +76,18 @@ class PlanOptions:
     time: int = setting(0, "index into a time series", Flag("--time"))
     series: int = setting(
         0,
-        "which series of DICOM, from 1 as --series list counts; 0: largest",
+        "which series of DICOM, or image of CZI or LIF, from 1 as --series list counts; 0: largest",
         Flag(
             "--series",
-            "which series of a DICOM folder (default: the largest); `list` shows them and does "
-            "nothing else",
+            "which series of a DICOM folder, or image of a CZI or LIF file (default: the largest); "
+            "`list` shows them and does nothing else",
             "N|list",
         ),
+    )
+    axes: str = setting(
+        "",
+        "axes of an HDF5, Zarr or N5 array that names none, as czyx",
+        Flag("--axes", "axes of an HDF5, Zarr or N5 array that names none, as czyx"),
     )
     spacing_um: tuple[float, ...] = setting(
         (),
@@ -113,6 +119,11 @@ class PlanOptions:
             raise UsageError(f"plan.time is {self.time}, expected 0 or more (--time)")
         if self.series < 0:
             raise UsageError(f"plan.series is {self.series}, expected 0 or more (--series)")
+        if self.axes and not is_axes(self.axes):
+            raise UsageError(
+                f"plan.axes is {self.axes!r:.40}, expected z, y and x, and t and c where there are "
+                "any, each once, as czyx (--axes)"
+            )
         if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(

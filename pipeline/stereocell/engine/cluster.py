@@ -22,6 +22,8 @@ _MAKERS = (
     "stereocell.read.ome_tiff",
     "stereocell.read.nifti",
     "stereocell.read.dicom",
+    "stereocell.read.ims",
+    "stereocell.read.hdf5",
 )
 T = TypeVar("T")
 R = TypeVar("R")

@@ -28,28 +28,37 @@ class Reader:
     title       the format's usual name
     example     a typical source, for messages
     has_series  one source may hold several volumes: `read_image(location, series)`
+    has_axes    its arrays may not name their axes: `read_image(location, axes)`
+    is_remote   it is read from an address, too
     """
 
     module: str
     title: str
     example: str
     has_series: bool = False
+    has_axes: bool = False
+    is_remote: bool = False
 
-    def read_image(self, location: Location, series: int) -> Image:
-        """Return the image of a source; `series` counts where the format has series."""
+    def read_image(self, location: Location, series: int, axes: str) -> Image:
+        """Return the image of a source; `series` and `axes` count where the format has them."""
         # imported on use: each import takes up to 2 s, and a process needs one
         read = import_module(self.module).read_image
-        image: Image = read(location, series) if self.has_series else read(location)
+        chosen = ((series,) if self.has_series else ()) + ((axes,) if self.has_axes else ())
+        image: Image = read(location, *chosen)
         return image
 
 
 READERS = {
-    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr"),
-    "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif"),
+    "ome-zarr": Reader(
+        "stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr", has_axes=True, is_remote=True
+    ),
+    "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif", is_remote=True),
     "nifti": Reader("stereocell.read.nifti", "NIfTI", "NAME.nii, NAME.nii.gz"),
     "dicom": Reader(
         "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
     ),
+    "ims": Reader("stereocell.read.ims", "Imaris", "NAME.ims"),
+    "hdf5": Reader("stereocell.read.hdf5", "HDF5", "NAME.h5:/KEY", has_axes=True),
 }
 
 
@@ -59,6 +68,14 @@ def reader_of(source: str | Path) -> str:
     return "" if reader is None else reader.module
 
 
+def _no_series(location: Location, given: str) -> UsageError:
+    titles = ", ".join(reader.title for reader in READERS.values() if reader.has_series)
+    return UsageError(
+        f"{location.shown}: --series {given}: expected a format of several images ({titles}), "
+        "or no --series"
+    )
+
+
 def _formats() -> str:
     """Return all formats, each with an example, as a phrase for messages."""
     *others, last = (f"{reader.title} ({reader.example})" for reader in READERS.values())
@@ -66,15 +83,22 @@ def _formats() -> str:
 
 
 def open(
-    source: str | Path, *, time: int = 0, spacing_um: Triple | None = None, series: int = 0
+    source: str | Path,
+    *,
+    time: int = 0,
+    spacing_um: Triple | None = None,
+    series: int = 0,
+    axes: str = "",
 ) -> Dataset:
-    """Open OME-Zarr 0.4 or 0.5, OME-TIFF, NIfTI or DICOM (a folder or a file).
+    """Open a source of any format of READERS.
 
-    source      a local path (the only form for DICOM and NIfTI) or an address (`http://`,
+    source      a local path or, where the format's Reader says so, an address (`http://`,
                 `https://`, `s3://`, or another one that fsspec knows)
     time        time point, from 0
     spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
-    series      series of a DICOM source, from 1 as `list_series` counts; 0: the largest
+    series      series of DICOM, or image of a file of several, from 1 as `list_series` counts;
+                0: the largest
+    axes        the names of an array's dimensions, as `czyx`, where its format states none
 
     No voxels are read yet, with two exceptions: DICOM slices at the same place, to detect copies,
     and floats of NIfTI, to count NaN. Raises SourceError where the source can't be read as a
@@ -85,14 +109,18 @@ def open(
         volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
     """
     location = Location.of(source)
-    if location.is_local and not Path(location.source).exists():
-        raise SourceError(
-            f"{location.shown}: not found, expected an OME-Zarr, OME-TIFF or NIfTI file, or DICOM"
-        )
-    if location.is_local and not Path(location.source).is_dir():
-        require_own(location.source, [location.folder], named=location.shown)
+    if location.is_local and not Path(location.path).exists():
+        raise SourceError(f"{location.shown}: not found, expected a file or a folder")
+    if location.is_local and not Path(location.path).is_dir():
+        require_own(location.path, [location.folder], named=location.shown)
     if location.format is None:
         raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
+    reader = READERS[location.format]
+    if not location.is_local and not reader.is_remote:
+        raise SourceError(
+            f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
+            "copy it here first"
+        )
     if not location.is_local:
         with one_line(location.shown, "an address that fsspec opens"):
             files, path = fsspec.url_to_fs(location.source, **location.storage_options)
@@ -100,11 +128,11 @@ def open(
             raise SourceError(
                 f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
             )
-    reader = READERS[location.format]
     if series and not reader.has_series:
-        titles = " and ".join(other.title for other in READERS.values() if other.has_series)
-        raise UsageError(f"{location.shown}: --series {series}: only {titles} holds series")
-    image = reader.read_image(location, series)
+        raise _no_series(location, str(series))
+    if axes and not reader.has_axes:
+        raise UsageError(f"{location.shown}: --axes {axes}: {reader.title} states its axes")
+    image = reader.read_image(location, series, axes)
     try:
         return _dataset(location, image, time, spacing_um)
     except BaseException:
@@ -143,7 +171,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
 
 
 def list_series(source: str | Path) -> tuple[str, ...]:
-    """Return a line for each series of a DICOM folder or file; line i describes `series` = i.
+    """Return a line for each image of a source of several; line i describes `series` = i.
 
     A line holds modality, orientation, size and spacing, and no description from the files.
     Raises SourceError where the source can't be read, UsageError where it has another format.
@@ -151,7 +179,7 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     location = Location.of(source)
     reader = READERS.get(location.format or "")
     if reader is None or not reader.has_series:
-        raise UsageError(f"{location.shown}: --series list: expected DICOM, which holds series")
+        raise _no_series(location, "list")
     lines: tuple[str, ...] = import_module(reader.module).list_series(location)
     return lines
 

@@ -21,7 +21,25 @@ _TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", "
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
-_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
+_ANALYZE_SUFFIXES = (".hdr", ".img", ".hdr.gz", ".img.gz")  # also pairs of NIfTI
+_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
+# format -> endings of its files' names, in lower case
+_FILE_SUFFIXES = {
+    "ims": (".ims",),
+    "hdf5": (".h5", ".hdf5", ".hdf"),
+    "nrrd": (".nrrd", ".nhdr"),
+    "metaimage": (".mha", ".mhd"),
+    "mrc": tuple(
+        ending + packed
+        for ending in (".mrc", ".rec", ".map", ".mrcs", ".ccp4")
+        for packed in ("", ".gz", ".bz2")
+    ),
+    "czi": (".czi",),
+    "lif": (".lif",),
+    "nd2": (".nd2",),
+}
+_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
+_HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
@@ -37,7 +55,8 @@ _AWS_CREDENTIALS = (
 class Location:
     """One source.
 
-    source    an absolute local path or an address, in the form of the format libraries
+    source    an absolute local path or an address, in the form of the format libraries; with
+              `:/KEY` where it names a dataset in an HDF5 file
     is_local  a path on this machine
     """
 
@@ -52,7 +71,8 @@ class Location:
         """
         text = str(source)
         if not _ADDRESS.match(text):
-            return cls(os.path.abspath(os.path.expanduser(text)), True)
+            path, key = _split_key(text)
+            return cls(os.path.abspath(os.path.expanduser(path)) + key, True)
         try:
             parts = urlsplit(text)
         except ValueError as error:
@@ -64,9 +84,19 @@ class Location:
         return cls(text, False)
 
     @property
+    def path(self) -> str:
+        """The file or folder on this machine, without a dataset's key."""
+        return _split_key(self.source)[0]
+
+    @property
+    def key(self) -> str:
+        """The dataset in an HDF5 file, as `/a/b`; empty where none is named."""
+        return _split_key(self.source)[1][1:]
+
+    @property
     def folder(self) -> Path:
         """The source's own folder, links followed: its files must lie there or below."""
-        path = Path(os.path.realpath(self.source))
+        path = Path(os.path.realpath(self.path))
         return path if path.is_dir() else path.parent
 
     @property
@@ -81,26 +111,32 @@ class Location:
     @property
     def parts(self) -> tuple[str, ...]:
         """The names along the path."""
-        path = self.source if self.is_local else self.shown.partition("://")[2]
+        path = self.path if self.is_local else self.shown.partition("://")[2]
         return tuple(part for part in path.split("/") if part)
 
     @property
     def name(self) -> str:
         """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
         parts = self.parts
-        first = next((i for i, part in enumerate(parts) if part.endswith(".zarr")), len(parts) - 1)
+        outermost = (i for i, part in enumerate(parts) if part.endswith((".zarr", ".n5")))
+        first = next(outermost, len(parts) - 1)
         return "-".join(_stem(part) for part in parts[first:]) or "dataset"
 
     @property
     def format(self) -> str | None:
-        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content fits one.
+        """The name of the format (open_dataset.READERS); None: neither name nor content fits one.
 
         DICOM is any other folder on this machine, and a file with DICOM's first bytes.
         """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
+        if any(part.endswith(".n5") for part in self.parts) or self._is_n5():
+            return "n5"
         if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
             return "ome-tiff"
+        for name, endings in _FILE_SUFFIXES.items():
+            if self.parts and self.parts[-1].lower().endswith(endings):
+                return name
         if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
             return "ome-zarr"
         if not self.is_local or not self.parts:
@@ -110,7 +146,13 @@ class Location:
         is_named = self.parts[-1].lower().endswith(_DICOM_SUFFIXES)
         if is_named or os.path.isdir(self.source) or _begins_as_dicom(self.source):
             return "dicom"
-        return None
+        if self.parts[-1].lower().endswith(_ANALYZE_SUFFIXES):
+            return "nifti"
+        return "hdf5" if _first_bytes(self.source, 8) == _HDF5_MAGIC else None
+
+    def _is_n5(self) -> bool:
+        """Whether a folder is a group or a dataset of N5: others have no `attributes.json`."""
+        return self.is_local and os.path.exists(f"{self.source}/attributes.json")
 
     @property
     def storage_options(self) -> dict[str, Any]:
@@ -229,18 +271,38 @@ def require_apart(source: str | Path, out: Path) -> None:
         )
 
 
+def require_file(location: Location) -> None:
+    """Raise SourceError where a local source is a folder and its format's name says a file."""
+    if location.is_local and os.path.isdir(location.path):
+        raise SourceError(f"{location.shown}: is a folder, expected a file")
+
+
+def _split_key(text: str) -> tuple[str, str]:
+    """Return a path and the `:/KEY` behind it; a file whose own name holds that goes first."""
+    found = _KEYED.fullmatch(text)
+    if found is None or os.path.exists(text):
+        return text, ""
+    return found[1], f":/{found[2].lstrip('/')}"
+
+
 def _begins_as_dicom(path: str) -> bool:
+    return _first_bytes(path, 132)[128:] == b"DICM"
+
+
+def _first_bytes(path: str, count: int) -> bytes:
+    """Return the first bytes of a regular file; none where it can't be read."""
     if not os.path.isfile(path):
-        return False
+        return b""
     try:
         with open(path, "rb") as file:
-            return file.read(132)[128:] == b"DICM"
+            return file.read(count)
     except OSError:
-        return False
+        return b""
 
 
 def _stem(name: str) -> str:
-    for suffix in _TIFF_SUFFIXES + _ZARR_SUFFIXES:
+    files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
+    for suffix in sorted((*_TIFF_SUFFIXES, *_ZARR_SUFFIXES, ".n5", *files), key=len, reverse=True):
         if name.lower().endswith(suffix) and len(name) > len(suffix):
             return name[: -len(suffix)]
     return name

@@ -1,0 +1,71 @@
+"""A Zarr array (v2 or v3) without the metadata of OME-Zarr.
+
+Its axes come from `--axes`, from the names of dimensions (v3, or xarray's `_ARRAY_DIMENSIONS` in
+v2), else three dimensions are z, y, x. Its spacing comes from `--spacing-um` or from the attributes
+of read/array_spacing.py.
+"""
+
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import zarr
+from zarr.abc.store import Store
+
+from stereocell.model.errors import SourceError
+from stereocell.read.array_axes import settle_axes
+from stereocell.read.array_spacing import spacing_from
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.spacing import Grid
+from stereocell.read.zarr_store import open_array
+from stereocell.storage.library_errors import one_line, without_warning
+from stereocell.storage.location import Location
+
+_LISTED = 12  # arrays that a message names
+_MAX_NODES = 1000  # members of a group that are looked at
+
+
+def read_array(location: Location, store: Store, path: str, axes: str = "") -> Image:
+    """Return the image of the array at a path of the store, relative to the source.
+
+    axes  the user's `--axes`; empty: none
+    """
+    array = open_array(location, store, path)
+    where = f"{location.shown}/{path}".rstrip("/")
+    named = getattr(array.metadata, "dimension_names", None) or array.attrs.get(
+        "_ARRAY_DIMENSIONS", ()
+    )
+    listed = [str(name).lower() for name in named] if isinstance(named, list | tuple) else []
+    names, notes = settle_axes(where, array.shape, axes, listed)
+    voxels = VoxelArray(array, names)
+    if voxels.size("c") > MAX_CHANNELS:
+        raise SourceError(
+            f"{where}: axis c: found {voxels.size('c')}, expected at most {MAX_CHANNELS}"
+        )
+    unnamed = (None,) * voxels.size("c")
+    grid = Grid(voxels.shape, spacing_from(dict(array.attrs), names))
+    return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=notes)
+
+
+def read_only_array(location: Location, store: Store, group: "zarr.Group", axes: str = "") -> Image:
+    """Return the image of the only array in a group of no OME-Zarr image. Raises SourceError."""
+    found: list[tuple[str, Any]] = []
+    if location.is_local:  # most addresses can't be listed
+        with (
+            without_warning("Object at ", UserWarning),  # of files that are no array
+            one_line(location.shown, "a group whose arrays can be listed"),
+        ):
+            members = islice(group.members(max_depth=None), _MAX_NODES)
+            found = [(path, node) for path, node in members if isinstance(node, zarr.Array)]
+    found = sorted((path, node) for path, node in found if sum(n > 1 for n in node.shape) >= 3)
+    if len(found) == 1:
+        image = read_array(location, store, found[0][0], axes)
+        note = f"array {found[0][0]}, the only one of a group without `multiscales`"
+        return replace(image, notes=(note, *image.notes))
+    listed = ", ".join(f"{path} {node.shape}" for path, node in found[:_LISTED])
+    instead = f", or one array, as {location.shown}/{found[0][0]}: found {listed}" if found else ""
+    raise SourceError(
+        f"{location.shown}: no multiscales: not found, expected the attribute `multiscales` of an "
+        f"image{instead}"
+    )
