@@ -29,7 +29,7 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
         help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
-        "file), NIfTI, Imaris, HDF5 (FILE.h5:/KEY): a path",
+        "file), NIfTI, Imaris, HDF5 (FILE.h5:/KEY), NRRD, MetaImage, MRC, ...: a path",
     )
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")

@@ -24,6 +24,9 @@ _MAKERS = (
     "stereocell.read.dicom",
     "stereocell.read.ims",
     "stereocell.read.hdf5",
+    "stereocell.read.nrrd",
+    "stereocell.read.metaimage",
+    "stereocell.read.mrc",
 )
 T = TypeVar("T")
 R = TypeVar("R")

@@ -53,12 +53,15 @@ READERS = {
         "stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr", has_axes=True, is_remote=True
     ),
     "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif", is_remote=True),
-    "nifti": Reader("stereocell.read.nifti", "NIfTI", "NAME.nii, NAME.nii.gz"),
+    "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze", "NAME.nii, NAME.nii.gz, NAME.hdr"),
     "dicom": Reader(
         "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
     ),
     "ims": Reader("stereocell.read.ims", "Imaris", "NAME.ims"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5", "NAME.h5:/KEY", has_axes=True),
+    "nrrd": Reader("stereocell.read.nrrd", "NRRD", "NAME.nrrd, NAME.nhdr"),
+    "metaimage": Reader("stereocell.read.metaimage", "MetaImage", "NAME.mha, NAME.mhd"),
+    "mrc": Reader("stereocell.read.mrc", "MRC", "NAME.mrc, NAME.rec, NAME.map"),
 }
 
 

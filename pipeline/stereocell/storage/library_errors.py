@@ -38,7 +38,12 @@ _FAULTS = (
 )
 # Classes of libraries that take long to import: an error of theirs is raised once they are there
 _NO_NODE = ("zarr.errors", "NodeNotFoundError")
-_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"), _NO_NODE)
+_LATE = (
+    ("aiohttp", "ClientError"),
+    ("botocore.exceptions", "BotoCoreError"),
+    ("nrrd.errors", "NRRDError"),
+    _NO_NODE,
+)
 
 
 def _faults() -> tuple[type[BaseException], ...]:
