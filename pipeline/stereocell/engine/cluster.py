@@ -24,6 +24,7 @@ _MAKERS = (
     "stereocell.read.dicom",
     "stereocell.read.ims",
     "stereocell.read.hdf5",
+    "stereocell.read.n5",
     "stereocell.read.nrrd",
     "stereocell.read.metaimage",
     "stereocell.read.mrc",

@@ -18,6 +18,8 @@ def settle_axes(
     UsageError where `given` doesn't fit, SourceError where the axes can't be told.
     """
     found = f"found {len(shape)} dimensions {tuple(int(n) for n in shape)}"
+    if len(shape) < 3:
+        raise SourceError(f"{where}: a volume needs at least 2 planes: {found}, expected z, y, x")
     if given:
         if not is_axes(given) or len(given) != len(shape):
             raise UsageError(

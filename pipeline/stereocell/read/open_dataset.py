@@ -59,6 +59,7 @@ READERS = {
     ),
     "ims": Reader("stereocell.read.ims", "Imaris", "NAME.ims"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5", "NAME.h5:/KEY", has_axes=True),
+    "n5": Reader("stereocell.read.n5", "N5", "NAME.n5", has_axes=True, is_remote=True),
     "nrrd": Reader("stereocell.read.nrrd", "NRRD", "NAME.nrrd, NAME.nhdr"),
     "metaimage": Reader("stereocell.read.metaimage", "MetaImage", "NAME.mha, NAME.mhd"),
     "mrc": Reader("stereocell.read.mrc", "MRC", "NAME.mrc, NAME.rec, NAME.map"),
