@@ -76,10 +76,10 @@ class PlanOptions:
     time: int = setting(0, "index into a time series", Flag("--time"))
     series: int = setting(
         0,
-        "which series of DICOM, or image of CZI or LIF, from 1 as --series list counts; 0: largest",
+        "which series of DICOM, or image of CZI, LIF or ND2, as --series list counts; 0: largest",
         Flag(
             "--series",
-            "which series of a DICOM folder, or image of a CZI or LIF file (default: the largest); "
+            "which series of a DICOM folder, or image of CZI, LIF or ND2 (default: the largest); "
             "`list` shows them and does nothing else",
             "N|list",
         ),

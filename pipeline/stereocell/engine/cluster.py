@@ -28,6 +28,9 @@ _MAKERS = (
     "stereocell.read.nrrd",
     "stereocell.read.metaimage",
     "stereocell.read.mrc",
+    "stereocell.read.czi",
+    "stereocell.read.lif",
+    "stereocell.read.nd2",
 )
 T = TypeVar("T")
 R = TypeVar("R")

@@ -63,6 +63,9 @@ READERS = {
     "nrrd": Reader("stereocell.read.nrrd", "NRRD", "NAME.nrrd, NAME.nhdr"),
     "metaimage": Reader("stereocell.read.metaimage", "MetaImage", "NAME.mha, NAME.mhd"),
     "mrc": Reader("stereocell.read.mrc", "MRC", "NAME.mrc, NAME.rec, NAME.map"),
+    "czi": Reader("stereocell.read.czi", "CZI", "NAME.czi", has_series=True),
+    "lif": Reader("stereocell.read.lif", "LIF", "NAME.lif", has_series=True),
+    "nd2": Reader("stereocell.read.nd2", "ND2", "NAME.nd2", has_series=True),
 }
 
 
