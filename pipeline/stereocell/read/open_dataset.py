@@ -53,26 +53,33 @@ READERS = {
         "stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr", has_axes=True, is_remote=True
     ),
     "ome-tiff": Reader("stereocell.read.ome_tiff", "OME-TIFF", "NAME.ome.tif", is_remote=True),
-    "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze", "NAME.nii, NAME.nii.gz, NAME.hdr"),
+    "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze", ".nii, .nii.gz, .hdr"),
     "dicom": Reader(
         "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
     ),
-    "ims": Reader("stereocell.read.ims", "Imaris", "NAME.ims"),
+    "ims": Reader("stereocell.read.ims", "Imaris", ".ims"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5", "NAME.h5:/KEY", has_axes=True),
-    "n5": Reader("stereocell.read.n5", "N5", "NAME.n5", has_axes=True, is_remote=True),
-    "nrrd": Reader("stereocell.read.nrrd", "NRRD", "NAME.nrrd, NAME.nhdr"),
-    "metaimage": Reader("stereocell.read.metaimage", "MetaImage", "NAME.mha, NAME.mhd"),
-    "mrc": Reader("stereocell.read.mrc", "MRC", "NAME.mrc, NAME.rec, NAME.map"),
-    "czi": Reader("stereocell.read.czi", "CZI", "NAME.czi", has_series=True),
-    "lif": Reader("stereocell.read.lif", "LIF", "NAME.lif", has_series=True),
-    "nd2": Reader("stereocell.read.nd2", "ND2", "NAME.nd2", has_series=True),
+    "n5": Reader("stereocell.read.n5", "N5", ".n5", has_axes=True, is_remote=True),
+    "nrrd": Reader("stereocell.read.nrrd", "NRRD", ".nrrd, .nhdr"),
+    "metaimage": Reader("stereocell.read.metaimage", "MetaImage", ".mha, .mhd"),
+    "mrc": Reader("stereocell.read.mrc", "MRC", ".mrc, .rec, .map"),
+    "czi": Reader("stereocell.read.czi", "CZI", ".czi", has_series=True),
+    "lif": Reader("stereocell.read.lif", "LIF", ".lif", has_series=True),
+    "nd2": Reader("stereocell.read.nd2", "ND2", ".nd2", has_series=True),
 }
 
 
+# what a name that no reader knows is given to; it takes the formats of bioio's installed plugins
+OTHER = Reader("stereocell.read.bioio_image", "what bioio reads", "any file", has_series=True)
+
+
 def reader_of(source: str | Path) -> str:
-    """Return the dotted name of the module that reads a source; empty: the format is unknown."""
-    reader = READERS.get(Location.of(source).format or "")
-    return "" if reader is None else reader.module
+    """Return the dotted name of the module that reads a source."""
+    return READERS.get(Location.of(source).format or "", OTHER).module
+
+
+def _is_read_by_bioio(location: Location) -> bool:
+    return bool(import_module(OTHER.module).can_read(location))
 
 
 def _no_series(location: Location, given: str) -> UsageError:
@@ -120,9 +127,12 @@ def open(
         raise SourceError(f"{location.shown}: not found, expected a file or a folder")
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
-    if location.format is None:
-        raise SourceError(f"{location.shown}: unknown format, expected {_formats()}")
-    reader = READERS[location.format]
+    if location.format is None and not _is_read_by_bioio(location):
+        raise SourceError(
+            f"{location.shown}: unknown format, expected {_formats()}; or what "
+            "an installed plugin of bioio reads"
+        )
+    reader = READERS.get(location.format or "", OTHER)
     if not location.is_local and not reader.is_remote:
         raise SourceError(
             f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
@@ -184,8 +194,8 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     Raises SourceError where the source can't be read, UsageError where it has another format.
     """
     location = Location.of(source)
-    reader = READERS.get(location.format or "")
-    if reader is None or not reader.has_series:
+    reader = READERS.get(location.format or "", OTHER)
+    if not reader.has_series:
         raise _no_series(location, "list")
     lines: tuple[str, ...] = import_module(reader.module).list_series(location)
     return lines
