@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
+from support.array_files import SIZE_UM, characters, write_ims
 from support.phantoms import F_BODY, f_phantom
-
-SIZE_UM = (0.5, 0.2, 0.25)
 
 
 def write(path: Path, name: str = "raw", voxels: Any = None, **attributes: Any) -> Path:
@@ -152,38 +151,6 @@ def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"c{suffix}").mkdir()
     assert "is a folder" in refusal(tmp_path / f"c{suffix}")
     refusal(write(tmp_path / f"d{suffix}", "flat", np.zeros((40, 30))))
-
-
-def characters(text: str) -> NDArray[Any]:
-    """Return a text as Imaris writes it: an array of single characters."""
-    return np.frombuffer(text.encode(), "S1")
-
-
-def write_ims(path: Path, czyx: NDArray[Any], unit: str = "um", pad: int = 5) -> Path:
-    """Write two levels and two time points, each dataset padded by `pad` voxels."""
-    with h5py.File(path, "w") as file:
-        info = file.create_group("DataSetInfo/Image")
-        info.attrs["Unit"] = characters(unit)
-        for axis, (size, spacing) in enumerate(
-            zip(czyx.shape[:0:-1], reversed(SIZE_UM), strict=True)
-        ):
-            info.attrs["XYZ"[axis]] = characters(str(size))
-            info.attrs[f"ExtMin{axis}"] = characters("-3.5")
-            info.attrs[f"ExtMax{axis}"] = characters(f"{size * spacing - 3.5:.6f}")
-        for c, (name, color) in enumerate((("DAPI", "0 0 1"), ("CD31", "1 0.5 0"))):
-            group = file.create_group(f"DataSetInfo/Channel {c}")
-            group.attrs["Name"] = characters(name)
-            group.attrs["Color"] = characters(color)
-        for level, time in np.ndindex(2, 2):
-            for c, voxels in enumerate(czyx):
-                part = voxels[:, :: 2**level, :: 2**level] + time
-                group = file.create_group(
-                    f"DataSet/ResolutionLevel {level}/TimePoint {time}/Channel {c}"
-                )
-                for name, size in zip("ZYX", part.shape, strict=True):
-                    group.attrs[f"ImageSize{name}"] = characters(str(size))
-                group["Data"] = np.pad(part, [(0, pad)] * 3)
-    return path
 
 
 def test_imaris_has_its_true_size_levels_times_names_and_colours(tmp_path: Path) -> None:

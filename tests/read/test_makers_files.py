@@ -1,7 +1,6 @@
 """CZI, LIF and ND2: CZI written by Zeiss's library, LIF byte by byte; scenes, mosaics, extras."""
 
 import os
-import struct
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,9 +14,9 @@ from stereocell import read
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
+from support.array_files import SIZE_UM, write_czi, write_lif
 from support.phantoms import f_phantom
 
-SIZE_UM = (0.5, 0.2, 0.25)
 BOX = Box((1, 7, 3), (9, 30, 20))
 
 
@@ -34,31 +33,6 @@ def refusal(path: Path, **options: Any) -> str:
 
 
 # CZI
-
-
-def write_czi(path: Path, scenes: dict[int | None, NDArray[Any]], **about: Any) -> Path:
-    """Write (t, c, z, y, x) of each scene as two tiles that meet in its middle."""
-    with czi.create_czi(str(path)) as file:
-        for scene, tczyx in scenes.items():
-            top = 1000 * (scene or 0)
-            middle = tczyx.shape[-1] // 2
-            for t, c, z in np.ndindex(tczyx.shape[:3]):
-                for part in (slice(0, middle), slice(middle, None)):
-                    file.write(
-                        data=np.ascontiguousarray(tczyx[t, c, z][:, part, None]),
-                        plane={"T": t, "C": c, "Z": z},
-                        location=(int(part.start), top),
-                        scene=scene or 0,
-                    )
-        file.write_metadata(
-            document_name="Jane Doe",
-            channel_names={0: "DAPI", 1: "CD31"},
-            scale_x=SIZE_UM[2] * 1e-6,
-            scale_y=SIZE_UM[1] * 1e-6,
-            scale_z=SIZE_UM[0] * 1e-6,
-            **about,
-        )
-    return path
 
 
 def five(body: NDArray[Any]) -> NDArray[Any]:
@@ -105,50 +79,6 @@ def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
 
 
 # LIF
-
-
-def write_lif(path: Path, images: dict[str, tuple[str, NDArray[Any]]], spacing: Any = 1.0) -> Path:
-    """Write images, each with its axes, slowest first (`TCZYX` or a part in any order)."""
-    order = "XYZT"
-    sizes_um = dict(zip("ZYX", SIZE_UM, strict=True)) | {"T": 1e6}
-    elements, blocks = "", b""
-    for number, (name, (axes, voxels)) in enumerate(images.items()):
-        strides = dict(zip(axes, voxels.strides, strict=True))
-        counts = dict(zip(axes, voxels.shape, strict=True))
-        channels = "".join(
-            f'<ChannelDescription DataType="0" ChannelTag="0" Resolution="{8 * voxels.itemsize}" '
-            'NameOfMeasuredQuantity="" Unit="" Min="0" Max="65535" IsLUTInverted="0" '
-            f'LUTName="{lut}" BytesInc="{strides.get("C", 0) * c}" BitInc="0"><ChannelProperty>'
-            f"<Key>DyeName</Key><Value>{dye}</Value></ChannelProperty></ChannelDescription>"
-            for c, (lut, dye) in enumerate((("Blue", "DAPI"), ("Green", ""))[: counts.get("C", 1)])
-        )
-        dimensions = "".join(
-            f'<DimensionDescription DimID="{order.index(axis) + 1}" '
-            f'NumberOfElements="{counts[axis]}" Origin="0" '
-            f'Length="{(counts[axis] - 1) * sizes_um[axis] * 1e-6 * spacing:.9g}" '
-            f'Unit="{"s" if axis == "T" else "m"}" BytesInc="{strides[axis]}" BitInc="0"/>'
-            for axis in reversed(axes)
-            if axis in order
-        )
-        elements += (
-            f'<Element Name="{name}" UniqueID="u{number}"><Data><Image TextDescription="">'
-            f"<ImageDescription><Channels>{channels}</Channels><Dimensions>{dimensions}"
-            "</Dimensions></ImageDescription></Image></Data>"
-            f'<Memory Size="{voxels.nbytes}" MemoryBlockID="Mem{number}"/></Element>'
-        )
-        block = f"Mem{number}"
-        text = block.encode("utf-16-le")
-        inner = struct.pack("<BQBI", 0x2A, voxels.nbytes, 0x2A, len(block)) + text
-        blocks += struct.pack("<II", 0x70, len(inner)) + inner + voxels.tobytes()
-    xml = (
-        '<LMSDataContainerHeader Version="2"><Element Name="a"><Data><Experiment/></Data>'
-        f'<Memory Size="0" MemoryBlockID="None"/><Children>{elements}</Children></Element>'
-        "</LMSDataContainerHeader>"
-    )
-    text = xml.encode("utf-16-le")
-    head = struct.pack("<BI", 0x2A, len(xml)) + text
-    path.write_bytes(struct.pack("<II", 0x70, len(head)) + head + blocks)
-    return path
 
 
 @pytest.mark.parametrize("axes", ["TCZYX", "CTZYX", "TZCYX", "YCTZX"])

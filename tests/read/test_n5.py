@@ -10,40 +10,18 @@ from typing import Any
 import numcodecs
 import numpy as np
 import pytest
-import tensorstore
 from numpy.typing import NDArray
 
 from conftest import Server
 from stereocell import read
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
+from support.array_files import BLOCK, SIZE_UM
+from support.array_files import write_n5 as write
 from support.phantoms import f_phantom
 
 BOX = Box((1, 7, 3), (9, 30, 20))
 NM: dict[str, Any] = {"pixelResolution": {"dimensions": [250, 200, 500], "unit": "nm"}}
-SIZE_UM = (0.5, 0.2, 0.25)
-BLOCK = (16, 12, 8)  # x, y, z
-
-
-def write(
-    path: Path, zyx: NDArray[Any] | None = None, packing: Any = None, **attributes: Any
-) -> Path:
-    voxels = f_phantom() if zyx is None else zyx
-    spec = {
-        "driver": "n5",
-        "kvstore": f"file://{path}/",
-        "metadata": {
-            "dataType": voxels.dtype.name,
-            "dimensions": voxels.shape[::-1],
-            "blockSize": BLOCK[: voxels.ndim] + (1,) * (voxels.ndim - 3),
-            "compression": packing or {"type": "gzip"},
-        },
-    }
-    stored = tensorstore.open(spec, create=True).result()
-    stored.write(voxels.transpose()).result()
-    about = path / "attributes.json"
-    about.write_text(json.dumps(json.loads(about.read_text()) | attributes))
-    return path
 
 
 def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:

@@ -20,6 +20,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree, attribute
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _LISTED = 12  # datasets that a message names
@@ -29,21 +30,27 @@ def read_image(location: Location, axes: str = "") -> Image:
     """Return the image of one dataset. Raises SourceError where it can't be read, or is unclear."""
     tree = Hdf5Tree(location, "an HDF5 file that is whole")
     try:
-        dataset, notes = _choose(tree, location.key)
-        where = f"{location.path}:{dataset.name}"
-        voxels = Hdf5Array(dataset, where)
-        names, assumed = settle_axes(where, voxels.shape, axes, _named(dataset))
-        array = VoxelArray(voxels, names)
-        if array.size("c") > MAX_CHANNELS:
-            raise SourceError(
-                f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
-            )
-        unnamed = (None,) * array.size("c")
-        grid = Grid(array.shape, _spacing(dataset, names))
-        return Image((array,), (grid,), unnamed, unnamed, 1, tree.close, notes=(*notes, *assumed))
+        # all of it asks h5py, which may fail at any name or attribute of a damaged file
+        with one_line(tree.where, "an HDF5 file that is whole"):
+            return _image(tree, location, axes)
     except BaseException:
         tree.close()
         raise
+
+
+def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
+    dataset, notes = _choose(tree, location.key)
+    where = f"{location.path}:{dataset.name}"
+    voxels = Hdf5Array(dataset, where)
+    names, assumed = settle_axes(where, voxels.shape, axes, _named(dataset))
+    array = VoxelArray(voxels, names)
+    if array.size("c") > MAX_CHANNELS:
+        raise SourceError(
+            f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
+        )
+    unnamed = (None,) * array.size("c")
+    grid = Grid(array.shape, _spacing(dataset, names))
+    return Image((array,), (grid,), unnamed, unnamed, 1, tree.close, notes=(*notes, *assumed))
 
 
 def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:

@@ -18,6 +18,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree, attribute
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
@@ -60,23 +61,29 @@ def read_image(location: Location) -> Image:
     """Return the image of the file. Raises SourceError where it isn't one of Imaris 5.5."""
     tree = Hdf5Tree(location, "an Imaris 5.5 file (HDF5), whole")
     try:
-        times = _count(tree, "/DataSet/ResolutionLevel 0", "TimePoint", _MAX_TIMES)
-        channels = _count(tree, _FINEST, "Channel", MAX_CHANNELS)
-        levels = _count(tree, "/DataSet", "ResolutionLevel", _MAX_LEVELS)
-        extents = _extents(tree)
-        arrays, grids = [], []
-        for level in range(levels):
-            array = _level(tree, level, times, channels)
-            shape = array.shape
-            spacing = extents and _triple(e / n for e, n in zip(extents, shape, strict=True))
-            half = spacing and _triple(0.5 * s for s in spacing)
-            arrays.append(array)
-            grids.append(Grid(shape, spacing, half))
-        names, colors = zip(*(_channel(tree, index) for index in range(channels)), strict=True)
-        return Image(tuple(arrays), tuple(grids), names, colors, 1, tree.close)
+        # all of it asks h5py, which may fail at any name or attribute of a damaged file
+        with one_line(tree.where, "an Imaris 5.5 file (HDF5), whole"):
+            return _image(tree)
     except BaseException:
         tree.close()
         raise
+
+
+def _image(tree: Hdf5Tree) -> Image:
+    times = _count(tree, "/DataSet/ResolutionLevel 0", "TimePoint", _MAX_TIMES)
+    channels = _count(tree, _FINEST, "Channel", MAX_CHANNELS)
+    levels = _count(tree, "/DataSet", "ResolutionLevel", _MAX_LEVELS)
+    extents = _extents(tree)
+    arrays, grids = [], []
+    for level in range(levels):
+        array = _level(tree, level, times, channels)
+        shape = array.shape
+        spacing = extents and _triple(e / n for e, n in zip(extents, shape, strict=True))
+        half = spacing and _triple(0.5 * s for s in spacing)
+        arrays.append(array)
+        grids.append(Grid(shape, spacing, half))
+    names, colors = zip(*(_channel(tree, index) for index in range(channels)), strict=True)
+    return Image(tuple(arrays), tuple(grids), names, colors, 1, tree.close)
 
 
 def _count(tree: Hdf5Tree, path: str, kind: str, most: int) -> int:

@@ -253,7 +253,8 @@ def _spacing(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | Non
     """Return the spacing (z, y, x), um, of a level's or a group's attributes; None: not stated."""
     transform = attributes.get("transform")  # COSEM's, axes slowest first
     if isinstance(transform, Mapping) and isinstance(transform.get("scale"), list):
-        named = [str(axis) for axis in transform.get("axes", ())]
+        listed = transform.get("axes")
+        named = [str(axis) for axis in listed] if isinstance(listed, list) else []
         if set("zyx") <= set(named) and math.prod(named.count(a) for a in "zyx") == 1:
             return spacing_of(_floats(transform["scale"]), transform.get("units"), named)
     sizes: Any = attributes.get("pixelResolution", attributes.get("resolution"))
