@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
-from support.array_files import SIZE_UM, characters, write_ims
+from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
 from support.phantoms import F_BODY, f_phantom
 
 
@@ -188,3 +188,29 @@ def test_imaris_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> Non
     dataset = read.open(path, time=1)
     with pytest.raises(SourceError, match="Channel 1"):
         whole(dataset, 1)
+
+
+def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path: Path) -> None:
+    body = f_phantom() * 60  # beyond int16
+    with h5py.File(tmp_path / "a b.h5", "w") as file:
+        for setup, time in np.ndindex(2, 2):
+            for level in (0, 1):
+                step = 2**level
+                part = (body + 10 * setup + time)[:, ::step, ::step]
+                path = f"t{time + 18:05d}/s{setup:02d}/{level}/cells"
+                file.create_dataset(path, data=part.view(np.int16), chunks=(4, 8, 8))
+            if time == 0:
+                file[f"s{setup:02d}/resolutions"] = [[1.0, 1.0, 1.0], [2.0, 2.0, 1.0]]
+    assert "--spacing-um" in refusal(tmp_path / "a b.h5")
+    write_bdv_xml(tmp_path, "a b.h5", "nanometer")
+    dataset = read.open(tmp_path / "a b.h5", time=1)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    assert [level.shape for level in dataset.levels] == [(16, 48, 36), (16, 24, 18)]
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.levels[1].spacing_um == pytest.approx((0.5, 0.4, 0.5))
+    assert (dataset.dtype, dataset.time_points) == (np.uint16, 2)
+    np.testing.assert_array_equal(whole(dataset, 1), body + 11)
+    assert "2 setups of BigDataViewer" in dataset.notes[0]
+    cells = read.open(f"{tmp_path / 'a b.h5'}:/t00018/s00/0/cells", spacing_um=SIZE_UM)
+    assert whole(cells).shape == (16, 48, 36)
+    assert "BigDataViewer's axes" in refusal(tmp_path / "a b.h5", axes="zyx")

@@ -16,7 +16,7 @@ from conftest import Server
 from stereocell import read
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
-from support.array_files import BLOCK, SIZE_UM
+from support.array_files import BLOCK, SIZE_UM, write_bdv_xml
 from support.array_files import write_n5 as write
 from support.phantoms import f_phantom
 
@@ -112,16 +112,7 @@ def bdv(folder: Path, unit: str = "nanometer") -> Path:
             write(path / "s0", f_phantom() + 10 * setup + time)
         about = folder / "a.n5" / f"setup{setup}" / "attributes.json"
         about.write_text(json.dumps({"downsamplingFactors": [[1, 1, 1]]}))
-    setups = "".join(
-        f"<ViewSetup><id>{i}</id><name>{name}</name><voxelSize><unit>{unit}</unit>"
-        "<size>250 200 500</size></voxelSize></ViewSetup>"
-        for i, name in enumerate(("DAPI", "CD31"))
-    )
-    (folder / "b.xml").write_text(
-        '<?xml version="1.0" encoding="UTF-8"?><SpimData version="0.2"><SequenceDescription>'
-        '<ImageLoader format="bdv.n5"><n5 type="relative">a.n5</n5></ImageLoader>'
-        f"<ViewSetups>{setups}</ViewSetups></SequenceDescription></SpimData>"
-    )
+    write_bdv_xml(folder, "a.n5", unit)
     return folder / "a.n5"
 
 

@@ -140,3 +140,17 @@ def write_n5(
     about = path / "attributes.json"
     about.write_text(json.dumps(json.loads(about.read_text()) | attributes))
     return path
+
+
+def write_bdv_xml(folder: Path, container: str, unit: str) -> None:
+    """Write BigDataViewer's XML of two setups, of SIZE_UM where the unit is the nanometre."""
+    setups = "".join(
+        f"<ViewSetup><id>{i}</id><name>{name}</name><voxelSize><unit>{unit}</unit>"
+        "<size>250 200 500</size></voxelSize></ViewSetup>"
+        for i, name in enumerate(("DAPI", "CD31"))
+    )
+    (folder / "b.xml").write_text(
+        '<?xml version="1.0" encoding="UTF-8"?><SpimData version="0.2"><SequenceDescription>'
+        f'<ImageLoader format="bdv"><file type="relative">{container}</file></ImageLoader>'
+        f"<ViewSetups>{setups}</ViewSetups></SequenceDescription></SpimData>"
+    )

@@ -13,7 +13,8 @@ from itertools import islice
 
 import h5py
 
-from stereocell.model.errors import SourceError
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.read import bdv_hdf5
 from stereocell.read.array_axes import settle_axes
 from stereocell.read.array_spacing import ATTRIBUTES, spacing_from
 from stereocell.read.dataset import VoxelArray
@@ -39,6 +40,12 @@ def read_image(location: Location, axes: str = "") -> Image:
 
 
 def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
+    if not location.key and bdv_hdf5.is_container(tree):
+        if axes:
+            raise UsageError(
+                f"{tree.where}: --axes {axes}: BigDataViewer's axes are z, y, x, expected none"
+            )
+        return bdv_hdf5.read_image(tree, location)
     dataset, notes = _choose(tree, location.key)
     where = f"{location.path}:{dataset.name}"
     voxels = Hdf5Array(dataset, where)

@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_axes
 from stereocell.read.array_spacing import spacing_of
+from stereocell.read.bdv_image import grids_of, image_of
 from stereocell.read.bdv_xml import Setup, read_setups
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.n5_blocks import unpack_block
 from stereocell.read.n5_files import N5Files
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.spacing import Triple
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
@@ -93,21 +94,6 @@ class N5Array:
             raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
 
 
-class _Series:
-    """Datasets of one shape, by time and channel, as (t, c, z, y, x)."""
-
-    def __init__(self, arrays: Sequence[Sequence[N5Array]]) -> None:
-        first = arrays[0][0]
-        self.shape: tuple[int, ...] = (len(arrays), len(arrays[0]), *first.shape)
-        self.chunks: tuple[int, ...] = (1, 1, *first.chunks)
-        self.dtype = first.dtype
-        self._arrays = arrays
-
-    def __getitem__(self, key: Any) -> NDArray[Any]:
-        time, channel, *place = key
-        return self._arrays[time][channel][tuple(place)]
-
-
 def read_image(location: Location, axes: str = "") -> Image:
     """Return the image of a dataset, a pyramid or a container. Raises SourceError."""
     files = N5Files(location)
@@ -168,7 +154,7 @@ def _pyramid(
         raise SourceError(f"{files.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     finest = _spacing(levels[0][1], names) or _spacing(group, names)
     scales = [_factors(group, attributes, i, names) for i, (_, attributes) in enumerate(levels)]
-    grids = _grids([v.shape for v in voxels], finest, scales)
+    grids = grids_of([v.shape for v in voxels], finest, scales)
     unnamed = (None,) * count
     return Image(voxels, grids, unnamed, unnamed, 1, notes=notes)
 
@@ -181,27 +167,17 @@ def _container(files: N5Files, setups: Sequence[str], told: Mapping[int, Setup])
     """
     times = _count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)
     levels = _levels(files, f"{setups[0]}timepoint0")
-    series = []
-    for index in range(len(levels)):
-        arrays = [
+    views = [
+        [
             [_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups]
             for t in range(times)
         ]
-        first = arrays[0][0]
-        for array in (one for row in arrays for one in row):
-            if array.shape != first.shape or array.dtype != first.dtype or len(first.shape) != 3:
-                raise SourceError(
-                    f"{files.where}: setups: found {array.shape} {array.dtype} beside "
-                    f"{first.shape} {first.dtype}, expected one grid: name a setup's folder"
-                )
-        series.append(VoxelArray(_Series(arrays), tuple("tczyx")))
+        for index in range(len(levels))
+    ]
     group = files.attributes(setups[0].rstrip("/"))
-    finest = told[0].spacing_um if 0 in told else None
-    finest = finest or _spacing(files.attributes(f"{setups[0]}timepoint0"), "zyx")
+    stated = _spacing(files.attributes(f"{setups[0]}timepoint0"), "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
-    grids = _grids([array.shape for array in series], finest, scales)
-    names = tuple(told[c].name if c in told else None for c in range(len(setups)))
-    return Image(tuple(series), grids, names, (None,) * len(setups), 1)
+    return image_of(files.where, views, scales, stated, told)
 
 
 def _dataset(files: N5Files, path: str) -> N5Array:
@@ -213,20 +189,6 @@ def _count(files: N5Files, pattern: str, most: int) -> int:
     while count < most and "dimensions" in files.attributes(pattern.format(count)):
         count += 1
     return count
-
-
-def _grids(
-    shapes: Sequence[tuple[int, int, int]], finest: Triple | None, scales: Sequence[Triple | None]
-) -> tuple[Grid, ...]:
-    """Return the levels' grids; a level without factors is measured by its shape."""
-    grids = []
-    for shape, scale in zip(shapes, scales, strict=True):
-        spacing = finest
-        if finest is not None and scale is not None:
-            z, y, x = (s * f for s, f in zip(finest, scale, strict=True))
-            spacing = (z, y, x)
-        grids.append(Grid(shape, None if scale is None and shape != shapes[0] else spacing))
-    return tuple(grids)
 
 
 def _factors(

@@ -74,7 +74,9 @@ def read_image(location: Location, axes: str = "") -> Image:
             f"and at most {_MAX_LEVELS}"
         )
     if axes:
-        raise UsageError(f"{where}: --axes {axes}: the image names its axes, {', '.join(names)}")
+        raise UsageError(
+            f"{where}: --axes {axes}: the image names its axes, {', '.join(names)}; expected none"
+        )
     missing = [axis for axis in "zyx" if axis not in names]
     if missing:
         raise SourceError(

@@ -148,7 +148,9 @@ def open(
     if series and not reader.has_series:
         raise _no_series(location, str(series))
     if axes and not reader.has_axes:
-        raise UsageError(f"{location.shown}: --axes {axes}: {reader.title} states its axes")
+        raise UsageError(
+            f"{location.shown}: --axes {axes}: {reader.title} names its axes, expected none"
+        )
     image = reader.read_image(location, series, axes)
     try:
         return _dataset(location, image, time, spacing_um)
