@@ -126,6 +126,7 @@ def test_nrrd_spaces_encodings_and_byte_orders(
     dataset = read.open(tmp_path / "a.nrrd")
     assert error(dataset) <= 0.51
     assert dataset.dtype == np.int16
+    assert "Jane" not in f"{dataset.name} {dataset.notes} {dataset.channels}"
 
 
 def test_a_nrrd_of_no_body_is_a_stack_as_stored(tmp_path: Path) -> None:

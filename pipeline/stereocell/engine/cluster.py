@@ -31,6 +31,7 @@ _MAKERS = (
     "stereocell.read.czi",
     "stereocell.read.lif",
     "stereocell.read.nd2",
+    "stereocell.read.bioio_image",
 )
 T = TypeVar("T")
 R = TypeVar("R")
