@@ -18,8 +18,8 @@ from stereocell.read.array_spacing import spacing_from
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.spacing import Grid
-from stereocell.read.zarr_store import open_array
-from stereocell.storage.library_errors import one_line, without_warning
+from stereocell.read.zarr_store import open_array, quiet
+from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _LISTED = 12  # arrays that a message names
@@ -52,10 +52,7 @@ def read_only_array(location: Location, store: Store, group: "zarr.Group", axes:
     """Return the image of the only array in a group of no OME-Zarr image. Raises SourceError."""
     found: list[tuple[str, Any]] = []
     if location.is_local:  # most addresses can't be listed
-        with (
-            without_warning("Object at ", UserWarning),  # of files that are no array
-            one_line(location.shown, "a group whose arrays can be listed"),
-        ):
+        with quiet(), one_line(location.shown, "a group whose arrays can be listed"):
             members = islice(group.members(max_depth=None), _MAX_NODES)
             found = [(path, node) for path, node in members if isinstance(node, zarr.Array)]
     found = sorted((path, node) for path, node in found if sum(n > 1 for n in node.shape) >= 3)

@@ -23,7 +23,7 @@ from stereocell.read import bare_zarr
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.spacing import Grid, Triple, um_per
-from stereocell.read.zarr_store import GuardedStore, open_array, open_store
+from stereocell.read.zarr_store import GuardedStore, open_array, open_store, quiet
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -45,7 +45,7 @@ def read_image(location: Location, axes: str = "") -> Image:
     Raises SourceError where there is no image, UsageError where `axes` doesn't fit.
     """
     where = location.shown
-    with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image, or a Zarr array"):
+    with quiet(), one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image, or a Zarr array"):
         store = open_store(location)
         node = zarr.open(GuardedStore(store, location), mode="r")
     if isinstance(node, zarr.Array):

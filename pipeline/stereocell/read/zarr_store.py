@@ -12,6 +12,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import zarr
@@ -21,7 +22,7 @@ from zarr.abc.store import ByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
-from stereocell.storage.library_errors import one_line
+from stereocell.storage.library_errors import one_line, without_warning
 from stereocell.storage.location import Location, require_own, require_own_key
 
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
@@ -160,6 +161,12 @@ def codec_name(codec: Any) -> str:
     return str(name)
 
 
+def quiet() -> AbstractContextManager[None]:
+    """Silence zarr's warnings of metadata that other writers leave, which a user can't change."""
+    starts = "Both zarr.json|Numcodecs codecs|Object at |Found an empty list of filters"
+    return without_warning(starts, UserWarning)
+
+
 def open_store(location: Location) -> Store:
     """Return the store of a group or an array; its reads are to go through a GuardedStore."""
     if location.is_local:
@@ -174,7 +181,8 @@ def open_array(
     location: Location, store: Store, path: str, zarr_format: Any = None
 ) -> "zarr.Array[Any]":
     """Return the array at a path of a store, whose chunks are checked. Raises SourceError."""
-    with one_line(f"{location.shown}: level {path!r:.80}", "a Zarr array"):
+    where = f"{location.shown}: level {path!r:.80}" if path else location.shown
+    with quiet(), one_line(where, "a Zarr array"):
         guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
         codecs = tuple(codec_name(codec) for codec in array.compressors)
