@@ -128,6 +128,22 @@ def test_a_container_of_bigdataviewer_has_channels_and_times(tmp_path: Path) -> 
     assert "--spacing-um" in refusal(bdv(tmp_path / "pixels", unit="pixel"))
 
 
+def test_the_xml_itself_opens_its_container_if_it_is_in_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    bdv(tmp_path / "home")
+    dataset = read.open(tmp_path / "home" / "b.xml", time=1)
+    np.testing.assert_array_equal(whole(dataset, 1), f_phantom() + 11)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    (tmp_path / "home" / "a.n5").rename(tmp_path / "a.n5")
+    assert "not found" in refusal(tmp_path / "home" / "b.xml")
+    (tmp_path / "home" / "a.n5").symlink_to("../a.n5")
+    assert "expected a container in" in refusal(tmp_path / "home" / "b.xml")
+    (tmp_path / "home" / "c.xml").write_text("<SpimData><other/></SpimData>")
+    assert "found no file of HDF5 or N5" in refusal(tmp_path / "home" / "c.xml")
+    (tmp_path / "home" / "d.xml").write_text("<SpimData><other>")
+    refusal(tmp_path / "home" / "d.xml")
+
+
 def test_several_datasets_are_listed(tmp_path: Path) -> None:
     write(tmp_path / "a.n5" / "raw", **NM)
     (tmp_path / "a.n5" / "attributes.json").write_text('{"n5": "2.0.0"}')

@@ -25,6 +25,7 @@ _MAKERS = (
     "stereocell.read.ims",
     "stereocell.read.hdf5",
     "stereocell.read.n5",
+    "stereocell.read.bdv",
     "stereocell.read.nrrd",
     "stereocell.read.metaimage",
     "stereocell.read.mrc",

@@ -47,6 +47,17 @@ def read_setups(path: str) -> dict[int, Setup]:
     return {}
 
 
+def container_of(path: str) -> str | None:
+    """Return the path of the container that an XML names, as it stands there; None: none."""
+    file = Path(path)
+    if file.stat().st_size > _MAX_BYTES:
+        return None
+    root = _parsed(file.read_text(encoding="utf-8", errors="replace"))
+    loader = root.find("SequenceDescription/ImageLoader") if root is not None else None
+    named = [(node.text or "").strip() for node in loader] if loader is not None else []
+    return next((name for name in named if name), None)
+
+
 def _parsed(text: str) -> ElementTree.Element | None:
     """Return the root of the XML; None: it is another's, or damaged, or has entities."""
     if "<SpimData" not in text or "<!DOCTYPE" in text or "<!ENTITY" in text:

@@ -82,7 +82,7 @@ class Hdf5Tree:
         Links are not followed: what they lead to is in the file under its own name, or elsewhere.
         """
         waiting: deque[h5py.Group] = deque([start])
-        seen = {start.id.__hash__()}
+        seen = {hash(start.id)}
         for _ in range(_MAX_NODES):
             if not waiting:
                 return
@@ -91,8 +91,8 @@ class Hdf5Tree:
                 if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                     continue
                 node = group[name]
-                if isinstance(node, h5py.Group) and node.id.__hash__() not in seen:
-                    seen.add(node.id.__hash__())
+                if isinstance(node, h5py.Group) and hash(node.id) not in seen:
+                    seen.add(hash(node.id))
                     waiting.append(node)
                 elif isinstance(node, h5py.Dataset) and is_volume(node):
                     yield node

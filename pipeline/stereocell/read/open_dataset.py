@@ -60,6 +60,7 @@ READERS = {
     "ims": Reader("stereocell.read.ims", "Imaris", ".ims"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5", "NAME.h5:/KEY", has_axes=True),
     "n5": Reader("stereocell.read.n5", "N5", ".n5", has_axes=True, is_remote=True),
+    "bdv": Reader("stereocell.read.bdv", "BigDataViewer", ".xml"),
     "nrrd": Reader("stereocell.read.nrrd", "NRRD", ".nrrd, .nhdr"),
     "metaimage": Reader("stereocell.read.metaimage", "MetaImage", ".mha, .mhd"),
     "mrc": Reader("stereocell.read.mrc", "MRC", ".mrc, .rec, .map"),

@@ -134,6 +134,8 @@ class Location:
             return "n5"
         if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
             return "ome-tiff"
+        if self.is_local and self._is_bdv():
+            return "bdv"
         for name, endings in _FILE_SUFFIXES.items():
             if self.parts and self.parts[-1].lower().endswith(endings):
                 return name
@@ -149,6 +151,11 @@ class Location:
         if self.parts[-1].lower().endswith(_ANALYZE_SUFFIXES):
             return "nifti"
         return "hdf5" if _first_bytes(self.source, 8) == _HDF5_MAGIC else None
+
+    def _is_bdv(self) -> bool:
+        """Whether a file is the XML of BigDataViewer."""
+        is_named = self.source.lower().endswith(".xml")
+        return is_named and b"<SpimData" in _first_bytes(self.source, 1 << 16)
 
     def _is_n5(self) -> bool:
         """Whether a folder is a group or a dataset of N5: others have no `attributes.json`."""
@@ -302,7 +309,9 @@ def _first_bytes(path: str, count: int) -> bytes:
 
 def _stem(name: str) -> str:
     files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
-    for suffix in sorted((*_TIFF_SUFFIXES, *_ZARR_SUFFIXES, ".n5", *files), key=len, reverse=True):
+    for suffix in sorted(
+        (*_TIFF_SUFFIXES, *_ZARR_SUFFIXES, ".n5", ".xml", *files), key=len, reverse=True
+    ):
         if name.lower().endswith(suffix) and len(name) > len(suffix):
             return name[: -len(suffix)]
     return name
