@@ -164,13 +164,16 @@ CASES: dict[str, tuple[Maker, str]] = {
     "TIFF, spacing in pixels": (tiff_of(SMALL, unit="pixel"), "voxel size: not found"),
     "no multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].pop("multiscales")),
-        "no multiscales: not found",
+        "voxel size: not found",
     ),
     "empty multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].update(multiscales=[])),
         "no multiscales",
     ),
-    "no attributes": (zarr_with(lambda content: content.pop("attributes")), "no multiscales"),
+    "no attributes": (
+        zarr_with(lambda content: content.pop("attributes")),
+        "voxel size: not found",
+    ),
     "plate": (
         zarr_with(lambda content: content.update(attributes={"ome": {"plate": {}}})),
         "no multiscales: found a plate",
@@ -242,10 +245,16 @@ CASES: dict[str, tuple[Maker, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", ["scan.dcm.gz", "SCANS.ZIP", "all.tar"])
-def test_a_packed_file_is_to_be_unpacked(name: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(b"packed")
-    assert "a packed file: unpack it; expected" in refusal(tmp_path / name)
+@pytest.mark.parametrize("suffix", ["tar", "zip", "xz", "tar.gz"])
+def test_a_packed_file_is_to_be_unpacked(suffix: str, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "scan.dcm").write_bytes(b"an image")
+    packings = {"tar": "tar", "zip": "zip", "xz": "xztar", "tar.gz": "gztar"}
+    packed = shutil.make_archive(str(tmp_path / "p"), packings[suffix], tmp_path / "folder")
+    path = Path(packed).rename(tmp_path / f"SCANS.{suffix.upper()}")
+    line = refusal(path)
+    assert "(unpack it)" in line or "(unzip it" in line or "(gunzip it)" in line
+    assert "; expected OME-Zarr" in line
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -15,9 +15,9 @@ class SourceRef:
     """An address and the options of `read.open`.
 
     spacing_um   (z, y, x), um, or empty for the file's own
-    series       of DICOM or planes, from 1; 0: the largest
+    series       of a source of several images, from 1; 0: the largest
     pattern      of the names of planes, or empty
-    axes         of a TIFF file, or empty
+    axes         letters of an array whose format leaves them open, as `czyx`, or empty
     fingerprint  the planned one, since the address may hold another volume now; empty: any volume
     """
 

@@ -35,8 +35,9 @@ def declare_slices(parser: argparse.ArgumentParser) -> None:
 def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
-        help="OME-Zarr or TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
-        "file), NIfTI or a folder of planes (TIFF, PNG, JPEG): a path",
+        help="a path: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of planes (TIFF, "
+        "PNG, JPEG), Imaris, HDF5 (FILE.h5:/KEY), NRRD, MRC, CZI, ...; or an http(s):// or s3:// "
+        "address of OME-Zarr, TIFF or N5",
     )
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")

@@ -21,7 +21,6 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
-_PACKED = (".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz")
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
 
@@ -30,79 +29,112 @@ class Reader:
     """One format: its names, and the module whose `read_image(location) -> Image` reads it.
 
     title       the format's usual name
-    example     a typical source, for messages
-    has_series  one source may hold several volumes: `read_image(location, series)`
-    has_pattern names of files tell what they hold: `read_image(location, series, pattern)`
-    has_axes    a file may not say what its planes are: `read_image(location, axes=axes)`
+    has_series  one source may hold several images: `read_image(location, series=1)`
+    has_pattern names of files tell what they hold: `read_image(location, pattern="a_z{z}.tif")`
+    has_axes    a source may not name its axes: `read_image(location, axes="czyx")`
+    is_remote   it is read from an address, too
     """
 
     module: str
     title: str
-    example: str
     has_series: bool = False
     has_pattern: bool = False
     has_axes: bool = False
+    is_remote: bool = False
 
     def read_image(
         self, location: Location, *, series: int = 0, pattern: str = "", axes: str = ""
     ) -> Image:
         """Return the image of a source. Raises UsageError for an option that it doesn't take."""
         given: dict[str, Any] = {}
-        for has, name, value in (
-            (self.has_series, "series", series),
-            (self.has_pattern, "pattern", pattern),
-            (self.has_axes, "axes", axes),
-        ):
-            if has:
+        for name, value in (("series", series), ("pattern", pattern), ("axes", axes)):
+            if getattr(self, f"has_{name}"):
                 given[name] = value
             elif value:
-                raise UsageError(f"{location.shown}: --{name} {value}: {_ONLY[name]}")
+                raise _not_taken(location, self, name, str(value))
         # imported on use: each import takes up to 2 s, and a process needs one
         image: Image = import_module(self.module).read_image(location, **given)
         return image
 
 
-_ONLY = {
-    "series": "only DICOM and folders of planes hold series",
-    "pattern": "only folders of planes are told by their files' names",
-    "axes": "only a TIFF file may leave open what its planes are",
-}
 READERS = {
-    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", "NAME.zarr"),
-    "tiff": Reader(
-        "stereocell.read.tiff", "TIFF", "NAME.tif, NAME.ome.tif, NAME.lsm, NAME.stk", has_axes=True
-    ),
+    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
+    "tiff": Reader("stereocell.read.tiff", "TIFF", has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
-        "planes of TIFF, PNG or JPEG",
-        "a folder, on this machine",
+        "a folder of TIFF, PNG or JPEG planes",
         has_series=True,
         has_pattern=True,
     ),
-    "nifti": Reader("stereocell.read.nifti", "NIfTI", "NAME.nii, NAME.nii.gz"),
-    "dicom": Reader(
-        "stereocell.read.dicom", "DICOM", "a folder or a file, on this machine", has_series=True
-    ),
+    "dicom": Reader("stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True),
+    "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
+    "ims": Reader("stereocell.read.ims", "Imaris"),
+    "hdf5": Reader("stereocell.read.hdf5", "HDF5 (NAME.h5:/KEY)", has_axes=True),
+    "n5": Reader("stereocell.read.n5", "N5", has_axes=True, is_remote=True),
+    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML"),
+    "nrrd": Reader("stereocell.read.nrrd", "NRRD"),
+    "metaimage": Reader("stereocell.read.metaimage", "MetaImage"),
+    "mrc": Reader("stereocell.read.mrc", "MRC"),
+    "czi": Reader("stereocell.read.czi", "CZI", has_series=True),
+    "lif": Reader("stereocell.read.lif", "LIF", has_series=True),
+    "nd2": Reader("stereocell.read.nd2", "ND2", has_series=True),
 }
+# a file that no reader above knows is given to this one, which takes what bioio's plugins do
+OTHER = Reader(
+    "stereocell.read.bioio_image", "a file for an installed plugin of bioio", has_series=True
+)
 
 
 def reader_of(source: str | Path) -> str:
-    """Return the dotted name of the module that reads a source; empty: the format is unknown."""
-    reader = READERS.get(Location.of(source).format or "")
-    return "" if reader is None else reader.module
+    """Return the dotted name of the module that reads a source."""
+    return READERS.get(Location.of(source).format or "", OTHER).module
 
 
-def _found(location: Location) -> str:
-    """Return the words for what a file is of which no reader knows the format."""
+def _find(source: str | Path) -> tuple[Location, Reader]:
+    """Return the place of a source that is there, and the reader of its format."""
+    location = Location.of(source)
+    if location.is_local and not Path(location.path).exists():
+        raise SourceError(f"{location.shown}: not found, expected a file or a folder")
+    if location.is_local and not Path(location.path).is_dir():
+        require_own(location.path, [location.folder], named=location.shown)
+    named = location.format
+    if named is None and not import_module(OTHER.module).can_read(location):
+        raise _unknown(location)
+    reader = READERS.get(named or "", OTHER)
+    if not location.is_local and not reader.is_remote:
+        raise SourceError(
+            f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
+            "copy it here first"
+        )
     if not location.is_local:
-        return ""
-    return f": found {describe(first_bytes(location.source))}"
+        with one_line(location.shown, "an address that fsspec opens"):
+            files, path = fsspec.url_to_fs(location.source, **location.storage_options)
+        if not does_answer(files, path):
+            raise SourceError(
+                f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
+            )
+    return location, reader
 
 
-def _formats() -> str:
-    """Return all formats, each with an example, as a phrase for messages."""
-    *others, last = (f"{reader.title} ({reader.example})" for reader in READERS.values())
-    return f"{', '.join(others)} or {last}"
+def _unknown(location: Location) -> SourceError:
+    """Return the error of a source of no known format, which says what it is instead."""
+    last = location.parts[-1].lower() if location.parts else ""
+    found = "unknown format"
+    if last.endswith(_SURFACES):
+        found = "a surface (mesh), no volume"
+    elif location.is_local:
+        found += f": found {describe(first_bytes(location.source))}"
+    formats = ", ".join(reader.title for reader in READERS.values())
+    return SourceError(f"{location.shown}: {found}; expected {formats}, or {OTHER.title}")
+
+
+def _not_taken(location: Location, reader: Reader, option: str, value: str) -> UsageError:
+    """Return the error of an option that a format doesn't take; it names those that do."""
+    takers = [one.title for one in (*READERS.values(), OTHER) if getattr(one, f"has_{option}")]
+    return UsageError(
+        f"{location.shown}: --{option} {value}: found {reader.title}, expected "
+        f"{', '.join(takers)}, or no --{option}"
+    )
 
 
 def open(
@@ -114,17 +146,18 @@ def open(
     pattern: str = "",
     axes: str = "",
 ) -> Dataset:
-    """Open OME-Zarr 0.4 or 0.5, TIFF, a folder of planes, NIfTI or DICOM (a folder or a file).
+    """Open a source of any format of READERS.
 
-    source      a local path (the only form but for OME-Zarr and TIFF) or an address (`http://`,
+    source      a local path or, where the format's Reader says so, an address (`http://`,
                 `https://`, `s3://`, or another one that fsspec knows)
     time        time point, from 0
     spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
-    series      series of DICOM or of planes, from 1 as `list_series` counts; 0: the largest
+    series      series of DICOM or of planes, or image of a file of several, from 1 as
+                `list_series` counts; 0: the largest
     pattern     how the files of a folder of planes are named, as `img_c{c}_z{z}.tif`; empty:
                 guessed
-    axes        the axes of a TIFF file that are longer than 1, as `zcyx`; empty: as the file has
-                them
+    axes        letters of an array's axes, or of those longer than 1, as `czyx`, slowest first;
+                empty: as the source names them
 
     No voxels are read yet, with two exceptions: DICOM slices at the same place, to detect copies,
     and floats of NIfTI, to count NaN. Raises SourceError where the source can't be read as a
@@ -134,32 +167,7 @@ def open(
         dataset = open("head.ome.zarr")
         volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
     """
-    location = Location.of(source)
-    if location.is_local and not Path(location.source).exists():
-        raise SourceError(
-            f"{location.shown}: not found, expected an OME-Zarr, TIFF or NIfTI file, or DICOM"
-        )
-    if location.is_local and not Path(location.source).is_dir():
-        require_own(location.source, [location.folder], named=location.shown)
-    if location.format is None:
-        last = location.parts[-1].lower() if location.parts else ""
-        if last.endswith(_SURFACES):
-            raise SourceError(
-                f"{location.shown}: a surface (mesh), no volume; expected {_formats()}"
-            )
-        if last.endswith(_PACKED):
-            raise SourceError(f"{location.shown}: a packed file: unpack it; expected {_formats()}")
-        raise SourceError(
-            f"{location.shown}: unknown format{_found(location)}, expected {_formats()}"
-        )
-    if not location.is_local:
-        with one_line(location.shown, "an address that fsspec opens"):
-            files, path = fsspec.url_to_fs(location.source, **location.storage_options)
-        if not does_answer(files, path):
-            raise SourceError(
-                f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
-            )
-    reader = READERS[location.format]
+    location, reader = _find(source)
     image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
     try:
         return _dataset(location, image, time, spacing_um)
@@ -205,15 +213,14 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
 
 
 def list_series(source: str | Path) -> tuple[str, ...]:
-    """Return a line for each series of DICOM, or of planes; line i describes `series` = i.
+    """Return a line for each image of a source of several; line i describes `series` = i.
 
     A line holds modality, orientation, size and spacing, and no description from the files.
     Raises SourceError where the source can't be read, UsageError where it has another format.
     """
-    location = Location.of(source)
-    reader = READERS.get(location.format or "")
-    if reader is None or not reader.has_series:
-        raise UsageError(f"{location.shown}: --series list: {_ONLY['series']}")
+    location, reader = _find(source)
+    if not reader.has_series:
+        raise _not_taken(location, reader, "series", "list")
     lines: tuple[str, ...] = import_module(reader.module).list_series(location)
     return lines
 

@@ -97,6 +97,11 @@ def part_of(location: Location, path: str) -> Location:
     return part
 
 
+def is_collection(ome: Mapping[str, Any]) -> bool:
+    """Return whether a group's attributes say that it holds images, as a plate does."""
+    return any(key in ome for key in ("plate", "well", CONTAINER, "labels"))
+
+
 def describe_group(ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree) -> str:
     """Return what a group without an image of its own holds, and how to open a part of it."""
     shown = tree.location.shown.rstrip("/")

@@ -37,6 +37,8 @@ def describe(head: bytes) -> str:
         return "a DICOM file"
     if head.startswith(TIFF_MAGIC):
         return "a TIFF file"
+    if head[257:262] == b"ustar":
+        return "a tar archive (unpack it)"
     for magic, words in _MAGIC:
         if head.startswith(magic):
             return words

@@ -7,7 +7,8 @@ import zarr
 from numpy.typing import NDArray
 from tifffile import TiffPage, TiffPageSeries
 
-from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.errors import SourceError
+from stereocell.read.array_axes import given_axes
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Color
 
@@ -44,20 +45,9 @@ class FirstAlong:
 def with_given_axes(where: str, arrays: list[VoxelArray], axes: str) -> list[VoxelArray]:
     """Return arrays whose axes are the user's letters. Raises UsageError where those don't fit.
 
-    axes  of those longer than 1, slowest first, as `zcyx`
+    axes  of all, or of those longer than 1, slowest first, as `zcyx`
     """
-    letters = axes.strip().lower().replace(",", "")
-    shape = [int(n) for n in arrays[0].array.shape]
-    long = [place for place, length in enumerate(shape) if length > 1]
-    is_sound = set(letters) <= set("tczyx") and len(set(letters)) == len(letters)
-    if not is_sound or not {"z", "y", "x"} <= set(letters) or len(letters) != len(long):
-        lengths = ", ".join(str(shape[place]) for place in long)
-        raise UsageError(
-            f"{where}: --axes is {axes!r:.40}, expected {len(long)} letters of t, c, z, y and x, "
-            f"each once, with z, y and x among them: the file's axes are {lengths} long"
-        )
-    names = dict(zip(long, letters, strict=True))
-    renamed = tuple(names.get(place, "_") for place in range(len(shape)))
+    renamed = given_axes(where, arrays[0].array.shape, axes)
     return [VoxelArray(level.array, renamed) for level in arrays]
 
 
