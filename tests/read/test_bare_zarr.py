@@ -10,7 +10,7 @@ import zarr
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
-from support.phantoms import f_phantom
+from support.phantoms import f_phantom, write_ome_zarr
 
 SIZE_UM = (0.5, 0.2, 0.25)
 
@@ -66,7 +66,7 @@ def test_a_group_of_several_arrays_lists_them(tmp_path: Path) -> None:
     zarr.open_group(tmp_path / "g.zarr" / "deep", mode="w")
     write(tmp_path / "g.zarr" / "deep" / "label")
     (tmp_path / "g.zarr" / "notes.txt").write_text("of no array")
-    with pytest.raises(SourceError, match=r"found deep/label \(16, 48, 36\), raw \(16, 48, 36\)"):
+    with pytest.raises(SourceError, match=r"found deep/label \(16, 48, 36\), raw .* as .*/raw$"):
         read.open(tmp_path / "g.zarr")
     assert read.open(tmp_path / "g.zarr" / "raw", spacing_um=SIZE_UM).name == "g-raw"
 
@@ -74,6 +74,33 @@ def test_a_group_of_several_arrays_lists_them(tmp_path: Path) -> None:
 def test_axes_of_an_ome_zarr_are_its_own(tiny_zarr_05: Path) -> None:
     with pytest.raises(UsageError, match="names its axes, c, z, y, x"):
         read.open(tiny_zarr_05, axes="czyx")
+
+
+@pytest.mark.parametrize("version", ["0.4", "0.5"])
+def test_a_level_of_an_image_names_the_image(tmp_path: Path, version: str) -> None:
+    both = np.stack([f_phantom(), f_phantom() + 1])
+    image = write_ome_zarr(tmp_path / "a b.zarr", [both], "czyx", version)
+    with pytest.raises(SourceError, match=rf"a level of an OME-Zarr image, .* as {image} "):
+        read.open(image / "0", spacing_um=SIZE_UM)
+    dataset = read.open(image / "0", spacing_um=SIZE_UM, axes="czyx")
+    np.testing.assert_array_equal(dataset.read(1, dataset.levels[0].box).voxels, f_phantom() + 1)
+
+
+def test_named_axes_without_z_are_not_taken_for_others(tmp_path: Path) -> None:
+    named = write(tmp_path / "a.zarr", dimension_names=list("tyx"))
+    with pytest.raises(SourceError, match=r"one plane .*: found axes t, y, x, .* --axes zyx takes"):
+        read.open(named, spacing_um=SIZE_UM)
+    assert read.open(named, spacing_um=SIZE_UM, axes="zyx").time_points == 1
+    flat = write(tmp_path / "b.zarr", voxels=f_phantom()[None, None, :1])
+    with pytest.raises(SourceError, match=r"one plane \(2D\)"):
+        read.open(flat, spacing_um=SIZE_UM)
+
+
+@pytest.mark.parametrize("axes", ["zyx", "tczyx", "T, C, Z, Y, X"])
+def test_axes_of_length_1_may_be_left_out(tmp_path: Path, axes: str) -> None:
+    path = write(tmp_path / "a.zarr", voxels=f_phantom()[None, None])
+    dataset = read.open(path, spacing_um=SIZE_UM, axes=axes)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
 
 
 def test_a_damaged_chunk_is_one_line(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from stereocell.model.axes import AXES, axes_of, is_axes
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.series import counted
 
 
 def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
@@ -37,14 +38,23 @@ def settle_axes(
     Without any, three axes longer than 1 are taken for z, y, x; others may have length 1. Raises
     UsageError where `given` doesn't fit, SourceError where the axes can't be told.
     """
-    found = f"found {len(shape)} dimensions {tuple(int(n) for n in shape)}"
-    if len(shape) < 3:
-        raise SourceError(f"{where}: a volume needs at least 2 planes: {found}, expected z, y, x")
+    found = f"found {counted(len(shape), 'dimension')} {tuple(int(n) for n in shape)}"
+    long = [index for index, size in enumerate(shape) if size > 1]
+    if len(shape) < 3 or (len(long) < 3 < len(shape)):
+        raise SourceError(
+            f"{where}: one plane (2D): a volume needs at least 2 planes: {found}, expected z, y, x"
+        )
     if given:
         return given_axes(where, shape, given), ()
     if len(named) == len(shape) and is_axes("".join(named)) and all(len(n) == 1 for n in named):
         return tuple(named), ()
-    long = [index for index, size in enumerate(shape) if size > 1]
+    if len(named) == len(shape) and set(named) <= set(AXES) and len(set(named)) == len(named):
+        asked = "".join("z" if n == ("t" if "t" in named else "c") else n for n in named)
+        way = f"; --axes {asked} takes what isn't y, x for slices" if is_axes(asked) else ""
+        raise SourceError(
+            f"{where}: one plane (2D): a volume needs at least 2 planes: found axes "
+            f"{', '.join(named)}, expected z, y, x among them{way}"
+        )
     if len(long) != 3 and len(shape) == 3:
         long = [0, 1, 2]
     if len(long) != 3:

@@ -17,6 +17,7 @@ from stereocell.read.array_axes import settle_axes
 from stereocell.read.array_spacing import spacing_from
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.series import likely_image
 from stereocell.read.spacing import Grid
 from stereocell.read.zarr_collections import is_collection, ome_of
 from stereocell.read.zarr_store import open_array, quiet
@@ -74,7 +75,8 @@ def read_only_array(
     more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
     raise SourceError(
         f"{location.shown}: no multiscales: found {listed}{more}; expected the attribute "
-        f"`multiscales` of an image, or one array, as {location.shown}/{found[0][0]}"
+        f"`multiscales` of an image, or one array, as {location.shown}/"
+        f"{likely_image([path for path, _ in found])}"
     )
 
 

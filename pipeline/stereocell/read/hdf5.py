@@ -20,6 +20,7 @@ from stereocell.read.array_spacing import ATTRIBUTES, spacing_from
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree, attribute
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.series import likely_image
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
@@ -79,7 +80,7 @@ def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:
     more = ", ..." if len(found) > _LISTED else ""
     raise SourceError(
         f"{tree.where}{':' + key if key else ''}: several datasets: found {listed}{more}, "
-        f"expected one, as {tree.where}:{found[0].name}"
+        f"expected one, as {tree.where}:{likely_image([str(one.name) for one in found])}"
     )
 
 

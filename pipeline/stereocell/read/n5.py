@@ -30,6 +30,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.n5_blocks import unpack_block
 from stereocell.read.n5_files import N5Files
+from stereocell.read.series import likely_image
 from stereocell.read.spacing import Triple
 from stereocell.storage.location import Location
 
@@ -122,7 +123,7 @@ def read_image(location: Location, axes: str = "") -> Image:
         )
     raise SourceError(
         f"{files.where}: several datasets: found {', '.join(found[:_LISTED])}, expected one, as "
-        f"{files.where}/{found[0]}"
+        f"{files.where}/{likely_image(found)}"
     )
 
 

@@ -26,6 +26,7 @@ from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.read.zarr_collections import (
     ZarrTree,
     describe_group,
+    image_of_level,
     is_collection,
     labels_evidence,
     notes_on_labels,
@@ -56,6 +57,11 @@ def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> 
         guard = GuardedStore(store, location)
         node = zarr.open(guard, mode="r")
     if isinstance(node, zarr.Array):
+        if not axes and (image := image_of_level(location)):
+            raise SourceError(
+                f"{where}: found a level of an OME-Zarr image, expected the image, as {image} "
+                "(--level picks the level), or its axes by --axes"
+            )
         return bare_zarr.read_array(location, store, "", axes)
     metadata = node.metadata
     attributes = metadata.attributes

@@ -21,6 +21,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
+_VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
 
@@ -122,10 +123,23 @@ def _unknown(location: Location) -> SourceError:
     found = "unknown format"
     if last.endswith(_SURFACES):
         found = "a surface (mesh), no volume"
+    elif header := _header_beside(location):
+        return SourceError(
+            f"{location.shown}: found the voxels of {_shown(header):.200}, expected that file"
+        )
     elif location.is_local:
         found += f": found {describe(first_bytes(location.source))}"
     formats = ", ".join(reader.title for reader in READERS.values())
     return SourceError(f"{location.shown}: {found}; expected {formats}, or {OTHER.title}")
+
+
+def _header_beside(location: Location) -> str:
+    """Return the name of the header beside a file of bare voxels; empty: there is none."""
+    path = Path(location.path)
+    if not location.is_local or path.suffix.lower() not in _VOXELS:
+        return ""
+    beside = (path.with_suffix(suffix) for suffix in _HEADERS)
+    return next((header.name for header in beside if header.is_file()), "")
 
 
 def _not_taken(location: Location, reader: Reader, option: str, value: str) -> UsageError:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from stereocell.model.errors import UsageError
 
+_LABELS = ("label", "mask", "seg", "pred")  # in the names of arrays that number objects
+
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
@@ -34,6 +36,12 @@ def choose(where: str, candidates: Sequence[Candidate], series: int) -> tuple[in
     label = candidates[largest].label
     note = f"{count} images; building --series {largest + 1}, the largest: {label}"
     return largest, (note,) if count > 1 else ()
+
+
+def likely_image(paths: Sequence[str]) -> str:
+    """Return the first path whose name is not that of a label map, as an example for messages."""
+    images = (path for path in paths if not any(word in path.lower() for word in _LABELS))
+    return next(images, paths[0])
 
 
 def counted(count: int, word: str) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 import zarr
 
 from stereocell.model.errors import SourceError
-from stereocell.read.zarr_store import GuardedStore
+from stereocell.read.zarr_store import GuardedStore, open_store, quiet
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, is_own, require_own_key
 
@@ -100,6 +100,21 @@ def part_of(location: Location, path: str) -> Location:
 def is_collection(ome: Mapping[str, Any]) -> bool:
     """Return whether a group's attributes say that it holds images, as a plate does."""
     return any(key in ome for key in ("plate", "well", CONTAINER, "labels"))
+
+
+def image_of_level(location: Location) -> str:
+    """Return the shown path of the OME-Zarr image of which an array is a level; empty: of none."""
+    source, _, name = location.source.rstrip("/").rpartition("/")
+    image = replace(location, source=source)
+    try:
+        with quiet(), one_line(image.shown, "a group"):
+            group = zarr.open_group(GuardedStore(open_store(image), image), mode="r")
+            multiscales = ome_of(group.metadata.attributes).get("multiscales")
+    except SourceError:
+        return ""
+    tables = multiscales if isinstance(multiscales, list) else []
+    is_level = any(name in _paths(table, "datasets") for table in tables)
+    return image.shown if is_level else ""
 
 
 def describe_group(ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree) -> str:

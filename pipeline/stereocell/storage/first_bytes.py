@@ -18,6 +18,7 @@ _MAGIC = (
     (b"ZISRAWFILE", "a CZI file of Zeiss"),
     (b"\xda\xce\xbe\x0a", "an ND2 file of Nikon"),
     (b"\xd0\xcf\x11\xe0", "an OLE file (Olympus OIB, older Microsoft Office)"),
+    (b"# === DATA DESCRIPTION", "the header of Philips PAR/REC (dcm2niix makes NIfTI of it)"),
     (b"GIF8", "a GIF image"),
     (b"BM", "a BMP image"),
 )
