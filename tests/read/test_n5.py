@@ -240,3 +240,8 @@ def test_attributes_that_are_no_table_are_one_line(tmp_path: Path) -> None:
         refusal(tmp_path / f"{index}.n5")
     (tmp_path / "empty.n5").mkdir()
     assert "no dataset" in refusal(tmp_path / "empty.n5")
+
+
+def test_a_file_in_place_of_a_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.n5").write_bytes(b"packed")
+    assert "is a file, expected a folder of N5" in refusal(tmp_path / "a.n5")

@@ -97,6 +97,8 @@ class N5Array:
 
 def read_image(location: Location, axes: str = "") -> Image:
     """Return the image of a dataset, a pyramid or a container. Raises SourceError."""
+    if location.is_local and not os.path.isdir(location.source):
+        raise SourceError(f"{location.shown}: is a file, expected a folder of N5")
     files = N5Files(location)
     attributes = files.attributes("")
     if "dimensions" in attributes:

@@ -132,10 +132,10 @@ def _find(location: Location) -> Found:
             held = f"one file, {next(iter(left_out), 'which is none')}"
         if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
             raise UsageError(f"{location.shown}: is a label map: found {held}; {_INSTEAD}")
-        many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""
+        many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'nothing'}; expected slices of MR, CT or the like{_others(root)}"
+            f"{many}{held or 'no file'}; expected slices of MR, CT or the like{_others(root)}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
 
