@@ -100,7 +100,8 @@ def build(
 def open_volume(source: str | Path, **options: Any) -> "Dataset":
     """Open a source without reading voxels.
 
-    options  `time`, `spacing_um`, `series`: see `stereocell.read.open`, which also lists the errors
+    options  `time`, `spacing_um`, `series`, `pattern`, `axes`: see `stereocell.read.open`, with the
+             errors
 
     The dataset has `channels`, `levels` (shape in voxels and spacing in um, (z, y, x)) and
     `read(channel, box, level)`. That returns a Volume: `voxels` (z, y, x) in the source's dtype,

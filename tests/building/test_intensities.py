@@ -42,3 +42,21 @@ def test_it_is_taken_for_nothing_else(
 ) -> None:
     assert main(["plan", str(labels), "-o", str(tmp_path / "out"), "--as", "labels"]) == 2
     assert "plan.taken_as is 'labels', expected intensity" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["uint32", "int32"])
+@pytest.mark.parametrize("objects", [1, 192])
+def test_wide_integers_that_number_objects_end_the_plan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, objects: int
+) -> None:
+    z, y, x = np.mgrid[:24, :64, :64] // 8
+    number = (z * 8 + y) * 8 + x + 16_777_216  # next to each other in float32's last bit
+    voxels = np.where(number - 16_777_216 < objects, number, 0).astype(kind)
+    path = tmp_path / "wide.ome.tif"
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "--as intensity" in capsys.readouterr().err
+    assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
+    told = " ".join("".join(capsys.readouterr()).split())
+    assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in told

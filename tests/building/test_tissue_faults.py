@@ -190,7 +190,7 @@ def fork_and_run() -> None:
         "building.stage_tasks",
         "bundle.write",
         "usd.write_usdz",
-        "read.ome_tiff",
+        "read.tiff",
         "read.ome_zarr",
     ):
         key_of("", importlib.import_module(f"stereocell.{name}"))  # known from now on

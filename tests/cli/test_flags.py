@@ -20,6 +20,8 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--grid": (["5x2"], "plan", "grid", "5x2"),
     "--time": (["3"], "plan", "time", 3),
     "--series": (["4"], "plan", "series", 4),
+    "--pattern": (["a_c{c}_z{z}.tif"], "plan", "pattern", "a_c{c}_z{z}.tif"),
+    "--axes": (["zcyx"], "plan", "axes", "zcyx"),
     "--spacing-um": (["2,.5,.5"], "plan", "spacing_um", (2.0, 0.5, 0.5)),
     "--as": (["intensity"], "plan", "taken_as", "intensity"),
     "--neurological": ([], "plan", "neurological", True),

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 import yaml
 
 import stereocell
@@ -93,6 +94,17 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_series(tmp_path / "scans" / "head" / "other", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
     write_enhanced(tmp_path / "frames.dcm", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
     write_f_nifti(tmp_path / "brain.nii.gz", body, (500, 200, 200))
+    spaced = {"spacing": 0.5, "unit": "um"}
+    for name, axes, stored in (
+        ("film", "TYX", body), ("cells", "TZYX", voxels.transpose(1, 0, 2, 3)),
+    ):  # fmt: skip
+        tifffile.imwrite(
+            tmp_path / f"{name}.tif", stored, imagej=True, resolution=(5.0, 5.0),
+            metadata={"axes": axes, **spaced},
+        )  # fmt: skip
+    (tmp_path / "planes").mkdir()
+    for c, z in np.ndindex(voxels.shape[:2]):
+        tifffile.imwrite(tmp_path / "planes" / f"img_c{c}_z{z}.tif", voxels[c, z])
     for name in ("edited.usda", "edits.usda"):
         (tmp_path / name).write_text(blocks(DOCS / "blender.md", "usda")[0])
     (tmp_path / "organoid.toml").write_text(blocks(DOCS / "extending.md", "toml")[0])
@@ -225,7 +237,7 @@ def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.Monk
     np.save(tmp_path / "f.npy", body)
     monkeypatch.setattr(Location, "format", property(lambda location: "npy"))
     monkeypatch.setitem(sys.modules, "npy_reader", SimpleNamespace(read_image=names["read_image"]))
-    reader = open_dataset.Reader("npy_reader", "NumPy", "NAME.npy")
+    reader = open_dataset.Reader("npy_reader", "NumPy")
     monkeypatch.setitem(open_dataset.READERS, "npy", reader)
     dataset = stereocell.open_volume(tmp_path / "f.npy", spacing_um=(0.5, 0.2, 0.2))
     assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()

@@ -1,9 +1,11 @@
 """All cases, in a fixed order."""
 
 from malformed import (
+    array_cases,
     build_cases,
     dicom_cases,
     nifti_cases,
+    plane_cases,
     settings_cases,
     tiff_cases,
     usd_cases,
@@ -12,7 +14,8 @@ from malformed import (
 from malformed.cases import Case
 
 MODULES = (
-    zarr_cases, tiff_cases, nifti_cases, dicom_cases, settings_cases, build_cases, usd_cases,
+    zarr_cases, tiff_cases, plane_cases, nifti_cases, dicom_cases, array_cases, settings_cases,
+    build_cases, usd_cases,
 )  # fmt: skip
 
 

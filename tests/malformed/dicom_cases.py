@@ -13,6 +13,7 @@ import pydicom
 from pydicom.encaps import encapsulate
 
 from malformed.cases import ODD_NAMES, Case, copied, cut, flip, plan, slices
+from support.dicom_mosaics import csa
 
 KIND = "dicom"
 Change = Callable[[Any], None]
@@ -128,7 +129,7 @@ def _file(
 
 
 def _bytes() -> Iterator[Case]:
-    for source in ("e.dcm", "series"):
+    for source in ("e.dcm", "m.dcm", "series"):
         for share in (0.0, 0.1, 0.5, 0.95):
             yield _file(
                 f"{source} cut to {share:g}", lambda p, s=share: cut(p, s), source, "refused"
@@ -168,6 +169,22 @@ def _bytes() -> Iterator[Case]:
         "more frames than groups",
         lambda p: _change(p, _with(NumberOfFrames=4000)),
         expect="refused",
+    )
+    for name, changed in {
+        "without its private header": lambda ds: ds.__delitem__(0x00291010),
+        "of a private header of noise": lambda ds: setattr(ds[0x00291010], "value", b"SV10" + b"\xff" * 400),
+        "of 1000 slices": lambda ds: setattr(ds[0x00291010], "value", csa(NumberOfImagesInMosaic=["1000"], SliceNormalVector=["0", "0", "1"])),
+        "of -4 slices": lambda ds: setattr(ds[0x00291010], "value", csa(NumberOfImagesInMosaic=["-4"], SliceNormalVector=["0", "0", "1"])),
+        "of slices nowhere": lambda ds: setattr(ds[0x00291010], "value", csa(NumberOfImagesInMosaic=["7"], SliceNormalVector=["nan", "0", "1"])),
+        "of slices at one place": _with(SpacingBetweenSlices=0, SliceThickness=0),
+    }.items():  # fmt: skip
+        yield _file(
+            f"a mosaic {name}", lambda p, c=changed: _change(p, c), "m.dcm", expect="refused"
+        )
+    yield _each("a segmentation", _with(SOPClassUID="1.2.840.10008.5.1.4.1.1.66.4", Modality="SEG"))
+    yield _each(
+        "a dose of no planes",
+        _with(SOPClassUID="1.2.840.10008.5.1.4.1.1.481.2", NumberOfFrames=4),
     )
     yield _file("fewer frames than groups", lambda p: _change(p, _with(NumberOfFrames=2)))
 

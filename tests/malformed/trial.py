@@ -63,12 +63,13 @@ def import_all() -> None:
         if not module.name.endswith(_LEFT_OUT):
             importlib.import_module(module.name)
     from stereocell.building import stage_tasks
-    from stereocell.building.tasks import iso_value, unit, window
+    from stereocell.building.tasks import evidence, solids, unit, window
     from stereocell.storage import cache_key
 
     for maker in (
         window,
-        iso_value,
+        evidence,
+        solids,
         unit,
         stage_tasks,
     ):  # looked up once a process, at the cost of seconds
@@ -269,7 +270,7 @@ def _find_unsound(arguments: list[str]) -> str:
             return "an empty plan"
     elif arguments[0] == "slices":
         content = read_json(Path("out/slices.json"), "slices.schema.json", "")
-        if not all(Path("out", name).stat().st_size for name in content["slices"]):
+        if not all(Path("out", one["file"]).stat().st_size for one in content["slices"]):
             return "an empty slice"
     return ""
 

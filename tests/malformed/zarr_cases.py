@@ -37,6 +37,7 @@ def cases() -> Iterator[Case]:
     yield from _spoilt_text()
     yield from _arrays()
     yield from _images()
+    yield from _collections()
     yield from _paths()
     yield from _links()
     yield from _chunks()
@@ -79,8 +80,9 @@ _ARRAY: dict[str, tuple[Change, str]] = {
     **{
         f"data_type {kind}": (put("data_type", kind), "refused")
         for kind in ("int64", "uint64", "float64", "complex64", "bool", "string", "r24", "", None,
-                     7, "float16", {"name": "numpy.datetime64"}, ["uint8"])
+                     7, {"name": "numpy.datetime64"}, ["uint8"])
     },
+    "data_type float16": (put("data_type", "float16"), "any"),  # as wide as the file's uint16
     "shape of 10^6 each way": (put("shape", [2, 10**6, 10**6, 10**6]), "any"),
     "shape and chunks of 10^6 each way": (
         lambda c: c.update(shape=[2, 10**6, 10**6, 10**6], chunk_grid=_grid([1, 10**6, 10**6, 10**6])),
@@ -149,6 +151,17 @@ def _arrays() -> Iterator[Case]:
         yield _json(name, "0/zarr.json", change, expect)
     for name, (change, expect) in _V2.items():
         yield _json(name, "0/.zarray", change, expect, 4)
+
+
+def _collections() -> Iterator[Case]:
+    for name, ome in {
+        "plate of words": {"plate": "A"}, "plate of odd wells": {"plate": {"wells": [None, {}, {"path": "\n" * 10**6}]}},
+        "plate that leads out": {"plate": {"wells": [{"path": "../../.."}]}}, "well of nothing": {"well": {"images": [{}]}},
+        "labels alone": {"labels": ["x" * 10**6, 3, None]}, "container that leads out": {"bioformats2raw.layout": 3, "series": ["../x"]},
+        "container of itself": {"bioformats2raw.layout": 3, "labels": []},
+    }.items():  # fmt: skip
+        yield _json(name, "zarr.json", put("attributes", "ome", ome), "refused")
+    yield _json("label image", "zarr.json", put("attributes", "ome", "image-label", 3), "refused")
 
 
 def _images() -> Iterator[Case]:

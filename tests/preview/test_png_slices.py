@@ -2,40 +2,228 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
+import nibabel
 import numpy as np
+import pydicom
 import pytest
 from jsonschema import Draft202012Validator
 from PIL import Image
 
+from corpus.real import data_folder
 from stereocell import read
+from stereocell.building import phases
+from stereocell.building.open_source import open_source, source_of
+from stereocell.building.settings import PlanOptions, Settings
 from stereocell.cli.__main__ import main
-from stereocell.model.volume import zyx_to_xyz
-from stereocell.preview.png_slices import to_bytes
+from stereocell.preview.cut_planes import LONGEST_PX, cut_planes, square_pixels
+from stereocell.preview.png_slices import to_bytes, without_surface
 from stereocell.storage.assets import schema_path
 from support import phantoms
-from support.dicom_series import grid, scene, turn, write_series
+from support.dicom_reading import interpolation_bound
+from support.dicom_series import (
+    BRIGHTEST,
+    ORIENTATIONS,
+    grid,
+    oriented,
+    sample,
+    scene,
+    tilted,
+    turn,
+    write_series,
+)
+from support.nifti_files import write
+
+SHAPE = (22, 24, 26)
 
 
-def test_slices_show_the_scene_where_the_json_says(tmp_path: Path) -> None:
-    write_series(tmp_path / "s", grid("sagittal", rotation=turn((1, 2, 3), 20)))
-    assert main(["slices", str(tmp_path / "s"), "-o", str(tmp_path / "out")]) == 0
-    about = json.loads((tmp_path / "out" / "slices.json").read_text())
-    schema = json.loads(schema_path("slices.schema.json").read_text())
-    assert list(Draft202012Validator(schema).iter_errors(about)) == []
-    assert (about["modality"], about["axes_grow_to"]["slices"]) == ("MR", "anterior")
-    assert len(list((tmp_path / "out").iterdir())) == len(about["slices"]) + 1
-    images = [Image.open(tmp_path / "out" / name) for name in about["slices"]]
+def places_lps_mm(about: dict[str, Any]) -> np.ndarray:
+    """LPS of every pixel by the JSON, (slices, rows, columns, 3)."""
+    count, rows, columns = about["shape"]
+    first = np.array([one["first_um"] for one in about["slices"]])
+    down, right = np.array(about["step_down_um"]), np.array(about["step_right_um"])
+    world = (
+        first[:, None, None]
+        + np.arange(rows)[None, :, None, None] * down
+        + np.arange(columns)[None, None, :, None] * right
+    )
+    assert len(first) == count
+    return np.stack([world[..., 0], -world[..., 2], world[..., 1]], axis=-1) / 1000
+
+
+def pictures(folder: Path, about: dict[str, Any]) -> np.ndarray:
+    images = [Image.open(folder / one["file"]) for one in about["slices"]]
     assert {image.mode for image in images} == {"L"}
+    assert [one["file"] for one in about["slices"]] == sorted(
+        path.name for path in folder.glob("*.png")
+    )
     shown = np.stack([np.asarray(image) for image in images])
     assert list(shown.shape) == about["shape"]
-    index = np.stack(np.meshgrid(*map(np.arange, shown.shape), indexing="ij"), axis=-1)
-    move = np.array(about["placement"])
-    world = zyx_to_xyz(index * about["spacing_um"]) @ move[:3, :3].T + move[:3, 3]
-    lps = np.stack([world[..., 0], -world[..., 2], world[..., 1]], axis=-1) / 1000
+    return shown
+
+
+def written(source: Path, out: Path, *flags: str) -> tuple[dict[str, Any], np.ndarray]:
+    assert main(["slices", str(source), "-o", str(out), *flags]) == 0
+    about = json.loads((out / "slices.json").read_text())
+    schema = json.loads(schema_path("slices.schema.json").read_text())
+    assert list(Draft202012Validator(schema).iter_errors(about)) == []
+    return about, pictures(out, about)
+
+
+@pytest.mark.parametrize("plane", ["acquired", "axial", "coronal", "sagittal"])
+def test_slices_show_the_scene_where_the_json_says(tmp_path: Path, plane: str) -> None:
+    write_series(tmp_path / "s", grid("sagittal", rotation=turn((1, 2, 3), 20)))
+    about, shown = written(tmp_path / "s", tmp_path / "out", "--plane", plane)
+    assert about["modality"] == "MR"
+    assert about["plane"] == ("sagittal" if plane == "acquired" else plane)
     low, high = about["window"]
-    expected = 255 * np.clip((scene(lps) - low) / (high - low), 0, 1)
-    assert np.abs(shown - expected).max() <= 1 + 255 / (high - low)
+    expected = 255 * np.clip((scene(places_lps_mm(about)) - low) / (high - low), 0, 1)
+    bound = interpolation_bound(2.5) * 255 / (high - low)
+    assert np.abs(shown - expected).max() <= 1 + bound
+
+
+def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shape = (12, 30, 26)
+    affine = tilted(grid(shape=shape, spacing=(2.5, 2.0, 2.0)), shape, 15)
+    indices = [0, 1, 2, 3, 4.3, 5.6, 7, 8, 9, 10, 11]
+    files = write_series(tmp_path / "s", affine, shape, indices=indices)
+    about, shown = written(tmp_path / "s", tmp_path / "out")
+    assert "11 axial slices, the source's own images, 26 x 30 pixels" in capsys.readouterr().out
+    low, high = about["window"]
+    stored = np.stack([pydicom.dcmread(path).pixel_array for path in files])[::-1]  # from above
+    expected = 255 * np.clip((stored - low) / (high - low), 0, 1)
+    assert np.abs(shown - expected).max() <= 0.5 + 1e-3
+    headers = [pydicom.dcmread(path).ImagePositionPatient for path in files][::-1]
+    assert places_lps_mm(about)[:, 0, 0] == pytest.approx(np.array(headers, float), abs=1e-4)
+    across, _ = written(tmp_path / "s", tmp_path / "sides", "--plane", "coronal")
+    assert across["shape"][0] > 30  # of the grid, onto which the tilted slices are moved
+
+
+@pytest.mark.parametrize("plane", ["axial", "coronal", "sagittal"])
+@pytest.mark.parametrize("flag", [(), ("--neurological",)])
+def test_images_of_a_tilted_gantry_lie_where_the_json_says(
+    tmp_path: Path, plane: str, flag: tuple[str, ...]
+) -> None:
+    shape = (12, 30, 26)
+    for number, sign in enumerate((1, -1)):
+        affine = tilted(grid(plane, shape, rotation=turn((1, 2, 3), 10)), shape, sign * 15)
+        write_series(
+            tmp_path / f"s{number}", affine, shape, indices=[0, 1, 2, 3.4, 5, 6, 8, 9.3, 11]
+        )
+        about, shown = written(tmp_path / f"s{number}", tmp_path / f"out{number}", *flag)
+        assert (about["plane"], about["shape"][0]) == (plane, 9)
+        low, high = about["window"]
+        expected = 255 * np.clip((scene(places_lps_mm(about)) - low) / (high - low), 0, 1)
+        assert np.abs(shown - expected).max() <= 1 + interpolation_bound(2.2) * 255 / (high - low)
+
+
+@pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
+def test_a_real_ct_of_28_uneven_tilted_slices_gives_28_pictures(tmp_path: Path) -> None:
+    folder = data_folder()
+    assert folder is not None
+    about, shown = written(folder / "ct_head_ge", tmp_path / "out")
+    assert (about["plane"], about["shape"]) == ("axial", [28, 512, 512])
+    files = sorted((folder / "ct_head_ge").glob("*.dcm"))
+    headers = sorted(
+        (pydicom.dcmread(path) for path in files), key=lambda ds: -ds.ImagePositionPatient[2]
+    )
+    low, high = about["window"]
+    for picture, ds in zip(shown, headers, strict=True):
+        values = ds.pixel_array.astype(float) * ds.RescaleSlope + ds.RescaleIntercept
+        inside = ds.pixel_array != ds.get("PixelPaddingValue")
+        expected = 255 * np.clip((values - low) / (high - low), 0, 1)
+        assert np.abs(picture - expected)[inside].max() <= 0.5 + 1e-3
+
+
+@pytest.mark.parametrize(("order", "signs"), ORIENTATIONS)
+@pytest.mark.parametrize("kind", ["dicom", "nifti"])
+def test_every_plane_of_every_orientation_is_the_right_way_up(
+    tmp_path: Path, kind: str, order: tuple[int, ...], signs: tuple[int, ...]
+) -> None:
+    affine = oriented(order, signs, SHAPE)
+    if kind == "dicom":
+        write_series(tmp_path / "s", affine, SHAPE)
+    else:
+        write(tmp_path / "s.nii", affine, np.rint(sample(affine, SHAPE)).astype(np.int16))
+    source = str(tmp_path / ("s" if kind == "dicom" else "s.nii"))
+    for flag in (False, True):
+        plan = phases.settle(source, without_surface(Settings(plan=PlanOptions(neurological=flag))))
+        dataset = open_source(source_of(plan))
+        for plane in ("acquired", "axial", "coronal", "sagittal"):
+            cut = cut_planes(dataset, plan, 0, plane)
+            if plane == "acquired":  # the first stored axis is the slices' and the widest
+                assert cut.view.name == ("sagittal", "coronal", "axial")[order[0]]
+                assert len(cut.first_um) == SHAPE[0]
+            shown = np.stack(list(cut.planes))
+            assert shown.shape[1:] == cut.shape
+            assert cut.pixel_um[0] == pytest.approx(cut.pixel_um[1], rel=0.5 / min(cut.shape))
+            k, row, column = np.unravel_index(int(shown.argmax()), shown.shape)
+            down, right = cut.steps_um
+            world = cut.first_um[k] + row * down + column * right
+            found = np.array([world[0], -world[2], world[1]]) / 1000
+            assert np.abs(found - BRIGHTEST).max() < 1.5  # voxels are up to 2.5 mm
+            left, right_side, top, bottom = cut.view.ends
+            middle_row, middle_column = (n / 2 for n in cut.shape)
+            assert (column < middle_column) == (left in "LAS")
+            assert (column > middle_column) == (right_side in "LAS")
+            assert (row < middle_row) == (top in "LAS")
+            assert (row > middle_row) == (bottom in "LAS")
+            if cut.view.name != "sagittal":
+                assert left == ("L" if flag else "R")
+
+
+def test_the_widest_spacing_or_dim_info_says_how_nifti_was_acquired(tmp_path: Path) -> None:
+    voxels = np.arange(10 * 11 * 12, dtype=np.int16).reshape(10, 11, 12)
+    found = {}
+    for name, spacing, info in (
+        ("wide", (1, 4, 1), None),
+        ("last", (2, 2, 2), None),
+        ("said", (1, 4, 1), 0),
+    ):
+        nifti = nibabel.Nifti1Image(voxels, np.diag([*spacing, 1]))
+        nifti.header.set_xyzt_units("mm")
+        if info is not None:
+            nifti.header.set_dim_info(slice=info)
+        nibabel.save(nifti, tmp_path / f"{name}.nii")
+        about, _ = written(tmp_path / f"{name}.nii", tmp_path / name)
+        found[name] = about["plane"], about["shape"][0]
+    assert found == {"wide": ("coronal", 11), "last": ("axial", 12), "said": ("sagittal", 10)}
+
+
+def test_microscopy_has_planes_by_its_axes_with_square_pixels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    voxels = phantoms.f_phantom()
+    source = phantoms.write_ome_tiff(
+        tmp_path / "f.ome.tif", voxels, names=["F"], spacing=(3.0, 1.0, 1.0)
+    )
+    depth, height, width = voxels.shape
+    about, shown = written(source, tmp_path / "xy")
+    assert about["plane"] == "xy"
+    assert shown.shape == voxels.shape
+    about, shown = written(source, tmp_path / "xz", "--plane", "xz")
+    assert about["shape"] == [height, 3 * depth, width]
+    assert about["pixel_um"] == [1.0, 1.0]
+    assert about["axes_grow_to"] == {"slices": "y", "rows": "z", "columns": "x"}
+    low, high = about["window"]
+    middle = 255 * np.clip((voxels.transpose(1, 0, 2) - low) / (high - low), 0, 1)
+    assert np.abs(shown[:, 1::3] - middle).max() <= 1  # the middle of three is the voxel's own
+    capsys.readouterr()
+    assert main(["slices", str(source), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
+    told = capsys.readouterr().err
+    assert "--plane axial: " in told
+    assert "states no place in a body, expected acquired, xy, xz, yz" in told
+    assert not (tmp_path / "no").exists()
+
+
+def test_spacings_far_apart_make_no_huge_picture() -> None:
+    shape, pixel = square_pixels((10, 20), (1e9, 1e-6))
+    assert max(shape) <= LONGEST_PX
+    assert min(shape) >= 1
+    assert np.multiply(shape, pixel) == pytest.approx([1e10, 2e-5])
 
 
 def test_the_window_s_ends_are_black_and_white() -> None:

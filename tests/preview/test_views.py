@@ -1,6 +1,5 @@
 """Pictures of a patient are the right way up, whatever way the voxels were stored."""
 
-from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from stereocell.model.rigid_transform import IDENTITY
 from stereocell.preview.draw_slices import Slice, paint_slices
 from stereocell.preview.views import MICROSCOPE, View, views_of
 from support.dicom_reading import whole
-from support.dicom_series import BRIGHTEST, sample, write_series
+from support.dicom_series import BRIGHTEST, ORIENTATIONS, oriented, sample, write_series
 from support.nifti_files import write
 
 SHAPE = (22, 24, 26)
@@ -22,19 +21,6 @@ assert left > 5
 assert back < -5
 assert up > 5
 ITS_SIDES = set("LAS")
-ORIENTATIONS = [
-    (order, signs) for order in permutations(range(3)) for signs in product((1, -1), repeat=3)
-]
-
-
-def affine_of(order: tuple[int, ...], signs: tuple[int, ...]) -> np.ndarray:
-    """A grid round the origin whose stored axes run along those of LPS in this order."""
-    affine = np.eye(4)
-    affine[:3, :3] = 0
-    for stored, (axis, sign) in enumerate(zip(order, signs, strict=True)):
-        affine[axis, stored] = sign * (2.5, 2.2, 2.0)[stored]
-    affine[:3, 3] = -affine[:3, :3] @ (np.array(SHAPE) - 1) / 2
-    return affine
 
 
 def require_upright(view: View, voxels: np.ndarray) -> None:
@@ -58,7 +44,7 @@ def _kept(view: View) -> tuple[int, int]:
 def test_nifti_of_every_orientation(
     tmp_path: Path, order: tuple[int, ...], signs: tuple[int, ...]
 ) -> None:
-    affine = affine_of(order, signs)
+    affine = oriented(order, signs, SHAPE)
     voxels = np.rint(sample(affine, SHAPE)).astype(np.int16)
     dataset = read.open(write(tmp_path / "a.nii", affine, voxels))
     for is_neurological in (False, True):
@@ -70,7 +56,7 @@ def test_nifti_of_every_orientation(
 def test_dicom_of_every_orientation(
     tmp_path: Path, order: tuple[int, ...], signs: tuple[int, ...]
 ) -> None:
-    write_series(tmp_path / "s", affine_of(order, signs), SHAPE)
+    write_series(tmp_path / "s", oriented(order, signs, SHAPE), SHAPE)
     dataset = read.open(tmp_path / "s")
     for view in views_of(dataset.placement):
         require_upright(view, whole(dataset))

@@ -105,10 +105,16 @@ def plain_tiff(folder: Path) -> Path:
 
 
 def rgb_tiff(folder: Path) -> Path:
-    pixels = np.zeros((4, 16, 16, 3), np.uint8)
-    options = {"axes": "ZYXS", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 1.0}
+    pixels = np.zeros((16, 16, 3), np.uint8)
+    options = {"axes": "YXS"}
     tifffile.imwrite(folder / "rgb.ome.tif", pixels, ome=True, photometric="rgb", metadata=options)
     return folder / "rgb.ome.tif"
+
+
+def complex_tiff(folder: Path) -> Path:
+    options = {"axes": "ZYX", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 1.0}
+    tifffile.imwrite(folder / "c.ome.tif", SMALL.astype(np.complex64), ome=True, metadata=options)
+    return folder / "c.ome.tif"
 
 
 def incomplete_tiff(folder: Path) -> Path:
@@ -142,13 +148,13 @@ CASES: dict[str, tuple[Maker, str]] = {
     "text as Zarr": (text_file("bad.zarr"), "not found"),
     "empty folder as Zarr": (folder_named("bad.zarr"), "zarr.json"),
     "folder as TIFF": (folder_named("bad.ome.tif"), "directory"),
-    "TIFF without OME-XML": (plain_tiff, "OME-XML"),
-    "RGB TIFF": (rgb_tiff, "SamplesPerPixel: found 3"),
+    "TIFF without spacing": (plain_tiff, "voxel size: not found.*--spacing-um z,y,x"),
+    "flat RGB TIFF": (rgb_tiff, r"at least 2 planes.*a flat image of 3 channels\)"),
     "TIFF with missing planes": (incomplete_tiff, "found 6 planes, expected 8"),
     "TIFF of one plane": (tiff_of(SMALL[:1]), "at least 2 planes: found 1 along z"),
     "flat TIFF": (tiff_of(SMALL[0], "YX", spacing=None), "at least 2 planes: found 1 along z"),
     "flat TIFF with channels": (tiff_of(SMALL, "CYX", spacing=None), "at least 2 planes"),
-    "int8 TIFF": (tiff_of(SMALL.astype(np.int8)), "dtype of level 0: found int8"),
+    "complex TIFF": (complex_tiff, "dtype of level 0: found complex64, expected uint8"),
     "TIFF, negative spacing": (tiff_of(SMALL, spacing=(-1.0, 1.0, 1.0)), "voxel size z of level 0"),
     "TIFF, zero spacing": (tiff_of(SMALL, spacing=(1.0, 0.0, 1.0)), "voxel size y of level 0"),
     "TIFF, NaN spacing": (
@@ -158,13 +164,16 @@ CASES: dict[str, tuple[Maker, str]] = {
     "TIFF, spacing in pixels": (tiff_of(SMALL, unit="pixel"), "voxel size: not found"),
     "no multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].pop("multiscales")),
-        "no multiscales: not found",
+        "voxel size: not found",
     ),
     "empty multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].update(multiscales=[])),
         "no multiscales",
     ),
-    "no attributes": (zarr_with(lambda content: content.pop("attributes")), "no multiscales"),
+    "no attributes": (
+        zarr_with(lambda content: content.pop("attributes")),
+        "voxel size: not found",
+    ),
     "plate": (
         zarr_with(lambda content: content.update(attributes={"ome": {"plate": {}}})),
         "no multiscales: found a plate",
@@ -186,10 +195,7 @@ CASES: dict[str, tuple[Maker, str]] = {
     "levels of two dtypes": (mixed_dtypes, "dtype of level 1: found float32"),
     "flat Zarr": (zarr_of(SMALL[0], "yx"), "at least 2 planes: no axis z"),
     "Zarr of one plane": (zarr_of(SMALL[:1]), "at least 2 planes: found 1 along z"),
-    "int32 Zarr": (
-        zarr_of(SMALL.astype(np.int32)),
-        "found int32, expected uint8, uint16, int16 or",
-    ),
+    "complex Zarr": (zarr_of(SMALL.astype(np.complex64)), "found complex64, expected uint8"),
     "negative spacing": (scale(-0.5, 1, 1), "voxel size z of level 0: found -0.5 um"),
     "zero spacing": (scale(1, 0, 1), "voxel size y of level 0: found 0 um"),
     "NaN spacing": (scale(1, 1, float("nan")), "voxel size x of level 0: found nan um"),
@@ -237,6 +243,18 @@ CASES: dict[str, tuple[Maker, str]] = {
         "NaN or infinite",
     ),
 }
+
+
+@pytest.mark.parametrize("suffix", ["tar", "zip", "xz", "tar.gz"])
+def test_a_packed_file_is_to_be_unpacked(suffix: str, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "scan.dcm").write_bytes(b"an image")
+    packings = {"tar": "tar", "zip": "zip", "xz": "xztar", "tar.gz": "gztar"}
+    packed = shutil.make_archive(str(tmp_path / "p"), packings[suffix], tmp_path / "folder")
+    path = Path(packed).rename(tmp_path / f"SCANS.{suffix.upper()}")
+    line = refusal(path)
+    assert "(unpack it)" in line or "(unzip it" in line or "(gunzip it)" in line
+    assert "; expected OME-Zarr" in line
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell import read
+from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
 from support.dicom_reading import error, interpolation_bound, lps_mm, whole
@@ -249,3 +250,41 @@ def test_garbled_files_raise_nothing_else(tmp_path: Path, suffix: str) -> None:
         path.write_bytes(garbled.tobytes())
         with suppress(SourceError):
             whole(read.open(path))
+
+
+@pytest.mark.parametrize("said", ["intent", "table"])
+def test_labels_that_the_header_states_end_the_plan(
+    tmp_path: Path, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mask of one object, which the voxels alone would not tell for labels."""
+    voxels = np.zeros(SHAPE, np.uint8)
+    voxels[5:12, 5:12, 5:12] = 1
+    nifti = nibabel.Nifti1Image(voxels, np.diag([2.0, 2.0, 2.0, 1.0]))
+    nifti.header.set_xyzt_units("mm")
+    if said == "intent":
+        nifti.header.set_intent("label")
+    else:
+        text = b"<CaretExtension><LabelTable><Label Key='1'>JANE DOE</Label></LabelTable>"
+        nifti.header.extensions.append(nibabel.nifti1.Nifti1Extension("comment", text))
+    nibabel.save(nifti, tmp_path / "m.nii.gz")
+    source, out = str(tmp_path / "m.nii.gz"), str(tmp_path / "out")
+    assert main(["plan", source, "-o", out]) == 2
+    told = capsys.readouterr().err
+    assert ("intent code 1002" if said == "intent" else "a table of labels") in told
+    assert "JANE" not in told
+    assert main(["plan", source, "-o", out, "--as", "intensity"]) == 0
+
+
+def test_values_on_a_surface_are_told_as_such(tmp_path: Path) -> None:
+    axes = (
+        nibabel.cifti2.ScalarAxis(["a"]),
+        nibabel.cifti2.BrainModelAxis.from_surface(np.arange(5), 9, name="CortexLeft"),
+    )
+    image = nibabel.cifti2.Cifti2Image(np.ones((1, 5), np.float32), axes)
+    nibabel.save(image, tmp_path / "s.dscalar.nii")
+    with pytest.raises(SourceError, match="CIFTI, values on surfaces"):
+        read.open(tmp_path / "s.dscalar.nii")
+    gifti = nibabel.gifti.GiftiImage()
+    nibabel.save(gifti, tmp_path / "LEFT.SURF.gii")
+    with pytest.raises(SourceError, match="a surface"):
+        read.open(tmp_path / "LEFT.SURF.gii")

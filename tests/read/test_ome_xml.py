@@ -24,7 +24,7 @@ def test_spacing_names_and_colours_are_read() -> None:
     assert first.names == ("DAPI", None, None)
     # R, G, B, A in a signed number: 0x0000ffff is blue, 0xff0000ff red
     assert first.colors == ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), None)
-    assert (second.spacing_um, second.names, second.colors) == (None, (), ())
+    assert (second.spacing_um, second.names, second.colors) == ((None, None, None), (), ())
 
 
 @pytest.mark.parametrize("version", ["2016-06", "2013-06", "2008-09"])
@@ -36,7 +36,6 @@ def test_every_version_s_namespace_is_one(version: str) -> None:
 @pytest.mark.parametrize(
     ("inside", "told"),
     [
-        ('<BinaryOnly MetadataFile="first.ome.tif" UUID="u"/>', "is in 'first.ome.tif'"),
         ('<Image><Pixels PhysicalSizeZ="deep"/></Image>', "PhysicalSizeZ: found 'deep'"),
         ('<Image><Pixels><Channel Color="red"/></Pixels></Image>', "Channel Color: found 'red'"),
     ],

@@ -4,6 +4,8 @@ from itertools import permutations
 from pathlib import Path
 from typing import Any
 
+import h5py
+import nrrd
 import numpy as np
 import pytest
 import tifffile
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
+from support.array_files import write_czi
 from support.phantoms import UNITS, f_phantom, write_ome_tiff, write_ome_zarr
 
 BOX = Box((1, 3, 5), (4, 30, 21))
@@ -239,3 +242,42 @@ def test_further_images_are_noted(tmp_path: Path, suffix: str) -> None:
     assert dataset.images == 2
     assert dataset.notes == ("2 images in the source; building the first alone",)
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, body)
+
+
+def test_a_format_is_told_by_the_first_bytes_where_the_name_says_nothing(tmp_path: Path) -> None:
+    body = f_phantom()
+    tifffile.imwrite(tmp_path / "a.dat", body, photometric="minisblack")
+    nrrd.write(str(tmp_path / "b.nrrd"), body, index_order="C")
+    with h5py.File(tmp_path / "c.mat", "w") as file:
+        file["raw"] = body
+    write_czi(tmp_path / "d.czi", {None: body[None, None]})
+    (tmp_path / "b.nrrd").rename(tmp_path / "b")
+    (tmp_path / "d.czi").rename(tmp_path / "d.CZI (1)")
+    for name in ("a.dat", "b", "c.mat", "d.CZI (1)"):
+        dataset = read.open(tmp_path / name, spacing_um=(2.0, 1.0, 1.0))
+        np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, body)
+
+
+def test_a_folder_of_planes_beside_other_files_is_planes(tmp_path: Path) -> None:
+    folder = tmp_path / "export.lif"
+    folder.mkdir()
+    for z, plane in enumerate(f_phantom()):
+        tifffile.imwrite(folder / f"z{z:03d}.tif", plane)
+    with h5py.File(folder / "all.h5", "w") as file:
+        file["raw"] = f_phantom() + 1
+    dataset = read.open(folder, spacing_um=(2.0, 1.0, 1.0))
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
+
+
+def test_an_address_of_a_format_on_this_machine_is_to_be_copied() -> None:
+    with pytest.raises(SourceError, match="CZI at an address, expected a path on this machine"):
+        read.open("https://nowhere.invalid/a.czi")
+
+
+def test_bare_voxels_name_their_header(tmp_path: Path) -> None:
+    (tmp_path / "a.raw").write_bytes(bytes(range(100)))
+    with pytest.raises(SourceError, match="unknown format: found"):
+        read.open(tmp_path / "a.raw")
+    (tmp_path / "a.mhd").write_text("NDims = 3")
+    with pytest.raises(SourceError, match=r"found the voxels of a\.mhd, expected that file"):
+        read.open(tmp_path / "a.raw")

@@ -13,17 +13,17 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from stereocell.building import stage_tasks
-from stereocell.building.tasks import iso_value, unit, window
+from stereocell.building.tasks import evidence, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.read.open_dataset import READERS
 from stereocell.report import page
 from stereocell.storage import assets, cache_key
 
 ROOT = Path(__file__).parents[2]
-ZARR, TIFF = READERS["ome-zarr"].module, READERS["ome-tiff"].module
+ZARR, TIFF = READERS["ome-zarr"].module, READERS["tiff"].module
 MAKERS = {
     "window": (window, ZARR),
-    "iso-value": (iso_value, ZARR),
+    "evidence": (evidence, ZARR),
     "unit": (unit, ZARR),
     "unit of a TIFF": (unit, TIFF),
     "stage": (stage_tasks,),
@@ -31,7 +31,7 @@ MAKERS = {
     "report": (page,),
 }
 UNITS = {"unit", "unit of a TIFF"}
-TASKS = UNITS | {"window", "iso-value"}
+TASKS = UNITS | {"window", "evidence"}
 
 
 @pytest.fixture(scope="module")
@@ -108,11 +108,11 @@ PACKAGE = "pipeline/stereocell"
         ("serve/limits.py", set()),
         ("textures/tangents.py", UNITS | {"bundle", "report"}),
         ("meshes/simplify.py", UNITS | {"bundle"}),
-        ("filters/denoise.py", TASKS - {"window"} | {"report"}),
-        ("isosurface/isovalue.py", {"iso-value"}),
+        ("filters/denoise.py", TASKS | {"stage", "bundle", "report"}),
+        ("isosurface/level_evidence.py", {"evidence", "window", "report"}),
         ("transfer/boundaries.py", {"window", "report"}),
         ("read/ome_zarr.py", TASKS - {"unit of a TIFF"}),
-        ("read/ome_tiff.py", {"unit of a TIFF"}),
+        ("read/tiff/ome.py", {"unit of a TIFF"}),
         ("read/dicom/frame.py", set()),
         ("read/nifti.py", set()),
         ("formats/exr.py", {"stage", "bundle"}),

@@ -5,6 +5,7 @@ LPS in mm; whatever the grid, a voxel holds `scene` at its own place.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from itertools import permutations, product
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,21 @@ def grid(
     affine = np.eye(4)
     affine[:3, :3] = axes * spacing
     affine[:3, 3] = shift - affine[:3, :3] @ (np.array(shape) - 1) / 2
+    return affine
+
+
+ORIENTATIONS = [  # of stored axes among those of LPS: the axis of each, and its sign
+    (order, signs) for order in permutations(range(3)) for signs in product((1, -1), repeat=3)
+]
+
+
+def oriented(order: Sequence[int], signs: Sequence[int], shape: Sequence[int]) -> Affine:
+    """Return a grid round the origin whose stored axes run along those of LPS in this order."""
+    affine = np.eye(4)
+    affine[:3, :3] = 0
+    for stored, (axis, sign) in enumerate(zip(order, signs, strict=True)):
+        affine[axis, stored] = sign * (2.5, 2.2, 2.0)[stored]
+    affine[:3, 3] = -affine[:3, :3] @ (np.array(shape) - 1) / 2
     return affine
 
 

@@ -26,7 +26,7 @@ from stereocell.building.open_source import open_source
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.serve.brick_library import BrickLibrary
-from support import identity_search
+from support import dicom_mosaics, identity_search
 from support.dicom_series import compress, grid, write_enhanced, write_series
 
 # Every text has TEXT in it, every UID NUMBER, every date and time its own; a count follows.
@@ -123,6 +123,21 @@ def jpeg(folder: Path) -> None:
         packed.save_as(path)
 
 
+def mosaic(folder: Path) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        mark_all(ds)
+        ds.ImageType = [TEXT.upper()[:16], "MOSAIC"]
+        header = dicom_mosaics.csa(
+            NumberOfImagesInMosaic=["7"],
+            SliceNormalVector=["0", "0", "1"],
+            ReferencingPhysicianName=[TEXT, NUMBER, DATE, TIME],
+        )
+        ds[0x00291010].value = header + bytes(len(header) % 2)
+
+    affine = grid(shape=dicom_mosaics.SHAPE, spacing=dicom_mosaics.SPACING)
+    dicom_mosaics.write_mosaic(folder / f"{TEXT}.dcm", affine, change=change)
+
+
 def packed_nifti(folder: Path) -> None:
     values = np.arange(8 * 9 * 10, dtype=np.float32).reshape(8, 9, 10)
     values[0, 0, 0] = np.nan  # that is said
@@ -136,7 +151,7 @@ def packed_nifti(folder: Path) -> None:
     nibabel.save(nifti, folder / "a.nii.gz")
 
 
-@pytest.mark.parametrize("write", [enhanced, jpeg, packed_nifti])
+@pytest.mark.parametrize("write", [enhanced, jpeg, mosaic, packed_nifti])
 def test_no_identity_is_in_what_is_made_of_other_kinds_of_file(
     write: Callable[[Path], None],
     tmp_path: Path,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from stereocell import read
 from stereocell.building.plan import Channel, Plan
+from stereocell.building.settings import PlanOptions
 from stereocell.storage.workspace import fetch
 
 
@@ -14,7 +15,9 @@ class SourceRef:
     """An address and the options of `read.open`.
 
     spacing_um   (z, y, x), um, or empty for the file's own
-    series       of DICOM, from 1; 0: the largest
+    series       of a source of several images, from 1; 0: the largest
+    pattern      of the names of planes, or empty
+    axes         letters of an array whose format leaves them open, as `czyx`, or empty
     fingerprint  the planned one, since the address may hold another volume now; empty: any volume
     """
 
@@ -23,23 +26,43 @@ class SourceRef:
     spacing_um: tuple[float, ...]
     series: int = 0
     fingerprint: str = ""
+    pattern: str = ""
+    axes: str = ""
 
 
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
     fetch(Path(ref.source))  # an added channel's source lies in OUT
-    if not ref.spacing_um:
-        return read.open(ref.source, time=ref.time, series=ref.series)
-    z, y, x = ref.spacing_um
-    return read.open(ref.source, time=ref.time, spacing_um=(z, y, x), series=ref.series)
+    given = None
+    if ref.spacing_um:
+        z, y, x = ref.spacing_um
+        given = (z, y, x)
+    return read.open(
+        ref.source,
+        time=ref.time,
+        spacing_um=given,
+        series=ref.series,
+        pattern=ref.pattern,
+        axes=ref.axes,
+    )
 
 
 def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
     """Return the reference to a plan's source, or to that of one of its channels."""
     if channel is not None and channel.source:
         return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
-    options = plan.settings.plan
+    return as_asked(plan.source, plan.settings.plan, plan.fingerprint)
+
+
+def as_asked(source: str, options: PlanOptions, fingerprint: str = "") -> SourceRef:
+    """Return the reference to a source that is read as the settings say."""
     return SourceRef(
-        plan.source, options.time, options.spacing_um, options.series, plan.fingerprint
+        source,
+        options.time,
+        options.spacing_um,
+        options.series,
+        fingerprint,
+        options.pattern,
+        options.axes,
     )

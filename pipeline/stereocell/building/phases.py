@@ -13,7 +13,7 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.intensities import require_intensities
-from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
 from stereocell.building.plan import (
@@ -78,7 +78,7 @@ def settle(source: str, settings: Settings) -> Plan:
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
-    dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
+    dataset = open_source(as_asked(location, options))
     for note in dataset.notes:
         console.print(f"plan: {note}", markup=False)
     modality = dataset.modality or options.modality

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions, parse_level
 from stereocell.meshes.options import LodOptions
+from stereocell.model.axes import axes_of, is_axes
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
 from stereocell.model.settings import AUTO, Flag, setting
@@ -77,12 +78,31 @@ class PlanOptions:
     time: int = setting(0, "index into a time series", Flag("--time"))
     series: int = setting(
         0,
-        "which series of DICOM, from 1 as --series list counts; 0: largest",
+        "which of several images of a source, from 1 as --series list counts; 0: the largest",
         Flag(
             "--series",
-            "which series of a DICOM folder (default: the largest); `list` shows them and does "
-            "nothing else",
+            "which of several images of a source: series of DICOM or planes, segments, scenes of "
+            "CZI, LIF, ND2 (default: the largest); `list` shows them and does nothing else",
             "N|list",
+        ),
+    )
+    pattern: str = setting(
+        "",
+        "how the files of a folder of planes are named, as img_c{c}_z{z}.tif; empty: guessed",
+        Flag(
+            "--pattern",
+            "how the files of a folder of planes are named: {z} for the plane's number, {c} for "
+            "the channel, {t} for the time, * for anything else, as img_c{c}_z{z}.tif (default: "
+            "guessed)",
+        ),
+    )
+    axes: str = setting(
+        "",
+        "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, as czyx; empty: what the file says",
+        Flag(
+            "--axes",
+            "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, slowest first, as zyx or czyx: "
+            "where the file names none, or a TIFF's are wrong",
         ),
     )
     spacing_um: tuple[float, ...] = setting(
@@ -115,6 +135,11 @@ class PlanOptions:
             raise UsageError(f"plan.time is {self.time}, expected 0 or more (--time)")
         if self.series < 0:
             raise UsageError(f"plan.series is {self.series}, expected 0 or more (--series)")
+        if self.axes and not is_axes(axes_of(self.axes)):
+            raise UsageError(
+                f"plan.axes is {self.axes!r:.40}, expected z, y and x, and t and c where there are "
+                "any, each once, as czyx (--axes)"
+            )
         if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(

@@ -163,8 +163,8 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         commands.iso,
     ),
     "slices": (
-        "write 8-bit PNG slices of one channel, with a JSON of spacing and window",
-        "slices scans/head -o out/slices --preset mri --series 2",
+        "write 8-bit PNG slices of one channel, the right way up, with a JSON of places and window",
+        "slices scans/head -o out/slices --preset mri --plane axial",
         flags.declare_slices,
         commands.slices,
     ),

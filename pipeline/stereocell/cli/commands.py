@@ -216,9 +216,10 @@ def slices(options: argparse.Namespace) -> Answer:
 
     wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
     require_apart(options.input, options.out)
-    count = write_slices(phases.settle(options.input, without_surface(wanted)), options.out)
-    print_unless_json(options, f"wrote {count} slices to {options.out}")
-    return Answer({"out": str(options.out), "slices": count})
+    plan = phases.settle(options.input, without_surface(wanted))
+    written = write_slices(plan, options.out, options.plane)
+    print_unless_json(options, f"wrote to {options.out}: {written.line}")
+    return Answer({"out": str(options.out), "slices": written.count, "plane": written.plane})
 
 
 def sample(options: argparse.Namespace) -> Answer:

@@ -23,13 +23,21 @@ def declare_input(parser: argparse.ArgumentParser) -> None:
 def declare_slices(parser: argparse.ArgumentParser) -> None:
     declare_source(parser)
     parser.add_argument("-o", "--out", type=_place, required=True, help="folder of the pictures")
+    parser.add_argument(
+        "--plane",
+        choices=["acquired", "axial", "coronal", "sagittal", "xy", "xz", "yz"],
+        default="acquired",
+        help="which planes: as the source's own images lie (default), of a patient axial, coronal "
+        "or sagittal, of microscopy xy, xz or yz",
+    )
 
 
 def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
-        help="OME-Zarr or OME-TIFF: a path, http(s):// or s3:// address; DICOM (a folder or a "
-        "file) or NIfTI: a path",
+        help="a path: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of planes (TIFF, "
+        "PNG, JPEG), Imaris, HDF5 (FILE.h5:/KEY), NRRD, MRC, CZI, ...; or an http(s):// or s3:// "
+        "address of OME-Zarr, TIFF or N5",
     )
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")

@@ -20,9 +20,21 @@ _MAKERS = (
     "stereocell.building.tasks.unit",
     "stereocell.building.stage_tasks",
     "stereocell.read.ome_zarr",
-    "stereocell.read.ome_tiff",
+    "stereocell.read.tiff",
+    "stereocell.read.planes",
     "stereocell.read.nifti",
     "stereocell.read.dicom",
+    "stereocell.read.ims",
+    "stereocell.read.hdf5",
+    "stereocell.read.n5",
+    "stereocell.read.bdv",
+    "stereocell.read.nrrd",
+    "stereocell.read.metaimage",
+    "stereocell.read.mrc",
+    "stereocell.read.czi",
+    "stereocell.read.lif",
+    "stereocell.read.nd2",
+    "stereocell.read.bioio_image",
 )
 T = TypeVar("T")
 R = TypeVar("R")

@@ -1,13 +1,13 @@
 """Write one channel as 8-bit PNG slices, with a JSON that describes them.
 
-    000.png 001.png ...     slice z, from posterior to anterior for DICOM and NIfTI
-    slices.json             size, spacing, window, orientation, modality: schemas/slices.schema.json
+    000.png 001.png ...     slices across one axis, the right way up (preview/cut_planes.py)
+    slices.json             plane, sizes, places, window, modality: schemas/slices.schema.json
 
 The window is found as in a build, so that 0 and 255 mean the same here as there.
 """
 
 import json
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +22,21 @@ from stereocell.building.settings import Settings
 from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import OutputError, UsageError
-from stereocell.model.rigid_transform import IDENTITY
 from stereocell.model.version import GENERATOR
-from stereocell.model.volume import Volume
+from stereocell.preview.cut_planes import ACQUIRED, Cut, cut_planes, extent_words, is_patient
 from stereocell.storage.atomic_write import replacing_folder
 
 INDEX = "slices.json"
-FORMAT, VERSION = "stereocell-slices", 1
-# directions of growing index, for a source with a known place in a body
-ANATOMICAL = {"slices": "anterior", "rows": "inferior", "columns": "left"}
-UNKNOWN = {"slices": "towards the viewer", "rows": "down", "columns": "right"}
+FORMAT, VERSION = "stereocell-slices", 2
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What was written: the number of slices, the plane's name, and a line that says it."""
+
+    count: int
+    plane: str
+    line: str
 
 
 def without_surface(settings: Settings) -> Settings:
@@ -40,13 +45,14 @@ def without_surface(settings: Settings) -> Settings:
     return replace(settings, surface=SurfaceOptions(**lengths))  # type: ignore[arg-type]
 
 
-def write_slices(plan: Plan, folder: Path) -> int:
-    """Write the plan's region of its one channel; return the number of slices.
+def write_slices(plan: Plan, folder: Path, plane: str = ACQUIRED) -> Written:
+    """Write the plan's region of its one channel.
 
     folder  replaced as a whole if it holds slices
+    plane   one of cut_planes.PLANES
 
-    Raises UsageError for more than one channel, OutputError for a folder with other content,
-    SourceError where the source can't be read.
+    Raises UsageError for more than one channel and for a plane that the source hasn't, OutputError
+    for a folder with other content, SourceError where the source can't be read.
     """
     if len(plan.channels) != 1:
         found = ", ".join(channel.name for channel in plan.channels)
@@ -54,15 +60,16 @@ def write_slices(plan: Plan, folder: Path) -> int:
     if folder.exists() and not (folder / INDEX).is_file() and _holds(folder):
         raise OutputError(f"{folder}: exists and holds no slices: no {INDEX} in it")
     dataset, channel = open_source(source_of(plan)), plan.channels[0]
-    volume = dataset.read(channel.index, plan.region, plan.level)
+    cut = cut_planes(dataset, plan, channel.index, plane)
     window = measure_statistics(statistics_task(plan, channel)).window
+    count = len(cut.first_um)
+    names = [f"{k:0{len(str(count))}d}.png" for k in range(count)]
     with replacing_folder(folder) as new:
-        names = [f"{z:0{len(str(len(volume.voxels)))}d}.png" for z in range(len(volume.voxels))]
-        for name, plane in zip(names, volume.voxels, strict=True):
-            Image.fromarray(to_bytes(plane, window)).save(new / name)
-        content = _describe(plan, volume, window, names)
+        for name, picture in zip(names, cut.planes, strict=True):
+            Image.fromarray(to_bytes(picture, window)).save(new / name)
+        content = _describe(plan, cut, window, names)
         (new / INDEX).write_text(json.dumps(content, indent=1) + "\n")
-    return len(names)
+    return Written(count, cut.view.name, _line(plan, cut))
 
 
 def to_bytes(plane: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
@@ -73,22 +80,42 @@ def to_bytes(plane: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uin
 
 
 def _describe(
-    plan: Plan, volume: Volume, window: tuple[float, float], names: list[str]
+    plan: Plan, cut: Cut, window: tuple[float, float], names: list[str]
 ) -> dict[str, object]:
-    is_placed = plan.placement != IDENTITY
+    down, right = cut.steps_um.tolist()
+    places = zip(names, cut.first_um.tolist(), strict=True)
     return {
         "format": FORMAT,
         "version": VERSION,
         "generator": GENERATOR,
         "modality": plan.modality,
-        "shape": list(volume.voxels.shape),
-        "spacing_um": list(volume.spacing_um),
-        "origin_um": list(volume.origin_um),
+        "plane": cut.view.name,
+        "shape": [len(names), *cut.shape],
+        "pixel_um": list(cut.pixel_um),
         "window": list(window),
-        "axes_grow_to": ANATOMICAL if is_placed else UNKNOWN,
-        "placement": [list(row) for row in plan.placement],
-        "slices": names,
+        "axes_grow_to": extent_words(cut, is_patient=is_patient(plan)),
+        "step_down_um": down,
+        "step_right_um": right,
+        "slices": [{"file": name, "first_um": first} for name, first in places],
     }
+
+
+def _line(plan: Plan, cut: Cut) -> str:
+    """Return a line: `28 axial slices of ...`."""
+    (rows, columns), size, count = cut.shape, max(cut.pixel_um), len(cut.first_um)
+    words = extent_words(cut, is_patient=is_patient(plan))
+    if is_patient(plan):
+        left, right, top, bottom = cut.view.ends
+        pixel, runs = f"{size / 1000:.3g} mm", f"towards {words['slices']}"
+        sides = f"{left} on the left, {right} on the right, {top} above, {bottom} below"
+    else:
+        pixel, runs = f"{size:.3g} um", f"along {words['slices']}"
+        sides = f"{words['columns']} to the right, {words['rows']} down"
+    own = ", the source's own images" if cut.are_own else ""
+    return (
+        f"{count} {cut.view.name} slice{'s' * (count != 1)}{own}, {columns} x {rows} pixels of "
+        f"{pixel}, {runs}; {sides}"
+    )
 
 
 def _holds(folder: Path) -> bool:

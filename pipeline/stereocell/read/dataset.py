@@ -14,6 +14,8 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.read.acquired import Acquired
+from stereocell.read.cast import built_dtype, cast
 from stereocell.read.fingerprint import fingerprint_of
 from stereocell.read.spacing import Level
 from stereocell.storage.library_errors import one_line
@@ -50,7 +52,7 @@ class StoredArray(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class VoxelArray:
-    """One level's voxels in the layout of the source.
+    """One level's voxels in the layout and the dtype of the source.
 
     axes  the names of the array's dimensions: `t`, `c`, `z`, `y`, `x` in any order; a dimension of
           any other name has length 1
@@ -77,6 +79,11 @@ class VoxelArray:
         return int(self.array.shape[self.axes.index(axis)]) if axis in self.axes else 1
 
     def window(self, time: int, channel: int, box: Box) -> NDArray[Any]:
+        """Return the voxels of a box, (z, y, x), in the dtype of a build (read/cast.py)."""
+        stored = self.stored_window(time, channel, box)
+        return cast(stored, built_dtype(stored.dtype) or stored.dtype)
+
+    def stored_window(self, time: int, channel: int, box: Box) -> NDArray[Any]:
         """Return the voxels of a box, (z, y, x), stored dtype, in this machine's byte order."""
         wanted: dict[str, int | slice] = dict(zip("zyx", box.slices, strict=True))
         wanted |= {"t": time, "c": channel}
@@ -94,7 +101,7 @@ class Dataset:
 
     name         the name to display: the file's name without its suffix; for DICOM and NIfTI,
                  whose file names may identify a patient, the kind of image
-    dtype        uint8, uint16, int16 or float32
+    dtype        uint8, uint16, int16 or float32; `stored_dtype` is the file's
     levels       finest first
     channels     in the source's order
     time_points  the number of time points in the source; `time` is the index of the one to read
@@ -104,6 +111,8 @@ class Dataset:
                  of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
                  read/anatomical_axes.py
     remarks      changes and omissions of the reader, a sentence each
+    acquired     the source's own images: the axis across which they lie
+    labels       what in the metadata says that the voxels number objects; empty: nothing does
     """
 
     source: str
@@ -120,6 +129,8 @@ class Dataset:
     modality: str = ""
     placement: Matrix = IDENTITY
     remarks: tuple[str, ...] = ()
+    labels: str = ""
+    acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
 
     def __post_init__(self) -> None:
         if self.on_close is not None:
@@ -178,6 +189,20 @@ class Dataset:
             )
         )
         return Volume(voxels, place.spacing_um, (z, y, x))
+
+    @property
+    def stored_dtype(self) -> np.dtype[Any]:
+        """The dtype in the file, in this machine's byte order."""
+        return np.dtype(self.arrays[0].array.dtype).newbyteorder("=")
+
+    def read_stored(self, channel: int, box: Box) -> NDArray[Any]:
+        """Return the voxels of a box of level 0, (z, y, x), in the file's dtype.
+
+        Raises SourceError where a chunk can't be decoded.
+        """
+        where = f"{self.shown}: channel {self.channels[channel].name!r}, voxels {_range(box)}"
+        with one_line(where, "chunks that are whole"):
+            return self.arrays[0].stored_window(self.time, channel, box)
 
     def find_channels(self, selection: Sequence[str]) -> tuple[int, ...]:
         """Return the indices of channels given by name or index, in that order, each once.

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.read.acquired import Acquired
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 
@@ -20,7 +21,7 @@ class Image:
     images         the number of images in the source
     close          frees open files, or None
     title          the image's name; None: the file's name is used
-    modality, placement  as in Dataset
+    modality, placement, acquired, labels  as in Dataset
     notes          become Dataset's `remarks`
     notes_at       returns more notes, about one time point; it may read that point's voxels
     """
@@ -34,6 +35,8 @@ class Image:
     title: str | None = None
     modality: str = ""
     placement: Matrix = IDENTITY
+    acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
+    labels: str = ""
     notes: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None
 

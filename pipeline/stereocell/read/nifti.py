@@ -1,14 +1,16 @@
-"""NIfTI-1 and -2, .nii and .nii.gz, read by nibabel.
+"""NIfTI-1 and -2, .nii and .nii.gz, their pairs .hdr and .img, and Analyze 7.5, read by nibabel.
 
 nibabel chooses the affine: sform, else qform, else a guess by the shape, which a note reports. NaN
 marks voxels outside a brain that was cut out; it is read as the smallest finite value of its time
-point. Texts in the header (`descrip`, `db_name`, ...) and the file's name may identify a patient
-and are not read.
+point. Analyze states no orientation; nibabel takes x to run to the patient's left, and a matrix of
+SPM beside the pair (.mat) for the affine. Texts in the header (`descrip`, `db_name`, ...) and the
+file's name may identify a patient and are not read.
 
 References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/
 """
 
 import logging
+import os
 import warnings
 import zlib
 from functools import partial
@@ -16,11 +18,14 @@ from typing import Any
 
 import nibabel
 import numpy as np
+from nibabel.cifti2.cifti2 import Cifti2Image
 from nibabel.fileslice import fileslice
 from nibabel.openers import ImageOpener
 from numpy.typing import NDArray
+from scipy.io.matlab import MatReadError
 
 from stereocell.model.errors import SourceError
+from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Image
@@ -29,12 +34,15 @@ from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.library_errors import raise_if_short
-from stereocell.storage.location import Location
+from stereocell.storage.location import Location, require_own
 
-NAME = "NIfTI"
+NAME, ANALYZE = "NIfTI", "Analyze"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
+_INTENT_LABEL = 1002
+_LABEL_TABLE = b"<LabelTable"  # of Connectome Workbench and TotalSegmentator
+_WIDER = 1.05  # factor by which slices lie further apart than pixels
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _FAULTS = (
     nibabel.filebasedimages.ImageFileError,
@@ -49,6 +57,7 @@ _FAULTS = (
     MemoryError,
     np.linalg.LinAlgError,
     zlib.error,
+    MatReadError,
 )
 
 
@@ -64,7 +73,8 @@ def read_image(location: Location) -> Image:
     if stored.kind not in "iuf":
         raise SourceError(f"{where}: datatype: found {stored}, expected whole or real numbers")
     dtype = _dtype(stored, image.dataobj.slope, image.dataobj.inter)
-    unit = header.get_xyzt_units()[0]
+    is_nifti = isinstance(image, nibabel.nifti1.Nifti1Pair)
+    unit = header.get_xyzt_units()[0] if is_nifti else "mm"
     affine = _RAS_TO_LPS @ np.where(np.isfinite(image.affine), image.affine, 0.0)
     affine[:3] *= _MM[unit]
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
@@ -72,7 +82,9 @@ def read_image(location: Location) -> Image:
     if not is_sound or abs(np.linalg.det(affine[:3, :3] / lengths)) < 0.1:
         raise SourceError(f"{where}: sform and qform: found no three axes, expected an affine")
     notes = []
-    if not (header["sform_code"] or header["qform_code"]):
+    if not is_nifti:
+        notes.append("Analyze states no orientation: x to the left of the patient is a guess")
+    elif not (header["sform_code"] or header["qform_code"]):
         notes.append(
             "neither sform nor qform: which side is left is a guess, x to the left of the patient"
         )
@@ -85,6 +97,7 @@ def read_image(location: Location) -> Image:
         grid, affine = orthogonal_grid(grid, affine)
         notes.append("the affine has skew axes: resampled onto an orthogonal grid")
     canonical = canonical_of(affine, grid)
+    title = NAME if is_nifti else ANALYZE
     z, y, x = (grid[axis] for axis in canonical.order)
     times = shape[3] if len(shape) > 3 else 1
     counts: dict[int, int] = {}
@@ -93,14 +106,41 @@ def read_image(location: Location) -> Image:
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),
-        names=(NAME,),
+        names=(title,),
         colors=(None,),
         images=1,
-        title=NAME,
+        title=title,
         placement=canonical.placement,
+        labels=_labels(header) if is_nifti else "",
+        acquired=Acquired(_image_axis(header.get_dim_info()[2] if is_nifti else None, canonical)),
         notes=tuple(notes),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _labels(header: Any) -> str:
+    """Return what in the header says that voxels number objects; of a table only its presence."""
+    if header["intent_code"] == _INTENT_LABEL:
+        return f"NIfTI's intent code {_INTENT_LABEL} (label)"
+    tables = (extension.get_content() for extension in header.extensions)
+    if any(isinstance(text, bytes) and _LABEL_TABLE in text for text in tables):
+        return "a table of labels in an extension of its header"
+    return ""
+
+
+def _image_axis(named: int | None, canonical: Canonical) -> int:
+    """Return the axis (of z, y, x) across which the scanner's images lie.
+
+    named  the stored axis that the header's `dim_info` names; None: it names none
+
+    Else it is the axis of the widest spacing, or where several
+    are as wide (a share of `_WIDER`), the last stored one: the slowest in the file.
+    """
+    if named is not None:
+        return canonical.order.index(named)
+    spacing = canonical.spacing_um
+    wide = [axis for axis in range(3) if spacing[axis] * _WIDER >= max(spacing)]
+    return max(wide, key=lambda axis: canonical.order[axis])
 
 
 def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:
@@ -111,17 +151,24 @@ def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[s
 
 
 def _open(location: Location) -> Any:
+    _require_own_pair(location)
     logging.getLogger("nibabel.global").disabled = True  # its messages quote fields of the header
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image: Any = nibabel.load(location.source, mmap=False)
-            if not isinstance(image, nibabel.nifti1.Nifti1Pair):
+            if isinstance(image, Cifti2Image):
+                raise SourceError(
+                    f"{location.shown}: CIFTI, values on surfaces and in greyordinates; expected "
+                    "NIfTI with a volume"
+                )
+            if not isinstance(image, nibabel.nifti1.Nifti1Pair | nibabel.analyze.AnalyzeImage):
                 raise TypeError
             # an invalid quaternion, unit or type fails here rather than later
             header: Any = image.header
             image.affine.sum()
-            header.get_xyzt_units()
+            if isinstance(image, nibabel.nifti1.Nifti1Pair):
+                header.get_xyzt_units()
             header.get_data_dtype()
             header.get_data_shape()
             stored: Any = image.dataobj
@@ -131,13 +178,28 @@ def _open(location: Location) -> Any:
     except _FAULTS as error:
         raise_if_short(error, location.shown)
         raise SourceError(
-            f"{location.shown}: not readable as NIfTI, expected a whole .nii or .nii.gz file"
+            f"{location.shown}: not readable as NIfTI, expected a whole .nii or .nii.gz file, "
+            "or a pair .hdr and .img"
         ) from None
+
+
+def _require_own_pair(location: Location) -> None:
+    """Raise SourceError where a file beside the source, which nibabel opens, is not its own."""
+    stem, suffix = os.path.splitext(location.source)
+    packed = suffix if suffix.lower() == ".gz" else ""
+    stem, suffix = os.path.splitext(stem) if packed else (stem, suffix)
+    if suffix.lower() in (".hdr", ".img"):
+        for beside in (".hdr", ".img", ".mat", ".HDR", ".IMG", ".MAT"):
+            path = stem + beside + ("" if beside.lower() == ".mat" else packed)
+            if os.path.lexists(path):
+                require_own(path, [location.folder], named=path)
 
 
 def _dtype(stored: np.dtype[Any], slope: float, intercept: float) -> np.dtype[Any]:
     if stored.kind == "f":
         return np.dtype(np.float32)
+    if stored.itemsize >= 4 and (slope, intercept) == (1, 0):
+        return stored.newbyteorder("=")  # labels keep their numbers; read/cast.py has the rest
     limits = np.iinfo(stored)
     return dtype_for([(float(limits.min), float(limits.max), float(slope), float(intercept))])
 
@@ -151,9 +213,10 @@ def _load(
     time: int,
 ) -> NDArray[Any]:
     try:
-        data = _open(location).dataobj
+        image = _open(location)
+        data = image.dataobj
         place = (slice(None),) * 3 + (time, 0, 0, 0)[: len(data.shape) - 3]
-        with ImageOpener(location.source) as file:
+        with ImageOpener(image.file_map["image"].filename) as file:
             raw = fileslice(file, place, data.shape, data.dtype, data.offset, data.order)  # type: ignore[no-untyped-call]
         values = rescale(raw, float(data.slope), float(data.inter), dtype)
     except _FAULTS as error:

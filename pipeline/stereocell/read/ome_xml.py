@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color, linear_color
-from stereocell.read.spacing import Triple, um_per
+from stereocell.read.spacing import PartialTriple, um_per
 
 _DEFAULT_UNIT = "\u00b5m"  # of PhysicalSizeX, Y and Z, where none is named
 
@@ -21,12 +21,12 @@ _DEFAULT_UNIT = "\u00b5m"  # of PhysicalSizeX, Y and Z, where none is named
 class OmeImage:
     """One image.
 
-    spacing_um  (z, y, x), um; None: not stated with a unit of length
+    spacing_um  (z, y, x), um; None each: not stated with a unit of length
     names       one for each channel; None: not stated
     colors      the same, linear RGB, 0..1
     """
 
-    spacing_um: Triple | None
+    spacing_um: PartialTriple
     names: tuple[str | None, ...]
     colors: tuple[Color | None, ...]
 
@@ -55,23 +55,31 @@ def parse(text: str, where: str) -> ElementTree.Element:
     return root
 
 
+def companion_of(root: ElementTree.Element) -> str:
+    """Return the name of the file that holds the metadata instead; empty: they are here."""
+    other = next(_children(root, "BinaryOnly"), None)
+    return "" if other is None else other.get("MetadataFile", "")
+
+
+def files_of(root: ElementTree.Element) -> Iterator[str]:
+    """Yield the name of the file of each plane, or of a run of them."""
+    for element in root.iter():
+        if _local(element) == "UUID" and element.get("FileName"):
+            yield element.get("FileName", "")
+
+
 def images_of(root: ElementTree.Element, where: str) -> list[OmeImage]:
     """Return the images with their pixels' metadata.
 
-    Raises SourceError where the metadata lies in another file, or holds what is no number.
+    Raises SourceError where they hold what is no number.
     """
-    for other in _children(root, "BinaryOnly"):
-        raise SourceError(
-            f"{where}: OME-XML: BinaryOnly: its metadata is in "
-            f"{other.get('MetadataFile', '')!r:.100}; expected that file"
-        )
     return [_image(image, where) for image in _children(root, "Image")]
 
 
 def _image(image: ElementTree.Element, where: str) -> OmeImage:
     pixels = next(_children(image, "Pixels"), None)
     if pixels is None:
-        return OmeImage(None, (), ())
+        return OmeImage((None, None, None), (), ())
     channels = list(_children(pixels, "Channel"))
     return OmeImage(
         _spacing(pixels, where),
@@ -80,14 +88,15 @@ def _image(image: ElementTree.Element, where: str) -> OmeImage:
     )
 
 
-def _spacing(pixels: ElementTree.Element, where: str) -> Triple | None:
-    lengths = []
+def _spacing(pixels: ElementTree.Element, where: str) -> PartialTriple:
+    lengths: list[float | None] = []
     for axis in "ZYX":
         field = f"PhysicalSize{axis}"
         given = pixels.get(field)
         um = um_per(pixels.get(f"{field}Unit", _DEFAULT_UNIT))
         if given is None or um is None:
-            return None
+            lengths.append(None)
+            continue
         try:
             lengths.append(float(given) * um)
         except ValueError:

@@ -11,74 +11,115 @@ use, and its import took 1.5 s of each process, four times as long as zarr's:
 References: OME-Zarr 0.5, https://ngff.openmicroscopy.org/0.5/
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import zarr
 from zarr.abc.store import Store
-from zarr.storage import FsspecStore, LocalStore
 
-from stereocell.model.errors import SourceError
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.read import bare_zarr
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.spacing import Grid, Triple, um_per
-from stereocell.read.zarr_store import GuardedStore, codec_name
+from stereocell.read.zarr_collections import (
+    ZarrTree,
+    describe_group,
+    image_of_level,
+    is_collection,
+    labels_evidence,
+    notes_on_labels,
+    part_of,
+    series_of,
+)
+from stereocell.read.zarr_store import GuardedStore, open_array, open_store, quiet
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64  # of the pyramid
-# attribute of a group without an image of its own -> the group's kind, for messages
-_OTHERS = {
-    "plate": "a plate",
-    "well": "a well",
-    "labels": "a list of labels",
-    "bioformats2raw.layout": "several series (bioformats2raw.layout), of which one is at /0",
-}
 
 
-def read_image(location: Location) -> Image:
-    """Return the first multiscale image of the group. Raises SourceError where there is none."""
+def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> Image:
+    """Return the first multiscale image of a group, or a bare array (bare_zarr.py).
+
+    The group may be a container of series, if it holds one image.
+
+    axes     the user's `--axes`, for a bare array
+    is_part  it is the one image of a container, and no container itself
+
+    Raises SourceError where there is no image, or where there are several groups of images;
+    UsageError where `axes` doesn't fit.
+    """
     where = location.shown
-    with one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image"):
-        store = _store(location)
-        metadata = zarr.open_group(GuardedStore(store, location), mode="r").metadata
+    with quiet(), one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image, or a Zarr array"):
+        store = open_store(location)
+        guard = GuardedStore(store, location)
+        node = zarr.open(guard, mode="r")
+    if isinstance(node, zarr.Array):
+        if not axes and (image := image_of_level(location)):
+            raise SourceError(
+                f"{where}: found a level of an OME-Zarr image, expected the image, as {image} "
+                "(--level picks the level), or its axes by --axes"
+            )
+        return bare_zarr.read_array(location, store, "", axes)
+    metadata = node.metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
     if not isinstance(ome, Mapping):
         raise SourceError(f"{where}: attribute `ome`: found {ome!r:.60}, expected a table")
+    tree = ZarrTree(location, guard, metadata.zarr_format)
     multiscales = ome.get("multiscales")
     if not isinstance(multiscales, list) or not multiscales:
-        found = next((f"found {_OTHERS[key]}" for key in _OTHERS if key in ome), "not found")
+        series = series_of(ome, tree)
+        if len(series) == 1 and not is_part:
+            return read_image(part_of(location, series[0]), axes, is_part=True)
+        if multiscales is None and not is_collection(ome):
+            only = bare_zarr.read_only_array(location, store, node, axes)
+            if only is not None:
+                return only
         raise SourceError(
-            f"{where}: no multiscales: {found}, expected the attribute `multiscales` of an image"
+            f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
+            "attribute `multiscales` of an image"
         )
     with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.4 and 0.5"):
-        axes, units = _axes(multiscales[0])
+        names, units = _axes(multiscales[0])
         datasets = list(multiscales[0]["datasets"])
         paths = [str(dataset["path"]) for dataset in datasets]
-        placements = [_placement(multiscales[0], dataset, len(axes)) for dataset in datasets]
+        placements = [_placement(multiscales[0], dataset, len(names)) for dataset in datasets]
     if not 0 < len(paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(paths) or 'none'}, expected a level, "
             f"and at most {_MAX_LEVELS}"
         )
-    missing = [axis for axis in "zyx" if axis not in axes]
+    if axes:
+        raise UsageError(
+            f"{where}: --axes {axes}: the image names its axes, {', '.join(names)}; expected none"
+        )
+    missing = [axis for axis in "zyx" if axis not in names]
     if missing:
         raise SourceError(
-            f"{where}: a volume needs at least 2 planes: no axis {missing[0]} "
-            f"among {', '.join(axes)}"
+            f"{where}: one plane (2D): a volume needs at least 2 planes: no axis {missing[0]} "
+            f"among {', '.join(names)}"
         )
-    arrays = tuple(_open_array(location, store, path, axes, metadata.zarr_format) for path in paths)
+    version = metadata.zarr_format
+    arrays = tuple(_level(location, store, path, names, version) for path in paths)
     grids = tuple(
         _grid(level, units, scale, shift)
         for level, (scale, shift) in zip(arrays, placements, strict=True)
     )
     omero = ome.get("omero", {})
     channels = omero.get("channels", []) if isinstance(omero, Mapping) else omero
-    names, colors = _channels(where, channels, arrays[0].size("c"))
-    return Image(arrays, grids, names, colors, len(multiscales))
+    titles, colors = _channels(where, channels, arrays[0].size("c"))
+    return Image(
+        arrays,
+        grids,
+        titles,
+        colors,
+        len(multiscales),
+        notes=notes_on_labels(tree),
+        labels=labels_evidence(ome, location),
+    )
 
 
 def _axes(multiscale: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[float | None, ...]]:
@@ -175,28 +216,13 @@ def _color(text: Any) -> Color | None:
     return linear_color((red, green, blue))
 
 
-def _store(location: Location) -> Store:
-    if location.is_local:
-        return LocalStore(location.source, read_only=True)
-    with one_line(location.shown, "an address that fsspec opens"):
-        return FsspecStore.from_url(
-            location.source, storage_options=location.storage_options, read_only=True
-        )
-
-
-def _open_array(
+def _level(
     location: Location, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
 ) -> VoxelArray:
-    field = f"{location.shown}: level {path!r:.80}"
-    with one_line(field, "a Zarr array"):
-        guard = GuardedStore(store, location)
-        array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
-        codecs = tuple(codec_name(codec) for codec in array.compressors)
-        size = math.prod(array.shards or array.chunks) * array.dtype.itemsize
-        named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
-        # not `path`, which may end in a slash
-        guard = GuardedStore(store, location, codecs, size, f"{array.path}/{named}".lstrip("/"))
-        array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
+    array = open_array(location, store, path, zarr_format)
     if array.ndim != len(axes):
-        raise SourceError(f"{field}: found {array.ndim} dimensions, expected {len(axes)} as `axes`")
+        raise SourceError(
+            f"{location.shown}: level {path!r:.80}: found {array.ndim} dimensions, "
+            f"expected {len(axes)} as `axes`"
+        )
     return VoxelArray(array, axes)

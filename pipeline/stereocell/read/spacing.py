@@ -9,6 +9,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
 
 Triple = tuple[float, float, float]
+PartialTriple = tuple[float | None, float | None, float | None]
 
 # unit -> um, in both spellings: OME-Zarr's (UDUNITS-2 names) and OME-XML's (symbols)
 _UM: dict[str, float] = {
@@ -62,11 +63,15 @@ class Grid:
     shape       voxels (z, y, x)
     spacing_um  (z, y, x), um
     offset_um   centre of voxel (0, 0, 0), (z, y, x), um
+    partial_um  (z, y, x), um, where the source states some of the three and `spacing_um` is None
+    hint        where a missing one may come from, for the message; empty: not known
     """
 
     shape: tuple[int, int, int]
     spacing_um: Triple | None = None
     offset_um: Triple | None = None
+    partial_um: PartialTriple = (None, None, None)
+    hint: str = ""
 
 
 def um_per(unit: object) -> float | None:
@@ -95,10 +100,7 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
         finest = given_um
         grids = tuple(grid if _is_sound(grid) else Grid(grid.shape) for grid in grids)
     elif grids[0].spacing_um is None:
-        raise SourceError(
-            f"{where}: voxel size: not found with a unit of length; "
-            "expected it in the metadata, or give it with --spacing-um z,y,x"
-        )
+        raise SourceError(f"{where}: voxel size: {_missing(grids[0])}")
     else:
         finest = grids[0].spacing_um
     _check(grids, where)
@@ -141,6 +143,35 @@ def _check(grids: tuple[Grid, ...], where: str) -> None:
                 f"{where}: shape (z, y, x) of level {index}: found {coarser.shape}, "
                 f"expected at most level {index - 1}'s {finer.shape}"
             )
+
+
+def _missing(grid: Grid) -> str:
+    """Return the words for a spacing that is not stated, or in part."""
+    stated = zip("zyx", grid.partial_um, strict=True)
+    found = [f"{axis} {value:.5g} um" for axis, value in stated if value is not None]
+    if not found:
+        return (
+            "not found with a unit of length; "
+            "expected it in the metadata, or give it with --spacing-um z,y,x"
+        )
+    lacking = [a for a, value in zip("zyx", grid.partial_um, strict=True) if value is None]
+    form = ",".join(
+        a if value is None else f"{value:.5g}"
+        for a, value in zip("zyx", grid.partial_um, strict=True)
+    )
+    hint = f" ({grid.hint})" if grid.hint else ""
+    return (
+        f"found {', '.join(found)}, but none along {' and '.join(lacking)}{hint}; "
+        f"expected all three, or give them with --spacing-um {form}"
+    )
+
+
+def grid_of(shape: tuple[int, int, int], stated_um: PartialTriple, hint: str = "") -> Grid:
+    """Return a grid whose spacing (z, y, x), um, is stated whole, in part or not at all."""
+    z, y, x = stated_um
+    if z is None or y is None or x is None:
+        return Grid(shape, partial_um=stated_um, hint=hint)
+    return Grid(shape, (z, y, x))
 
 
 def _factors(grid: Grid, finest: Grid) -> Triple:

@@ -8,17 +8,21 @@ is read whole only the file's size is known here, not the decoded size of its in
 
 import bz2
 import lzma
+import math
 import struct
 import zlib
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from typing import Any
 
+import zarr
 import zstandard
 from zarr.abc.buffer import Buffer
 from zarr.abc.store import ByteRequest, Store
 from zarr.core.buffer import BufferPrototype
-from zarr.storage import WrapperStore
+from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
+from stereocell.storage.library_errors import one_line, without_warning
 from stereocell.storage.location import Location, require_own, require_own_key
 
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
@@ -155,3 +159,35 @@ def codec_name(codec: Any) -> str:
     """Return the name of a codec of Zarr v3 or of numcodecs, as `gzip`."""
     name = type(codec).__name__.lower().removesuffix("codec").strip("_")
     return str(name)
+
+
+def quiet() -> AbstractContextManager[None]:
+    """Silence zarr's warnings of metadata that other writers leave, which a user can't change."""
+    starts = "Both zarr.json|Numcodecs codecs|Object at |Found an empty list of filters"
+    return without_warning(starts, UserWarning)
+
+
+def open_store(location: Location) -> Store:
+    """Return the store of a group or an array; its reads are to go through a GuardedStore."""
+    if location.is_local:
+        return LocalStore(location.source, read_only=True)
+    with one_line(location.shown, "an address that fsspec opens"):
+        return FsspecStore.from_url(
+            location.source, storage_options=location.storage_options, read_only=True
+        )
+
+
+def open_array(
+    location: Location, store: Store, path: str, zarr_format: Any = None
+) -> "zarr.Array[Any]":
+    """Return the array at a path of a store, whose chunks are checked. Raises SourceError."""
+    where = f"{location.shown}: level {path!r:.80}" if path else location.shown
+    with quiet(), one_line(where, "a Zarr array"):
+        guard = GuardedStore(store, location)
+        array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
+        codecs = tuple(codec_name(codec) for codec in array.compressors)
+        size = math.prod(array.shards or array.chunks) * array.dtype.itemsize
+        named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
+        # not `path`, which may end in a slash
+        guard = GuardedStore(store, location, codecs, size, f"{array.path}/{named}".lstrip("/"))
+        return zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)

@@ -38,7 +38,13 @@ _FAULTS = (
 )
 # Classes of libraries that take long to import: an error of theirs is raised once they are there
 _NO_NODE = ("zarr.errors", "NodeNotFoundError")
-_LATE = (("aiohttp", "ClientError"), ("botocore.exceptions", "BotoCoreError"), _NO_NODE)
+_LATE = (
+    ("aiohttp", "ClientError"),
+    ("botocore.exceptions", "BotoCoreError"),
+    ("nrrd.errors", "NRRDError"),
+    ("xml.etree.ElementTree", "ParseError"),  # a SyntaxError; liffile lets it pass
+    _NO_NODE,
+)
 
 
 def _faults() -> tuple[type[BaseException], ...]:

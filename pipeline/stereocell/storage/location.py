@@ -15,13 +15,46 @@ from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
+from stereocell.storage.first_bytes import HEAD_BYTES, TIFF_MAGIC
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
-_TIFF_SUFFIXES = (".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf", ".tiff", ".tif")
+_TIFF_SUFFIXES = (
+    *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
+    *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
+)
+_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
+_MOST_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
-_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs")
+_ANALYZE_SUFFIXES = (".hdr", ".img", ".hdr.gz", ".img.gz")  # also pairs of NIfTI
+_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
+# format -> endings of its files' names, in lower case
+_FILE_SUFFIXES = {
+    "tiff": _TIFF_SUFFIXES,
+    "nifti": _NIFTI_SUFFIXES,
+    "ims": (".ims",),
+    "hdf5": (".h5", ".hdf5", ".hdf"),
+    "nrrd": (".nrrd", ".nhdr"),
+    "metaimage": (".mha", ".mhd"),
+    "mrc": tuple(
+        ending + packed
+        for ending in (".mrc", ".rec", ".map", ".mrcs", ".ccp4")
+        for packed in ("", ".gz", ".bz2")
+    ),
+    "czi": (".czi",),
+    "lif": (".lif",),
+    "nd2": (".nd2",),
+}
+# first bytes -> format, of a file with another name
+_MAGIC = {
+    **dict.fromkeys(TIFF_MAGIC, "tiff"),
+    b"\x89HDF\r\n\x1a\n": "hdf5",
+    b"NRRD0": "nrrd",
+    b"ZISRAWFILE": "czi",
+    b"\xda\xce\xbe\x0a": "nd2",
+}
+_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
@@ -37,7 +70,8 @@ _AWS_CREDENTIALS = (
 class Location:
     """One source.
 
-    source    an absolute local path or an address, in the form of the format libraries
+    source    an absolute local path or an address, in the form of the format libraries; with
+              `:/KEY` where it names a dataset in an HDF5 file
     is_local  a path on this machine
     """
 
@@ -52,7 +86,8 @@ class Location:
         """
         text = str(source)
         if not _ADDRESS.match(text):
-            return cls(os.path.abspath(os.path.expanduser(text)), True)
+            path, key = _split_key(text)
+            return cls(os.path.abspath(os.path.expanduser(path)) + key, True)
         try:
             parts = urlsplit(text)
         except ValueError as error:
@@ -64,9 +99,19 @@ class Location:
         return cls(text, False)
 
     @property
+    def path(self) -> str:
+        """The file or folder on this machine, without a dataset's key."""
+        return _split_key(self.source)[0]
+
+    @property
+    def key(self) -> str:
+        """The dataset in an HDF5 file, as `/a/b`; empty where none is named."""
+        return _split_key(self.source)[1][1:]
+
+    @property
     def folder(self) -> Path:
         """The source's own folder, links followed: its files must lie there or below."""
-        path = Path(os.path.realpath(self.source))
+        path = Path(os.path.realpath(self.path))
         return path if path.is_dir() else path.parent
 
     @property
@@ -81,36 +126,61 @@ class Location:
     @property
     def parts(self) -> tuple[str, ...]:
         """The names along the path."""
-        path = self.source if self.is_local else self.shown.partition("://")[2]
+        path = self.path if self.is_local else self.shown.partition("://")[2]
         return tuple(part for part in path.split("/") if part)
 
     @property
     def name(self) -> str:
         """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
         parts = self.parts
-        first = next((i for i, part in enumerate(parts) if part.endswith(".zarr")), len(parts) - 1)
+        outermost = (i for i, part in enumerate(parts) if part.endswith((".zarr", ".n5")))
+        first = next(outermost, len(parts) - 1)
         return "-".join(_stem(part) for part in parts[first:]) or "dataset"
 
     @property
     def format(self) -> str | None:
-        """`ome-zarr`, `ome-tiff`, `nifti`, `dicom`; None where neither name nor content fits one.
+        """The name of the format (open_dataset.READERS); None: neither name nor content fits one.
 
-        DICOM is any other folder on this machine, and a file with DICOM's first bytes.
+        Planes are a folder of images without DICOM; DICOM is any other folder on this machine, and
+        a file with DICOM's first bytes.
         """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
-        if self.parts and self.parts[-1].lower().endswith(_TIFF_SUFFIXES):
-            return "ome-tiff"
+        if any(part.endswith(".n5") for part in self.parts) or self._is_n5():
+            return "n5"
         if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
             return "ome-zarr"
-        if not self.is_local or not self.parts:
+        if self.is_local and _holds_planes(self.source):
+            return "planes"
+        if not self.parts:
             return None
-        if self.parts[-1].lower().endswith(_NIFTI_SUFFIXES):
-            return "nifti"
-        is_named = self.parts[-1].lower().endswith(_DICOM_SUFFIXES)
-        if is_named or os.path.isdir(self.source) or _begins_as_dicom(self.source):
+        last = self.parts[-1].lower()
+        for name, endings in _FILE_SUFFIXES.items():
+            if last.endswith(endings):
+                return name
+        return self._format_by_content(last) if self.is_local else None
+
+    def _format_by_content(self, last: str) -> str | None:
+        """Return the format of a file whose name leaves it open; `last` is the name, lower case."""
+        begins = first_bytes(self.path)
+        found = next((name for magic, name in _MAGIC.items() if begins.startswith(magic)), None)
+        if found is not None:
+            return found
+        is_named = last.endswith(_DICOM_SUFFIXES)
+        if is_named or os.path.isdir(self.source) or begins[128:132] == b"DICM":
             return "dicom"
-        return None
+        if last.endswith(_ANALYZE_SUFFIXES):
+            return "nifti"
+        return "bdv" if self._is_bdv() else None
+
+    def _is_bdv(self) -> bool:
+        """Whether a file is the XML of BigDataViewer."""
+        is_named = self.source.lower().endswith(".xml")
+        return is_named and b"<SpimData" in first_bytes(self.source, 1 << 16)
+
+    def _is_n5(self) -> bool:
+        """Whether a folder is a group or a dataset of N5: others have no `attributes.json`."""
+        return self.is_local and os.path.exists(f"{self.source}/attributes.json")
 
     @property
     def storage_options(self) -> dict[str, Any]:
@@ -229,18 +299,54 @@ def require_apart(source: str | Path, out: Path) -> None:
         )
 
 
-def _begins_as_dicom(path: str) -> bool:
+def _holds_planes(folder: str) -> bool:
+    """Return whether a folder holds images of planes, and no DICOM beside them."""
+    are_there, others = False, 0
+    for at, folders, names in os.walk(folder):
+        folders.sort()
+        for name in sorted(names):
+            lower = name.lower()
+            if lower.startswith("."):
+                continue
+            if lower.endswith(_PLANE_SUFFIXES):
+                are_there = True
+            elif lower.endswith(_DICOM_SUFFIXES):
+                return False
+            elif others < _MOST_OTHERS:
+                others += 1
+                if first_bytes(os.path.join(at, name))[128:132] == b"DICM":
+                    return False
+    return are_there
+
+
+def require_file(location: Location) -> None:
+    """Raise SourceError where a local source is a folder and its format's name says a file."""
+    if location.is_local and os.path.isdir(location.path):
+        raise SourceError(f"{location.shown}: is a folder, expected a file")
+
+
+def _split_key(text: str) -> tuple[str, str]:
+    """Return a path and the `:/KEY` behind it; a file whose own name holds that goes first."""
+    found = _KEYED.fullmatch(text)
+    if found is None or os.path.exists(text):
+        return text, ""
+    return found[1], f":/{found[2].lstrip('/')}"
+
+
+def first_bytes(path: str, count: int = HEAD_BYTES) -> bytes:
+    """Return the head of a regular file; nothing where it can't be read."""
     if not os.path.isfile(path):
-        return False
+        return b""
     try:
         with open(path, "rb") as file:
-            return file.read(132)[128:] == b"DICM"
+            return file.read(count)
     except OSError:
-        return False
+        return b""
 
 
 def _stem(name: str) -> str:
-    for suffix in _TIFF_SUFFIXES + _ZARR_SUFFIXES:
+    files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
+    for suffix in sorted((*_ZARR_SUFFIXES, ".n5", ".xml", *files), key=len, reverse=True):
         if name.lower().endswith(suffix) and len(name) > len(suffix):
             return name[: -len(suffix)]
     return name

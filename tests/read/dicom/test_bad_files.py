@@ -212,7 +212,7 @@ def test_files_without_images_are_named_by_their_kind(tmp_path: Path) -> None:
 
 
 def test_empty_folder_is_refused(tmp_path: Path) -> None:
-    assert "found 0 files: nothing" in refusal(tmp_path)
+    assert "found no file; expected slices" in refusal(tmp_path)
 
 
 def test_several_frames_without_places_are_refused(tmp_path: Path) -> None:
@@ -261,3 +261,13 @@ def test_files_that_others_may_not_stay_for_are_passed_by(tmp_path: Path) -> Non
     series(tmp_path / "s")
     os.mkfifo(tmp_path / "s" / "pipe")  # opening it would wait for ever
     assert read.open(tmp_path / "s").notes == ("files left out: 1 not DICOM",)
+
+
+def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> None:
+    for name in ("JANE.nii", "DOE.nii.gz"):
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / "plate.zarr").mkdir()
+    (tmp_path / "notes of JANE.txt").write_bytes(b"")
+    told = refusal(tmp_path)
+    assert "or one of what the folder holds (2 nifti, 1 ome-zarr)" in told
+    assert "DOE" not in told

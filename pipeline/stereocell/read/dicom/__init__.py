@@ -18,18 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.dicom.frame import Frame
-from stereocell.read.dicom.header import NoPlaneError, is_dicom, read_frames
+from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.series import Stack, find_stacks
 from stereocell.read.image import Image
+from stereocell.read.plane_stack import StackLayout
 from stereocell.read.resample import resample_stack
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, is_own
 
+_INSTEAD = "objects can't be built yet: expected the image that it was drawn on"
+_LOOKED_AT = 1000  # entries of a folder
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -57,6 +61,12 @@ def read_image(location: Location, series: int = 0) -> Image:
             "(`--series list` shows them)"
         )
     stack = found.stacks[max(series, 1) - 1]
+    if stack.layout is None and stack.first.segments:
+        found_one = _labels(stack, len(found.stacks))
+        raise UsageError(
+            f"{location.shown}: is a label map: found {found_one}, of which this is no volume "
+            f"({stack.problem}); {_INSTEAD}"
+        )
     if stack.layout is None:
         raise SourceError(
             f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
@@ -76,6 +86,8 @@ def read_image(location: Location, series: int = 0) -> Image:
         title=modality or UNKNOWN,
         modality=modality,
         placement=canonical.placement,
+        labels=_labels(stack, len(found.stacks)),
+        acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
     )
 
@@ -102,7 +114,7 @@ def _find(location: Location) -> Found:
     for index, path in enumerate(paths):
         try:
             for frame in read_frames(path, index):
-                key = frame.instance + frame.index.to_bytes(4)
+                key = frame.instance + frame.index.to_bytes(4) + frame.tile.to_bytes(4)
                 earlier = frames.setdefault(key, frame)
                 if earlier is not frame:
                     copies.append((earlier, frame))
@@ -113,15 +125,30 @@ def _find(location: Location) -> Found:
         if earlier.position == frame.position and compare(earlier, frame):
             left_out["copies of others"] += 1
         else:
-            frames[f"{frame.file} {frame.index}".encode()] = frame
+            frames[f"{frame.file} {frame.index} {frame.tile}".encode()] = frame
     if not frames:
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
-        many = f"{len(files)} file{'s' * (len(files) != 1)}: " if root.is_dir() else ""
+        if not root.is_dir():
+            held = f"one file, {next(iter(left_out), 'which is none')}"
+        if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
+            raise UsageError(f"{location.shown}: is a label map: found {held}; {_INSTEAD}")
+        many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'nothing'}; expected slices of MR, CT or the like"
+            f"{many}{held or 'no file'}; expected slices of MR, CT or the like{_others(root)}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
+
+
+def _others(root: Path) -> str:
+    """Return a hint at sources of other formats that a folder holds; empty: there are none.
+
+    Their names may be private, and stay out.
+    """
+    paths = sorted(root.iterdir())[:_LOOKED_AT] if root.is_dir() else []
+    formats = Counter(Location.of(path).format for path in paths)
+    held = [f"{formats[kind]} {kind}" for kind in sorted(filter(None, formats)) if kind != "dicom"]
+    return f", or one of what the folder holds ({', '.join(held)})" if held else ""
 
 
 def _files(folder: Path) -> list[Path]:
@@ -164,6 +191,32 @@ def _load(
     if stack.layout is not None and stack.layout.is_resampled:
         planes = resample_stack(planes, stack.layout)
     return canonical.apply(planes)
+
+
+def _labels(stack: Stack, stacks: int) -> str:
+    count = stack.first.segments
+    if not count:
+        return ""
+    each = " (each a series of --series list)" * (stack.first.segment > 0 and stacks > 1)
+    return f"a DICOM segmentation of {count} segment{'s' * (count != 1)}{each}"
+
+
+def _acquired(
+    stack: Stack,
+    layout: StackLayout,
+    canonical: Canonical,
+    paths: Sequence[Path],
+    dtype: np.dtype[Any],
+    shown: str,
+) -> Acquired:
+    axis = canonical.order.index(0)
+    if not layout.is_resampled:
+        return Acquired(axis)
+    plane_shape = stack.first.rows, stack.first.columns
+    first = turned_places(layout.places, plane_shape, layout.shape, canonical)
+    return Acquired(
+        axis, first, lambda time: canonical.apply(decode(stack.times[time], paths, dtype, shown))
+    )
 
 
 def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:

@@ -43,7 +43,11 @@ class Frame:
     stack              digest of the stack ID in an enhanced image
     position           centre of the first pixel
     along_row          unit vector of growing column index; `along_column` of growing row index
+    rows, columns      pixels of the plane
     spacing            mm between (rows, columns)
+    tile, corner       which slice of a mosaic, and its first pixel (row, column) in the image
+    segment            the number of the one that it shows, in a segmentation; 0: of none or all
+    segments           how many the file has; 0: it is no segmentation
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -63,3 +67,7 @@ class Frame:
     along_column: Vector
     spacing: tuple[float, float]
     encoding: Encoding
+    tile: int = 0
+    corner: tuple[int, int] = (0, 0)
+    segment: int = 0
+    segments: int = 0

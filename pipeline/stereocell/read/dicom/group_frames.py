@@ -24,6 +24,7 @@ _STATED: tuple[tuple[str, str], ...] = (
     ("series", "SeriesInstanceUID"),
     ("reference", "FrameOfReferenceUID"),
     ("stack", "StackID"),
+    ("segment", "ReferencedSegmentNumber"),
     ("modality", "Modality"),
     ("rows", "Rows"),
     ("columns", "Columns"),

@@ -10,20 +10,33 @@ import hashlib
 import math
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import pydicom
-from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
+from pydicom.uid import (
+    UID,
+    DeflatedExplicitVRLittleEndian,
+    SegmentationStorage,
+)
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.frame_offsets import (
+    frame_offsets,
+    has_offsets,
+    is_dose,
+    place_first,
+)
+from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
 
 _TAGS: list[Any] = [
     "SOPClassUID",
+    "ImageType",
     "Modality",
     "SeriesInstanceUID",
     "SOPInstanceUID",
@@ -46,9 +59,19 @@ _TAGS: list[Any] = [
     "RescaleSlope",
     "RescaleIntercept",
     "ModalityLUTSequence",
+    "SegmentSequence",
+    "DetectorInformationSequence",
+    "SliceVector",
+    "SpacingBetweenSlices",
+    "SliceThickness",
+    "GridFrameOffsetVector",
+    "DoseGridScaling",
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
 ]
+SEGMENTATION = "of a segmentation"  # how a reason begins
+_SEGMENTATIONS = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
+_NO_PLACE = "without a place in the patient"
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
@@ -95,9 +118,18 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             header = pydicom.dcmread(
                 opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
             )
-            return _frames(header, opened, path.stat().st_size, file)
+            segments = _segments(header)
+            try:
+                return _frames(header, opened, path, file, segments)
+            except NoPlaneError as error:
+                if not segments and str(error) == _NO_PLACE:
+                    raise NoPlaneError(f"{_NO_PLACE}{_kind(header)}") from None
+                if not segments:
+                    raise
+                many = f"{segments} segment{'s' * (segments != 1)}"
+                raise NoPlaneError(f"{SEGMENTATION} of {many}, {error}") from None
     except DICOM_FAULTS:
-        raise NoPlaneError("damaged in their headers") from None
+        raise NoPlaneError("with a damaged header") from None
 
 
 def _refuse_deflated(path: Path) -> None:
@@ -107,18 +139,20 @@ def _refuse_deflated(path: Path) -> None:
         raise NoPlaneError("deflated as a whole, which is not read")
 
 
-def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
+def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int) -> list[Frame]:
     rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
+    size = path.stat().st_size
     if opened.tell() >= size or rows < 1 or columns < 1:
         raise NoPlaneError(f"without pixels{_kind(header)}")
     grey = ("MONOCHROME1", "MONOCHROME2")
     kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
-        raise NoPlaneError("of colours, not of grey values")
+        raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     count = int(header.get("NumberOfFrames") or 1)
-    is_float = _check_pixels(header, opened, size, rows * columns * count)
+    is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=segments > 0)
+    place_first(header)
     series, instance, reference = (
         hashlib.sha256(str(header.get(key, "")).encode()).digest()
         for key in ("SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID")
@@ -128,15 +162,24 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
     modality = str(header.get("Modality", "")).strip()
     shared = _first(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
+    offsets = None
     if (own or count > 1) and len(own) != count:
-        raise NoPlaneError("of several frames without a place for each")
+        if has_offsets(header):
+            normal = np.cross(*np.array(_axes(header, [None])[0]))
+            offsets = frame_offsets(header, count, normal)
+        if offsets is None:
+            raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
     frames = []
     padding = _padding(header)
     for index in range(count):
         groups = [own[index] if own else None, shared]
         stack = _found({}, groups, "FrameContentSequence", "StackID")
-        position, directions, spacing = _place(header, groups)
-        frames.append(
+        segment = _found({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
+        directions, spacing = _axes(header, groups)
+        mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
+        if offsets is not None:
+            mosaic = _shifted(mosaic, offsets[index], directions)
+        frames += [
             Frame(
                 file,
                 index,
@@ -146,15 +189,69 @@ def _frames(header: Any, opened: BinaryIO, size: int, file: int) -> list[Frame]:
                 hashlib.sha256(str(stack).encode()).digest(),
                 int(header.get("InstanceNumber") or 0),
                 modality if modality in MODALITIES else "",
-                rows,
-                columns,
-                position,
+                mosaic.rows,
+                mosaic.columns,
+                tile.position,
                 *directions,
                 spacing,
                 _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
+                number,
+                tile.corner,
+                int(segment or 0) if segments else 0,
+                segments,
             )
-        )
+            for number, tile in enumerate(mosaic.tiles)
+        ]
     return frames
+
+
+def _mosaic(
+    header: Any,
+    path: Path,
+    groups: Sequence[Any],
+    shape: tuple[int, int],
+    directions: tuple[Vector, Vector],
+    spacing: tuple[float, float],
+) -> Mosaic:
+    """Return the slices of an image of pixels (rows, columns): most hold one."""
+    stated = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+    position = None if stated is None else _vector(stated)
+    try:
+        found = find_mosaic(
+            path, header.get("ImageType") or (), shape, directions, spacing, position
+        )
+    except MosaicError as error:
+        raise NoPlaneError(str(error)) from None
+    if found is not None:
+        return found
+    if position is None:
+        raise NoPlaneError(_NO_PLACE)
+    return Mosaic(*shape, (Tile((0, 0), position),))
+
+
+def _shifted(mosaic: Mosaic, mm: float, directions: tuple[Vector, Vector]) -> Mosaic:
+    """Return an image's slices, moved along their normal."""
+    step = mm * np.cross(*np.array(directions))
+    tiles = tuple(
+        replace(tile, position=_vector(np.array(tile.position) + step)) for tile in mosaic.tiles
+    )
+    return replace(mosaic, tiles=tiles)
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = _numbers(values, 3)
+    return x, y, z
+
+
+def _segments(header: Any) -> int:
+    """Return how many segments a segmentation has, its background left out; 0: it is none.
+
+    References: DICOM PS3.3 C.8.20 (Segmentation).
+    """
+    if header.get("SOPClassUID") not in _SEGMENTATIONS and header.get("Modality") != "SEG":
+        return 0
+    listed = header.get("SegmentSequence") or ()
+    return max(1, sum(int(item.get("SegmentNumber") or 0) > 0 for item in listed))
 
 
 def _kind(header: Any) -> str:
@@ -185,11 +282,12 @@ def _padding(header: Any) -> tuple[int, int] | None:
     return min(ends), max(ends)
 
 
-def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
+def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_mask: bool) -> bool:
     """Return whether the pixels are floats. Raises NoPlaneError where they are cut short.
 
     opened  stands at the element of the pixels: tag, (VR, 2 bytes,) length
     size    of the file in bytes
+    is_mask  a pixel may be one bit
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -198,7 +296,7 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
     length = struct.unpack_from(f"{order}I", head, 4 if implicit else 8)[0]
     bits = int(header.get("BitsAllocated") or 0)
     is_float = element in (0x0008, 0x0009)
-    if bits not in (32, 64) if is_float else bits not in (8, 16, 32):
+    if bits not in (32, 64) if is_float else bits not in (1, 8, 16, 32)[not is_mask :]:
         raise NoPlaneError(f"of {bits} bits a pixel, not of 8, 16 or 32")
     syntax = header.file_meta.get("TransferSyntaxUID") if header.file_meta else None
     if is_compressed(syntax):
@@ -206,7 +304,7 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int) -> bool:
             raise NoPlaneError("compressed in a way that is not read")
         return is_float
     begin = opened.tell() - (4 if implicit else 0)
-    if min(length, size - begin) < count * bits // 8:
+    if min(length, size - begin) < (count * bits + 7) // 8:
         raise NoPlaneError("cut short")
     return is_float
 
@@ -235,28 +333,25 @@ def _numbers(value: Any, count: int) -> tuple[float, ...]:
     except DICOM_FAULTS:
         numbers = ()
     if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
-        raise NoPlaneError("without a place in the patient")
+        raise NoPlaneError(_NO_PLACE)
     return numbers
 
 
-def _place(
-    header: Any, groups: Sequence[Any]
-) -> tuple[Vector, tuple[Vector, Vector], tuple[float, float]]:
-    position = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tuple[float, float]]:
+    """Return unit vectors along a row and along a column, and mm between (rows, columns)."""
     orientation = _found(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
     spacing = _found(header, groups, "PixelMeasuresSequence", "PixelSpacing")
-    x, y, z = _numbers(position, 3)
     between = _numbers(spacing, 2)
     cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
     lengths = np.linalg.norm(cosines, axis=1)
     is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
     if min(between) <= 0 or not is_frame:
-        raise NoPlaneError("without a place in the patient")
+        raise NoPlaneError(_NO_PLACE)
     if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
         shown = " and ".join(f"{value:g}" for value in between)
         raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
     along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
-    return (x, y, z), (along_row, along_column), (between[0], between[1])
+    return (along_row, along_column), (between[0], between[1])
 
 
 def _encoding(
@@ -269,6 +364,8 @@ def _encoding(
     sequence = "PixelValueTransformationSequence"
     slope = _found(header, groups, sequence, "RescaleSlope")
     intercept = _found(header, groups, sequence, "RescaleIntercept")
+    if slope is None and is_dose(header):
+        slope = header.get("DoseGridScaling")
     slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
     if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
         raise NoPlaneError("of values that no rescale slope gives")

@@ -46,7 +46,10 @@ def decode(
         for file, places in groupby(order, key=lambda place: frames[place].file):
             wanted = list(places)
             where = f"{shown}: file {file + 1} of {len(paths)} in the order of names"
-            indices = [frames[place].index for place in wanted]
+            of_index: dict[int, list[int]] = {}  # of a mosaic all slices are in one frame
+            for place in wanted:
+                of_index.setdefault(frames[place].index, []).append(place)
+            indices = list(of_index)
             try:
                 with quiet():
                     dataset, plugin = open_pixels(paths[file])
@@ -55,13 +58,15 @@ def decode(
                         if plugin == "gdcm"
                         else stored_values(dataset, plugin, indices)
                     )
-                    for place, values in zip(wanted, stored, strict=True):
-                        encoding = frames[place].encoding
-                        raw = unpack_bits(values, encoding)
-                        planes[place] = rescale(raw, encoding.slope, encoding.intercept, dtype)
-                        if has_padding:
-                            mask = is_padding(values, raw, encoding)
-                            padding.add(place, planes[place], mask)
+                    for index, whole in zip(indices, stored, strict=True):
+                        for place in of_index[index]:
+                            frame, encoding = frames[place], frames[place].encoding
+                            values = _plane_of(whole, frame)
+                            raw = unpack_bits(values, encoding)
+                            planes[place] = rescale(raw, encoding.slope, encoding.intercept, dtype)
+                            if has_padding:
+                                mask = is_padding(values, raw, encoding)
+                                padding.add(place, planes[place], mask)
             except DICOM_FAULTS as error:  # its text may quote values of the file
                 raise_if_short(error, where)
                 raise SourceError(
@@ -70,6 +75,12 @@ def decode(
                 ) from None
     padding.fill(planes)
     return planes
+
+
+def _plane_of(whole: NDArray[Any], frame: Frame) -> NDArray[Any]:
+    """Return the pixels of a plane: of a mosaic one slice, a view."""
+    row, column = frame.corner
+    return whole[row : row + frame.rows, column : column + frame.columns]
 
 
 def unpack_bits(values: NDArray[Any], encoding: Encoding) -> NDArray[Any]:

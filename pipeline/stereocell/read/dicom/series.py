@@ -57,7 +57,8 @@ class Stack:
         """Modality, orientation, size and spacing, without any description from the file."""
         frame = self.first
         normal = normal_of(frame.along_row, frame.along_column)
-        name = f"{frame.modality or 'DICOM'}, {plane_name(normal)}"
+        segment = f", segment {frame.segment}" if frame.segment else ""
+        name = f"{frame.modality or 'DICOM'}{segment}, {plane_name(normal)}"
         planes = len(self.times[0]) if self.layout is None else self.layout.shape[0]
         size = f"{planes} x {frame.rows} x {frame.columns}"
         if self.layout is None:
@@ -68,7 +69,7 @@ class Stack:
 
 
 def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ...]:
-    """Return all stacks: volumes before others, the largest first.
+    """Return all stacks: volumes before others, images before segments, the largest first.
 
     are_equal  compares the pixels of two frames; it is called only for frames at one place
     """
@@ -78,7 +79,13 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
     return tuple(
         sorted(
             stacks,
-            key=lambda s: (s.layout is None, -s.voxels * len(s.times), s.first.file, s.first.index),
+            key=lambda s: (
+                s.layout is None,
+                s.first.segments > 0,
+                -s.voxels * len(s.times),
+                s.first.file,
+                s.first.index,
+            ),
         )
     )
 
@@ -96,6 +103,9 @@ def _stack(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> St
     places = _places(group)
     counts = {len(place) for place in places}
     notes = list(neighbours)
+    slices = 1 + max(frame.tile for frame in group.frames)
+    if slices > 1:
+        notes.append(f"mosaics of {slices} slices in one image: taken apart")
     extra = len(group.frames) - len(places)
     times = 1
     if extra:

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pydicom
 from numpy.typing import NDArray
 from pydicom import uid
@@ -69,10 +70,25 @@ def stored_values(dataset: Any, plugin: str, indices: Sequence[int]) -> Iterator
     """Yield the values (rows, columns) of frames, in their containers. Raises DICOM_FAULTS."""
     if plugin:
         _check_streams(dataset)
+    elif dataset.BitsAllocated == 1:
+        return _of_bits(dataset, indices)
     # all bits of the container: padding may use those above the stored ones
     return iter_pixels(
         dataset, indices=indices, raw=True, decoding_plugin=plugin, correct_unused_bits=False
     )
+
+
+def _of_bits(dataset: Any, indices: Sequence[int]) -> Iterator[NDArray[Any]]:
+    """Yield frames of one bit a pixel; pydicom 3.0 fails where a frame begins inside a byte.
+
+    References: DICOM PS3.5 8.1.1: the first pixel is the lowest bit, and frames follow unpadded.
+    """
+    rows, columns = int(dataset.Rows), int(dataset.Columns)
+    packed = np.frombuffer(dataset.PixelData, np.uint8)
+    for index in indices:
+        begin, end = index * rows * columns, (index + 1) * rows * columns
+        bits = np.unpackbits(packed[begin // 8 : -(-end // 8)], bitorder="little")
+        yield bits[begin % 8 :][: end - begin].reshape(rows, columns)
 
 
 def _check_streams(dataset: Any) -> None:

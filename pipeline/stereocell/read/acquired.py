@@ -1,0 +1,45 @@
+"""A source's own images: the axis across which they lie, and their places where a grid is made."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.read.anatomical_axes import Canonical
+
+
+@dataclass(frozen=True, eq=False)
+class Acquired:
+    """The planes that a source stores.
+
+    axis   of z, y, x: the images lie across it
+    first  float64 (n, 3): the first pixel of each image, (z, y, x) in voxels of the grid, images in
+           rising order along `axis`; None: the images are the grid's planes
+    load   returns the images of a time point along the voxels' axes (z, y, x), n of them along
+           `axis`; None with `first`
+    """
+
+    axis: int = 0
+    first: NDArray[np.float64] | None = None
+    load: Callable[[int], NDArray[Any]] | None = None
+
+
+def turned_places(
+    places: NDArray[np.float64],
+    plane_shape: tuple[int, int],
+    shape: tuple[int, int, int],
+    canonical: Canonical,
+) -> NDArray[np.float64]:
+    """Return the first pixels of planes once they are turned as `canonical` turns the grid.
+
+    places       (n, 3): first pixels as stored, in voxels (plane, row, column) of the stored grid
+    plane_shape  pixels (rows, columns)
+    shape        voxels of the stored grid (planes, rows, columns)
+    """
+    own = np.array((1, *plane_shape))
+    mirrored = np.array(shape) - own - places
+    turns = zip(canonical.order, canonical.flips, strict=True)
+    turned = np.stack([(mirrored if flip else places)[:, axis] for axis, flip in turns], axis=1)
+    return turned[::-1] if canonical.flips[canonical.order.index(0)] else turned

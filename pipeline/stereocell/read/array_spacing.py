@@ -1,0 +1,58 @@
+"""The voxel spacing in an array's attributes, by the names that writers use.
+
+`element_size_um` of PlantSeg and ilastik is z, y, x in um. Others count only where a unit stands
+beside them: `resolution` is nm in CREMI's files and voxels per length in others.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stereocell.read.spacing import Triple, um_per
+
+_SIZES = ("resolution", "spacing", "voxel_size", "voxel_spacing", "pixel_size", "pixelSize")
+_UNITS = ("units", "unit")
+_IN_UM = "element_size_um"
+ATTRIBUTES = (_IN_UM, *_SIZES, *_UNITS)
+
+
+def spacing_from(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | None:
+    """Return the spacing (z, y, x), um; None: no attribute tells it.
+
+    axes  of the array, as stored: sizes are along all of them, or along the three of space
+    """
+    if len(sizes := _numbers(attributes.get(_IN_UM))) == 3:
+        return sizes[0], sizes[1], sizes[2]
+    unit = next((u for u in map(attributes.get, _UNITS) if u is not None), None)
+    for name in _SIZES:
+        sizes = _numbers(attributes.get(name))
+        if sizes and (found := spacing_of(sizes, unit, axes)) is not None:
+            return found
+    return None
+
+
+def spacing_of(sizes: Sequence[float], unit: Any, axes: Sequence[str]) -> Triple | None:
+    """Return (z, y, x), um, of sizes along all axes, or along the three of space; None: neither.
+
+    unit  a text, or one for each size
+    """
+    along = [axis for axis in axes if axis in "zyx"] if len(sizes) == 3 else list(axes)
+    units = [unit] * len(sizes) if isinstance(unit, str) else list(np.atleast_1d(unit))
+    if len(along) != len(sizes) or len(units) != len(sizes):
+        return None
+    um = {a: (s, um_per(_text(u))) for a, s, u in zip(along, sizes, units, strict=True)}
+    found = [size * per for size, per in (um[axis] for axis in "zyx") if per is not None]
+    return (found[0], found[1], found[2]) if len(found) == 3 else None
+
+
+def _text(value: Any) -> str:
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return text.strip()
+
+
+def _numbers(value: Any) -> list[float]:
+    try:
+        return [float(number) for number in np.ravel(value)] if value is not None else []
+    except (TypeError, ValueError):
+        return []

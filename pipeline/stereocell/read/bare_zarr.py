@@ -1,0 +1,91 @@
+"""A Zarr array (v2 or v3) without the metadata of OME-Zarr.
+
+Its axes come from `--axes`, from the names of dimensions (v3, or xarray's `_ARRAY_DIMENSIONS` in
+v2), else three dimensions are z, y, x. Its spacing comes from `--spacing-um` or from the attributes
+of read/array_spacing.py.
+"""
+
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import zarr
+from zarr.abc.store import Store
+
+from stereocell.model.errors import SourceError
+from stereocell.read.array_axes import settle_axes
+from stereocell.read.array_spacing import spacing_from
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.series import likely_image
+from stereocell.read.spacing import Grid
+from stereocell.read.zarr_collections import is_collection, ome_of
+from stereocell.read.zarr_store import open_array, quiet
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
+
+_LISTED = 12  # arrays that a message names
+_MAX_NODES = 1000  # members of a group that are looked at
+
+
+def read_array(location: Location, store: Store, path: str, axes: str = "") -> Image:
+    """Return the image of the array at a path of the store, relative to the source.
+
+    axes  the user's `--axes`; empty: none
+    """
+    array = open_array(location, store, path)
+    where = f"{location.shown}/{path}".rstrip("/")
+    named = getattr(array.metadata, "dimension_names", None) or array.attrs.get(
+        "_ARRAY_DIMENSIONS", ()
+    )
+    listed = [str(name).lower() for name in named] if isinstance(named, list | tuple) else []
+    names, notes = settle_axes(where, array.shape, axes, listed)
+    voxels = VoxelArray(array, names)
+    if voxels.size("c") > MAX_CHANNELS:
+        raise SourceError(
+            f"{where}: axis c: found {voxels.size('c')}, expected at most {MAX_CHANNELS}"
+        )
+    unnamed = (None,) * voxels.size("c")
+    grid = Grid(voxels.shape, spacing_from(dict(array.attrs), names))
+    return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=notes)
+
+
+def read_only_array(
+    location: Location, store: Store, group: "zarr.Group", axes: str = ""
+) -> Image | None:
+    """Return the image of the only array in a group of no OME-Zarr image.
+
+    None: it has no array of three axes, or OME-Zarr is in it. Raises SourceError where it has
+    several.
+    """
+    if not location.is_local:  # most addresses can't be listed
+        return None
+    with quiet(), one_line(location.shown, "a group whose arrays can be listed"):
+        members = islice(group.members(max_depth=None), _MAX_NODES)
+        nodes: list[tuple[str, Any]] = list(members)
+    found = [(path, node) for path, node in nodes if _is_volume(node)]
+    if not found or any(_is_ome(node) for _, node in nodes):
+        return None
+    found.sort(key=lambda pair: pair[0])
+    if len(found) == 1:
+        image = read_array(location, store, found[0][0], axes)
+        note = f"array {found[0][0]}, the only one of a group without `multiscales`"
+        return replace(image, notes=(note, *image.notes))
+    listed = ", ".join(f"{path} {node.shape}" for path, node in found[:_LISTED])
+    more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
+    raise SourceError(
+        f"{location.shown}: no multiscales: found {listed}{more}; expected the attribute "
+        f"`multiscales` of an image, or one array, as {location.shown}/"
+        f"{likely_image([path for path, _ in found])}"
+    )
+
+
+def _is_volume(node: Any) -> bool:
+    return isinstance(node, zarr.Array) and sum(n > 1 for n in node.shape) >= 3
+
+
+def _is_ome(node: Any) -> bool:
+    if not isinstance(node, zarr.Group):
+        return False
+    ome = ome_of(node.metadata.attributes)
+    return "multiscales" in ome or is_collection(ome)

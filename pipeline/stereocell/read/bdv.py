@@ -1,0 +1,39 @@
+"""BigDataViewer's XML as a source: the container of HDF5 or N5 that it names is read.
+
+References: https://imagej.net/plugins/bdv/index
+"""
+
+import os
+
+from stereocell.model.errors import SourceError
+from stereocell.read import hdf5, n5
+from stereocell.read.bdv_xml import container_of
+from stereocell.read.image import Image
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, is_own, require_own
+
+_READERS = {"hdf5": hdf5.read_image, "n5": n5.read_image}
+
+
+def read_image(location: Location) -> Image:
+    """Return the image of the container. Raises SourceError where there is none in the folder."""
+    where = location.shown
+    with one_line(where, "BigDataViewer's XML"):
+        named = container_of(location.path)
+    if named is None:
+        raise SourceError(
+            f"{where}: ImageLoader: found no file of HDF5 or N5, expected one beside the XML"
+        )
+    path = os.path.join(os.path.dirname(os.path.realpath(location.path)), named)
+    field = f"{where}: ImageLoader {named!r:.200}"
+    if not is_own(path, [location.folder]):
+        raise SourceError(
+            f"{field}: leads to {os.path.realpath(path)}, expected a container in "
+            f"{location.folder} or below (links followed)"
+        )
+    if not os.path.isdir(path):
+        require_own(path, [location.folder], named=field)  # a pipe would block
+    container = Location.of(path)
+    if not os.path.exists(path) or container.format not in _READERS:
+        raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")
+    return _READERS[container.format](container)

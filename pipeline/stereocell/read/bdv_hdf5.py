@@ -1,0 +1,86 @@
+"""BigDataViewer's HDF5: `t00000/s00/0/cells`, a dataset for each time, setup and level.
+
+It holds 16 bits without a sign in datasets of int16, since Java has no others. Names and voxel
+sizes of the setups are in the XML beside it.
+
+References: https://imagej.net/plugins/bdv/index
+"""
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.bdv_image import image_of
+from stereocell.read.bdv_xml import read_setups
+from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.spacing import Triple
+from stereocell.storage.location import Location
+
+_MAX_LEVELS = 64
+
+
+class _Cells:
+    """A view's voxels; int16 is read as the uint16 that it holds."""
+
+    def __init__(self, array: Hdf5Array) -> None:
+        self.shape, self.chunks = array.shape, array.chunks
+        stored = np.dtype(array.dtype)
+        is_unsigned = stored.kind == "i" and stored.itemsize == 2
+        self.dtype = np.dtype(np.uint16) if is_unsigned else stored
+        self._array = array
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        found = np.asarray(self._array[key])
+        return found.astype(self.dtype, copy=False)  # of int16: modulo 2^16
+
+
+def is_container(tree: Hdf5Tree) -> bool:
+    """Whether a file has the groups of BigDataViewer."""
+    return bool(_named(tree, r"t\d{5,}") and _named(tree, r"s\d{2,}"))
+
+
+def read_image(tree: Hdf5Tree, location: Location) -> Image:
+    """Return the image of a container, whose setups are channels. Raises SourceError."""
+    times, setups = _named(tree, r"t\d{5,}"), _named(tree, r"s\d{2,}")[:MAX_CHANNELS]
+    first = tree.find(f"/{times[0]}/{setups[0]}")
+    names = set(first) if isinstance(first, h5py.Group) else set()
+    count = next((n for n in range(_MAX_LEVELS) if str(n) not in names), _MAX_LEVELS)
+    if count == 0:
+        raise SourceError(
+            f"{tree.where}: /{times[0]}/{setups[0]}: found no level, expected 0/cells"
+        )
+    levels = [
+        [[_cells(tree, f"/{t}/{s}/{level}/cells") for s in setups] for t in times]
+        for level in range(count)
+    ]
+    factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
+    told = read_setups(location.path)
+    image = image_of(tree.where, levels, factors, None, told)
+    return replace(image, close=tree.close)
+
+
+def _named(tree: Hdf5Tree, pattern: str) -> list[str]:
+    return sorted(name for name in tree.root if re.fullmatch(pattern, name))
+
+
+def _cells(tree: Hdf5Tree, path: str) -> _Cells:
+    node = tree.find(path)
+    if not isinstance(node, h5py.Dataset):
+        raise SourceError(f"{tree.where}: {path}: expected a dataset z, y, x")
+    return _Cells(Hdf5Array(node, f"{tree.where}: {path}"))
+
+
+def _factors(tree: Hdf5Tree, path: str, level: int) -> Triple | None:
+    """Return level 0's voxels per voxel (z, y, x); the file has a row x, y, z for each level."""
+    node = tree.find(path)
+    table = np.atleast_2d(node[()]) if isinstance(node, h5py.Dataset) else np.zeros((0, 3))
+    if level >= len(table) or table.shape[1] != 3 or not np.all(table[level] > 0):
+        return None
+    x, y, z = (float(value) for value in table[level])
+    return z, y, x

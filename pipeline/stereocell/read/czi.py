@@ -1,0 +1,173 @@
+"""Zeiss CZI, by pylibCZIrw (the extra `czi`), which composes the tiles of a mosaic.
+
+It is Zeiss's own library, under LGPL-3.0. czifile (BSD) asks for Python 3.12, and composes
+a mosaic whole, not a window of it; bioio-czi stands on this one. The finest level alone is read.
+Scenes are series.
+
+References: https://zeiss.github.io/libczi/
+"""
+
+import os
+import re
+from contextlib import ExitStack
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read import extras
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
+from stereocell.read.plane_array import PlaneArray
+from stereocell.read.series import Candidate, choose, counted, lines
+from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_file
+
+_TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
+_OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
+_MAGIC = b"ZISRAWFILE"
+_UM_PER_METER = 1e6
+_Rectangle = tuple[int, int, int, int]  # x, y, width, height
+
+
+class _File:
+    """An open file: its bounds, scenes and metadata."""
+
+    def __init__(self, location: Location, stack: ExitStack) -> None:
+        self.where = location.shown
+        require_file(location)
+        library = extras.load("pylibCZIrw.czi", "czi", self.where, "CZI")
+        with one_line(self.where, "a CZI file that is whole"):
+            path = os.path.realpath(location.path)
+            with open(path, "rb") as file:
+                if file.read(len(_MAGIC)) != _MAGIC:
+                    raise ValueError("no `ZISRAWFILE` at the start")
+            self.czi = stack.enter_context(library.open_czi(path))
+            self.bounds: dict[str, tuple[int, int]] = dict(self.czi.total_bounding_box)
+            self.types: list[str] = [str(kind) for _, kind in sorted(self.czi.pixel_types.items())]
+            scenes = sorted(self.czi.scenes_bounding_rectangle.items())
+            self.metadata = _parsed(self.czi.raw_metadata)
+        x, y = self.bounds.get("X", (0, 0)), self.bounds.get("Y", (0, 0))
+        all_of_it = (x[0], y[0], x[1] - x[0], y[1] - y[0])
+        self.scenes: list[tuple[int | None, _Rectangle]] = [
+            (index, (box.x, box.y, box.w, box.h)) for index, box in scenes
+        ] or [(None, all_of_it)]
+        self.spacing = _spacing(self.metadata)
+
+    def size(self, axis: str) -> int:
+        low, high = self.bounds.get(axis, (0, 1))
+        return high - low
+
+    def candidates(self) -> list[Candidate]:
+        found = []
+        spacing = self.spacing and ",".join(f"{value:.4g}" for value in self.spacing)
+        for _, (_, _, width, height) in self.scenes:
+            z = self.size("Z")
+            label = f"{z} x {height} x {width} voxels, {counted(self.size('C'), 'channel')}"
+            times = f", {self.size('T')} points in time" if self.size("T") > 1 else ""
+            label += times + (f", spacing {spacing} um (z,y,x)" if spacing else "")
+            found.append(Candidate(label, z * height * width if z > 1 else 0))
+        return found
+
+
+def read_image(location: Location, series: int = 0) -> Image:
+    """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
+    stack = ExitStack()
+    try:
+        file = _File(location, stack)
+        index, notes = choose(file.where, file.candidates(), series)
+        return _image(file, index, notes, stack)
+    except BaseException:
+        stack.close()
+        raise
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each scene. Raises SourceError."""
+    with ExitStack() as stack:
+        return lines(_File(location, stack).candidates())
+
+
+def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) -> Image:
+    for axis, kind in _OTHERS.items():
+        if file.size(axis) > 1:
+            raise SourceError(
+                f"{file.where}: {kind} ({axis}): found {file.size(axis)}, expected one: export one "
+                "from ZEN"
+            )
+    found = sorted(set(file.types))
+    if len(found) != 1 or found[0] not in _TYPES:
+        raise SourceError(
+            f"{file.where}: pixel types: found {', '.join(found) or 'none'}, expected one of "
+            f"{', '.join(_TYPES)} in all channels (no RGB)"
+        )
+    scene, (left, top, width, height) = file.scenes[index]
+    shape = (file.size("T"), file.size("C"), file.size("Z"), height, width)
+    if not 0 < shape[1] <= MAX_CHANNELS or min(shape) < 1:
+        raise SourceError(f"{file.where}: size (t, c, z, y, x): found {shape}, expected voxels")
+    first = {axis: file.bounds.get(axis, (0, 1))[0] for axis in "TCZ"}
+
+    def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
+        plane = {axis: first[axis] + at for axis, at in zip("TCZ", place, strict=True)}
+        y, x = top + rows.start, left + columns.start
+        roi = (x, y, columns.stop - columns.start, rows.stop - rows.start)
+        voxels: NDArray[Any] = file.czi.read(roi=roi, plane=plane, scene=scene)
+        return voxels[..., 0]
+
+    array = VoxelArray(PlaneArray(shape, np.dtype(_TYPES[found[0]]), read), tuple("tczyx"))
+    names, colors = _channels(file.metadata, shape[1])
+    return Image(
+        (array,), (Grid(array.shape, file.spacing),), names, colors, 1, stack.close, notes=notes
+    )
+
+
+def _parsed(text: str) -> ElementTree.Element:
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError("metadata with a DOCTYPE")
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"metadata: {error}") from None
+
+
+def _spacing(metadata: ElementTree.Element) -> Triple | None:
+    """Return the spacing (z, y, x), um; the file has m. None: not stated, or 0."""
+    found = dict.fromkeys("ZYX", 0.0)
+    for node in metadata.findall("Metadata/Scaling/Items/Distance"):
+        try:
+            found[str(node.get("Id"))] = float(node.findtext("Value", "")) * _UM_PER_METER
+        except ValueError:
+            continue
+    z, y, x = (found[axis] for axis in "ZYX")
+    return (z, y, x) if min(z, y, x) > 0 else None
+
+
+def _channels(
+    metadata: ElementTree.Element, count: int
+) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
+    nodes = metadata.findall("Metadata/Information/Image/Dimensions/Channels/Channel")
+    shown = {
+        node.get("Id"): node
+        for node in metadata.findall("Metadata/DisplaySetting/Channels/Channel")
+    }
+    names: list[str | None] = []
+    colors: list[Color | None] = []
+    for node in nodes[:count]:
+        names.append((node.get("Name") or "").strip() or None)
+        display = shown.get(node.get("Id"))
+        text = node.findtext("Color") or (display.findtext("Color") if display is not None else "")
+        colors.append(_color(text or ""))
+    lacking = [None] * (count - len(names))
+    return (*names, *lacking), (*colors, *lacking)
+
+
+def _color(text: str) -> Color | None:
+    """Return linear RGB of `#AARRGGBB` or `#RRGGBB`."""
+    match = re.fullmatch(r"#(?:[0-9a-fA-F]{2})?([0-9a-fA-F]{6})", text.strip())
+    if match is None:
+        return None
+    red, green, blue = bytes.fromhex(match[1])
+    return linear_color((red, green, blue))

@@ -1,0 +1,157 @@
+"""Voxels that lie in one stretch of a file: as they are, or packed.
+
+Unpacked ones are read a window at a time, by nibabel's `fileslice`: a memory map of the file would
+take address space of its whole size, and end the process where the file is cut short meanwhile.
+Packed ones have no blocks: they are decoded all at once, at the first access, and cached.
+"""
+
+import bz2
+import gzip
+import math
+import os
+import zlib
+from collections.abc import Callable, Sequence
+from threading import Lock
+from typing import IO, Any, Protocol, cast
+
+import numpy as np
+from nibabel.fileslice import fileslice
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import StoredArray
+
+PACKINGS = ("zlib", "gzip", "bzip2")
+_PIECE = 1 << 24  # bytes that are unpacked at once, of those before the voxels
+
+
+class FileArray:
+    """Unpacked voxels of a file, the last axis fastest.
+
+    offset  bytes before the first voxel
+    """
+
+    def __init__(
+        self, path: str, shape: Sequence[int], dtype: np.dtype[Any], offset: int, where: str
+    ) -> None:
+        self.shape = tuple(shape)
+        self.dtype = dtype
+        self.chunks: tuple[int, ...] = (*(1 for _ in shape[:-2]), *shape[-2:])
+        self._path, self._offset = path, offset
+        end, size = offset + math.prod(self.shape) * dtype.itemsize, os.path.getsize(path)
+        if end > size:
+            raise SourceError(
+                f"{where}: found {size} bytes, expected at least {end} for {self.shape} of "
+                f"{dtype.name} (the file is cut short)"
+            )
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        with open(self._path, "rb") as file:
+            found = fileslice(file, key, self.shape, self.dtype, self._offset, "C")  # type: ignore[no-untyped-call]
+        return cast("NDArray[Any]", found)
+
+
+class PackedArray:
+    """Voxels that `load` decodes all at once; they are cached."""
+
+    def __init__(
+        self, shape: Sequence[int], dtype: np.dtype[Any], load: Callable[[], NDArray[Any]]
+    ) -> None:
+        self.shape = tuple(shape)
+        self.dtype = dtype
+        self.chunks: tuple[int, ...] = self.shape
+        self._load = load
+        self._lock = Lock()
+        self._held: NDArray[Any] | None = None
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        with self._lock:
+            if self._held is None:
+                self._held = self._load()
+            return cast("NDArray[Any]", self._held[key])
+
+
+class FlippedArray:
+    """An array some of whose axes run backwards."""
+
+    def __init__(self, array: StoredArray, flips: Sequence[bool]) -> None:
+        self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
+        self.dtype = array.dtype
+        self._array, self._flips = array, tuple(flips)
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        """Return voxels by whole numbers, and slices of step 1 that lie inside."""
+        place = [
+            _mirrored(part, size) if flip else part
+            for part, size, flip in zip(key, self.shape, self._flips, strict=True)
+        ]
+        found = np.asarray(self._array[tuple(place)])
+        kept = [flip for part, flip in zip(key, self._flips, strict=True) if _is_slice(part)]
+        return found[tuple(slice(None, None, -1 if flip else 1) for flip in kept)]
+
+
+def _is_slice(part: Any) -> bool:
+    return isinstance(part, slice)
+
+
+def _mirrored(part: Any, size: int) -> Any:
+    if not isinstance(part, slice):
+        return size - 1 - int(part)
+    start, stop, _ = part.indices(size)
+    return slice(size - stop, size - start)
+
+
+class _Stream(Protocol):
+    def read(self, size: int, /) -> bytes: ...
+
+
+def unpack(
+    path: str, shape: Sequence[int], dtype: np.dtype[Any], packing: str, offset: int, skip: int = 0
+) -> NDArray[Any]:
+    """Return the voxels of a packed stretch of a file.
+
+    packing  one of PACKINGS
+    offset   bytes before the stretch
+    skip     unpacked bytes before the first voxel
+
+    No more is unpacked than the shape asks for. Raises the library's error, or EOFError.
+    """
+    size = math.prod(shape) * dtype.itemsize
+    with open(path, "rb") as file:
+        file.seek(offset)
+        stream = _opened(file, packing)
+        while skip > 0 and (passed := len(stream.read(min(skip, _PIECE)))):
+            skip -= passed
+        parts, left = [], size
+        while left > 0 and (part := stream.read(min(left, _PIECE))):
+            parts.append(part)
+            left -= len(part)
+    if left > 0:
+        raise EOFError(f"found {size - left} bytes after unpacking, {size} are needed")
+    return np.frombuffer(b"".join(parts), dtype).reshape(tuple(shape))
+
+
+def _opened(file: IO[bytes], packing: str) -> _Stream:
+    if packing == "gzip":
+        return cast("_Stream", gzip.GzipFile(fileobj=file))
+    if packing == "bzip2":
+        return bz2.BZ2File(file)
+    return _Zlib(file)
+
+
+class _Zlib:
+    """A stream of zlib's own format, read piece by piece."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._stream = zlib.decompressobj()
+
+    def read(self, size: int, /) -> bytes:
+        """Return up to `size` unpacked bytes; none at the end."""
+        while not self._stream.eof:
+            packed = self._stream.unconsumed_tail or self._file.read(_PIECE)
+            if found := self._stream.decompress(packed, size):
+                return found
+            if not packed:
+                break
+        return b""

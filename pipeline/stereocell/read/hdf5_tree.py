@@ -1,0 +1,168 @@
+"""HDF5 files, opened so that a link or an external file can't lead out of the source's folder.
+
+HDF5 looks for the file of an external link, of external storage and of a virtual dataset in
+several places, the working folder among them. So links are followed here, one by one; a dataset
+whose voxels lie in other files is refused.
+"""
+
+import os
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack
+from importlib import import_module
+from typing import Any
+
+import h5py
+
+from stereocell.model.errors import SourceError
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_file, require_own
+
+_MAX_STEPS = 200  # names along a path, links followed
+_MAX_NODES = 20_000  # groups and datasets that a search visits
+_LISTED = 12  # names in a message
+_NUMBERS = "biuf"  # kinds of dtype
+_EXTRA = 'pip install "stereocell[hdf5]"'
+
+
+class Hdf5Tree:
+    """An open file. Use `close` at the end.
+
+    where  the file's name, for messages
+    """
+
+    def __init__(self, location: Location, expected: str) -> None:
+        require_file(location)
+        self.where = location.path
+        self._folder = location.folder
+        self._stack = ExitStack()
+        with one_line(self.where, expected):
+            self.root = self._open(os.path.realpath(location.path))["/"]
+
+    def close(self) -> None:
+        """Close the file, and those that its links led to."""
+        self._stack.close()
+
+    def _open(self, path: str) -> h5py.File:
+        return self._stack.enter_context(h5py.File(path, "r", locking="best-effort"))
+
+    def find(self, path: str, start: h5py.Group | None = None) -> h5py.Group | h5py.Dataset:
+        """Return a group or a dataset by its path. Raises SourceError where there is none."""
+        at: Any = start if start is not None else self.root
+        steps = deque(_steps(path))
+        for _ in range(_MAX_STEPS):
+            if not steps:
+                return at
+            name = steps.popleft()
+            link = at.get(name, getlink=True) if isinstance(at, h5py.Group) else None
+            if link is None:
+                beside = sorted(at)[:_LISTED] if isinstance(at, h5py.Group) else []
+                raise SourceError(
+                    f"{self.where}: {path!r:.200}: {name!r:.80} not found, expected one of "
+                    f"{', '.join(beside) or 'nothing: it is no group'}"
+                )
+            if isinstance(link, h5py.SoftLink):
+                steps.extendleft(reversed(_steps(link.path)))
+                at = at.file["/"] if link.path.startswith("/") else at
+            elif isinstance(link, h5py.ExternalLink):
+                named = f"{self.where}: link {name!r:.200}"
+                file = os.path.join(os.path.dirname(at.file.filename), link.filename)
+                require_own(file, [self._folder], named=named)
+                with one_line(named, "an HDF5 file that is whole"):
+                    at = self._open(os.path.realpath(file))["/"]
+                steps.extendleft(reversed(_steps(link.path)))
+            else:
+                with one_line(f"{self.where}: {path!r:.200}", "a group or a dataset"):
+                    at = at[name]
+        raise SourceError(f"{self.where}: {path!r:.200}: links in a circle, expected a dataset")
+
+    def volumes(self, start: h5py.Group) -> Iterator[h5py.Dataset]:
+        """Yield the datasets of numbers with three axes longer than 1, below a group, by name.
+
+        Links are not followed: what they lead to is in the file under its own name, or elsewhere.
+        """
+        waiting: deque[h5py.Group] = deque([start])
+        seen = {hash(start.id)}
+        for _ in range(_MAX_NODES):
+            if not waiting:
+                return
+            group = waiting.popleft()
+            for name in sorted(group):
+                if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                    continue
+                node = group[name]
+                if isinstance(node, h5py.Group) and hash(node.id) not in seen:
+                    seen.add(hash(node.id))
+                    waiting.append(node)
+                elif isinstance(node, h5py.Dataset) and is_volume(node):
+                    yield node
+
+
+def is_volume(dataset: h5py.Dataset) -> bool:
+    """Whether a dataset holds numbers along three axes longer than 1."""
+    return dataset.dtype.kind in _NUMBERS and sum(n > 1 for n in dataset.shape or ()) >= 3
+
+
+def _steps(path: str) -> list[str]:
+    return [step for step in path.split("/") if step not in ("", ".")]
+
+
+class Hdf5Array:
+    """A dataset's voxels, read by h5py a window at a time.
+
+    Raises SourceError where they lie in other files, or are packed by a filter that isn't there.
+    """
+
+    def __init__(self, dataset: h5py.Dataset, where: str) -> None:
+        require_readable(dataset, where)
+        self._dataset = dataset
+        self.shape: tuple[int, ...] = dataset.shape
+        self.dtype = dataset.dtype
+        self.chunks: tuple[int, ...] = dataset.chunks or (
+            *(1 for _ in dataset.shape[:-2]),
+            *dataset.shape[-2:],
+        )
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._dataset[key]
+
+
+def require_readable(dataset: h5py.Dataset, where: str) -> None:
+    """Raise SourceError where a dataset's voxels can't be had from its own file."""
+    if dataset.external or dataset.is_virtual:
+        raise SourceError(
+            f"{where}: its voxels lie in other files (external or virtual storage), expected them "
+            "in the file itself: copy the dataset by h5repack or h5py"
+        )
+    creation = dataset.id.get_create_plist()
+    for index in range(creation.get_nfilters()):
+        code, _, _, name = creation.get_filter(index)
+        if not (h5py.h5z.filter_avail(code) or (_has_plugins() and h5py.h5z.filter_avail(code))):
+            shown = name.decode("ascii", "replace").strip().split(";")[0]
+            title = shown if shown.isprintable() and shown else "unknown"
+            raise SourceError(
+                f"{where}: filter {title:.40} (number {code}): not installed, "
+                f"expected gzip, LZF or szip, or {_EXTRA}"
+            )
+
+
+def _has_plugins() -> bool:
+    """Register the filters of hdf5plugin; False: it isn't installed."""
+    try:
+        import_module("hdf5plugin")
+    except ImportError:
+        return False
+    return True
+
+
+def attribute(node: h5py.Group | h5py.Dataset, name: str) -> Any:
+    """Return an attribute; text as str, also Imaris's arrays of characters; None: there is none."""
+    if name not in node.attrs:
+        return None
+    with one_line(f"{node.file.filename}: attribute {name!r} of {node.name}", "a readable one"):
+        value = node.attrs[name]
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if getattr(value, "dtype", None) is not None and value.dtype.kind == "S":
+        return b"".join(value.ravel().tolist()).decode("utf-8", "replace")
+    return value

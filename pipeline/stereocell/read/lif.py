@@ -1,0 +1,143 @@
+"""Leica LIF, by liffile (BSD; the extra `lif`). A file holds several images: series.
+
+The images' names are what a person typed, and are not shown. Scan orders such as xzy are turned
+round by the axes' names. readlif, which bioio-lif stands on, is under GPL-3.0.
+"""
+
+import os
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read import extras
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
+from stereocell.read.plane_array import PlaneArray
+from stereocell.read.series import Candidate, choose, lines
+from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_file
+
+_MAGIC = b"\x70\x00\x00\x00"  # other files of Leica's name files elsewhere
+_UM_PER_METER = 1e6
+_OTHERS = {
+    "\u03bb": "wavelengths (a lambda stack)",
+    "\u039b": "excitations (a lambda stack)",
+    "M": "tiles of a mosaic",
+    "S": "samples (RGB)",
+}
+_COLORS = {
+    "red": (255, 0, 0),
+    "green": (0, 255, 0),
+    "blue": (0, 0, 255),
+    "cyan": (0, 255, 255),
+    "magenta": (255, 0, 255),
+    "yellow": (255, 255, 0),
+    "gray": (255, 255, 255),
+    "grey": (255, 255, 255),
+}
+
+
+def read_image(location: Location, series: int = 0) -> Image:
+    """Return one image; 0 is the largest volume. Raises SourceError, UsageError for no such one."""
+    stack = ExitStack()
+    try:
+        images, candidates = _images(location, stack)
+        index, notes = choose(location.shown, candidates, series)
+        return _image(location.shown, images[index], notes, stack)
+    except BaseException:
+        stack.close()
+        raise
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each image. Raises SourceError."""
+    with ExitStack() as stack:
+        return lines(_images(location, stack)[1])
+
+
+def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candidate]]:
+    """Return the images of the file, and what a list says of each."""
+    require_file(location)
+    library = extras.load("liffile", "lif", location.shown, "LIF")
+    with one_line(location.shown, "a LIF file that is whole"):
+        path = os.path.realpath(location.path)
+        with open(path, "rb") as file:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise ValueError("not the first bytes of LIF")
+        images = list(stack.enter_context(library.LifFile(path)).images)
+        candidates = [_candidate(image) for image in images]  # the library reads the XML here
+    if not images:
+        raise SourceError(f"{location.shown}: found no image, expected one")
+    return images, candidates
+
+
+def _candidate(image: Any) -> Candidate:
+    sizes = dict(zip(image.dims, image.shape, strict=True))
+    shape = [int(sizes.get(axis, 1)) for axis in "ZYX"]
+    others = [f"{size} {_OTHERS.get(axis, axis)}" for axis, size in _other_axes(image).items()]
+    counts = [f"{sizes[a]} {name}" for a, name in (("C", "channels"), ("T", "points in time"))
+              if sizes.get(a, 1) > 1]  # fmt: skip
+    spacing = _spacing(image)
+    lengths = [f"spacing {','.join(f'{s:.4g}' for s in spacing)} um (z,y,x)"] if spacing else []
+    label = ", ".join([f"{shape[0]} x {shape[1]} x {shape[2]} voxels", *counts, *others, *lengths])
+    is_volume = not others and min(shape) > 1
+    return Candidate(label, shape[0] * shape[1] * shape[2] if is_volume else 0)
+
+
+def _other_axes(image: Any) -> dict[str, int]:
+    sizes = zip(image.dims, image.shape, strict=True)
+    return {axis: int(size) for axis, size in sizes if axis not in "TCZYX" and size > 1}
+
+
+def _image(where: str, image: Any, notes: tuple[str, ...], stack: ExitStack) -> Image:
+    for axis, size in _other_axes(image).items():
+        raise SourceError(
+            f"{where}: found {size} {_OTHERS.get(axis, f'of axis {axis}')}, expected z, y, x, "
+            "channels and time: take another --series, or export it from LAS X"
+        )
+    missing = [axis for axis in "ZYX" if axis not in image.dims]
+    if missing:
+        raise SourceError(
+            f"{where}: a volume needs at least 2 planes: found axes {', '.join(image.dims)}, "
+            "expected Z, Y, X: take another --series (`--series list` shows them)"
+        )
+    dims = tuple(image.dims)
+
+    def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
+        found = image.frame(**dict(zip(dims[:-2], place, strict=True)))
+        return np.asarray(found)[rows, columns]
+
+    axes = tuple(axis.lower() for axis in dims)
+    array = VoxelArray(PlaneArray(image.shape, np.dtype(image.dtype), read), axes)
+    if (count := array.size("c")) > MAX_CHANNELS:
+        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    names, colors = _channels(image, count)
+    grid = Grid(array.shape, _spacing(image))
+    return Image((array,), (grid,), names, colors, 1, stack.close, notes=notes)
+
+
+def _spacing(image: Any) -> Triple | None:
+    """Return the spacing (z, y, x), um, of the planes' places in m; None: not stated."""
+    found = []
+    for axis in "ZYX":
+        places = np.asarray(image.coords.get(axis, ()), float)
+        if len(places) > 1 and places[-1] != places[0]:
+            step = abs(float(places[-1] - places[0])) / (len(places) - 1)
+            found.append(step * _UM_PER_METER)
+    return (found[0], found[1], found[2]) if len(found) == 3 else None
+
+
+def _channels(image: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
+    names: list[str | None] = []
+    colors: list[Color | None] = []
+    for node in list(image.xml_element.iter("ChannelDescription"))[:count]:
+        properties = {p.findtext("Key"): p.findtext("Value") for p in node.iter("ChannelProperty")}
+        names.append((properties.get("DyeName") or "").strip() or None)
+        rgb = _COLORS.get(node.get("LUTName", "").lower())
+        colors.append(linear_color(rgb) if rgb else None)
+    lacking = [None] * (count - len(names))
+    return (*names, *lacking), (*colors, *lacking)

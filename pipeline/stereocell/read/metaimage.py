@@ -1,0 +1,186 @@
+"""MetaImage: .mha, and .mhd with its voxels in a file beside it.
+
+The header is lines of `Key = value`, of which the short list below is read; others may identify a
+patient. As in ITK, `Offset` and the rows of `TransformMatrix` are of LPS, in mm, whatever
+`AnatomicalOrientation` says. SimpleITK (50 MB), which reads the format too, opens the file of the
+voxels without asking where it lies; the tests compare with it.
+
+References: https://itk.org/Wiki/ITK/MetaIO/Documentation
+"""
+
+import math
+import os
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import StoredArray
+from stereocell.read.file_array import FileArray, PackedArray, unpack
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.patient_grid import place
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_file, require_own
+
+NAME = "MetaImage"
+_MAX_HEADER = 1 << 16  # bytes
+_TYPES = {
+    "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2",
+    "MET_INT": "i4", "MET_UINT": "u4", "MET_LONG": "i4", "MET_ULONG": "u4",
+    "MET_LONG_LONG": "i8", "MET_ULONG_LONG": "u8", "MET_FLOAT": "f4", "MET_DOUBLE": "f8",
+}  # fmt: skip
+_OTHER_NAMES = {
+    "Position": "Offset", "Origin": "Offset", "Rotation": "TransformMatrix",
+    "Orientation": "TransformMatrix", "ElementSize": "ElementSpacing",
+    "ElementByteOrderMSB": "BinaryDataByteOrderMSB",
+}  # fmt: skip
+_READ = {
+    "NDims", "DimSize", "ElementType", "ElementNumberOfChannels", "ElementSpacing", "Offset",
+    "TransformMatrix", "BinaryData", "BinaryDataByteOrderMSB", "CompressedData", "HeaderSize",
+    "ElementDataFile",
+}  # fmt: skip
+
+
+def read_image(location: Location) -> Image:
+    """Return the image of the file, with all its time points. Raises SourceError."""
+    where = location.shown
+    require_file(location)
+    fields, end = _header(location)
+    shape = _integers(where, fields, "DimSize")
+    if len(shape) not in (3, 4) or min(shape) < 1:
+        raise SourceError(
+            f"{where}: DimSize: found {fields.get('DimSize', 'none'):.60}, expected three sizes "
+            "x, y, z, or four with time (a volume needs at least 2 planes)"
+        )
+    samples = _integers(where, fields, "ElementNumberOfChannels") or [1]
+    if len(samples) != 1 or not 0 < samples[0] <= MAX_CHANNELS:
+        raise SourceError(
+            f"{where}: ElementNumberOfChannels: found {samples}, expected 1 to {MAX_CHANNELS}"
+        )
+    array = _array(location, fields, end, (*reversed(shape), samples[0]))
+    axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
+    affine, notes = _affine(where, fields, len(shape))
+    placed = place(where, array, axes, affine, "TransformMatrix")
+    count = placed.array.size("c")
+    return Image(
+        arrays=(placed.array,),
+        grids=(placed.grid,),
+        names=(NAME,) if count == 1 else (None,) * count,
+        colors=(None,) * count,
+        images=1,
+        title=NAME,
+        placement=placed.placement,
+        notes=(*notes, *placed.notes),
+    )
+
+
+def _header(location: Location) -> tuple[dict[str, str], int]:
+    """Return the fields of the header, and its length in bytes."""
+    with one_line(location.shown, f"a {NAME} file"), open(location.path, "rb") as file:
+        content = file.read(_MAX_HEADER)
+    fields: dict[str, str] = {}
+    end = 0
+    for line in content.splitlines(keepends=True):
+        end += len(line)
+        key, mark, value = line.decode("latin-1").partition("=")
+        if not mark:
+            break
+        name = _OTHER_NAMES.get(key.strip(), key.strip())
+        if name in _READ and (name not in fields or key.strip() == name):
+            fields[name] = value.strip()
+        if name == "ElementDataFile":
+            return fields, end
+    raise SourceError(
+        f"{location.shown}: header: no ElementDataFile in {len(content)} bytes, "
+        f"expected {NAME} (.mha, .mhd)"
+    )
+
+
+def _array(
+    location: Location, fields: dict[str, str], end: int, shape: tuple[int, ...]
+) -> StoredArray:
+    """Return the voxels, which lie behind the header or in a file beside it."""
+    where, stated = location.shown, fields.get("ElementType", "")
+    kind = _TYPES.get(stated.removesuffix("_ARRAY"))
+    if kind is None:
+        raise SourceError(
+            f"{where}: ElementType: found {stated or 'none':.40}, expected one of "
+            f"{', '.join(_TYPES)}"
+        )
+    if not _flag(fields, "BinaryData", True):
+        raise SourceError(f"{where}: BinaryData: found False (text), expected True: write it anew")
+    dtype = np.dtype((">" if _flag(fields, "BinaryDataByteOrderMSB", False) else "<") + kind)
+    named = fields["ElementDataFile"]
+    path = os.path.realpath(location.path)
+    if named.upper() != "LOCAL":
+        if named.upper().startswith("LIST") or "%" in named:
+            raise SourceError(
+                f"{where}: ElementDataFile: found a list of files, expected one: write it anew as "
+                ".mha"
+            )
+        path, end = os.path.join(os.path.dirname(path), named), 0
+        field = f"{where}: ElementDataFile {named!r:.200}"
+        require_own(path, [location.folder], named=field)
+        if not Path(path).is_file():
+            raise SourceError(f"{field}: not found, expected the voxels beside the header")
+        where = field
+    if _flag(fields, "CompressedData", False):
+        load = partial(unpack, path, shape, dtype, "zlib", end)
+        return PackedArray(shape, dtype, load)
+    skip = (_integers(location.shown, fields, "HeaderSize") or [0])[0]
+    if skip < 0:  # the voxels are the last bytes of the file
+        skip = max(0, os.path.getsize(path) - math.prod(shape) * dtype.itemsize)
+        end = 0
+    return FileArray(path, shape, dtype, end + skip, where)
+
+
+def _affine(
+    where: str, fields: dict[str, str], dimensions: int
+) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], tuple[str, ...]]:
+    """Return the affine (4, 4) to LPS in mm, and notes."""
+    n = dimensions
+    spacing = _numbers(where, fields, "ElementSpacing", n)
+    matrix = _numbers(where, fields, "TransformMatrix", n * n)
+    notes = []
+    if matrix is None:
+        notes.append("no TransformMatrix: which side is left is a guess, x to the patient's left")
+    if spacing is None:
+        raise SourceError(
+            f"{where}: ElementSpacing: not found, expected {n} lengths in mm: add it to the header"
+        )
+    turned = np.eye(n) if matrix is None else np.array(matrix).reshape(n, n)
+    affine = np.eye(4)
+    affine[:3, :3] = turned[:3, :3].T * np.array(spacing[:3])  # a row for each axis of the image
+    affine[:3, 3] = (_numbers(where, fields, "Offset", n) or [0.0] * n)[:3]
+    return affine, tuple(notes)
+
+
+def _flag(fields: dict[str, str], name: str, default: bool) -> bool:
+    text = fields.get(name, "").lower()
+    return text[:1] in ("t", "1", "y") if text else default
+
+
+def _integers(where: str, fields: dict[str, str], name: str) -> list[int]:
+    values = _numbers(where, fields, name) or []
+    if not all(value.is_integer() and abs(value) < 1 << 40 for value in values):
+        raise SourceError(f"{where}: {name}: found {fields[name]:.60}, expected whole numbers")
+    return [int(value) for value in values]
+
+
+def _numbers(
+    where: str, fields: dict[str, str], name: str, count: int | None = None
+) -> list[float] | None:
+    """Return a field's numbers; None: the field isn't there. Raises SourceError."""
+    if name not in fields:
+        return None
+    try:
+        values = [float(part) for part in fields[name].split()]
+    except ValueError:
+        values = []
+    if not values or (count is not None and len(values) != count) or not np.isfinite(values).all():
+        raise SourceError(
+            f"{where}: {name}: found {fields[name]!r:.60}, expected "
+            f"{count if count is not None else 'some'} numbers"
+        )
+    return values

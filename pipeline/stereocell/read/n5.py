@@ -1,0 +1,248 @@
+"""N5: a dataset, a pyramid `s0`, `s1`, ..., or a container of BigDataViewer, a block at a time.
+
+zarr-python has dropped N5 since version 3, and tensorstore (20 MB), which has it, opens every file
+below the source wherever a link leads and unpacks a block of any size. A block is simple: a header
+of 16-bit and 32-bit numbers, then one of the usual codecs. So it is read here.
+
+N5 names axes fastest first, and its blocks' paths as well; here all is turned round to z, y, x. An
+absent block is 0.
+
+References: https://github.com/saalfeldlab/n5 (the specification in its README)
+"""
+
+import math
+import os
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.array_axes import settle_axes
+from stereocell.read.array_spacing import spacing_of
+from stereocell.read.bdv_image import grids_of, image_of
+from stereocell.read.bdv_xml import Setup, read_setups
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.n5_blocks import unpack_block
+from stereocell.read.n5_files import N5Files
+from stereocell.read.series import likely_image
+from stereocell.read.spacing import Triple
+from stereocell.storage.location import Location
+
+_MAX_LEVELS = 64
+_MAX_TIMES = 100_000
+_LISTED = 12  # datasets that a message names
+_TYPES = {f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)}
+_TYPES |= {"float32", "float64"}
+
+
+class N5Array:
+    """A dataset's voxels, axes slowest first; only the blocks that a window touches are read."""
+
+    def __init__(self, files: N5Files, path: str, attributes: Mapping[str, Any]) -> None:
+        where = f"{files.where}/{path}".rstrip("/")
+        sizes, blocks = (_whole(where, attributes, name) for name in ("dimensions", "blockSize"))
+        kind = attributes.get("dataType")
+        if kind not in _TYPES:
+            raise SourceError(f"{where}: dataType: found {kind!r:.40}, expected uint8, uint16, ...")
+        if len(sizes) != len(blocks):
+            raise SourceError(
+                f"{where}: blockSize: found {len(blocks)} numbers, expected {len(sizes)}"
+            )
+        self.shape: tuple[int, ...] = tuple(reversed(sizes))
+        self.chunks: tuple[int, ...] = tuple(reversed(blocks))
+        self.dtype = np.dtype(kind).newbyteorder(">")
+        packing = attributes.get("compression", attributes.get("compressionType", "raw"))
+        self._packing = packing if isinstance(packing, Mapping) else {"type": packing}
+        self._files, self._path = files, path
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        """Return voxels by whole numbers, and slices of step 1 that lie inside."""
+        bounds = [
+            part.indices(size)[:2] if isinstance(part, slice) else (int(part), int(part) + 1)
+            for part, size in zip(key, self.shape, strict=True)
+        ]
+        found = np.zeros([stop - start for start, stop in bounds], self.dtype)
+        spans = [range(a // n, -(-b // n)) for (a, b), n in zip(bounds, self.chunks, strict=True)]
+        for index in product(*spans):
+            if (block := self._block(index)) is None:
+                continue
+            starts = [i * n for i, n in zip(index, self.chunks, strict=True)]
+            into, out = [], []
+            for (low, high), start, size in zip(bounds, starts, block.shape, strict=True):
+                first, last = max(low, start), min(high, start + size)
+                into.append(slice(first - low, max(last, first) - low))
+                out.append(slice(first - start, max(last, first) - start))
+            found[tuple(into)] = block[tuple(out)]
+        kept = tuple(slice(None) if isinstance(part, slice) else 0 for part in key)
+        return found[kept]
+
+    def _block(self, index: Sequence[int]) -> NDArray[Any] | None:
+        path = "/".join([self._path, *map(str, reversed(index))]).lstrip("/")
+        content = self._files.read(path)
+        if content is None:
+            if self._files.read(f"{self._path}/attributes.json".lstrip("/")) is None:
+                raise OSError("attributes.json is gone since it was opened")
+            return None
+        try:
+            return unpack_block(content, self.chunks, self.dtype, self._packing)
+        except struct.error:
+            raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
+
+
+def read_image(location: Location, axes: str = "") -> Image:
+    """Return the image of a dataset, a pyramid or a container. Raises SourceError."""
+    if location.is_local and not os.path.isdir(location.source):
+        raise SourceError(f"{location.shown}: is a file, expected a folder of N5")
+    files = N5Files(location)
+    attributes = files.attributes("")
+    if "dimensions" in attributes:
+        above = files.above()
+        return _pyramid(files, above, [("", attributes)], axes)
+    if "dimensions" in files.attributes("s0"):
+        return _pyramid(files, attributes, _levels(files, ""), axes)
+    if "dimensions" in files.attributes("timepoint0/s0"):
+        number = re.fullmatch(r"setup(\d+)", os.path.basename(location.source))
+        told = read_setups(os.path.dirname(location.source)) if location.is_local else {}
+        setup = told.get(int(number[1])) if number else None
+        return _container(files, [""], {0: setup} if setup else {})
+    if "dimensions" in files.attributes("setup0/timepoint0/s0"):
+        count = _count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)
+        told = read_setups(location.source) if location.is_local else {}
+        return _container(files, [f"setup{index}/" for index in range(count)], told)
+    found = files.datasets(_LISTED + 1)
+    if len(found) == 1:
+        return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
+    if not found:
+        raise SourceError(
+            f"{files.where}: no dataset: found no attributes.json with `dimensions`, expected one, "
+            "or s0 below"
+        )
+    raise SourceError(
+        f"{files.where}: several datasets: found {', '.join(found[:_LISTED])}, expected one, as "
+        f"{files.where}/{likely_image(found)}"
+    )
+
+
+def _levels(files: N5Files, path: str) -> list[tuple[str, Mapping[str, Any]]]:
+    """Return the paths and attributes of `s0`, `s1`, ... below a path."""
+    found: list[tuple[str, Mapping[str, Any]]] = []
+    for index in range(_MAX_LEVELS):
+        level = f"{path}/s{index}".lstrip("/")
+        if "dimensions" not in (attributes := files.attributes(level)):
+            break
+        found.append((level, attributes))
+    return found
+
+
+def _pyramid(
+    files: N5Files,
+    group: Mapping[str, Any],
+    levels: Sequence[tuple[str, Mapping[str, Any]]],
+    axes: str,
+) -> Image:
+    arrays = [N5Array(files, path, attributes) for path, attributes in levels]
+    named = levels[0][1].get("axes", group.get("axes"))
+    listed = [str(a).lower() for a in reversed(named)] if isinstance(named, list) else []
+    names, notes = settle_axes(files.where, arrays[0].shape, axes, listed)
+    if any(len(array.shape) != len(names) for array in arrays):
+        raise SourceError(f"{files.where}: levels: expected {len(names)} dimensions in each")
+    voxels = tuple(VoxelArray(array, names) for array in arrays)
+    if (count := voxels[0].size("c")) > MAX_CHANNELS:
+        raise SourceError(f"{files.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    finest = _spacing(levels[0][1], names) or _spacing(group, names)
+    scales = [_factors(group, attributes, i, names) for i, (_, attributes) in enumerate(levels)]
+    grids = grids_of([v.shape for v in voxels], finest, scales)
+    unnamed = (None,) * count
+    return Image(voxels, grids, unnamed, unnamed, 1, notes=notes)
+
+
+def _container(files: N5Files, setups: Sequence[str], told: Mapping[int, Setup]) -> Image:
+    """Return the image of BigDataViewer's container: setups are channels.
+
+    setups  the folders of the setups, each with a slash at its end
+    told    the setups of the XML, by their indices
+    """
+    times = _count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)
+    levels = _levels(files, f"{setups[0]}timepoint0")
+    views = [
+        [
+            [_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups]
+            for t in range(times)
+        ]
+        for index in range(len(levels))
+    ]
+    group = files.attributes(setups[0].rstrip("/"))
+    stated = _spacing(files.attributes(f"{setups[0]}timepoint0"), "zyx")
+    scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
+    return image_of(files.where, views, scales, stated, told)
+
+
+def _dataset(files: N5Files, path: str) -> N5Array:
+    return N5Array(files, path, files.attributes(path))
+
+
+def _count(files: N5Files, pattern: str, most: int) -> int:
+    count = 0
+    while count < most and "dimensions" in files.attributes(pattern.format(count)):
+        count += 1
+    return count
+
+
+def _factors(
+    group: Mapping[str, Any], level: Mapping[str, Any], index: int, axes: Sequence[str]
+) -> Triple | None:
+    """Return level 0's voxels per voxel, (z, y, x); None: not stated."""
+    stated = level.get("downsamplingFactors")
+    for name in ("downsamplingFactors", "scales"):
+        every = group.get(name)
+        if stated is None and isinstance(every, list) and index < len(every):
+            stated = every[index]
+    try:
+        found = [float(value) for value in stated or ()]
+    except (TypeError, ValueError):
+        return None
+    along = dict(zip(reversed(axes), found, strict=False))
+    if len(found) == 3:
+        along = dict(zip(reversed([a for a in axes if a in "zyx"]), found, strict=True))
+    values = [along.get(axis, 0.0) for axis in "zyx"]
+    return (values[0], values[1], values[2]) if min(values) > 0 else None
+
+
+def _spacing(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | None:
+    """Return the spacing (z, y, x), um, of a level's or a group's attributes; None: not stated."""
+    transform = attributes.get("transform")  # COSEM's, axes slowest first
+    if isinstance(transform, Mapping) and isinstance(transform.get("scale"), list):
+        listed = transform.get("axes")
+        named = [str(axis) for axis in listed] if isinstance(listed, list) else []
+        if set("zyx") <= set(named) and math.prod(named.count(a) for a in "zyx") == 1:
+            return spacing_of(_floats(transform["scale"]), transform.get("units"), named)
+    sizes: Any = attributes.get("pixelResolution", attributes.get("resolution"))
+    unit: Any = None
+    if isinstance(sizes, Mapping):
+        sizes, unit = sizes.get("dimensions"), sizes.get("unit")
+    unit = unit or attributes.get("units", attributes.get("unit"))
+    if isinstance(unit, list):
+        unit = unit[::-1]
+    return spacing_of(_floats(sizes)[::-1], unit, axes)
+
+
+def _floats(values: Any) -> list[float]:
+    try:
+        return [float(value) for value in values or ()]
+    except (TypeError, ValueError):
+        return []
+
+
+def _whole(where: str, attributes: Mapping[str, Any], name: str) -> list[int]:
+    values = attributes.get(name)
+    if not isinstance(values, list) or not all(
+        isinstance(value, int) and 0 < value < 1 << 40 for value in values
+    ):
+        raise SourceError(f"{where}: {name}: found {values!r:.60}, expected sizes above 0")
+    return values

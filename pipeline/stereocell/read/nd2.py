@@ -1,0 +1,111 @@
+"""Nikon ND2, by the library nd2 (BSD; the extra `nd2`). Stage positions are series."""
+
+import os
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read import extras
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
+from stereocell.read.plane_array import PlaneArray
+from stereocell.read.series import Candidate, choose, counted, lines
+from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_file
+
+_IN_FRAME = "CYXS"  # axes inside a frame
+
+
+class _File:
+    """An open file: its sizes by axis, of which P counts stage positions."""
+
+    def __init__(self, location: Location, stack: ExitStack) -> None:
+        self.where = location.shown
+        require_file(location)
+        library = extras.load("nd2", "nd2", self.where, "ND2")
+        with one_line(self.where, "an ND2 file that is whole"):
+            self.nd2: Any = stack.enter_context(library.ND2File(os.path.realpath(location.path)))
+            self.sizes = {str(axis): int(size) for axis, size in self.nd2.sizes.items()}
+            self.dtype = np.dtype(self.nd2.dtype)
+            self.spacing = _spacing(self.nd2, self.sizes)
+
+    def size(self, axis: str) -> int:
+        return self.sizes.get(axis, 1)
+
+    def candidates(self) -> list[Candidate]:
+        z, y, x = (self.size(axis) for axis in "ZYX")
+        label = f"{z} x {y} x {x} voxels, {counted(self.size('C'), 'channel')}"
+        label += f", {self.size('T')} points in time" if self.size("T") > 1 else ""
+        label += (
+            f", spacing {','.join(f'{s:.4g}' for s in self.spacing)} um" if self.spacing else ""
+        )
+        return [Candidate(label, z * y * x if z > 1 else 0)] * self.size("P")
+
+
+def read_image(location: Location, series: int = 0) -> Image:
+    """Return the image of one position; 0 is the first. Raises SourceError, UsageError."""
+    stack = ExitStack()
+    try:
+        file = _File(location, stack)
+        index, notes = choose(file.where, file.candidates(), series)
+        return _image(file, index, notes, stack)
+    except BaseException:
+        stack.close()
+        raise
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each position. Raises SourceError."""
+    with ExitStack() as stack:
+        return lines(_File(location, stack).candidates())
+
+
+def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack) -> Image:
+    for axis, size in file.sizes.items():
+        if axis not in "PTCZYX" and size > 1:
+            kind = "samples (RGB)" if axis == "S" else f"of axis {axis}"
+            raise SourceError(
+                f"{file.where}: found {size} {kind}, expected z, y, x, channels, time and positions"
+            )
+    if (count := file.size("C")) > MAX_CHANNELS:
+        raise SourceError(f"{file.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    loops = [axis for axis in file.sizes if axis not in _IN_FRAME]
+    lengths = [file.sizes[axis] for axis in loops]
+
+    def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
+        wanted = {"P": position, **dict(zip("TZC", place, strict=True))}
+        at = [wanted.get(axis, 0) for axis in loops]
+        number = int(np.ravel_multi_index(at, lengths)) if loops else 0
+        frame = np.asarray(file.nd2.read_frame(number)).squeeze()
+        return (frame[wanted["C"]] if count > 1 else frame)[rows, columns]
+
+    shape = (file.size("T"), file.size("Z"), count, file.size("Y"), file.size("X"))
+    array = VoxelArray(PlaneArray(shape, file.dtype, read), tuple("tzcyx"))
+    with one_line(file.where, "an ND2 file with metadata of its channels"):
+        names, colors = _channels(file.nd2, count)
+    return Image(
+        (array,), (Grid(array.shape, file.spacing),), names, colors, 1, stack.close, notes=notes
+    )
+
+
+def _spacing(nd2: Any, sizes: dict[str, int]) -> Triple | None:
+    """Return the spacing (z, y, x), um; None: not stated. The library has 1 where z is missing."""
+    size = nd2.voxel_size()
+    z, y, x = (float(value) for value in (size.z, size.y, size.x))
+    return (z, y, x) if min(z, y, x) > 0 and "Z" in sizes else None
+
+
+def _channels(nd2: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
+    stated = list(getattr(nd2.metadata, "channels", None) or [])[:count]
+    names = [(one.channel.name or "").strip() or None for one in stated]
+    colors: list[Color | None] = []
+    for one in stated:
+        color = getattr(one.channel, "color", None)
+        rgb = (color.r, color.g, color.b) if color is not None else None
+        colors.append(linear_color(rgb) if rgb else None)
+    lacking = [None] * (count - len(names))
+    return (*names, *lacking), (*colors, *lacking)

@@ -1,0 +1,250 @@
+"""NRRD: .nrrd, and .nhdr with its voxels in a file beside it. pynrrd reads the fields.
+
+Where `space` names anatomical axes the image lies in the patient, in mm unless `space units` says
+otherwise. Without (Fiji, CMTK) it is a stack: x, y, z as stored, the spacing in `space units`.
+pynrrd's own `read_data` reads the whole file, and opens a file of voxels wherever it lies; so the
+voxels are read by file_array.py. Comments and `key:=value` pairs may identify a patient.
+
+References: https://teem.sourceforge.net/nrrd/format.html
+"""
+
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import nrrd
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import StoredArray, VoxelArray
+from stereocell.read.file_array import FileArray, PackedArray, unpack
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.patient_grid import place
+from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_file, require_own
+
+NAME = "NRRD"
+_MAX_HEADER = 1 << 20  # bytes
+_MAX_LINES = 10_000  # `line skip`
+_TYPES = {
+    "i1": ("signed char", "int8", "int8_t"),
+    "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
+    "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
+    "u2": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
+    "i4": ("int", "signed int", "int32", "int32_t"),
+    "u4": ("uint", "unsigned int", "uint32", "uint32_t"),
+    "i8": ("longlong", "long long", "long long int", "signed long long", "int64", "int64_t"),
+    "u8": ("ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"),
+    "f4": ("float",),
+    "f8": ("double",),
+}
+_PACKINGS = {"gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"}
+_SIDES = {"left": (0, 1), "right": (0, -1), "posterior": (1, 1), "anterior": (1, -1)}
+_SIDES |= {"superior": (2, 1), "inferior": (2, -1)}  # word -> (axis of LPS, sign)
+_SHORT = {"LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
+_SHORT |= {"RAS": "right-anterior-superior", "RPS": "right-posterior-superior"}
+_IN_MM = ("scanner-xyz", "scanner-xyz-time")
+
+
+def read_image(location: Location) -> Image:
+    """Return the image of the file, with all its time points. Raises SourceError."""
+    where = location.shown
+    require_file(location)
+    fields, end = _header(location)
+    shape = [int(n) for n in np.atleast_1d(fields["sizes"])]
+    directions = _directions(where, fields, len(shape))
+    names = _axes(where, fields, shape, directions)
+    array = _array(location, fields, end, shape[::-1])
+    axes = tuple(reversed(names))
+    sizes = [shape[names.index(axis)] for axis in "ijk"]
+    if (count := shape[names.index("c")] if "c" in names else 1) > MAX_CHANNELS:
+        raise SourceError(f"{where}: sizes: found {count} values, expected at most {MAX_CHANNELS}")
+    spatial = directions[[names.index(axis) for axis in "ijk"]]
+    to_lps = _to_lps(where, fields)
+    if to_lps is None:
+        swapped = {"i": "x", "j": "y", "k": "z"}
+        voxels = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
+        z, y, x = reversed(sizes)
+        grid, placed_notes = Grid((z, y, x), _spacing(fields, spatial)), _turned(spatial)
+        unnamed = (None,) * count
+        return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=placed_notes)
+    affine = np.eye(4)
+    unit = _unit(fields)
+    affine[:3, :3] = to_lps @ spatial.T * (unit / 1000.0)
+    origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
+    affine[:3, 3] = to_lps @ np.where(np.isfinite(origin), origin, 0.0) * (unit / 1000.0)
+    placed = place(where, array, axes, affine, "space directions")
+    return Image(
+        arrays=(placed.array,),
+        grids=(placed.grid,),
+        names=(NAME,) if count == 1 else (None,) * count,
+        colors=(None,) * count,
+        images=1,
+        title=NAME,
+        placement=placed.placement,
+        notes=placed.notes,
+    )
+
+
+def _header(location: Location) -> tuple[Mapping[str, Any], int]:
+    """Return the fields and the length of the header, the empty line included, in bytes."""
+    where = location.shown
+    with one_line(where, f"an {NAME} file (.nrrd, .nhdr)"), open(location.path, "rb") as file:
+        content = file.read(_MAX_HEADER)
+        if not content.startswith(b"NRRD"):
+            raise ValueError("no `NRRD` at the start")
+        blank = re.search(rb"\n\r?\n", content)
+        head = content[: blank.start()] if blank else content
+        fields = nrrd.read_header([f"{line}\n" for line in head.decode("latin-1").splitlines()])
+        missing = {"sizes", "type", "encoding"} - set(fields)
+        if missing:
+            raise KeyError(min(missing))
+        fields["sizes"] = np.atleast_1d(fields["sizes"])
+        if min(fields["sizes"]) < 1 or len(fields["sizes"]) != fields["dimension"]:
+            raise ValueError(f"sizes: {fields['sizes'].tolist()}")
+    return fields, blank.end() if blank else len(content)
+
+
+def _directions(where: str, fields: Mapping[str, Any], count: int) -> NDArray[np.float64]:
+    """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction."""
+    stated = fields.get("space directions")
+    found = np.full((count, 3), np.nan)
+    if stated is None:  # only lengths; the axes of space are the first three that have one
+        spacings = np.full(count, np.nan)
+        given = np.ravel(fields.get("spacings", ())).astype(float)[:count]
+        spacings[: len(given)] = given
+        kinds = list(fields.get("kinds", ()))
+        known = [i for i, kind in enumerate(kinds[:count]) if kind in ("domain", "space")]
+        known = known or [i for i in range(count) if np.isfinite(spacings[i]) or count == 3]
+        for row, index in enumerate(known[:3]):
+            found[index] = np.eye(3)[row] * (spacings[index] if len(given) else np.nan)
+            found[index, row] = spacings[index] if np.isfinite(spacings[index]) else 0.0
+        return np.where(np.isnan(found) & np.isin(np.arange(count), known)[:, None], 0.0, found)
+    rows = [np.ravel(row) if row is not None else [np.nan] * 3 for row in stated]
+    if len(rows) != count or any(len(row) != 3 for row in rows):
+        raise SourceError(
+            f"{where}: space directions: found {len(rows)} of {sorted({len(r) for r in rows})} "
+            f"numbers, expected {count} of 3"
+        )
+    return np.array(rows, float)
+
+
+def _axes(
+    where: str, fields: Mapping[str, Any], shape: Sequence[int], directions: NDArray[np.float64]
+) -> list[str]:
+    """Return the names of the axes, fastest first: i, j, k of space, t and c."""
+    spatial = [index for index in range(len(shape)) if np.isfinite(directions[index]).all()]
+    if len(spatial) != 3:
+        raise SourceError(
+            f"{where}: sizes {list(shape)}: found {len(spatial)} axes of space, expected 3 by "
+            "`space directions`, `spacings` or `kinds` (a volume needs at least 2 planes)"
+        )
+    kinds = list(fields.get("kinds", ())) + [""] * len(shape)
+    names = [f"single{index}" for index in range(len(shape))]
+    for name, index in zip("ijk", spatial, strict=True):
+        names[index] = name
+    for index in set(range(len(shape))) - set(spatial):
+        name = "t" if str(kinds[index]) == "time" else "c"
+        if name in names and shape[index] > 1:
+            raise SourceError(
+                f"{where}: kinds: found {kinds[: len(shape)]}, expected one axis of time, and one "
+                "of values, beside those of space"
+            )
+        if name not in names:
+            names[index] = name
+    return names
+
+
+def _to_lps(where: str, fields: Mapping[str, Any]) -> NDArray[np.float64] | None:
+    """Return the matrix (3, 3) from the file's space to LPS; None: it names no anatomical axes."""
+    space = str(fields.get("space", ""))
+    words = _SHORT.get(space.upper()[:3], space).lower().removesuffix("-time").split("-")
+    if not all(word in _SIDES for word in words):
+        return np.eye(3) if space.lower() in _IN_MM else None
+    matrix = np.zeros((3, 3))
+    for column, word in enumerate(words):
+        axis, sign = _SIDES[word]
+        matrix[axis, min(column, 2)] += sign
+    if len(words) != 3 or abs(np.linalg.det(matrix)) != 1:
+        raise SourceError(f"{where}: space: found {space!r:.60}, expected three axes of the body")
+    return matrix
+
+
+def _unit(fields: Mapping[str, Any]) -> float:
+    """Return um for each unit of the patient's space: mm where none is stated, as Slicer writes."""
+    return _stated_unit(fields) or 1000.0
+
+
+def _stated_unit(fields: Mapping[str, Any]) -> float | None:
+    units = [str(unit).strip(' "') for unit in fields.get("space units", fields.get("units", ()))]
+    found = {um_per(unit) or um_per(unit.removesuffix("s")) for unit in units if unit}
+    return found.pop() if len(found) == 1 else None
+
+
+def _spacing(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> Triple | None:
+    unit = _stated_unit(fields)
+    x, y, z = (float(length) for length in np.linalg.norm(spatial, axis=1))
+    return None if unit is None or min(x, y, z) == 0 else (z * unit, y * unit, x * unit)
+
+
+def _turned(spatial: NDArray[np.float64]) -> tuple[str, ...]:
+    """Note directions that are not along x, y, z: outside a patient they are not followed."""
+    is_straight = np.array_equal(spatial, np.diag(np.abs(np.diag(spatial))))
+    return () if is_straight else ("axes turned or mirrored by `space directions`: as stored",)
+
+
+def _array(
+    location: Location, fields: Mapping[str, Any], end: int, shape: Sequence[int]
+) -> StoredArray:
+    """Return the voxels, which lie behind the header or in a file beside it."""
+    where, stated = location.shown, str(fields["type"])
+    kind = next((kind for kind, names in _TYPES.items() if stated in names), None)
+    if kind is None:
+        raise SourceError(f"{where}: type: found {stated!r:.40}, expected whole or real numbers")
+    endian = fields.get("endian", "little" if kind.endswith("1") else None)
+    if endian not in ("little", "big"):
+        raise SourceError(f"{where}: endian: found {endian!r:.40}, expected little or big")
+    dtype = np.dtype((">" if endian == "big" else "<") + kind)
+    path = os.path.realpath(location.path)
+    named = fields.get("data file", fields.get("datafile"))
+    if named is not None:
+        if str(named).upper().startswith("LIST") or "%" in str(named):
+            raise SourceError(
+                f"{where}: data file: found a list of files, expected one: write it anew as .nrrd"
+            )
+        path, end = os.path.join(os.path.dirname(path), str(named)), 0
+        where = f"{where}: data file {str(named)!r:.200}"
+        require_own(path, [location.folder], named=where)
+        if not Path(path).is_file():
+            raise SourceError(f"{where}: not found, expected the voxels beside the header")
+    skip = int(fields.get("byte skip", fields.get("byteskip", 0)))
+    end = _after_lines(path, end, int(fields.get("line skip", fields.get("lineskip", 0))))
+    encoding = str(fields["encoding"]).lower()
+    if encoding == "raw":
+        if skip < 0:  # the voxels are the last bytes of the file
+            end, skip = max(0, os.path.getsize(path) - math.prod(shape) * dtype.itemsize), 0
+        return FileArray(path, shape, dtype, end + skip, where)
+    if encoding not in _PACKINGS or skip < 0:
+        raise SourceError(
+            f"{where}: encoding: found {encoding!r:.40}, byte skip {skip}, expected raw, gzip or "
+            "bzip2: write it anew"
+        )
+    load = partial(unpack, path, shape, dtype, _PACKINGS[encoding], end, skip)
+    return PackedArray(shape, dtype, load)
+
+
+def _after_lines(path: str, start: int, count: int) -> int:
+    """Return the place in a file after some lines, in bytes."""
+    if count <= 0:
+        return start
+    with open(path, "rb") as file:
+        file.seek(start)
+        for _ in range(min(count, _MAX_LINES)):
+            file.readline(_MAX_HEADER)
+        return file.tell()

@@ -1,0 +1,91 @@
+"""The canonical form of an array that an affine places in the patient (anatomical_axes.py)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.model.rigid_transform import Matrix
+from stereocell.model.tiling import Box
+from stereocell.read.anatomical_axes import Canonical, canonical_of
+from stereocell.read.dataset import StoredArray, VoxelArray
+from stereocell.read.file_array import FlippedArray
+from stereocell.read.resample import orthogonal_grid, resample_sheared
+from stereocell.read.spacing import Grid
+from stereocell.read.whole_array import WholeArray
+
+_SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
+_MIN_VOLUME = 0.1  # of the three unit axes' parallelepiped; below, they lie in a plane
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Voxels on canonical axes, their grid, and their place in the patient's world."""
+
+    array: VoxelArray
+    grid: Grid
+    placement: Matrix
+    notes: tuple[str, ...] = ()
+
+
+def place(
+    where: str, array: StoredArray, axes: tuple[str, ...], affine: NDArray[np.float64], field: str
+) -> Placed:
+    """Return an array's canonical form: flipped and permuted on reading, a window at a time.
+
+    axes    of the array; i, j, k are those of the affine, t and c may be there
+    affine  (4, 4) for columns: from (i, j, k, 1) to LPS in mm
+    field   of the header that holds it, for messages
+
+    Skew axes are resampled onto an orthogonal grid, which reads a time point whole. Raises
+    SourceError where the affine has no three axes.
+    """
+    lengths = np.linalg.norm(affine[:3, :3], axis=0)
+    is_sound = np.isfinite(affine).all() and lengths.min() > 0
+    if not is_sound or abs(np.linalg.det(affine[:3, :3] / lengths)) < _MIN_VOLUME:
+        raise SourceError(f"{where}: {field}: found no three axes, expected an affine of space")
+    i, j, k = (int(array.shape[axes.index(axis)]) for axis in "ijk")
+    unit = affine[:3, :3] / lengths
+    if np.abs(unit.T @ unit - np.eye(3)).max() > _SKEW:
+        return _resampled(where, array, axes, affine)
+    canonical = canonical_of(affine, (i, j, k))
+    names, flips = list(axes), [False] * len(axes)
+    for name, stored, flip in zip("zyx", canonical.order, canonical.flips, strict=True):
+        names[axes.index("ijk"[stored])] = name
+        flips[axes.index("ijk"[stored])] = flip
+    voxels = VoxelArray(FlippedArray(array, flips) if any(flips) else array, tuple(names))
+    return Placed(voxels, Grid(voxels.shape, canonical.spacing_um), canonical.placement)
+
+
+def _resampled(
+    where: str, array: StoredArray, axes: tuple[str, ...], affine: NDArray[np.float64]
+) -> Placed:
+    swapped = {"i": "x", "j": "y", "k": "z"}
+    stored = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
+    if stored.size("c") > 1:
+        raise SourceError(
+            f"{where}: skew axes and {stored.size('c')} values for each voxel, expected one of both"
+        )
+    shape, orthogonal = orthogonal_grid(stored.shape[::-1], affine)
+    canonical = canonical_of(orthogonal, shape)
+    z, y, x = (shape[axis] for axis in canonical.order)
+    whole = WholeArray(
+        (stored.size("t"), z, y, x),
+        np.dtype(array.dtype).newbyteorder("="),
+        lambda time: _load(stored, affine, canonical, time),
+    )
+    return Placed(
+        VoxelArray(whole, ("t", "z", "y", "x")),
+        Grid((z, y, x), canonical.spacing_um),
+        canonical.placement,
+        ("the affine has skew axes: resampled onto an orthogonal grid",),
+    )
+
+
+def _load(
+    stored: VoxelArray, affine: NDArray[np.float64], canonical: Canonical, time: int
+) -> NDArray[Any]:
+    voxels = stored.window(time, 0, Box((0, 0, 0), stored.shape)).transpose()
+    return canonical.apply(resample_sheared(voxels, affine)[0])

@@ -1,0 +1,42 @@
+"""Voxels of a library that returns one plane at a time, or a part of one."""
+
+from collections.abc import Callable, Sequence
+from itertools import product
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# (indices of the plane, rows, columns) -> voxels (rows, columns)
+ReadPlane = Callable[[tuple[int, ...], slice, slice], NDArray[Any]]
+
+
+class PlaneArray:
+    """An array whose last two axes are a plane's. Planes are read one by one, and not cached."""
+
+    def __init__(self, shape: Sequence[int], dtype: np.dtype[Any], read: ReadPlane) -> None:
+        self.shape: tuple[int, ...] = tuple(shape)
+        self.dtype = dtype
+        self.chunks: tuple[int, ...] = (*(1 for _ in shape[:-2]), *shape[-2:])
+        self._read = read
+        self._lock = Lock()  # of the library's file
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        """Return voxels by whole numbers, and slices of step 1 that lie inside."""
+        bounds = [
+            part.indices(size)[:2] if isinstance(part, slice) else (int(part), int(part) + 1)
+            for part, size in zip(key, self.shape, strict=True)
+        ]
+        found = np.empty([stop - start for start, stop in bounds], self.dtype)
+        rows, columns = (slice(*bound) for bound in bounds[-2:])
+        for place in product(*(range(stop - start) for start, stop in bounds[:-2])):
+            index = tuple(at + start for at, (start, _) in zip(place, bounds, strict=False))
+            with self._lock:
+                plane = self._read(index, rows, columns)
+            if plane.shape != found[place].shape:
+                raise ValueError(
+                    f"plane {index}: found {plane.shape} voxels, not {found[place].shape}"
+                )
+            found[place] = plane
+        return found[tuple(slice(None) if isinstance(part, slice) else 0 for part in key)]

@@ -1,0 +1,171 @@
+"""One file of a folder of planes: what its head says, and its pixels."""
+
+import os
+import struct
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import imagecodecs
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+from tifffile import TiffFile
+
+from stereocell.model.errors import SourceError
+from stereocell.read.spacing import PartialTriple
+from stereocell.read.tiff.open_file import open_tiff, require_pages
+from stereocell.read.tiff.stated import stated_by
+from stereocell.storage.first_bytes import HEAD_BYTES, describe
+from stereocell.storage.library_errors import collected_log, one_line
+from stereocell.storage.location import Location
+
+TIFF = (".tif", ".tiff", ".stk", ".lsm")
+PNG = (".png",)
+JPEG = (".jpg", ".jpeg")
+_PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+_PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
+_JPEG_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What a file holds.
+
+    shape    rows, columns, samples (colour and alpha; 1: grey)
+    pages    more than one: the file is a stack, or no plane
+    spacing_um  (z, y, x), um, as far as it is stated
+    z_um     where the plane lies along z, um; None: not stated
+    """
+
+    shape: tuple[int, int, int]
+    dtype: np.dtype[Any]
+    pages: int = 1
+    spacing_um: PartialTriple = (None, None, None)
+    z_um: float | None = None
+
+    @property
+    def words(self) -> str:
+        """Size and dtype, for messages."""
+        rows, columns, samples = self.shape
+        colour = f", {samples} samples a pixel" if samples > 1 else ""
+        return f"{columns} x {rows} pixels of {self.dtype.name}{colour}"
+
+
+def read_head(path: str, named: str) -> Head:
+    """Return what a file says of itself; no pixels are decoded. Raises SourceError."""
+    with collected_log("tifffile"), one_line(named, "an image that is whole"):
+        return _FORMATS[_kind(path)].head(path, named)
+
+
+def read_plane(path: str, named: str) -> NDArray[Any]:
+    """Return the pixels, (rows, columns, samples), in the file's dtype. Raises SourceError."""
+    with collected_log("tifffile"), one_line(named, "an image that is whole"):
+        found = _FORMATS[_kind(path)].plane(path, named)
+    return found[..., None] if found.ndim == 2 else found
+
+
+def _kind(path: str) -> str:
+    lower = path.lower()
+    return "tiff" if lower.endswith(TIFF) else "png" if lower.endswith(PNG) else "jpeg"
+
+
+def _open(path: str, stack: ExitStack) -> TiffFile:
+    return open_tiff(Location(path, True), stack)
+
+
+def _tiff_head(path: str, named: str) -> Head:
+    with ExitStack() as stack:
+        tiff = _open(path, stack)
+        page, pages = tiff.pages.first, len(tiff.pages)
+        if page.dtype is None:
+            raise SourceError(f"{named}: found pixels of no known type, expected numbers")
+        if tiff.is_stk or tiff.is_lsm:
+            pages = 2  # one directory may hold a stack
+        if pages == 1:
+            require_pages(named, tiff, [page], 1)
+            described = (tiff.imagej_metadata or {}) if tiff.is_imagej else {}
+            images = described.get("images", 1)  # of ImageJ's one directory over 4 GB
+            pages = images if isinstance(images, int) else 1
+        plane = (tiff.metaseries_metadata or {}).get("PlaneInfo", {}) if tiff.is_metaseries else {}
+        z_um = plane.get("z-position")
+        return Head(
+            (page.imagelength, page.imagewidth, page.samplesperpixel),
+            np.dtype(page.dtype),
+            pages,
+            stated_by(tiff).spacing_um,
+            float(z_um) if isinstance(z_um, int | float) else None,
+        )
+
+
+def _tiff_plane(path: str, named: str) -> NDArray[Any]:
+    with ExitStack() as stack:
+        page = _open(path, stack).pages.first
+        pixels = page.asarray()
+        is_planar = page.samplesperpixel > 1 and page.planarconfig == 2
+        return np.moveaxis(pixels, 0, -1) if is_planar else pixels
+
+
+def _png_head(path: str, named: str) -> Head:
+    head = _begin(path, named, _PNG_MAGIC, "PNG")
+    if len(head) < 33:
+        raise SourceError(f"{named}: cut short at byte {len(head)}, expected the whole file")
+    columns, rows, bits, colour = struct.unpack(">2I2B", head[16:26])
+    if colour not in _PNG_SAMPLES:
+        raise SourceError(f"{named}: found a palette, expected grey or RGB pixels")
+    if not (rows and columns):
+        raise SourceError(f"{named}: found {columns} x {rows} pixels, expected at least one")
+    return Head(
+        (rows, columns, _PNG_SAMPLES[colour]), np.dtype(np.uint16 if bits == 16 else np.uint8)
+    )
+
+
+def _png_plane(path: str, named: str) -> NDArray[Any]:
+    # not by pillow, which cuts 16-bit RGB to 8 bits
+    with open(path, "rb") as file:
+        return np.asarray(imagecodecs.png_decode(file.read()))
+
+
+def _jpeg_head(path: str, named: str) -> Head:
+    _begin(path, named, b"\xff\xd8", "JPEG")
+    try:
+        with Pillow.open(path) as image:
+            columns, rows = image.size
+            mode = image.mode
+    except Pillow.DecompressionBombError as error:
+        raise SourceError(f"{named}: {error!s:.100}, expected a smaller image") from error
+    if mode not in _JPEG_SAMPLES:
+        raise SourceError(f"{named}: found pixels of kind {mode}, expected grey or RGB")
+    return Head((rows, columns, _JPEG_SAMPLES[mode]), np.dtype(np.uint8))
+
+
+def _jpeg_plane(path: str, named: str) -> NDArray[Any]:
+    with Pillow.open(path) as image:
+        return np.asarray(image)
+
+
+def _begin(path: str, named: str, magic: bytes, title: str) -> bytes:
+    with open(path, "rb") as file:
+        head = file.read(HEAD_BYTES)
+    if not head.startswith(magic):
+        raise SourceError(f"{named}: found {describe(head)}, expected {title}")
+    return head
+
+
+@dataclass(frozen=True, slots=True)
+class _Format:
+    head: Callable[[str, str], Head]
+    plane: Callable[[str, str], NDArray[Any]]
+
+
+_FORMATS = {
+    "tiff": _Format(_tiff_head, _tiff_plane),
+    "png": _Format(_png_head, _png_plane),
+    "jpeg": _Format(_jpeg_head, _jpeg_plane),
+}
+
+
+def join(folder: str, path: str) -> str:
+    """Return the place on the disk of a file that is named relative to a folder, with `/`."""
+    return os.path.join(folder, *path.split("/"))

@@ -1,0 +1,110 @@
+"""Voxels of a TIFF's series as lazy arrays: tifffile serves strips and tiles as chunks of Zarr."""
+
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+from tifffile import TiffPage, TiffPageSeries
+
+from stereocell.model.errors import SourceError
+from stereocell.read.array_axes import given_axes
+from stereocell.read.dataset import StoredArray, VoxelArray
+from stereocell.read.image import Color
+
+_RGB, _PALETTE, _WHITE_IS_ZERO = 2, 3, 0  # TIFF tag PhotometricInterpretation
+RGB_NAMES = ("Red", "Green", "Blue")
+RGB_COLORS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # linear
+
+
+def array_of(series: TiffPageSeries, level: int) -> VoxelArray:
+    """Return a level's voxels. Axes of length 1 are squeezed out: tifffile 2026.5 requires it."""
+    array = zarr.open_array(series.aszarr(level=level), mode="r")
+    # tifffile's store is Zarr v3 from 2026.5 on, v2 before; each names the axes in its own way
+    names: Any = getattr(array.metadata, "dimension_names", None)
+    names = names or array.attrs["_ARRAY_DIMENSIONS"]
+    return VoxelArray(array, tuple(str(name).lower().rstrip("0123456789") for name in names))
+
+
+class FirstAlong:
+    """An array at index 0 of one of its axes."""
+
+    def __init__(self, array: StoredArray, axis: int) -> None:
+        self._array, self._axis = array, axis
+        self.shape = self._without(array.shape)
+        self.chunks = self._without(array.chunks)
+        self.dtype = array.dtype
+
+    def _without(self, values: tuple[int, ...]) -> tuple[int, ...]:
+        return (*values[: self._axis], *values[self._axis + 1 :])
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        return np.asarray(self._array[(*key[: self._axis], 0, *key[self._axis :])])
+
+
+def with_given_axes(where: str, arrays: list[VoxelArray], axes: str) -> list[VoxelArray]:
+    """Return arrays whose axes are the user's letters. Raises UsageError where those don't fit.
+
+    axes  of all, or of those longer than 1, slowest first, as `zcyx`
+    """
+    renamed = given_axes(where, arrays[0].array.shape, axes)
+    return [VoxelArray(level.array, renamed) for level in arrays]
+
+
+def require_depth(where: str, finest: VoxelArray) -> None:
+    """Raise SourceError for a flat image whose times or channels may be slices after all."""
+    if finest.size("z") > 1:
+        return
+    for axis, noun in (("t", "points in time"), ("c", "channels")):
+        count = finest.size(axis)
+        if count > 1 and finest.axes[-1] != axis:  # else they are colours of pixels
+            lengths = {a: n for a, n in zip(finest.axes, finest.array.shape, strict=True) if n > 1}
+            asked = "".join("z" if a == axis else a for a in lengths)
+            raise SourceError(
+                f"{where}: a volume needs at least 2 planes: found 1 along z, and {count} {noun}; "
+                f"expected slices: --axes {asked} takes the {noun} for slices"
+            )
+
+
+def samples_as_channels(
+    where: str, arrays: list[VoxelArray], page: TiffPage
+) -> tuple[list[VoxelArray], tuple[str | None, ...], tuple[Color | None, ...], tuple[str, ...]]:
+    """Return arrays whose samples (axis s) are channels: their names, colours and notes.
+
+    page  the first one, whose tags say what the samples are
+
+    Raises SourceError where the file has channels beside its samples.
+    """
+    count = arrays[0].size("s")
+    if count < 2:
+        return arrays, (), (), ()
+    if arrays[0].size("c") > 1:
+        raise SourceError(
+            f"{where}: SamplesPerPixel: found {count} beside {arrays[0].size('c')} channels, "
+            "expected channels as planes alone, or samples alone"
+        )
+    renamed = []
+    for level in arrays:
+        axes = tuple("c" if a == "s" else "_" if a == "c" else a for a in level.axes)
+        renamed.append(VoxelArray(level.array, axes))
+    if page.photometric != _RGB:
+        return renamed, (None,) * count, (None,) * count, ()
+    notes = [f"colour pixels: built as channels {', '.join(RGB_NAMES)}"]
+    if count > len(RGB_NAMES):
+        notes.append("the alpha of its pixels is left out")
+    return renamed, RGB_NAMES, RGB_COLORS, tuple(notes)
+
+
+def notes_of(page: TiffPage) -> tuple[str, ...]:
+    """Return what is made of values that stand for something else, a sentence each."""
+    if page.photometric == _PALETTE and _is_coloured(page):
+        return ("the file has a palette: its numbers are built, not the palette's colours",)
+    if page.photometric == _WHITE_IS_ZERO:
+        return ("the file says that 0 is white: built as stored, so that 0 is dark",)
+    return ()
+
+
+def _is_coloured(page: TiffPage) -> bool:
+    """Whether a palette is more than a ramp of one colour, which looks like intensities."""
+    palette = page.colormap
+    return palette is None or not bool((np.diff(palette.astype(np.int64), axis=-1) >= 0).all())

@@ -1,0 +1,145 @@
+"""OME-TIFF, by tifffile, which serves every level as a Zarr array of the file's strips or tiles.
+
+bioio's reader, which stands on tifffile, is not used: it reads level 0 only (it leaves out
+sub-resolutions, in SubIFDs), reads a whole page for each window, opens the file anew for each page,
+refuses a file for a fault anywhere in its metadata, and takes 2 s to import.
+
+References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
+"""
+
+import math
+import os
+import re
+from collections.abc import Sequence
+from contextlib import ExitStack
+from xml.etree import ElementTree
+
+from tifffile import TiffFile, TiffPage
+
+from stereocell.model.errors import SourceError
+from stereocell.read import ome_xml
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.ome_xml import OmeImage
+from stereocell.read.spacing import Grid, grid_of
+from stereocell.read.tiff.arrays import (
+    array_of,
+    require_depth,
+    samples_as_channels,
+    with_given_axes,
+)
+from stereocell.read.tiff.open_file import MAX_PLANES, require_pages
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_own
+
+# Limits of the numbers in OME-XML and tags: the libraries allocate lists of such a length at once.
+_MAX_SIDE = 10_000_000  # voxels along an axis
+_MAX_LEVELS = 64  # of the pyramid
+_SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
+_CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
+
+
+def read_ome(
+    location: Location,
+    tiff: TiffFile,
+    stack: ExitStack,
+    *,
+    root: ElementTree.Element,
+    text: str,
+    log: Sequence[str],
+    axes: str,
+) -> Image:
+    """Return the first image of an open file.
+
+    root, text  the OME-XML, of the file or of the one beside it
+    log         grows by tifffile's messages
+    axes        of those longer than 1, slowest first; empty: as the OME-XML has them
+
+    Raises SourceError where it can't be read as an image.
+    """
+    where = location.shown
+    with one_line(where, "an OME-TIFF file, whole, with its OME-XML"):
+        _check_claims(where, tiff, text)
+        _check_files(location, tiff, root)
+        images = ome_xml.images_of(root, where)
+        series = tiff.series[0]
+        pages = [list(level.pages) for level in series.levels]
+        arrays = [array_of(series, index) for index in range(len(pages))]
+    if series.kind != "ome":
+        reason = f" ({log[-1]:.120})" if log else ""
+        raise SourceError(
+            f"{where}: planes don't match the OME-XML{reason}, expected a page for each plane"
+        )
+    for index, level in enumerate(pages):
+        require_pages(f"{where}: level {index}", tiff, level, len(level))
+    if axes:
+        arrays = with_given_axes(where, arrays, axes)
+    return _image(where, images, arrays, page=series.keyframe, stack=stack)
+
+
+def _check_claims(where: str, tiff: TiffFile, text: str) -> None:
+    """Raise SourceError where the OME-XML or the tags request more than any file holds."""
+    sizes: dict[str, int] = {}
+    for name, digits in _CLAIM.findall(text):
+        most = _MAX_SIDE if name in ("SizeX", "SizeY") else MAX_PLANES
+        if name == "SizeC":
+            most = MAX_CHANNELS
+        value = int(digits) if len(digits) < 20 else math.inf
+        if value > most:
+            raise SourceError(
+                f"{where}: OME-XML: {name}: found {digits:.20}, expected at most {most}"
+            )
+        sizes[name] = max(sizes.get(name, 1), int(value))
+    planes = math.prod(sizes.get(f"Size{axis}", 1) for axis in "ZCT")
+    if planes > MAX_PLANES:
+        raise SourceError(f"{where}: OME-XML: {planes} planes, expected at most {MAX_PLANES}")
+    tag = tiff.pages.first.tags.get(_SUB_IFDS)
+    if tag is not None and tag.count > _MAX_LEVELS:
+        raise SourceError(f"{where}: SubIFDs: found {tag.count}, expected at most {_MAX_LEVELS}")
+
+
+def _check_files(location: Location, tiff: TiffFile, root: ElementTree.Element) -> None:
+    """Raise SourceError where the OME-XML refers to a file outside the source's folder.
+
+    This runs before tifffile opens these files. For a remote source tifffile opens none.
+    """
+    if not location.is_local:
+        return
+    names = {  # each once: every plane may name its file
+        element.get("FileName"): None
+        for element in root.iter()
+        if element.tag.endswith("UUID") and element.text != root.get("UUID", "")
+    }
+    folder = location.folder
+    for name in names:
+        if name is not None:
+            named = f"{location.shown}: OME-XML: UUID FileName {name!r:.200}"
+            require_own(os.path.join(tiff.filehandle.dirname, name), [folder], named=named)
+
+
+def _image(
+    where: str,
+    images: list[OmeImage],
+    arrays: list[VoxelArray],
+    *,
+    page: TiffPage,
+    stack: ExitStack,
+) -> Image:
+    if not images:
+        raise SourceError(f"{where}: OME-XML: found no Image, expected one")
+    arrays, names, colors, notes = samples_as_channels(where, arrays, page)
+    require_depth(where, arrays[0])
+    first, count = images[0], len(names) or arrays[0].size("c")
+    unnamed = [None] * (count - len(first.names))
+    return Image(
+        tuple(arrays),
+        (
+            grid_of(arrays[0].shape, first.spacing_um),
+            *(Grid(level.shape) for level in arrays[1:]),
+        ),
+        names or (*first.names[:count], *unnamed),
+        colors or (*first.colors[:count], *unnamed),
+        len(images),
+        stack.close,
+        notes=notes,
+    )

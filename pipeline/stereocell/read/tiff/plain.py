@@ -1,0 +1,197 @@
+"""TIFF without OME-XML: pages of one size, and what ImageJ, Zeiss, MetaMorph and others add.
+
+tifffile knows these kinds and names the axes of each. Pages of which no one says what they are
+count as slices along z, and a note says so: time and channels are told by the file alone, but for
+two unknown axes, of which a short one is taken for channels.
+"""
+
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+
+import tifffile
+from tifffile import TiffFile, TiffPageSeries
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.spacing import Grid, grid_of
+from stereocell.read.tiff.arrays import (
+    FirstAlong,
+    array_of,
+    notes_of,
+    require_depth,
+    samples_as_channels,
+    with_given_axes,
+)
+from stereocell.read.tiff.open_file import MAX_PLANES, open_tiff, refuse_short, require_series
+from stereocell.read.tiff.stated import stated_by
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location, require_own
+
+_UNKNOWN = "qio"  # tifffile's axes of pages that are sequence, image, other
+_PLACES = {"r": "positions", "p": "positions", "m": "mosaic tiles", "v": "views"}
+_MOST_CHANNELS = 10  # of two unknown axes the one this short may be channels
+_INDEX, _MAX_INDEX = "NDTiff.index", 64 << 20  # of Micro-Manager's NDTiff: file, its most bytes
+_EXPECTED = "a TIFF of planes of one size"
+
+
+def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) -> Image:
+    """Return the largest image of an open TIFF. Raises SourceError, UsageError for the axes.
+
+    axes  of those longer than 1, slowest first; empty: what the file says, or a guess
+    """
+    where = location.shown
+    with one_line(where, _EXPECTED):
+        tiff, indexed = _with_index(location, tiff, stack)
+        _require_imagej_whole(where, tiff)
+        found = list(tiff.series)
+    if not found:
+        raise SourceError(f"{where}: found no image, expected pages")
+    series = max(found, key=lambda one: one.size)  # the first of those
+    with one_line(where, _EXPECTED):
+        for level in series.levels:
+            require_series(where, tiff, level)
+        arrays = [array_of(series, index) for index in range(len(series.levels))]
+        page = series.keyframe
+        stated = stated_by(tiff)
+    notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
+    arrays, more = _at_first_place(arrays)
+    notes += more
+    if axes:
+        arrays = with_given_axes(where, arrays, axes)
+    else:
+        arrays, more = _with_axes(where, arrays)
+        notes += more
+    arrays, names, colors, told = samples_as_channels(where, arrays, page)
+    notes += [*told, *notes_of(page)]
+    require_depth(where, arrays[0])
+    count = len(names) or arrays[0].size("c")
+    if count > MAX_CHANNELS or arrays[0].size("z") * arrays[0].size("t") > MAX_PLANES:
+        raise SourceError(
+            f"{where}: found {count} channels and {arrays[0].size('z')} planes at each of "
+            f"{arrays[0].size('t')} times, expected at most {MAX_CHANNELS} and {MAX_PLANES}"
+        )
+    unstated = (None,) * count
+    shape = arrays[0].shape
+    return Image(
+        tuple(arrays),
+        (
+            grid_of(shape, stated.spacing_um, stated.hint),
+            *(Grid(level.shape) for level in arrays[1:]),
+        ),
+        names or (*(stated.names or indexed), *unstated)[:count],
+        colors or (*stated.colors, *unstated)[:count],
+        1,
+        stack.close,
+        notes=tuple(notes),
+    )
+
+
+def _left_out(others: int) -> list[str]:
+    if not others:
+        return []
+    return [f"{others} other image{'s' * (others > 1)} in the file left out: the largest is built"]
+
+
+def _with_index(
+    location: Location, tiff: TiffFile, stack: ExitStack
+) -> tuple[TiffFile, tuple[str, ...]]:
+    """Return the file with its NDTiff index, which names axes and other files, where it has one.
+
+    The second value is the names of channels in the index.
+    """
+    folder = os.path.dirname(os.path.realpath(location.source))
+    index = os.path.join(folder, _INDEX)
+    if not location.is_local or not tiff.is_micromanager or not os.path.exists(index):
+        return tiff, ()
+    found = require_own(index, [location.folder], named=f"{location.shown}: {_INDEX}")
+    if found is None or found.st_size > _MAX_INDEX:
+        return tiff, ()
+    rows = list(tifffile.read_ndtiff_index(index))
+    for name in dict.fromkeys(row[1] for row in rows):
+        named = f"{location.shown}: {_INDEX}: {name!r:.200}"
+        require_own(os.path.join(folder, name), [location.folder], named=named)
+    # tifffile numbers channels in the order of their first planes
+    channels = dict.fromkeys(row[0].get("channel") for row in rows)
+    names = tuple(name for name in channels if isinstance(name, str))
+    return open_tiff(location, stack, is_ndtiff=None), names
+
+
+def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
+    """Raise SourceError where planes are missing that ImageJ's description counts."""
+    meta = tiff.imagej_metadata if tiff.is_imagej else None
+    if not meta:
+        return
+    sizes = [meta.get(key, 1) for key in ("channels", "slices", "frames")]
+    if not all(isinstance(size, int) and 0 < size <= MAX_PLANES for size in sizes):
+        raise SourceError(
+            f"{where}: ImageJ's description: found {sizes!r:.80} channels, slices and frames, "
+            f"expected whole numbers from 1 to {MAX_PLANES}"
+        )
+    page = tiff.pages.first
+    planes = max(sizes[0] // page.samplesperpixel, 1) * sizes[1] * sizes[2]
+    if planes > len(tiff.pages) and page.is_final and page.dataoffsets:
+        end = page.dataoffsets[0] + planes * page.nbytes
+        if end > tiff.filehandle.size:
+            refuse_short(where, tiff.filehandle.size, end)
+
+
+def _at_first_place(arrays: list[VoxelArray]) -> tuple[list[VoxelArray], list[str]]:
+    """Return the arrays at the first of several positions, and notes."""
+    notes = []
+    for axis, noun in _PLACES.items():
+        count = arrays[0].size(axis)
+        if count > 1:
+            notes.append(f"{count} {noun} in the file: the first is built")
+            arrays = [_first_along(level, axis) for level in arrays]
+    return arrays, notes
+
+
+def _first_along(level: VoxelArray, axis: str) -> VoxelArray:
+    place = level.axes.index(axis)
+    axes = (*level.axes[:place], *level.axes[place + 1 :])
+    return VoxelArray(FirstAlong(level.array, place), axes)
+
+
+def _with_axes(where: str, arrays: list[VoxelArray]) -> tuple[list[VoxelArray], list[str]]:
+    """Return the arrays with z, and channels, in the place of unknown axes, and a note."""
+    axes = arrays[0].axes
+    known = [axis for axis in axes if axis not in _UNKNOWN]
+    unknown = [place for place, axis in enumerate(axes) if axis in _UNKNOWN]
+    if not unknown and len(set(known)) == len(known):
+        return arrays, []
+    lengths = [int(arrays[0].array.shape[place]) for place in unknown]
+    meant = _meant(axes, lengths) if len(set(known)) == len(known) else None
+    if meant is None:
+        shape = ", ".join(str(n) for n in arrays[0].array.shape)
+        raise SourceError(
+            f"{where}: axes: found {''.join(axes).upper()} of {shape}, expected pages whose axes "
+            "are named: by the file (ImageJ, OME-TIFF), or by --axes, as zcyx"
+        )
+    names = dict(zip(unknown, meant, strict=True))
+    renamed = tuple(names.get(place, axis) for place, axis in enumerate(axes))
+    nouns = {"z": "slices along z", "c": "channels", "t": "points in time"}
+    told = " of ".join(
+        f"{length} {nouns[axis]}" for length, axis in zip(lengths, meant, strict=True)
+    )
+    note = f"the file doesn't say what its pages are: read as {told}"
+    return [VoxelArray(level.array, renamed) for level in arrays], [note]
+
+
+def _meant(axes: Sequence[str], lengths: list[int]) -> str | None:
+    """Return the axes that the unknown ones are taken for, one letter each; None: no guess."""
+    if len(lengths) == 1:
+        return next((axis for axis in "zct" if axis not in axes), None)
+    if len(lengths) > 2 or "z" in axes or "c" in axes:
+        return None
+    first, second = lengths
+    if min(first, second) > _MOST_CHANNELS or first == second:
+        return None
+    return "cz" if first < second else "zc"
+
+
+def kind_of(series: TiffPageSeries) -> str:
+    """Return what a series is, for messages: `imagej, ZYX of 5 x 64 x 64, uint16`."""
+    shape = " x ".join(str(n) for n in series.shape)
+    return f"{series.kind}, {series.axes} of {shape}, {series.dtype}"

@@ -1,0 +1,209 @@
+"""Metadata of a plain TIFF, by the program that wrote it: spacings, names and colours of channels.
+
+Resolutions in dots per inch are printers' and not read: only an inch that ImageJ names counts.
+Texts that a user typed (labels of slices, image names, descriptions) are not read either, but for
+channels' names.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from tifffile import TiffFile
+
+from stereocell.read.image import Color, linear_color
+from stereocell.read.spacing import PartialTriple, um_per
+
+_CENTIMETRE = 3  # TIFF tag ResolutionUnit
+_ESCAPED = re.compile(r"\\u([0-9A-Fa-f]{4})")
+_MAX_NAME = 60  # characters; longer texts are no names of channels
+_NOTHING: PartialTriple = (None, None, None)
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What a file says of its voxels; None: not stated.
+
+    spacing_um  (z, y, x), um
+    names       of channels, maybe fewer than there are; `colors` the same, linear RGB
+    hint        where a missing spacing may come from
+    """
+
+    spacing_um: PartialTriple = _NOTHING
+    names: tuple[str | None, ...] = ()
+    colors: tuple[Color | None, ...] = ()
+    hint: str = ""
+
+
+def stated_by(tiff: TiffFile) -> Stated:
+    """Return the metadata of an open file; a garbled entry counts as not stated."""
+    for flag, read in _READERS.items():
+        if getattr(tiff, flag):
+            stated = read(tiff)
+            break
+    else:
+        stated = Stated()
+    z, y, x = stated.spacing_um
+    if y is None and x is None:
+        _, y, x = _by_tags(tiff)
+    return replace(stated, spacing_um=(z, y, x))
+
+
+def _imagej(tiff: TiffFile) -> Stated:
+    meta = _mapping(tiff.imagej_metadata)
+    unit = meta.get("unit")
+    per = {axis: _um(meta.get(f"{axis}unit", unit)) for axis in "zyx"}
+    if unit is None and _resolution_unit(tiff) == _CENTIMETRE:
+        per = dict.fromkeys("zyx", um_per("cm"))
+    y, x = (_over(per[axis], _resolution(tiff, axis)) for axis in "yx")
+    z = _times(per["z"], meta.get("spacing"))
+    hint = "ImageJ leaves out a depth of 1" if "spacing" not in meta else ""
+    luts = meta.get("LUTs")
+    colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
+    return Stated((z, y, x), _imagej_names(meta), colors, hint)
+
+
+def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
+    """Return the labels that all planes of a channel share: those are names of channels.
+
+    Other labels tell slices, often by a file's name.
+    """
+    labels, channels = meta.get("Labels"), meta.get("channels", 1)
+    if not isinstance(labels, list) or not isinstance(channels, int) or channels < 2:
+        return ()
+    order = str(meta.get("order", "czt")).lower()
+    if order not in ("czt", "ctz", "default") or len(labels) < channels:
+        return ()
+    shared = [set(labels[index::channels]) for index in range(channels)]
+    if any(len(names) > 1 for names in shared):
+        return ()
+    names = [_name(next(iter(names))) for names in shared]
+    return tuple(names) if len(set(names)) == channels else ()
+
+
+def _lut_color(lut: Any) -> Color | None:
+    """Return the colour of the brightest value; None for a grey one."""
+    table = np.asarray(lut)
+    if table.shape[0] != 3 or table.ndim != 2:
+        return None
+    red, green, blue = (int(value) for value in table[:, -1])
+    return None if red == green == blue else linear_color((red, green, blue))
+
+
+def _lsm(tiff: TiffFile) -> Stated:
+    meta = _mapping(tiff.lsm_metadata)
+    z, y, x = (_times(1e6, meta.get(f"VoxelSize{axis}")) for axis in "ZYX")  # metres
+    channels = _mapping(meta.get("ChannelColors"))
+    names = tuple(_name(name) for name in channels.get("ColorNames") or ())
+    colors = tuple(_rgb(color) for color in channels.get("Colors") or ())
+    return Stated((z, y, x), names, colors)
+
+
+def _stk(tiff: TiffFile) -> Stated:
+    meta = _mapping(tiff.stk_metadata)
+    per = _um(meta.get("CalibrationUnits")) if meta.get("SpatialCalibration", 1) else None
+    y, x = (_times(per, meta.get(f"{axis}Calibration")) for axis in "YX")
+    steps = np.abs(np.atleast_1d(np.asarray(meta.get("ZDistance", ()), np.float64)))
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    z = float(np.median(steps)) if steps.size else None  # um, whatever the calibration's unit
+    return Stated((z, y, x))
+
+
+def _metaseries(tiff: TiffFile) -> Stated:
+    plane = _mapping(_mapping(tiff.metaseries_metadata).get("PlaneInfo"))
+    is_set = plane.get("spatial-calibration-state", False)
+    per = _um(plane.get("spatial-calibration-units")) if is_set else None
+    y, x = (_times(per, plane.get(f"spatial-calibration-{axis}")) for axis in "yx")
+    return Stated((None, y, x))
+
+
+def _micromanager(tiff: TiffFile) -> Stated:
+    summary = _mapping(_mapping(tiff.micromanager_metadata).get("Summary"))
+    side = _times(1.0, summary.get("PixelSize_um") or None)  # 0: not calibrated
+    z = _times(1.0, summary.get("z-step_um") or None)
+    names = summary.get("ChNames")
+    return Stated((z, side, side), tuple(map(_name, names)) if isinstance(names, list) else ())
+
+
+def _scanimage(tiff: TiffFile) -> Stated:
+    frame = _mapping(_mapping(tiff.scanimage_metadata).get("FrameData"))
+    step = frame.get("SI.hStackManager.stackZStepSize")
+    return Stated((_times(1.0, step or None), None, None))
+
+
+def _shaped(tiff: TiffFile) -> Stated:
+    """tifffile's own JSON; a caller of `imwrite` may have put ImageJ's words into it."""
+    described = tiff.shaped_metadata
+    meta = _mapping(described[0]) if described else {}
+    per = _um(meta.get("unit"))
+    y, x = (_over(per, _resolution(tiff, axis)) for axis in "yx")
+    return Stated((_times(per, meta.get("spacing")), y, x))
+
+
+# by tifffile's flags; the first that fits
+_READERS: dict[str, Callable[[TiffFile], Stated]] = {
+    "is_lsm": _lsm,
+    "is_stk": _stk,
+    "is_metaseries": _metaseries,
+    "is_imagej": _imagej,
+    "is_micromanager": _micromanager,
+    "is_scanimage": _scanimage,
+    "is_shaped": _shaped,
+}
+
+
+def _by_tags(tiff: TiffFile) -> PartialTriple:
+    """Return y and x where the tags state them per centimetre."""
+    per = um_per("cm") if _resolution_unit(tiff) == _CENTIMETRE else None
+    y, x = (_over(per, _resolution(tiff, axis)) for axis in "yx")
+    return None, y, x
+
+
+def _resolution_unit(tiff: TiffFile) -> int:
+    return int(tiff.pages.first.tags.valueof("ResolutionUnit", default=0))
+
+
+def _resolution(tiff: TiffFile, axis: str) -> float | None:
+    """Return the pixels per unit along y or x."""
+    value = tiff.pages.first.tags.valueof(f"{axis.upper()}Resolution")
+    if not isinstance(value, tuple) or len(value) != 2 or not value[0] or not value[1]:
+        return None
+    return float(value[0]) / float(value[1])
+
+
+def _um(unit: Any) -> float | None:
+    """Return a unit's um; ImageJ writes the micro sign of `um` as an escape of ASCII."""
+    if not isinstance(unit, str):
+        return None
+    text = _ESCAPED.sub(lambda found: chr(int(found[1], 16)), unit)
+    return um_per(text.replace("\u00c2", "").strip())  # the first byte of UTF-8's micro sign
+
+
+def _times(per: float | None, value: Any) -> float | None:
+    if per is None or isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return per * float(value) if math.isfinite(value) else None
+
+
+def _over(per: float | None, resolution: float | None) -> float | None:
+    return None if per is None or not resolution else per / resolution
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def _name(text: Any) -> str | None:
+    name = " ".join(str(text).split())
+    return name if 0 < len(name) <= _MAX_NAME else None
+
+
+def _rgb(color: Any) -> Color | None:
+    try:
+        red, green, blue = (int(value) & 0xFF for value in list(color)[:3])
+    except (TypeError, ValueError):
+        return None
+    return None if red == green == blue else linear_color((red, green, blue))

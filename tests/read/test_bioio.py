@@ -1,0 +1,87 @@
+"""Other formats through bioio, of which a stand-in is installed here: it is no dependency."""
+
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import dask.array
+import numpy as np
+import pytest
+
+from stereocell import read
+from stereocell.model.errors import SourceError
+from stereocell.model.tiling import Box
+from support.phantoms import f_phantom
+
+
+class Unsupported(Exception):
+    """As bioio_base.exceptions.UnsupportedFileFormatError is: of no other class."""
+
+
+class BioImage:
+    """The part of bioio.BioImage that is used."""
+
+    scenes = ("Jane", "Joe")
+    channel_names = ("DAPI", "Channel:0:1")
+    physical_pixel_sizes = SimpleNamespace(Z=0.5, Y=0.2, X=0.25)
+
+    def __init__(self, path: str) -> None:
+        if not path.endswith(".dv"):
+            raise Unsupported
+        if Path(path).read_bytes() != b"DV":
+            raise ValueError("no DV\nat all")
+        self.set_scene(0)
+
+    def set_scene(self, index: int) -> None:
+        body = f_phantom()[: 9 if index == 0 else 16]
+        stored = np.stack([body, body + 1])[None]
+        self.dask_data = dask.array.from_array(stored, (1, 1, 1, 48, 36))
+        self.dims = SimpleNamespace(order="TCZYX", T=1, C=2, Z=len(body), Y=48, X=36)
+
+
+@pytest.fixture
+def _bioio(monkeypatch: pytest.MonkeyPatch) -> None:
+    bioio, base = ModuleType("bioio"), ModuleType("bioio_base")
+    exceptions: Any = ModuleType("bioio_base.exceptions")
+    bioio.BioImage = BioImage  # type: ignore[attr-defined]
+    bioio.__spec__ = SimpleNamespace()  # type: ignore[assignment]
+    exceptions.UnsupportedFileFormatError = Unsupported
+    for module in (bioio, base, exceptions):
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+
+
+@pytest.mark.usefixtures("_bioio")
+def test_a_plugin_s_format_is_read_with_its_scenes(tmp_path: Path) -> None:
+    (tmp_path / "a b.dv").write_bytes(b"DV")
+    dataset = read.open(tmp_path / "a b.dv")
+    assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.25)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "Channel1"]
+    assert dataset.notes[0] == "read by bioio"
+    assert "2 images; building --series 2" in dataset.notes[1]
+    box = Box((1, 7, 3), (9, 30, 20))
+    np.testing.assert_array_equal(dataset.read(1, box).voxels, f_phantom()[box.slices] + 1)
+    assert read.open(tmp_path / "a b.dv", series=1).levels[0].shape == (9, 48, 36)
+    assert "Jane" not in "".join(read.list_series(tmp_path / "a b.dv"))
+
+
+@pytest.mark.usefixtures("_bioio")
+def test_what_no_plugin_takes_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.dv").write_bytes(b"other")
+    (tmp_path / "a.xyz").write_bytes(b"other")
+    with pytest.raises(SourceError, match="no DV at all; expected a file that a plugin"):
+        read.open(tmp_path / "a.dv")
+    with pytest.raises(
+        SourceError,
+        match=r"unknown format: found .*; expected .* or a file for an installed plugin of bioio",
+    ):
+        read.open(tmp_path / "a.xyz")
+
+
+def test_without_bioio_the_line_names_it(tmp_path: Path) -> None:
+    (tmp_path / "a.dv").write_bytes(b"DV")
+    with pytest.raises(
+        SourceError,
+        match=r"unknown format: found .*; expected .* or a file for an installed plugin of bioio",
+    ):
+        read.open(tmp_path / "a.dv")

@@ -1,0 +1,216 @@
+"""HDF5 and Imaris files, written by h5py: axes, voxel sizes, padding, links."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell import read
+from stereocell.model.errors import SourceError, UsageError
+from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
+from support.phantoms import F_BODY, f_phantom
+
+
+def write(path: Path, name: str = "raw", voxels: Any = None, **attributes: Any) -> Path:
+    with h5py.File(path, "a") as file:
+        dataset = file.create_dataset(name, data=f_phantom() if voxels is None else voxels)
+        dataset.attrs.update(attributes)
+    return path
+
+
+def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
+    return dataset.read(channel, dataset.levels[0].box).voxels
+
+
+def refusal(source: str | Path, **options: Any) -> str:
+    with pytest.raises((SourceError, UsageError)) as caught:
+        read.open(source, **options)
+    assert "\n" not in str(caught.value)
+    assert "expected" in str(caught.value)
+    return str(caught.value)
+
+
+def test_the_only_volume_is_read_and_named(tmp_path: Path) -> None:
+    path = write(tmp_path / "Ann's µ data.H5", "a/b/raw", element_size_um=SIZE_UM)
+    write(path, "table", np.zeros((5, 2)))
+    dataset = read.open(path)
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+    assert dataset.levels[0].spacing_um == SIZE_UM
+    assert dataset.name == "Ann's µ data"
+    assert dataset.notes[0] == "dataset /a/b/raw, the only volume of the file"
+    assert "z, y, x are assumed" in dataset.notes[1]
+
+
+@pytest.mark.parametrize("key", [":/raw", ":raw", ":/group/../raw"])
+def test_a_key_chooses_among_datasets(tmp_path: Path, key: str) -> None:
+    path = write(tmp_path / "a.h5", element_size_um=SIZE_UM)
+    write(path, "label", f_phantom() // 1000)
+    if ".." in key:
+        assert "'..' not found" in refusal(f"{path}{key}") or "'group'" in refusal(f"{path}{key}")
+        return
+    assert whole(read.open(f"{path}{key}")).max() == F_BODY
+    line = refusal(path)
+    assert "/label (16, 48, 36) uint16, /raw (16, 48, 36) uint16" in line
+    assert line.endswith(f"expected one, as {path}:/raw")
+    assert "expected one of label, raw" in refusal(f"{path}:/none")
+
+
+def test_axes_come_from_tags_labels_and_the_user(tmp_path: Path) -> None:
+    body = f_phantom()
+    stored = np.stack([body, body + 1], axis=-1)  # z, y, x, c
+    tags = json.dumps({"axes": [{"key": key} for key in "zyxc"]})
+    tagged = write(tmp_path / "tags.h5", voxels=stored, axistags=tags, element_size_um=SIZE_UM)
+    labelled = write(tmp_path / "labels.h5", voxels=stored, element_size_um=SIZE_UM)
+    with h5py.File(labelled, "a") as file:
+        for dim, label in zip(file["raw"].dims, "zyxc", strict=True):
+            dim.label = label
+    bare = write(tmp_path / "bare.h5", voxels=stored, element_size_um=SIZE_UM)
+    for dataset in (read.open(tagged), read.open(labelled), read.open(bare, axes="zyxc")):
+        np.testing.assert_array_equal(whole(dataset, 1), body + 1)
+        assert not any("assumed" in note for note in dataset.notes)
+    assert "--axes zyxc" in refusal(bare)
+    assert "--axes zyx: found axes 16, 48, 36, 2 long, expected 4" in refusal(bare, axes="zyx")
+    series = write(tmp_path / "t.h5", voxels=stored.transpose(3, 2, 1, 0))
+    dataset = read.open(series, axes="txyz", spacing_um=SIZE_UM, time=1)
+    np.testing.assert_array_equal(whole(dataset), body + 1)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "expected"),
+    [
+        ({"resolution": (40.0, 4.0, 4.0), "units": "nm"}, (0.04, 0.004, 0.004)),
+        ({"spacing": (2.0, 1.0, 1.0), "unit": "micrometer"}, (2.0, 1.0, 1.0)),
+        ({"resolution": (40.0, 4.0, 4.0), "units": [b"nm", b"nm", b"um"]}, (0.04, 0.004, 4.0)),
+    ],
+)
+def test_sizes_with_a_unit_become_um(
+    tmp_path: Path, attributes: dict[str, Any], expected: tuple[float, ...]
+) -> None:
+    found = read.open(write(tmp_path / "a.hdf5", **attributes)).levels[0].spacing_um
+    assert found == pytest.approx(expected)
+
+
+def test_a_size_without_a_unit_is_no_length(tmp_path: Path) -> None:
+    assert "--spacing-um" in refusal(write(tmp_path / "a.h5", resolution=(40.0, 4.0, 4.0)))
+
+
+def test_links_in_the_folder_are_followed_and_others_refused(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    write(tmp_path / "secret.h5", element_size_um=SIZE_UM)
+    write(tmp_path / "home" / "b.h5", element_size_um=SIZE_UM)
+    path = tmp_path / "home" / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["near"] = h5py.ExternalLink("b.h5", "/raw")
+        file["soft"] = h5py.SoftLink("/near")
+        file["far"] = h5py.ExternalLink("../secret.h5", "/raw")
+        file["absolute"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/raw")
+        file["circle"] = h5py.SoftLink("/circle")
+        file.create_dataset("outside", (4, 5, 6), "u1", external=[("x.raw", 0, 120)])
+        layout = h5py.VirtualLayout((4, 5, 6), "u1")
+        layout[:] = h5py.VirtualSource("../secret.h5", "raw", (16, 48, 36))[:4, :5, :6]
+        file.create_virtual_dataset("virtual", layout)
+    for key in ("near", "soft"):
+        np.testing.assert_array_equal(whole(read.open(f"{path}:/{key}")), f_phantom())
+    for key in ("far", "absolute"):
+        assert "expected a file in" in refusal(f"{path}:/{key}")
+    assert "in a circle" in refusal(f"{path}:/circle")
+    for key in ("outside", "virtual"):
+        assert "voxels lie in other files" in refusal(f"{path}:/{key}")
+
+
+def test_a_filter_of_hdf5plugin_is_read(tmp_path: Path) -> None:
+    import hdf5plugin
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        made = file.create_dataset("raw", data=f_phantom(), chunks=(8, 8, 8), **hdf5plugin.Blosc())
+        made.attrs["element_size_um"] = SIZE_UM
+    np.testing.assert_array_equal(whole(read.open(tmp_path / "a.h5")), f_phantom())
+
+
+def test_an_unknown_filter_is_named_with_the_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "a.h5")
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file.create_dataset("raw", data=f_phantom(), compression="lzf")
+    monkeypatch.setattr(h5py.h5z, "filter_avail", lambda code: False)
+    assert 'pip install "stereocell[hdf5]"' in refusal(tmp_path / "b.h5")
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".ims"])
+def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
+    path = write(tmp_path / "a.h5", voxels=np.zeros((9, 300, 300)))
+    content = path.read_bytes()
+    for spoilt in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
+        (tmp_path / f"b{suffix}").write_bytes(spoilt)
+        refusal(tmp_path / f"b{suffix}")
+    (tmp_path / f"c{suffix}").mkdir()
+    assert "is a folder" in refusal(tmp_path / f"c{suffix}")
+    refusal(write(tmp_path / f"d{suffix}", "flat", np.zeros((40, 30))))
+
+
+def test_imaris_has_its_true_size_levels_times_names_and_colours(tmp_path: Path) -> None:
+    czyx = np.stack([f_phantom(), f_phantom()[::-1]])
+    path = write_ims(tmp_path / "a b.ims", czyx)
+    dataset = read.open(path, time=1)
+    assert [level.shape for level in dataset.levels] == [(16, 48, 36), (16, 24, 18)]
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.levels[1].spacing_um == pytest.approx((0.5, 0.4, 0.5))
+    assert dataset.levels[1].origin_um == pytest.approx((0.0, 0.1, 0.125))
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    assert dataset.channels[0].color == (0.0, 0.0, 1.0)
+    assert dataset.channels[1].color == pytest.approx((1.0, 0.2159, 0.0), abs=1e-3)
+    for channel in (0, 1):
+        np.testing.assert_array_equal(whole(dataset, channel), czyx[channel] + 1)
+    assert dataset.time_points == 2
+
+
+def test_imaris_units_become_um(tmp_path: Path) -> None:
+    path = write_ims(tmp_path / "a.ims", f_phantom()[None].repeat(2, 0), unit="nm")
+    assert read.open(path).levels[0].spacing_um == pytest.approx([s / 1000 for s in SIZE_UM])
+
+
+def test_imaris_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> None:
+    path = write_ims(tmp_path / "a.ims", f_phantom()[None].repeat(2, 0))
+    with h5py.File(path, "a") as file:
+        group = file["DataSet/ResolutionLevel 0/TimePoint 0/Channel 0"]
+        group.attrs["ImageSizeZ"] = characters("1000")
+    assert "ImageSizeZ: found 1000, expected 1 to 21" in refusal(path)
+    with h5py.File(path, "a") as file:
+        file["DataSet/ResolutionLevel 0/TimePoint 0/Channel 0"].attrs["ImageSizeZ"] = characters(
+            "16"
+        )
+        del file["DataSet/ResolutionLevel 0/TimePoint 1/Channel 1"]
+    dataset = read.open(path, time=1)
+    with pytest.raises(SourceError, match="Channel 1"):
+        whole(dataset, 1)
+
+
+def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path: Path) -> None:
+    body = f_phantom() * 60  # beyond int16
+    with h5py.File(tmp_path / "a b.h5", "w") as file:
+        for setup, time in np.ndindex(2, 2):
+            for level in (0, 1):
+                step = 2**level
+                part = (body + 10 * setup + time)[:, ::step, ::step]
+                path = f"t{time + 18:05d}/s{setup:02d}/{level}/cells"
+                file.create_dataset(path, data=part.view(np.int16), chunks=(4, 8, 8))
+            if time == 0:
+                file[f"s{setup:02d}/resolutions"] = [[1.0, 1.0, 1.0], [2.0, 2.0, 1.0]]
+    assert "--spacing-um" in refusal(tmp_path / "a b.h5")
+    write_bdv_xml(tmp_path, "a b.h5", "nanometer")
+    dataset = read.open(tmp_path / "a b.h5", time=1)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    assert [level.shape for level in dataset.levels] == [(16, 48, 36), (16, 24, 18)]
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.levels[1].spacing_um == pytest.approx((0.5, 0.4, 0.5))
+    assert (dataset.dtype, dataset.time_points) == (np.uint16, 2)
+    np.testing.assert_array_equal(whole(dataset, 1), body + 11)
+    assert "2 setups of BigDataViewer" in dataset.notes[0]
+    cells = read.open(f"{tmp_path / 'a b.h5'}:/t00018/s00/0/cells", spacing_um=SIZE_UM)
+    assert whole(cells).shape == (16, 48, 36)
+    assert "BigDataViewer's axes" in refusal(tmp_path / "a b.h5", axes="zyx")

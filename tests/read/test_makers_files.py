@@ -1,0 +1,208 @@
+"""CZI, LIF and ND2: CZI written by Zeiss's library, LIF byte by byte; scenes, mosaics, extras."""
+
+import os
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pylibCZIrw import czi
+
+from stereocell import read
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.tiling import Box
+from support.array_files import SIZE_UM, write_czi, write_lif
+from support.phantoms import f_phantom
+
+BOX = Box((1, 7, 3), (9, 30, 20))
+
+
+def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
+    return dataset.read(channel, dataset.levels[0].box).voxels
+
+
+def refusal(path: Path, **options: Any) -> str:
+    with pytest.raises((SourceError, UsageError)) as caught:
+        whole(read.open(path, **options))
+    assert "\n" not in str(caught.value)
+    assert "expected" in str(caught.value) or "needs at least" in str(caught.value)
+    return str(caught.value)
+
+
+# CZI
+
+
+def five(body: NDArray[Any]) -> NDArray[Any]:
+    """Return (t, c, z, y, x), 2 and 2 of a body, all different."""
+    return np.stack([np.stack([body + 10 * t + c for c in (0, 1)]) for t in (0, 1)])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_czi_has_channels_times_spacing_and_its_tiles_composed(tmp_path: Path, dtype: Any) -> None:
+    body = (f_phantom() // 8).astype(dtype)
+    path = write_czi(tmp_path / "it's µ.CZI", {None: five(body)})
+    dataset = read.open(path, time=1)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.time_points == 2
+    for channel in (0, 1):
+        np.testing.assert_array_equal(whole(dataset, channel), body + 10 + channel)
+        found = dataset.read(channel, BOX).voxels
+        np.testing.assert_array_equal(found, (body + 10 + channel)[BOX.slices])
+    assert (dataset.dtype, dataset.name) == (dtype, "it's µ")
+
+
+def test_scenes_of_a_czi_are_series(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small, large = f_phantom()[:, :40], f_phantom() + 1
+    path = write_czi(tmp_path / "a.czi", {0: small[None, None], 1: large[None, None]})
+    dataset = read.open(path)
+    assert "2 images; building --series 2, the largest: 16 x 48 x 36" in dataset.notes[0]
+    np.testing.assert_array_equal(whole(dataset), large)
+    np.testing.assert_array_equal(whole(read.open(path, series=1)), small)
+    assert "found 3, expected 1 to 2" in refusal(path, series=3)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--series", "list"]) == 0
+    out = capsys.readouterr().out
+    assert "1  16 x 40 x 36 voxels" in out
+    assert "Jane" not in out
+    assert not (tmp_path / "out" / "plan.json").exists()
+
+
+def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
+    with czi.create_czi(str(tmp_path / "a.czi")) as file:
+        file.write(data=np.zeros((9, 9, 3), np.uint8), plane={"C": 0, "Z": 0, "T": 0})
+    assert "found Bgr24" in refusal(tmp_path / "a.czi")
+    flat = f_phantom()[None, None, :1]
+    assert "at least 2 planes" in refusal(write_czi(tmp_path / "b.czi", {None: flat}))
+
+
+# LIF
+
+
+@pytest.mark.parametrize("axes", ["TCZYX", "CTZYX", "TZCYX", "YCTZX"])
+def test_lif_has_its_axes_names_and_colours(tmp_path: Path, axes: str) -> None:
+    tczyx = five(f_phantom())
+    stored = np.ascontiguousarray(tczyx.transpose(["TCZYX".index(axis) for axis in axes]))
+    dataset = read.open(write_lif(tmp_path / "a b.lif", {"Jane Doe": (axes, stored)}), time=1)
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "Channel1"]
+    assert [channel.color for channel in dataset.channels] == [(0, 0, 1), (0, 1, 0)]
+    for channel in (0, 1):
+        np.testing.assert_array_equal(whole(dataset, channel), tczyx[1, channel])
+    np.testing.assert_array_equal(dataset.read(0, BOX).voxels, tczyx[1, 0][BOX.slices])
+    assert dataset.name == "a b"
+
+
+def test_images_of_a_lif_are_series_without_their_names(tmp_path: Path) -> None:
+    flat = f_phantom()[0]
+    path = write_lif(
+        tmp_path / "a.lif",
+        {"Jane": ("YX", flat), "Joe": ("ZYX", f_phantom()), "Jim": ("ZYX", f_phantom()[:9].copy())},
+    )
+    dataset = read.open(path)
+    assert "3 images; building --series 2, the largest: 16 x 48 x 36" in dataset.notes[0]
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+    np.testing.assert_array_equal(whole(read.open(path, series=3)), f_phantom()[:9])
+    assert "found axes Y, X" in refusal(path, series=1)
+    lines = read.list_series(path)
+    assert len(lines) == 3
+    assert lines[0].endswith("no volume")
+    assert not any(name in "".join(lines) for name in ("Jane", "Joe", "Jim"))
+
+
+def test_a_lif_without_lengths_asks_for_them(tmp_path: Path) -> None:
+    path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())}, spacing=0)
+    assert "--spacing-um" in refusal(path)
+
+
+# ND2: there is no writer, so a stand-in of the library's class
+
+
+class Nd2:
+    """The part of nd2.ND2File that is used; frames are numbered as `sizes` has the loops."""
+
+    def __init__(self, path: str) -> None:
+        self.sizes = {"T": 2, "P": 2, "Z": 16, "C": 2, "Y": 48, "X": 36}
+        self.dtype = np.dtype(np.uint16)
+        names = [SimpleNamespace(name="DAPI", color=SimpleNamespace(r=0, g=0, b=255)),
+                 SimpleNamespace(name="", color=None)]  # fmt: skip
+        self.metadata = SimpleNamespace(channels=[SimpleNamespace(channel=one) for one in names])
+
+    def __enter__(self) -> "Nd2":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def voxel_size(self) -> Any:
+        return SimpleNamespace(**dict(zip("zyx", SIZE_UM, strict=True)))
+
+    def read_frame(self, number: int) -> NDArray[Any]:
+        t, p, z = np.unravel_index(number, (2, 2, 16))
+        return np.stack([f_phantom()[z] + 100 * p + 10 * t + c for c in (0, 1)]).astype(np.uint16)
+
+
+def test_nd2_has_positions_times_and_channels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import nd2
+
+    monkeypatch.setattr(nd2, "ND2File", Nd2)
+    (tmp_path / "a.nd2").touch()
+    dataset = read.open(tmp_path / "a.nd2", series=2, time=1)
+    assert dataset.levels[0].spacing_um == SIZE_UM
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "Channel1"]
+    assert [channel.color for channel in dataset.channels] == [(0, 0, 1), None]
+    for channel in (0, 1):
+        np.testing.assert_array_equal(whole(dataset, channel), f_phantom() + 110 + channel)
+    assert "building --series 1" in read.open(tmp_path / "a.nd2").notes[0]
+    assert len(read.list_series(tmp_path / "a.nd2")) == 2
+
+
+@pytest.mark.skipif("STEREOCELL_DATA" not in os.environ, reason="STEREOCELL_DATA is not set")
+def test_a_real_nd2_is_read_as_its_library_does() -> None:
+    import nd2
+
+    path = Path(os.environ["STEREOCELL_DATA"]) / "nd2" / "cluster.nd2"
+    if not path.exists():
+        pytest.skip("no nd2/cluster.nd2 below STEREOCELL_DATA")
+    expected = nd2.imread(path)  # T, Z, C, Y, X
+    dataset = read.open(path, time=2)
+    np.testing.assert_array_equal(whole(dataset, 1), expected[2, :, 1])
+
+
+# all three
+
+
+@pytest.mark.parametrize(("suffix", "extra"), [("czi", "czi"), ("lif", "lif"), ("nd2", "nd2")])
+def test_without_its_extra_a_format_says_how_to_get_it(
+    tmp_path: Path, suffix: str, extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def absent(name: str) -> Any:
+        raise ImportError(name)
+
+    monkeypatch.setattr("stereocell.read.extras.import_module", absent)
+    (tmp_path / f"a.{suffix}").write_bytes(b"abc")
+    assert f'pip install "stereocell[{extra}]"' in refusal(tmp_path / f"a.{suffix}")
+
+
+@pytest.mark.parametrize("suffix", ["czi", "lif", "nd2"])
+def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
+    good = b"no image at all"
+    if suffix == "czi":
+        good = write_czi(tmp_path / "good.czi", {None: f_phantom()[None, None]}).read_bytes()
+    if suffix == "lif":
+        good = write_lif(tmp_path / "g.lif", {"a": ("ZYX", f_phantom())}).read_bytes()
+    for content in (b"", b"no image", good[:100], good[: len(good) // 2]):
+        (tmp_path / f"a.{suffix}").write_bytes(content)
+        refusal(tmp_path / f"a.{suffix}")
+    (tmp_path / f"b.{suffix}").mkdir()
+    assert "is a folder" in refusal(tmp_path / f"b.{suffix}")
+
+
+def test_a_format_of_one_image_has_no_series(tiny_tiff: Path) -> None:
+    assert "CZI, LIF, ND2, a file for" in refusal(tiny_tiff, series=2)
+    with pytest.raises(UsageError, match="--series list: found TIFF, expected a folder of"):
+        read.list_series(tiny_tiff)

@@ -1,0 +1,123 @@
+"""MRC and CCP4 maps, written by mrcfile: axes, hand, Angstrom, signed bytes."""
+
+import bz2
+import gzip
+from pathlib import Path
+from typing import Any
+
+import mrcfile
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell import read
+from stereocell.model.errors import SourceError
+from stereocell.model.tiling import Box
+from support.phantoms import f_phantom
+
+ANGSTROM = (4.0, 8.0, 10.0)  # x, y, z
+
+
+def write(path: Path, voxels: Any = None, **fields: Any) -> Path:
+    with mrcfile.new(path, overwrite=True) as file:
+        file.set_data(f_phantom().astype(np.int16) if voxels is None else voxels)
+        file.set_volume()
+        file.voxel_size = ANGSTROM
+        for name, value in fields.items():
+            file.header[name] = value
+    return path
+
+
+def whole(dataset: read.Dataset) -> NDArray[Any]:
+    return dataset.read(0, dataset.levels[0].box).voxels
+
+
+@pytest.mark.parametrize("name", ["a.mrc", "it's a µ tomogram.REC", "a.map.gz", "a.mrc.bz2"])
+@pytest.mark.parametrize("dtype", [np.int16, np.uint16, np.float32])
+def test_rows_run_upwards_so_y_is_turned_round(tmp_path: Path, name: str, dtype: Any) -> None:
+    path = write(tmp_path / "plain", f_phantom().astype(dtype))
+    pack = {".gz": gzip.compress, ".bz2": bz2.compress}.get(Path(name).suffix, bytes)
+    (tmp_path / name).write_bytes(pack(path.read_bytes()))
+    dataset = read.open(tmp_path / name)
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[:, ::-1])
+    assert dataset.dtype == dtype
+    assert dataset.levels[0].spacing_um == pytest.approx((1e-3, 8e-4, 4e-4))
+    assert dataset.name == name.partition(".")[0]
+    box = Box((2, 3, 4), (9, 17, 30))
+    expected = f_phantom()[:, ::-1][box.slices]
+    np.testing.assert_array_equal(dataset.read(0, box).voxels, expected)
+
+
+@pytest.mark.parametrize("order", [(1, 2, 3), (3, 1, 2), (2, 1, 3), (3, 2, 1)])
+def test_columns_rows_and_sections_lie_along_any_axes(
+    tmp_path: Path, order: tuple[int, int, int]
+) -> None:
+    names = dict(zip(("mapc", "mapr", "maps"), order, strict=True))
+    xyz = f_phantom().astype(np.int16).transpose()
+    stored = xyz.transpose([axis - 1 for axis in reversed(order)])  # sections, rows, columns
+    counts = dict(zip(("mx", "my", "mz"), xyz.shape, strict=True))
+    cell = tuple(n * a for n, a in zip(xyz.shape, ANGSTROM, strict=True))
+    dataset = read.open(write(tmp_path / "a.mrc", stored, cella=cell, **names, **counts))
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[:, ::-1])
+    assert dataset.levels[0].spacing_um == pytest.approx((1e-3, 8e-4, 4e-4))
+
+
+def test_big_endian_and_an_extended_header_are_read(tmp_path: Path) -> None:
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(f_phantom().astype(">i2"))
+        file.set_volume()
+        file.set_extended_header(np.zeros(100, "V8"))
+        file.voxel_size = ANGSTROM
+    dataset = read.open(tmp_path / "a.mrc")
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[:, ::-1])
+
+
+def test_bytes_of_imod_have_a_sign_where_its_flag_says_so(tmp_path: Path) -> None:
+    voxels = (f_phantom() // 5).astype(np.uint8)  # 20 and 200
+    path = write(tmp_path / "a.mrc", voxels.view(np.int8))
+    content = bytearray(path.read_bytes())
+    content[152:160] = np.array([1146047817, 0], "<i4").tobytes()
+    path.write_bytes(content)
+    dataset = read.open(path)
+    assert dataset.dtype == np.uint8
+    np.testing.assert_array_equal(whole(dataset), voxels[:, ::-1])
+
+
+def test_a_stack_of_images_is_told(tmp_path: Path) -> None:
+    dataset = read.open(write(tmp_path / "a.mrc", ispg=0, mz=1, cella=(144.0, 384.0, 10.0)))
+    assert dataset.notes == ("the header says a stack of images: taken for one volume",)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"cella": (0, 0, 0)}, "--spacing-um"),
+        ({"mapc": 3}, "MAPS, MAPR, MAPC"),
+        ({"nx": 0}, "size"),
+        ({"nz": 4000}, "cut short"),
+        ({"mode": 4}, "complex"),
+        ({"mode": 77}, "expected an MRC"),
+        ({"nsymbt": -5000}, "expected"),
+    ],
+)
+def test_fields_out_of_order_are_named(
+    tmp_path: Path, fields: dict[str, Any], message: str
+) -> None:
+    path = write(tmp_path / "a.mrc")
+    header = np.frombuffer(path.read_bytes()[:1024], mrcfile.dtypes.HEADER_DTYPE).copy()
+    for name, value in fields.items():
+        header[name] = value
+    path.write_bytes(header.tobytes() + path.read_bytes()[1024:])
+    with pytest.raises(SourceError, match=message) as caught:
+        whole(read.open(path))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"no map", bytes(2000), b"\x1f\x8bno gzip"])
+def test_what_is_no_map_is_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.mrc").write_bytes(content)
+    with pytest.raises(SourceError, match="expected"):
+        read.open(tmp_path / "a.mrc")
+    (tmp_path / "b.mrc").mkdir()
+    with pytest.raises(SourceError, match="is a folder"):
+        read.open(tmp_path / "b.mrc")

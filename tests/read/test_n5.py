@@ -1,0 +1,247 @@
+"""N5, written by tensorstore: blocks, codecs, pyramids, BigDataViewer's containers."""
+
+import bz2
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numcodecs
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from conftest import Server
+from stereocell import read
+from stereocell.model.errors import SourceError
+from stereocell.model.tiling import Box
+from support.array_files import BLOCK, SIZE_UM, write_bdv_xml
+from support.array_files import write_n5 as write
+from support.phantoms import f_phantom
+
+BOX = Box((1, 7, 3), (9, 30, 20))
+NM: dict[str, Any] = {"pixelResolution": {"dimensions": [250, 200, 500], "unit": "nm"}}
+
+
+def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
+    return dataset.read(channel, dataset.levels[0].box).voxels
+
+
+def refusal(path: Path, **options: Any) -> str:
+    with pytest.raises(SourceError) as caught:
+        whole(read.open(path, **options))
+    assert "\n" not in str(caught.value)
+    assert "expected" in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("packing", ["raw", "gzip", "zlib", "bzip2", "xz", "blosc", "zstd"])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "int16", "float32"])
+def test_every_codec_and_number_is_read(tmp_path: Path, packing: str, dtype: str) -> None:
+    form: dict[str, Any] = {"type": "gzip", "useZlib": True} if packing == "zlib" else {}
+    if packing == "blosc":
+        form = {"cname": "lz4", "clevel": 5, "shuffle": 1}
+    body = (f_phantom() // 4).astype(dtype)
+    dataset = read.open(write(tmp_path / "it's.n5", body, {"type": packing, **form}, **NM))
+    np.testing.assert_array_equal(whole(dataset), body)
+    np.testing.assert_array_equal(dataset.read(0, BOX).voxels, body[BOX.slices])
+    assert dataset.dtype == np.dtype(dtype)
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.arrays[0].chunk == BLOCK[::-1]
+
+
+def test_lz4_of_java_is_read(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.n5", packing={"type": "raw"}, **NM)
+    about = path / "attributes.json"
+    fields = json.loads(about.read_text())
+    about.write_text(json.dumps(fields | {"compression": {"type": "lz4", "blockSize": 65536}}))
+    for file in path.rglob("*"):
+        if file.is_file() and file != about:
+            content = file.read_bytes()
+            raw = content[16:]
+            halves = raw[:1000], raw[1000:]  # a packed part, then one as it is
+            packed = numcodecs.lz4.compress(halves[0])[4:]
+            first = struct.pack("<8sBiii", b"LZ4Block", 0x26, len(packed), 1000, 0) + packed
+            size = len(halves[1])
+            second = struct.pack("<8sBiii", b"LZ4Block", 0x16, size, size, 0) + halves[1]
+            file.write_bytes(content[:16] + first + second)
+    np.testing.assert_array_equal(whole(read.open(path)), f_phantom())
+
+
+def test_an_absent_block_is_zero(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.n5", **NM)
+    (path / "1" / "0" / "0").unlink()
+    expected = f_phantom()
+    expected[:8, :12, 16:32] = 0
+    np.testing.assert_array_equal(whole(read.open(path)), expected)
+
+
+@pytest.mark.parametrize("stated", ["levels", "group", "scales"])
+def test_a_pyramid_has_its_levels(tmp_path: Path, stated: str) -> None:
+    factors = [[1, 1, 1], [2, 2, 1]]
+    body = f_phantom()
+    for index, part in enumerate((body, body[:, ::2, ::2])):
+        own = {"downsamplingFactors": factors[index]} if stated == "levels" else {}
+        write(tmp_path / "p.n5" / f"s{index}", part, **own)
+    group: dict[str, Any] = {"resolution": [250, 200, 500], "units": ["nm", "nm", "nm"]}
+    if stated != "levels":
+        group["scales" if stated == "scales" else "downsamplingFactors"] = factors
+    (tmp_path / "p.n5" / "attributes.json").write_text(json.dumps(group))
+    dataset = read.open(tmp_path / "p.n5")
+    assert [level.shape for level in dataset.levels] == [(16, 48, 36), (16, 24, 18)]
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.levels[1].spacing_um == pytest.approx((0.5, 0.4, 0.5))
+    np.testing.assert_array_equal(dataset.read(0, Box((0, 0, 0), (9, 9, 9)), 1).voxels,
+                                  body[:9, :18:2, :18:2])  # fmt: skip
+    # one level by itself takes the spacing of its group, for level 0
+    assert read.open(tmp_path / "p.n5" / "s0").levels[0].spacing_um == pytest.approx(SIZE_UM)
+
+
+def test_cosem_s_transform_names_its_axes(tmp_path: Path) -> None:
+    about = {"axes": ["z", "y", "x"], "scale": [500, 200, 250], "units": ["nm"] * 3}
+    dataset = read.open(write(tmp_path / "a.n5", transform=about))
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+
+
+def bdv(folder: Path, unit: str = "nanometer") -> Path:
+    """Write a container of two setups and two time points, and its XML."""
+    for setup in (0, 1):
+        for time in (0, 1):
+            path = folder / "a.n5" / f"setup{setup}" / f"timepoint{time}"
+            write(path / "s0", f_phantom() + 10 * setup + time)
+        about = folder / "a.n5" / f"setup{setup}" / "attributes.json"
+        about.write_text(json.dumps({"downsamplingFactors": [[1, 1, 1]]}))
+    write_bdv_xml(folder, "a.n5", unit)
+    return folder / "a.n5"
+
+
+def test_a_container_of_bigdataviewer_has_channels_and_times(tmp_path: Path) -> None:
+    dataset = read.open(bdv(tmp_path), time=1)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    np.testing.assert_array_equal(whole(dataset, 1), f_phantom() + 11)
+    assert dataset.time_points == 2
+    one = read.open(tmp_path / "a.n5" / "setup1")
+    assert ([c.name for c in one.channels], one.levels[0].spacing_um[0]) == (["CD31"], 0.5)
+    np.testing.assert_array_equal(whole(one), f_phantom() + 10)
+    assert "--spacing-um" in refusal(bdv(tmp_path / "pixels", unit="pixel"))
+
+
+def test_the_xml_itself_opens_its_container_if_it_is_in_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    bdv(tmp_path / "home")
+    dataset = read.open(tmp_path / "home" / "b.xml", time=1)
+    np.testing.assert_array_equal(whole(dataset, 1), f_phantom() + 11)
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "CD31"]
+    (tmp_path / "home" / "a.n5").rename(tmp_path / "a.n5")
+    assert "not found" in refusal(tmp_path / "home" / "b.xml")
+    (tmp_path / "home" / "a.n5").symlink_to("../a.n5")
+    assert "expected a container in" in refusal(tmp_path / "home" / "b.xml")
+    (tmp_path / "home" / "c.xml").write_text("<SpimData><other/></SpimData>")
+    assert "found no file of HDF5 or N5" in refusal(tmp_path / "home" / "c.xml")
+    (tmp_path / "home" / "d.xml").write_text("<SpimData><other>")
+    refusal(tmp_path / "home" / "d.xml")
+
+
+def test_several_datasets_are_listed(tmp_path: Path) -> None:
+    write(tmp_path / "a.n5" / "raw", **NM)
+    (tmp_path / "a.n5" / "attributes.json").write_text('{"n5": "2.0.0"}')
+    assert read.open(tmp_path / "a.n5").levels[0].spacing_um == pytest.approx(SIZE_UM)
+    write(tmp_path / "a.n5" / "deep" / "label")
+    assert "found raw, deep/label, expected one" in refusal(tmp_path / "a.n5")
+
+
+def test_axes_of_more_dimensions_are_given_or_named(tmp_path: Path) -> None:
+    both = np.stack([f_phantom(), f_phantom() + 1])
+    bare = write(tmp_path / "a.n5", both)
+    named = write(tmp_path / "b.n5", both, axes=["x", "y", "z", "c"])
+    for dataset in (
+        read.open(bare, axes="czyx", spacing_um=SIZE_UM),
+        read.open(named, spacing_um=SIZE_UM),
+    ):
+        np.testing.assert_array_equal(whole(dataset, 1), both[1])
+    assert "--axes czyx" in refusal(bare)
+
+
+def test_only_the_blocks_of_a_window_come_from_an_address(
+    tmp_path: Path, serve: Callable[[Path], Server]
+) -> None:
+    write(tmp_path / "a.n5", **NM)
+    server = serve(tmp_path)
+    dataset = read.open(f"{server.url}/a.n5")
+    dataset.read(0, Box((0, 12, 0), (8, 24, 17)))
+    blocks = [path for path in server.gets("/a.n5/") if not path.endswith(".json")]
+    assert sorted(set(blocks)) == ["/a.n5/0/1/0", "/a.n5/1/1/0"]
+
+
+@pytest.mark.parametrize("place", ["0/0/0", "attributes.json", "0"])
+def test_links_out_of_the_folder_are_refused(tmp_path: Path, place: str) -> None:
+    write(tmp_path / "secret.n5", **NM)
+    path = write(tmp_path / "a.n5", **NM)
+    target = path / place
+    if target.is_dir():
+        target.rename(tmp_path / "moved")
+    else:
+        target.unlink()
+    target.symlink_to(tmp_path / "secret.n5" / place)
+    assert "expected a file in" in refusal(path)
+
+
+@pytest.mark.parametrize("packing", ["raw", "gzip", "bzip2", "xz", "blosc", "zstd"])
+def test_a_block_cut_short_is_one_line(tmp_path: Path, packing: str) -> None:
+    form = {"cname": "zstd", "clevel": 5, "shuffle": 0} if packing == "blosc" else {}
+    path = write(tmp_path / "a.n5", packing={"type": packing, **form}, **NM)
+    block = path / "0" / "0" / "0"
+    content = block.read_bytes()
+    for size in (0, 3, 15, 20, len(content) // 2):
+        block.write_bytes(content[:size])
+        refusal(path)
+    block.write_bytes(content[:7] + b"\xff" + content[8:])
+    refusal(path)
+
+
+def test_a_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.n5", packing={"type": "bzip2"}, **NM)
+    block = path / "0" / "0" / "0"
+    block.write_bytes(block.read_bytes()[:16] + bz2.compress(bytes(1 << 27)))
+    assert whole(read.open(path))[0, 0, 0] == 0
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("dimensions", [36, -48, 16], "dimensions"),
+        ("dimensions", "many", "dimensions"),
+        ("dimensions", [36, 48], "at least 2 planes"),
+        ("blockSize", [16, 12], "blockSize"),
+        ("blockSize", [1 << 20, 1 << 20, 1 << 20], "GiB"),
+        ("dataType", "object", "dataType"),
+        ("compression", {"type": "jpeg"}, "compression 'jpeg'"),
+        ("pixelResolution", {"dimensions": "wide", "unit": "nm"}, "--spacing-um"),
+    ],
+)
+def test_fields_out_of_order_are_named(
+    tmp_path: Path, field: str, value: Any, message: str
+) -> None:
+    path = write(tmp_path / "a.n5", **NM)
+    about = path / "attributes.json"
+    fields = json.loads(about.read_text()) | {field: value}
+    if field == "dimensions" and len(value) == 2:
+        fields["blockSize"] = [16, 12]
+    about.write_text(json.dumps(fields))
+    assert message in refusal(path)
+
+
+def test_attributes_that_are_no_table_are_one_line(tmp_path: Path) -> None:
+    for index, text in enumerate(("", "[]", "{", "[" * 100_000)):
+        (tmp_path / f"{index}.n5").mkdir()
+        (tmp_path / f"{index}.n5" / "attributes.json").write_text(text)
+        refusal(tmp_path / f"{index}.n5")
+    (tmp_path / "empty.n5").mkdir()
+    assert "no dataset" in refusal(tmp_path / "empty.n5")
+
+
+def test_a_file_in_place_of_a_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.n5").write_bytes(b"packed")
+    assert "is a file, expected a folder of N5" in refusal(tmp_path / "a.n5")
