@@ -22,10 +22,10 @@ import zarr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
-from stereocell.building.channel_survey import iso_task, statistics_task
+from stereocell.building.channel_survey import evidence_task, statistics_task
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.tasks.iso_value import read_iso_field
-from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, measure_statistics
+from stereocell.building.tasks.evidence import measure_evidence
+from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, measure_window
 from stereocell.model.tiling import Box, cut
 from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr
@@ -116,10 +116,10 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
         plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
         settled = OutFolder(out).plan()
         (channel,) = settled.channels
-        statistics = measure_statistics(statistics_task(settled, channel))
+        window = measure_window(statistics_task(settled, channel))
         take(sent)
         for each in settled.tiles:
-            read_iso_field(iso_task(settled, each, channel=channel, statistics=statistics))
+            measure_evidence(evidence_task(settled, each, channel=channel, window=window))
         isos = take(sent)
     region, chunk = settled.region, chunk_of(source)
     voxel = stored(source, region) / math.prod(region.shape)
@@ -136,7 +136,7 @@ def measure_windows(folder: Path, source: Path) -> float:
         plan(f"{address}/{source.name}", out, (1, 1), REAL, "0")
         settled = OutFolder(out).plan()
         take(sent)
-        measure_statistics(statistics_task(settled, settled.channels[0]))
+        measure_window(statistics_task(settled, settled.channels[0]))
         coarse = {Path(file) for file in sent if not file.startswith(f"{source / '0'}/")}
         read = take(sent)
     region = settled.region

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import NO_PRESET, Settings, load
 from stereocell.engine.run import console
 from stereocell.isosurface.holder import LEAST_HU
@@ -37,7 +37,7 @@ def load_for(
     options = settings.plan
     try:
         location = Location.of(source).source
-        dataset = open_source(SourceRef(location, options.time, options.spacing_um, options.series))
+        dataset = open_source(as_asked(location, options))
         chosen, reason = choose_preset(dataset, options.modality)
     except StereoCellError:
         return settings
