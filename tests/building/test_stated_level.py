@@ -65,7 +65,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def out(source: Path) -> Path:
     settings = source.parent / "settings.toml"
     settings.write_text(SETTINGS)
-    flags = ["-o", str(source.parent / "out"), "--grid", "3x2", "--workers", "0"]
+    flags = ["-o", str(source.parent / "out"), "--grid", "2x1", "--workers", "0"]
     assert main(["build", str(source), *flags, "--config", str(settings)]) == 0
     return source.parent / "out"
 
@@ -170,7 +170,7 @@ def test_a_value_above_the_background_is_that_of_the_build(
 ) -> None:
     iso = _stated(out, "uneven")["iso"]
     settings = str(source.parent / "settings.toml")
-    flags = ["--grid", "3x2", "--channels", "uneven", "--config", settings]
+    flags = ["--grid", "2x1", "--channels", "uneven", "--config", settings]
     given = [*flags, "--iso-value", f"uneven={iso!r}+b"]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *given]) == 0
     assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0

@@ -381,6 +381,7 @@ def test_what_is_no_place_is_said_in_a_line(
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: Path) -> None:
     voxels, _ = blobs(2)
     source = phantoms.write_ome_tiff(tmp_path / "blobs.ome.tif", voxels[None], "CZYX")

@@ -152,7 +152,7 @@ def _change_a_digit(file: Path) -> None:
     os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
-@pytest.mark.parametrize("name", [f"window-{F}-*.json", f"r0_c0/{F}/iso-*.json", "survey.json"])
+@pytest.mark.parametrize("name", [f"window-{F}-*.json", f"r0_c0/{F}/solids-*.json", "survey.json"])
 def test_what_the_units_rest_on_is_named_and_found_anew(
     out: Path, built: Path, capfd: pytest.CaptureFixture[str], name: str
 ) -> None:

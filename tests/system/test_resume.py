@@ -117,12 +117,15 @@ def test_cut_file_is_made_again(out: Path, built: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("content", ["{}", "{ not JSON"])
-@pytest.mark.parametrize("name", ["survey.json", "done.json", "iso", "window", "phases.json"])
+@pytest.mark.parametrize(
+    "name", ["survey.json", "done.json", "evidence", "solids", "window", "phases.json"]
+)
 def test_damaged_json_is_made_again_by_a_build_and_named_by_the_phase(
     out: Path, built: Path, capsys: pytest.CaptureFixture[str], name: str, content: str
 ) -> None:
     places = {
-        "iso": next((out / "units").rglob("iso-*.json")),
+        "evidence": next((out / "units").rglob("evidence-*.json")),
+        "solids": next((out / "units").rglob("solids-*.json")),
         "window": next((out / "units").glob("window-*.json")),
         "phases.json": out / "phases.json",
     }

@@ -5,7 +5,7 @@ each tile's sums, which add up to the channel's levels. Solids: what lies above 
 which decides how the surface is cleaned. The result, survey.json, steers the units.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.building.level_choice import (
+    Found,
+    Solids,
+    choose_rung,
+    find_level,
+    given_level,
+    level_of_tile,
+)
 from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
@@ -46,45 +54,16 @@ from stereocell.building.tasks.window import (
     write_window,
 )
 from stereocell.engine.run import Engine, console
-from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
-from stereocell.isosurface.level_evidence import TileEvidence
-from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, RUNGS, parse_level
+from stereocell.isosurface.channel_level import Level
+from stereocell.isosurface.options import CRITERIA
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
-from stereocell.model.lattice_field import LatticeField, make_iso_field
+from stereocell.model.lattice_field import make_iso_field
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import make_appearance
 from stereocell.transfer.windows import parse_window
-
-APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
-Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """What is known of a channel's level before its solids are.
-
-    window    of the channel
-    levels    what its tiles add up to; None where the level was given
-    evidence  each tile's; empty where the level was given
-    rungs     the levels that may have the surface: the given one, or clear ones; the first is
-              taken, unless its solids speak against it
-    doubt     why there is none
-    """
-
-    window: Window
-    levels: ChannelLevels | None
-    evidence: Mapping[str, TileEvidence]
-    rungs: tuple[Level | float, ...]
-    subtracts: bool
-    doubt: str
-
-    @property
-    def background(self) -> LatticeField | None:
-        """The background that is subtracted, voxel values."""
-        return self.window.statistics.background if self.subtracts else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +109,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
         ]
         chosen = choose_rung(of_rungs)
         iso = {
-            tile.id: _tile_iso(
+            tile.id: level_of_tile(
                 plan,
                 tile,
                 one,
@@ -199,79 +178,6 @@ def _of_channel(
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,
     )
-
-
-def find_level(
-    plan: Plan, channel: Channel, window: Window, evidence: Mapping[str, TileEvidence]
-) -> Found:
-    """Return a channel's level; `evidence` by tile ID, empty where the level is given."""
-    given = given_level(plan, channel)
-    if given is not None:
-        return Found(window, None, {}, (given[0],), given[1], "")
-    options = plan.settings.isovalue
-    levels = find_levels(
-        list(evidence.values()),
-        counting=window.counting,
-        finest_um=min(plan.spacing_um),
-        modality=plan.modality,
-        options=options if options.criterion in CRITERIA else None,
-    )
-    clear = levels.clear
-    doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
-    if options.criterion == ADAPTIVE and clear:
-        threshold = window.statistics.threshold
-        if threshold is None:
-            nothing = "no clear surface: the channel's histogram has no threshold"
-            return Found(window, levels, evidence, (), False, nothing)
-        plain = replace(levels, subtracts=False)
-        return Found(window, plain, evidence, (threshold.value,), False, "")
-    rung = channel.rung or options.rung
-    if clear and rung != APART:
-        place = RUNGS[rung]
-        if place >= len(clear):
-            doubt = f"no clear surface: {len(clear)} clear levels, none that is the {rung}"
-        clear = clear[place : place + 1]
-    return Found(window, levels, evidence, clear, levels.subtracts, doubt)
-
-
-def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
-    """Return the iso-value that the user gives for a channel, and whether above the background."""
-    if channel.rung:
-        return None if channel.rung in RUNGS else (float(channel.rung), False)
-    given = plan.settings.iso_values.get(channel.name)
-    return None if given is None else parse_level(f"--iso-value {channel.name}", given)
-
-
-def choose_rung(of_rungs: Sequence[Solids]) -> int:
-    """Return the first rung whose solids are many; the outermost where none has many.
-
-    of_rungs  the ComponentSums of each tile at each rung, outermost first
-    """
-    if len(of_rungs) < 2:
-        return 0
-    for place, solids in enumerate(of_rungs):
-        # over the tiles: what fills all of them is the largest in each
-        largest = sum(one["largest"] for one in solids.values())
-        if largest < APART_SHARE * sum(one["voxels"] for one in solids.values()):
-            return place
-    return 0
-
-
-def _tile_iso(plan: Plan, tile: Tile, found: Found, chosen: int, files: dict[str, str]) -> TileIso:
-    if not found.rungs:
-        return TileIso(None, 0.0, None, files)
-    level, below = found.rungs[chosen], 0.0
-    if found.background is not None:
-        under = np.broadcast_to(found.background.at(tile.box), tile.box.shape)
-        below = float(np.mean(under, dtype=np.float64))
-    if found.levels is None or not isinstance(level, Level):
-        value = level.value if isinstance(level, Level) else level
-        return TileIso(value, below, None, files)
-    tile_evidence, value = found.evidence[tile.id], level.value
-    judged = found.levels.judge_tile(level, tile_evidence)
-    if plan.settings.isovalue.scope == "tile":
-        value = found.levels.level_of_tile(level, tile_evidence)
-    return TileIso(value, below, None if judged is None else judged.confidence, files)
 
 
 def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
@@ -369,7 +275,7 @@ def _solids(
         one = found[channel.id]
         if rung >= len(one.rungs):
             return None
-        iso = _tile_iso(plan, tile, one, rung, {}).value
+        iso = level_of_tile(plan, tile, one, rung, {}).value
         if iso is None:
             return None
         surface = plan.settings.surface

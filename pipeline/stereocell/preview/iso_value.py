@@ -12,15 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from stereocell.building.channel_survey import (
-    Found,
-    Solids,
-    choose_rung,
-    evidence_task,
-    find_level,
-    given_level,
-    statistics_task,
-)
+from stereocell.building.channel_survey import evidence_task, statistics_task
+from stereocell.building.level_choice import Found, Solids, choose_rung, find_level, given_level
 from stereocell.building.open_source import open_source, source_of
 from stereocell.building.other_levels import find_other_levels, take
 from stereocell.building.phases import settle

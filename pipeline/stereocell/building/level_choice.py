@@ -1,0 +1,119 @@
+"""Which level of a channel has its surface: the given one, a rung of the ladder, its threshold."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stereocell.building.plan import Channel, Plan
+from stereocell.building.survey_file import TileIso
+from stereocell.building.tasks.window import Window
+from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
+from stereocell.isosurface.level_evidence import TileEvidence
+from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, RUNGS, parse_level
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tiling import Tile
+
+APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
+Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What is known of a channel's level before its solids are.
+
+    window    of the channel
+    levels    what its tiles add up to; None where the level was given
+    evidence  each tile's; empty where the level was given
+    rungs     the levels that may have the surface: the given one, or clear ones; the first is
+              taken, unless its solids speak against it
+    doubt     why there is none
+    """
+
+    window: Window
+    levels: ChannelLevels | None
+    evidence: Mapping[str, TileEvidence]
+    rungs: tuple[Level | float, ...]
+    subtracts: bool
+    doubt: str
+
+    @property
+    def background(self) -> LatticeField | None:
+        """The background that is subtracted, voxel values."""
+        return self.window.statistics.background if self.subtracts else None
+
+
+def find_level(
+    plan: Plan, channel: Channel, window: Window, evidence: Mapping[str, TileEvidence]
+) -> Found:
+    """Return a channel's level; `evidence` by tile ID, empty where the level is given."""
+    given = given_level(plan, channel)
+    if given is not None:
+        return Found(window, None, {}, (given[0],), given[1], "")
+    options = plan.settings.isovalue
+    levels = find_levels(
+        list(evidence.values()),
+        counting=window.counting,
+        finest_um=min(plan.spacing_um),
+        modality=plan.modality,
+        options=options if options.criterion in CRITERIA else None,
+    )
+    clear = levels.clear
+    doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
+    if options.criterion == ADAPTIVE and clear:
+        threshold = window.statistics.threshold
+        if threshold is None:
+            nothing = "no clear surface: the channel's histogram has no threshold"
+            return Found(window, levels, evidence, (), False, nothing)
+        plain = replace(levels, subtracts=False)
+        return Found(window, plain, evidence, (threshold.value,), False, "")
+    rung = channel.rung or options.rung
+    if clear and rung != APART:
+        place = RUNGS[rung]
+        if place >= len(clear):
+            doubt = f"no clear surface: {len(clear)} clear levels, none that is the {rung}"
+        clear = clear[place : place + 1]
+    return Found(window, levels, evidence, clear, levels.subtracts, doubt)
+
+
+def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
+    """Return the iso-value that the user gives for a channel, and whether above the background."""
+    if channel.rung:
+        return None if channel.rung in RUNGS else (float(channel.rung), False)
+    given = plan.settings.iso_values.get(channel.name)
+    return None if given is None else parse_level(f"--iso-value {channel.name}", given)
+
+
+def choose_rung(of_rungs: Sequence[Solids]) -> int:
+    """Return the first rung whose solids are many; the outermost where none has many.
+
+    of_rungs  the ComponentSums of each tile at each rung, outermost first
+    """
+    if len(of_rungs) < 2:
+        return 0
+    for place, solids in enumerate(of_rungs):
+        # over the tiles: what fills all of them is the largest in each
+        largest = sum(one["largest"] for one in solids.values())
+        if largest < APART_SHARE * sum(one["voxels"] for one in solids.values()):
+            return place
+    return 0
+
+
+def level_of_tile(
+    plan: Plan, tile: Tile, found: Found, chosen: int, files: dict[str, str]
+) -> TileIso:
+    if not found.rungs:
+        return TileIso(None, 0.0, None, files)
+    level, below = found.rungs[chosen], 0.0
+    if found.background is not None:
+        under = np.broadcast_to(found.background.at(tile.box), tile.box.shape)
+        below = float(np.mean(under, dtype=np.float64))
+    if found.levels is None or not isinstance(level, Level):
+        value = level.value if isinstance(level, Level) else level
+        return TileIso(value, below, None, files)
+    tile_evidence, value = found.evidence[tile.id], level.value
+    judged = found.levels.judge_tile(level, tile_evidence)
+    if plan.settings.isovalue.scope == "tile":
+        value = found.levels.level_of_tile(level, tile_evidence)
+    return TileIso(value, below, None if judged is None else judged.confidence, files)
