@@ -7,7 +7,6 @@ plugin's affair, so this runs only for a name that no reader here knows.
 References: https://bioio-devs.github.io/bioio/
 """
 
-import math
 import re
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
-from stereocell.read.series import Candidate, choose, lines
+from stereocell.read.series import Candidate, candidate, choose, lines
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
@@ -90,8 +89,9 @@ def _candidates(image: Any) -> list[Candidate]:
         image.set_scene(index)
         sizes = {axis: int(getattr(image.dims, axis, 1)) for axis in "TCZYX"}
         z, y, x = (sizes[axis] for axis in "ZYX")
-        label = f"{z} x {y} x {x} voxels, {sizes['C']} channels, {sizes['T']} points in time"
-        found.append(Candidate(label, math.prod((z, y, x)) if z > 1 else 0))
+        found.append(
+            candidate((z, y, x), channels=sizes["C"], times=sizes["T"], spacing_um=_spacing(image))
+        )
     return found
 
 

@@ -10,6 +10,7 @@ References: https://zeiss.github.io/libczi/
 import os
 import re
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 from xml.etree import ElementTree
 
@@ -21,7 +22,7 @@ from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.plane_array import PlaneArray
-from stereocell.read.series import Candidate, choose, counted, lines
+from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
@@ -62,33 +63,31 @@ class _File:
         return high - low
 
     def candidates(self) -> list[Candidate]:
-        found = []
-        spacing = self.spacing and ",".join(f"{value:.4g}" for value in self.spacing)
-        for _, (_, _, width, height) in self.scenes:
-            z = self.size("Z")
-            label = f"{z} x {height} x {width} voxels, {counted(self.size('C'), 'channel')}"
-            times = f", {self.size('T')} points in time" if self.size("T") > 1 else ""
-            label += times + (f", spacing {spacing} um (z,y,x)" if spacing else "")
-            found.append(Candidate(label, z * height * width if z > 1 else 0))
-        return found
+        return [
+            candidate(
+                (self.size("Z"), height, width),
+                channels=self.size("C"),
+                times=self.size("T"),
+                spacing_um=self.spacing,
+            )
+            for _, (_, _, width, height) in self.scenes
+        ]
 
 
 def read_image(location: Location, series: int = 0) -> Image:
     """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
-    stack = ExitStack()
-    try:
-        file = _File(location, stack)
-        index, notes = choose(file.where, file.candidates(), series)
-        return _image(file, index, notes, stack)
-    except BaseException:
-        stack.close()
-        raise
+    return read_chosen(location.shown, series, partial(_opened, location), _image)
+
+
+def _opened(location: Location, stack: ExitStack) -> tuple[_File, list[Candidate]]:
+    file = _File(location, stack)
+    return file, file.candidates()
 
 
 def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each scene. Raises SourceError."""
     with ExitStack() as stack:
-        return lines(_File(location, stack).candidates())
+        return lines(_opened(location, stack)[1])
 
 
 def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) -> Image:

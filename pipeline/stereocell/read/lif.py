@@ -6,6 +6,7 @@ round by the axes' names. readlif, which bioio-lif stands on, is under GPL-3.0.
 
 import os
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.plane_array import PlaneArray
-from stereocell.read.series import Candidate, choose, lines
+from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
@@ -43,14 +44,12 @@ _COLORS = {
 
 def read_image(location: Location, series: int = 0) -> Image:
     """Return one image; 0 is the largest volume. Raises SourceError, UsageError for no such one."""
-    stack = ExitStack()
-    try:
-        images, candidates = _images(location, stack)
-        index, notes = choose(location.shown, candidates, series)
-        return _image(location.shown, images[index], notes, stack)
-    except BaseException:
-        stack.close()
-        raise
+    return read_chosen(
+        location.shown,
+        series,
+        partial(_images, location),
+        lambda images, index, notes, stack: _image(location.shown, images[index], notes, stack),
+    )
 
 
 def list_series(location: Location) -> tuple[str, ...]:
@@ -77,15 +76,11 @@ def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candi
 
 def _candidate(image: Any) -> Candidate:
     sizes = dict(zip(image.dims, image.shape, strict=True))
-    shape = [int(sizes.get(axis, 1)) for axis in "ZYX"]
+    z, y, x, channels, times = (int(sizes.get(axis, 1)) for axis in "ZYXCT")
     others = [f"{size} {_OTHERS.get(axis, axis)}" for axis, size in _other_axes(image).items()]
-    counts = [f"{sizes[a]} {name}" for a, name in (("C", "channels"), ("T", "points in time"))
-              if sizes.get(a, 1) > 1]  # fmt: skip
-    spacing = _spacing(image)
-    lengths = [f"spacing {','.join(f'{s:.4g}' for s in spacing)} um (z,y,x)"] if spacing else []
-    label = ", ".join([f"{shape[0]} x {shape[1]} x {shape[2]} voxels", *counts, *others, *lengths])
-    is_volume = not others and min(shape) > 1
-    return Candidate(label, shape[0] * shape[1] * shape[2] if is_volume else 0)
+    return candidate(
+        (z, y, x), channels=channels, times=times, spacing_um=_spacing(image), others=others
+    )
 
 
 def _other_axes(image: Any) -> dict[str, int]:

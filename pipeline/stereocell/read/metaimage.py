@@ -61,18 +61,7 @@ def read_image(location: Location) -> Image:
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, fields, len(shape))
-    placed = place(where, array, axes, affine, "TransformMatrix")
-    count = placed.array.size("c")
-    return Image(
-        arrays=(placed.array,),
-        grids=(placed.grid,),
-        names=(NAME,) if count == 1 else (None,) * count,
-        colors=(None,) * count,
-        images=1,
-        title=NAME,
-        placement=placed.placement,
-        notes=(*notes, *placed.notes),
-    )
+    return place(where, array, axes, affine, "TransformMatrix").image(NAME, notes)
 
 
 def _header(location: Location) -> tuple[dict[str, str], int]:

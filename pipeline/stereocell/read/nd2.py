@@ -2,6 +2,7 @@
 
 import os
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
 from stereocell.read.plane_array import PlaneArray
-from stereocell.read.series import Candidate, choose, counted, lines
+from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
@@ -38,30 +39,26 @@ class _File:
 
     def candidates(self) -> list[Candidate]:
         z, y, x = (self.size(axis) for axis in "ZYX")
-        label = f"{z} x {y} x {x} voxels, {counted(self.size('C'), 'channel')}"
-        label += f", {self.size('T')} points in time" if self.size("T") > 1 else ""
-        label += (
-            f", spacing {','.join(f'{s:.4g}' for s in self.spacing)} um" if self.spacing else ""
+        one = candidate(
+            (z, y, x), channels=self.size("C"), times=self.size("T"), spacing_um=self.spacing
         )
-        return [Candidate(label, z * y * x if z > 1 else 0)] * self.size("P")
+        return [one] * self.size("P")
 
 
 def read_image(location: Location, series: int = 0) -> Image:
     """Return the image of one position; 0 is the first. Raises SourceError, UsageError."""
-    stack = ExitStack()
-    try:
-        file = _File(location, stack)
-        index, notes = choose(file.where, file.candidates(), series)
-        return _image(file, index, notes, stack)
-    except BaseException:
-        stack.close()
-        raise
+    return read_chosen(location.shown, series, partial(_opened, location), _image)
+
+
+def _opened(location: Location, stack: ExitStack) -> tuple[_File, list[Candidate]]:
+    file = _File(location, stack)
+    return file, file.candidates()
 
 
 def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each position. Raises SourceError."""
     with ExitStack() as stack:
-        return lines(_File(location, stack).candidates())
+        return lines(_opened(location, stack)[1])
 
 
 def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack) -> Image:

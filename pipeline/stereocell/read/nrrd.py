@@ -79,17 +79,7 @@ def read_image(location: Location) -> Image:
     affine[:3, :3] = to_lps @ spatial.T * (unit / 1000.0)
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
     affine[:3, 3] = to_lps @ np.where(np.isfinite(origin), origin, 0.0) * (unit / 1000.0)
-    placed = place(where, array, axes, affine, "space directions")
-    return Image(
-        arrays=(placed.array,),
-        grids=(placed.grid,),
-        names=(NAME,) if count == 1 else (None,) * count,
-        colors=(None,) * count,
-        images=1,
-        title=NAME,
-        placement=placed.placement,
-        notes=placed.notes,
-    )
+    return place(where, array, axes, affine, "space directions").image(NAME)
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:

@@ -1,5 +1,6 @@
 """The canonical form of an array that an affine places in the patient (anatomical_axes.py)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from stereocell.model.tiling import Box
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.file_array import FlippedArray
+from stereocell.read.image import Image
 from stereocell.read.resample import orthogonal_grid, resample_sheared
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
@@ -28,6 +30,20 @@ class Placed:
     grid: Grid
     placement: Matrix
     notes: tuple[str, ...] = ()
+
+    def image(self, title: str, notes: Sequence[str] = ()) -> Image:
+        """Return the image of a format whose files name no channel, after more notes."""
+        count = self.array.size("c")
+        return Image(
+            arrays=(self.array,),
+            grids=(self.grid,),
+            names=(title,) if count == 1 else (None,) * count,
+            colors=(None,) * count,
+            images=1,
+            title=title,
+            placement=self.placement,
+            notes=(*notes, *self.notes),
+        )
 
 
 def place(

@@ -1,9 +1,15 @@
 """Which image of a file of several is read: the one that `--series` names, else the largest."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import TypeVar
 
 from stereocell.model.errors import UsageError
+from stereocell.read.image import Image
+from stereocell.read.spacing import Triple
+
+T = TypeVar("T")
 
 _LABELS = ("label", "mask", "seg", "pred")  # in the names of arrays that number objects
 
@@ -18,6 +24,50 @@ class Candidate:
 
     label: str
     voxels: int
+
+
+def candidate(
+    shape: tuple[int, int, int],
+    *,
+    channels: int,
+    times: int,
+    spacing_um: Triple | None,
+    others: Sequence[str] = (),
+) -> Candidate:
+    """Return an image as a list names it.
+
+    shape       voxels (z, y, x)
+    spacing_um  (z, y, x), um; None: not stated
+    others      further axes, each with its length: an image that has some is no volume
+    """
+    z, y, x = shape
+    parts = [f"{z} x {y} x {x} voxels", counted(channels, "channel"), *others]
+    if times > 1:
+        parts.append(f"{times} points in time")
+    if spacing_um:
+        parts.append(f"spacing {','.join(f'{length:.4g}' for length in spacing_um)} um (z,y,x)")
+    return Candidate(", ".join(parts), z * y * x if min(shape) > 1 and not others else 0)
+
+
+def read_chosen(
+    where: str,
+    series: int,
+    opened: Callable[[ExitStack], tuple[T, Sequence[Candidate]]],
+    read: Callable[[T, int, tuple[str, ...], ExitStack], Image],
+) -> Image:
+    """Return the chosen image of a file, which closes where that fails.
+
+    opened  opens the file, to be closed by the stack, and returns it with its images
+    read    returns the image of an index, with these notes; it keeps the stack open
+    """
+    stack = ExitStack()
+    try:
+        source, candidates = opened(stack)
+        index, notes = choose(where, candidates, series)
+        return read(source, index, notes, stack)
+    except BaseException:
+        stack.close()
+        raise
 
 
 def choose(where: str, candidates: Sequence[Candidate], series: int) -> tuple[int, tuple[str, ...]]:
