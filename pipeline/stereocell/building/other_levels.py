@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stereocell.building.plan import Channel, Plan
-from stereocell.isosurface.channel_level import Level
+from stereocell.isosurface.channel_level import Level, clear_of
 from stereocell.isosurface.options import ADAPTIVE, RUNGS
 
 MOST = 3
+LIKELY = 0.2  # confidence from which a doubtful rung goes before a level that was only moved
 _ASIDE = 0.25  # share of the contrast by which a level is moved where the ladder has no other
 _ALIKE = 0.03  # share of the contrast: levels nearer to one another are one
 
@@ -47,15 +48,18 @@ def find_other_levels(
     threshold  the adaptive one, voxel value; None: there is none
 
     First the ladder's other rungs, clear ones before doubtful ones, then the adaptive threshold,
-    then levels a little lower and higher.
+    then levels a little lower and higher; last the rungs that hardly anything speaks for.
     """
     if not ladder:
         return []
-    levels = [*_rungs(channel, ladder, subtracts)]
+    named, doubtful = _rungs(channel, ladder, subtracts)
+    likely = [level for level in doubtful if (level.confidence or 0.0) >= LIKELY]
+    levels = [*named, *likely]
     if threshold is not None and plan.settings.isovalue.criterion != ADAPTIVE:
         flag = f"--iso-criterion {ADAPTIVE}"
         levels.append(OtherLevel(ADAPTIVE, threshold, False, flag, None))
     levels += _aside(channel, ladder, taken, subtracts)
+    levels += [level for level in doubtful if level not in likely]
     contrast = max(level.contrast for level in ladder)
     chosen: list[OtherLevel] = []
     for level in levels:
@@ -72,8 +76,11 @@ def take(channel: Channel, value: float, above: bool) -> str:
     return "--iso-value " + shlex.quote(f"{channel.name}={value:.5g}{'+b' if above else ''}")
 
 
-def _rungs(channel: Channel, ladder: Sequence[Level], subtracts: bool) -> list[OtherLevel]:
-    clear = [level for place, level in enumerate(ladder) if _is_rung(ladder, place)]
+def _rungs(
+    channel: Channel, ladder: Sequence[Level], subtracts: bool
+) -> tuple[list[OtherLevel], list[OtherLevel]]:
+    """Return the clear rungs by their names, and the doubtful ones, best first."""
+    clear = clear_of(ladder)
     doubtful = [level for level in ladder if level not in clear]
     named = [
         OtherLevel(
@@ -87,7 +94,7 @@ def _rungs(channel: Channel, ladder: Sequence[Level], subtracts: bool) -> list[O
         if place < len(clear)
     ]
     doubtful.sort(key=lambda level: -level.confidence)
-    return named + [
+    return named, [
         OtherLevel(
             "doubtful",
             level.value,
@@ -97,11 +104,6 @@ def _rungs(channel: Channel, ladder: Sequence[Level], subtracts: bool) -> list[O
         )
         for level in doubtful
     ]
-
-
-def _is_rung(ladder: Sequence[Level], place: int) -> bool:
-    within = any(level.is_clear for level in ladder[:place])
-    return ladder[place].is_clear or (within and ladder[place].is_clear_within)
 
 
 def _aside(

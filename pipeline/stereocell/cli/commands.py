@@ -7,6 +7,7 @@ are lazy, so that --help is quick.
 
 import argparse
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
@@ -201,7 +202,7 @@ def build(options: argparse.Namespace) -> Answer:
     made = run_phases(options, "units", "stage", "bundle", "report")
     for name in ("stage", "bundle", "report"):
         print_unless_json(options, f"{name:<8} {made.data[name]}")
-    print_unless_json(options, f"look at it: stereocell view {options.shown}")
+    print_unless_json(options, f"look at it: stereocell view {shlex.quote(str(options.shown))}")
     return Answer({**planned.data, **made.data})
 
 

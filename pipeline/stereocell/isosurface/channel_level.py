@@ -187,11 +187,7 @@ class ChannelLevels:
     @property
     def clear(self) -> tuple[Level, ...]:
         """The clear ones, outermost first: the rungs of the ladder that have surfaces."""
-        found: list[Level] = []
-        for level in self.ladder:
-            if level.is_clear or (found and level.is_clear_within):
-                found.append(level)
-        return tuple(found)
+        return clear_of(self.ladder)
 
     @property
     def doubt(self) -> str:
@@ -245,6 +241,15 @@ class ChannelLevels:
         if not self.subtracts and not self.has_padding:
             sums = sums + tile.padding
         return _Sight(sums, self.histogram.edges, self.noise, self.finest_um)
+
+
+def clear_of(ladder: Sequence[Level]) -> tuple[Level, ...]:
+    """Return the clear levels of a ladder: one within a clear one needs less to be clear."""
+    found: list[Level] = []
+    for level in ladder:
+        if level.is_clear or (found and level.is_clear_within):
+            found.append(level)
+    return tuple(found)
 
 
 def find_levels(

@@ -7,6 +7,7 @@ of units stays one that a phone opens; sums and remarks cover all units.
 import base64
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.version import GENERATOR
 from stereocell.model.volume import zyx_to_xyz
-from stereocell.preview.draw_slices import Slice, cut_unit, draw_slices
+from stereocell.preview.draw_slices import OUTLINE, Slice, cut_unit, draw_slices
 from stereocell.preview.views import View, views_of
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scenes
@@ -269,7 +270,7 @@ def _cut(facts: Facts, unit: UnitFacts, other: OtherLevel | None = None) -> list
     if other is not None:
         iso = SurfaceLevel(other.value, None, 0.0).field
         background = background if other.above else None
-    return cut_unit(
+    slices = cut_unit(
         load_volume(unit.directory)[inner, inner, inner],
         lattice,
         first_um=plan.position_um(lattice.start),
@@ -279,6 +280,13 @@ def _cut(facts: Facts, unit: UnitFacts, other: OtherLevel | None = None) -> list
         iso_at=None if iso is None else partial(_in_eight_bits, iso, background, low, high),
         views=_views(plan),
     )
+    if other is None:
+        return slices
+    # the only line there: drawn as a surface is, and not dashed
+    return [
+        replace(one, above=None, contours=() if one.above is None else ((OUTLINE, one.above),))
+        for one in slices
+    ]
 
 
 def _views(plan: Plan) -> tuple[View, View, View]:
