@@ -207,6 +207,8 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
         ("even=outer,outer", "--surfaces even: found outer,outer, expected each once"),
         ("even=skin", "--surfaces even: found 'skin', expected outer, inner, third or voxel"),
         ("odd=outer", "--surfaces names channel 'odd', expected one of uneven"),
+        ("even=outer,,inner", "--surfaces even: found '', expected outer, inner, third or voxel"),
+        ("even=", "--surfaces is 'even=', expected CHANNEL=SURFACE,..."),
     ],
 )
 def test_a_surface_that_is_none_is_one_clear_line(
@@ -222,6 +224,23 @@ def test_a_surface_that_is_none_is_one_clear_line(
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_an_iso_value_beside_surfaces_is_told_to_go_unused(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flags = ["-o", str(tmp_path / "out"), "--channels", "even", "--surfaces", "even=inner"]
+    assert main(["plan", str(source), *flags, "--iso-value", "even=700"]) == 0
+    told = "plan: even: built where --surfaces says, not at the iso-value 700"
+    assert told in capsys.readouterr().err
+
+
+def test_a_window_given_twice_is_refused(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flags = ["-o", str(tmp_path / "out"), "--window", "even=1:2", "--window", "3=3:4"]
+    assert main(["plan", str(source), *flags]) == 2
+    assert "--window names channel 'even' twice, expected once" in capsys.readouterr().err
 
 
 def test_tiles_of_their_own_level_state_it_as_a_field(source: Path, tmp_path: Path) -> None:

@@ -89,6 +89,12 @@ def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:
     assert choose(plan, []).alpha_um == 2.0
 
 
+def test_a_solid_that_fills_its_tile_has_no_faces_and_decides_nothing() -> None:
+    sums = asdict(sum_components(np.ones((8, 9, 10), bool), SPACING, 1.0))
+    assert (sums["kept"], sums["kept_faces"]) == (1, 0)
+    assert choose(_plan_with(max_alpha_um=2.0), [sums]).alpha_um == 2.0
+
+
 def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
     assert choose(_plan_with(alpha_um=0.8), []).alpha_um == 0.8
     assert choose(_plan_with(alpha_um=0.8), []).offset_um == 0.0

@@ -107,7 +107,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             {tile.id: rung[tile.id, channel.id].content["solids"] for tile in plan.tiles}
             for rung in solids[: len(one.rungs)]
         ]
-        chosen = choose_rung(of_rungs)
+        chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
         iso = {
             tile.id: level_of_tile(
                 plan,

@@ -16,6 +16,8 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 
 APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
+# ... and what may be taken for many that touch: their share, and how many solids there must be
+JOINED_SHARE, MANY = 2 / 3, 30
 Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 
 
@@ -86,18 +88,24 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
 
 
 def choose_rung(of_rungs: Sequence[Solids]) -> int:
-    """Return the first rung whose solids are many; the outermost where none has many.
+    """Return the first rung whose solids are many.
+
+    Where none has many, cells that touch are joined at every level: then the rung whose largest
+    solids hold the least, if that is under JOINED_SHARE and there are MANY; else the outermost.
 
     of_rungs  the ComponentSums of each tile at each rung, outermost first
     """
-    if len(of_rungs) < 2:
-        return 0
-    for place, solids in enumerate(of_rungs):
+    shares: list[float] = []
+    for solids in of_rungs:
         # over the tiles: what fills all of them is the largest in each
-        largest = sum(one["largest"] for one in solids.values())
-        if largest < APART_SHARE * sum(one["voxels"] for one in solids.values()):
-            return place
-    return 0
+        voxels, largest, count = (
+            sum(one[key] for one in solids.values()) for key in ("voxels", "largest", "count")
+        )
+        if largest < APART_SHARE * voxels:
+            return len(shares)
+        shares.append(largest / voxels if voxels and count >= MANY else 1.0)
+    best = int(np.argmin(shares)) if shares else 0
+    return best if shares and shares[best] < JOINED_SHARE else 0
 
 
 def level_of_tile(

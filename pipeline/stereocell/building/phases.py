@@ -95,6 +95,11 @@ def settle(source: str, settings: Settings) -> Plan:
         for place, index in enumerate(chosen)
     ]
     channels = with_surfaces(channels, settings.surfaces)
+    for channel in channels:
+        given = settings.iso_values.get(channel.name, settings.iso_values.get(str(channel.index)))
+        if channel.rung and given is not None:
+            told = f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
+            console.print(f"plan: {told}", markup=False)
     level = choose_level(dataset.levels, len(channels), settings)
     origin = dataset.levels[level[0]].origin_um
     return make_plan(

@@ -64,9 +64,12 @@ def with_surfaces(channels: Sequence["Channel"], wanted: Mapping[str, str]) -> l
     by_name = _by_name("--surfaces", wanted, channels)
     found: list[Channel] = []
     for channel in channels:
-        rungs = [part.strip() for part in by_name.get(channel.name, "").split(",")]
+        if channel.name not in by_name:
+            found.append(channel)
+            continue
+        rungs = [part.strip() for part in by_name[channel.name].split(",")]
         for rung in rungs:
-            if rung and rung not in RUNGS:
+            if rung not in RUNGS:
                 parse_surface(channel.name, rung)
         if len(set(rungs)) < len(rungs):
             found_twice = ",".join(rungs)
@@ -414,7 +417,10 @@ def _of_all(windows: Mapping[str, str], channels: Sequence[Channel]) -> dict[str
     for key, window in windows.items():
         by_name = [channel.name for channel in channels if key in (channel.name, channel.base)]
         names = by_name or [channel.name for channel in channels if key == str(channel.index)]
-        found |= dict.fromkeys(names or [_name("--window", key, channels)], window)
+        for name in names or [_name("--window", key, channels)]:
+            if name in found:
+                raise UsageError(f"--window names channel {name!r} twice, expected once")
+            found[name] = window
     return found
 
 

@@ -163,7 +163,7 @@ def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
     except ValueError:
         given = ""
     if not name or given == "":
-        example = ", as CD31=MART1" if kind is str else ""
+        example = ", as CD31=MART1" if flag.form == "CHANNEL=CHANNEL" else ""
         raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}{example}")
     return name, given
 

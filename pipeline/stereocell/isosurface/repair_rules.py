@@ -103,9 +103,10 @@ def choose_repair(
         )
     if surface.alpha_um == AUTO:
         alpha = most.alpha_um
-        if kept:
+        faces = sum(tile["kept_faces"] for tile in sums)
+        if faces:  # solids that fill their tiles have none
             diagonal = sum(tile["kept_diagonal_um"] for tile in sums) / kept
-            faces = sum(tile["kept_faces"] for tile in sums) / kept
+            faces /= kept
             alpha = ALPHA_SIDES * diagonal / faces**0.5
         least = LEAST_ALPHA * max(spacing_um)
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
