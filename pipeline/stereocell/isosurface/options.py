@@ -76,7 +76,7 @@ class IsoValueOptions:
     rung: str = setting(
         "outer",
         f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the first whose largest "
-        "solid holds under a quarter of all",
+        "solids hold under a quarter of all, or the least of it where cells touch",
     )
     bins: int = setting(256, "levels that a criterion of edges tries")
     clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out there")
