@@ -67,6 +67,27 @@ def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
     assert "fewer --workers" in line
 
 
+class Restarting:
+    """A client, or its cluster, one of whose workers is being started anew while it closes."""
+
+    def __init__(self, cluster: "Restarting | None" = None) -> None:
+        self.cluster, self.status, self.closings = cluster, "running", 0
+
+    def close(self, timeout: float) -> None:
+        self.closings += 1
+        raise AssertionError("can only join a started process")
+
+
+def test_a_worker_that_starts_anew_does_not_keep_the_engine_from_closing() -> None:
+    cluster = Restarting()
+    client = Restarting(cluster)
+    engine = Engine(2)
+    engine._client = client
+    engine.close()
+    assert (client.closings, cluster.closings) == (1, 1)
+    assert client.status == "closed"
+
+
 class Gone:
     """A client and a task of its whose workers are gone: before the task ended, or after."""
 
