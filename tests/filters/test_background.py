@@ -28,6 +28,15 @@ def test_ramp_under_noise_and_bodies_is_found_where_it_lies() -> None:
     assert abs(np.median(error)) < 35
 
 
+def test_a_ground_that_falls_to_the_rim_is_found_on_to_the_rim() -> None:
+    """As a lens's vignetting leaves it: a parabola, steepest at the ends of what is built."""
+    z, y, x = np.indices(REGION.shape)
+    ground = 500 - 300 * ((x - 64) / 64) ** 2 + 0 * y + 0 * z
+    found = find_background(ground.astype(np.float32), REGION, spacing_um=SPACING, block_um=4.5)
+    error = found.at(REGION) - ground
+    assert np.ptp(np.percentile(error, [1, 99])) < 60  # of 300
+
+
 def test_coarser_voxels_give_the_same_background() -> None:
     fine = find_background(_ramp(), REGION, spacing_um=SPACING, block_um=4.5)
     coarse = find_background(_ramp()[:, ::2, ::2], REGION, spacing_um=SPACING, block_um=4.5)

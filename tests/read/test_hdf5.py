@@ -148,6 +148,8 @@ def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
     for spoilt in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
         (tmp_path / f"b{suffix}").write_bytes(spoilt)
         refusal(tmp_path / f"b{suffix}")
+    half = f"cut short at byte {len(content) // 2} of {len(content)}"
+    assert half in refusal(tmp_path / f"b{suffix}")
     (tmp_path / f"c{suffix}").mkdir()
     assert "is a folder" in refusal(tmp_path / f"c{suffix}")
     refusal(write(tmp_path / f"d{suffix}", "flat", np.zeros((40, 30))))

@@ -176,6 +176,13 @@ def test_a_real_nd2_is_read_as_its_library_does() -> None:
 # all three
 
 
+def test_an_nd2_without_its_end_is_cut_short(tmp_path: Path) -> None:
+    pytest.importorskip("nd2")
+    (tmp_path / "a.nd2").write_bytes(b"\xda\xce\xbe\n" + bytes(5000))
+    with pytest.raises(SourceError, match="cut short at byte 5004, or never closed"):
+        read.open(tmp_path / "a.nd2")
+
+
 @pytest.mark.parametrize(("suffix", "extra"), [("czi", "czi"), ("lif", "lif"), ("nd2", "nd2")])
 def test_without_its_extra_a_format_says_how_to_get_it(
     tmp_path: Path, suffix: str, extra: str, monkeypatch: pytest.MonkeyPatch

@@ -118,6 +118,10 @@ def test_what_is_no_map_is_one_line(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.mrc").write_bytes(content)
     with pytest.raises(SourceError, match="expected"):
         read.open(tmp_path / "a.mrc")
+    (tmp_path / "c.rec").write_bytes(content)
+    (tmp_path / "c.PAR").touch()
+    with pytest.raises(SourceError, match="dcm2niix"):
+        read.open(tmp_path / "c.rec")
     (tmp_path / "b.mrc").mkdir()
     with pytest.raises(SourceError, match="is a folder"):
         read.open(tmp_path / "b.mrc")

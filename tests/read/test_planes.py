@@ -364,3 +364,16 @@ def test_a_folder_of_dicom_with_pictures_stays_dicom(tmp_path: Path) -> None:
     (tmp_path / "deep").mkdir()
     (tmp_path / "deep" / "1").write_bytes(bytes(128) + b"DICM" + bytes(20))
     assert "no DICOM image" in refusal(tmp_path)
+
+
+def test_a_folder_of_planes_tells_what_else_it_holds(tmp_path: Path) -> None:
+    """A preview beside a NIfTI must not be taken for the volume without a word."""
+    (tmp_path / "head.nii.gz").touch()
+    png(tmp_path / "preview.png", np.zeros((8, 9), np.uint8))
+    with pytest.raises(SourceError, match=r"by its own name \(1 NIfTI or Analyze\)"):
+        read.open(tmp_path)
+    for number in (1, 2):
+        png(tmp_path / f"z{number}.png", np.zeros((8, 9), np.uint8))
+    (tmp_path / "preview.png").unlink()
+    notes = read.open(tmp_path, spacing_um=(1, 1, 1)).notes
+    assert any("holds 1 NIfTI or Analyze too" in note for note in notes)

@@ -101,7 +101,8 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
     if len(found) != 1 or found[0] not in _TYPES:
         raise SourceError(
             f"{file.where}: pixel types: found {', '.join(found) or 'none'}, expected one of "
-            f"{', '.join(_TYPES)} in all channels (no RGB)"
+            f"{', '.join(_TYPES)} in all channels (of a colour image, export its channels as "
+            "OME-TIFF from ZEN)"
         )
     scene, (left, top, width, height) = file.scenes[index]
     shape = (file.size("T"), file.size("C"), file.size("Z"), height, width)

@@ -6,6 +6,7 @@ whose voxels lie in other files is refused.
 """
 
 import os
+import re
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -22,6 +23,7 @@ _MAX_STEPS = 200  # names along a path, links followed
 _MAX_NODES = 20_000  # groups and datasets that a search visits
 _LISTED = 12  # names in a message
 _NUMBERS = "biuf"  # kinds of dtype
+_CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")  # in HDF5's words
 _EXTRA = 'pip install "stereocell[hdf5]"'
 
 
@@ -44,7 +46,12 @@ class Hdf5Tree:
         self._stack.close()
 
     def _open(self, path: str) -> h5py.File:
-        return self._stack.enter_context(h5py.File(path, "r", locking="best-effort"))
+        try:
+            return self._stack.enter_context(h5py.File(path, "r", locking="best-effort"))
+        except OSError as error:
+            if (cut := _CUT.search(str(error))) is None:
+                raise
+            raise ValueError(f"cut short at byte {cut[1]} of {cut[2]}") from None
 
     def find(self, path: str, start: h5py.Group | None = None) -> h5py.Group | h5py.Dataset:
         """Return a group or a dataset by its path. Raises SourceError where there is none."""

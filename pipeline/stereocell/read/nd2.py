@@ -18,6 +18,8 @@ from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
+_BEGIN, _END = b"\xda\xce\xbe\n", b"ND2 CHUNK MAP SIGNATURE 0000001!"
+_END_BYTES = 40  # of the signature and the place of the map of chunks, last in a file
 _IN_FRAME = "CYXS"  # axes inside a frame
 
 
@@ -28,8 +30,10 @@ class _File:
         self.where = location.shown
         require_file(location)
         library = extras.load("nd2", "nd2", self.where, "ND2")
+        path = os.path.realpath(location.path)
+        _require_end(path, self.where)
         with one_line(self.where, "an ND2 file that is whole"):
-            self.nd2: Any = stack.enter_context(library.ND2File(os.path.realpath(location.path)))
+            self.nd2: Any = stack.enter_context(library.ND2File(path))
             self.sizes = {str(axis): int(size) for axis, size in self.nd2.sizes.items()}
             self.dtype = np.dtype(self.nd2.dtype)
             self.spacing = _spacing(self.nd2, self.sizes)
@@ -43,6 +47,20 @@ class _File:
             (z, y, x), channels=self.size("C"), times=self.size("T"), spacing_um=self.spacing
         )
         return [one] * self.size("P")
+
+
+def _require_end(path: str, where: str) -> None:
+    """Raise SourceError for a file without the map of its chunks, which is written last."""
+    with open(path, "rb") as file:
+        begins = file.read(len(_BEGIN))
+        file.seek(max(0, os.path.getsize(path) - _END_BYTES))
+        ends = file.read()
+    if begins == _BEGIN and not ends.startswith(_END):
+        raise SourceError(
+            f"{where}: cut short at byte {os.path.getsize(path)}, or never closed: the map of its "
+            "chunks, which ends an ND2 file, is missing; expected an ND2 file that is whole: copy "
+            "it again"
+        )
 
 
 def read_image(location: Location, series: int = 0) -> Image:

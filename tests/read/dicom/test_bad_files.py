@@ -269,5 +269,5 @@ def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> 
     (tmp_path / "plate.zarr").mkdir()
     (tmp_path / "notes of JANE.txt").write_bytes(b"")
     told = refusal(tmp_path)
-    assert "or one of what the folder holds (2 nifti, 1 ome-zarr)" in told
+    assert "by its own name (2 NIfTI or Analyze, 1 OME-Zarr)" in told
     assert "DOE" not in told

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
+from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
@@ -33,7 +34,6 @@ from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, is_own
 
 _INSTEAD = "objects can't be built yet: expected the image that it was drawn on"
-_LOOKED_AT = 1000  # entries of a folder
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -135,20 +135,9 @@ def _find(location: Location) -> Found:
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'no file'}; expected slices of MR, CT or the like{_others(root)}"
+            f"{many}{held or 'no file'}; expected slices of MR, CT or the like{or_one_of(root, 'dicom')}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
-
-
-def _others(root: Path) -> str:
-    """Return a hint at sources of other formats that a folder holds; empty: there are none.
-
-    Their names may be private, and stay out.
-    """
-    paths = sorted(root.iterdir())[:_LOOKED_AT] if root.is_dir() else []
-    formats = Counter(Location.of(path).format for path in paths)
-    held = [f"{formats[kind]} {kind}" for kind in sorted(filter(None, formats)) if kind != "dicom"]
-    return f", or one of what the folder holds ({', '.join(held)})" if held else ""
 
 
 def _files(folder: Path) -> list[Path]:

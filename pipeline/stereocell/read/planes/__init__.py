@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.beside import or_one_of, others_in
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Color, Image
 from stereocell.read.planes.arrays import PlaneArray, StackArray
@@ -50,6 +51,8 @@ def read_image(location: Location, series: int = 0, pattern: str = "") -> Image:
     if whole is not None:
         return whole
     places, notes = _places(location, listed, pattern)
+    if held := others_in(location.source, "planes", "tiff"):
+        notes.append(f"the folder holds {held} too, which are not read: name one to build it")
     groups = groups_of(places)
     if series > len(groups):
         raise UsageError(
@@ -79,7 +82,7 @@ def read_image(location: Location, series: int = 0, pattern: str = "") -> Image:
         raise SourceError(
             f"{where}: a volume needs at least 2 planes: found images of one plane, and no number "
             f"in their names that counts planes, as {chosen[0].path!r:.100}; expected such "
-            "numbers, or --pattern with {z}"
+            f"numbers, or --pattern with {{z}}{or_one_of(location.source, 'planes', 'tiff')}"
         )
     if len(volume.planes) > 1:
         raise SourceError(
