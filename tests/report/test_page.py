@@ -428,7 +428,7 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
     }
     assert titles == {
         "1 channel without a surface": ("dim: no clear surface: as the test has it",),
-        "1 channel with low confidence in their surface (below 0.4)": ("CD31: 0.10 at 100",),
+        "1 channel with low confidence in their surface (below 0.6)": ("CD31: 0.10 at 100",),
         "1 unit without a surface, in channels that have some": (
             "r0_c0/CD31: no voxel crosses the iso-value",
         ),

@@ -6,6 +6,9 @@ changes nothing.
 
 - Where the histogram has a valley between two peaks, the level lies half-way between the upper peak
   and the median of what is darker, as far as the valley reaches.
+- Of MR the outer level parts air from tissue of every brightness: where air lies in a deep valley,
+  the level is half-way to the dimmest quarter of the tissue. Half-way to the brightest peak it kept
+  the brain and tore the skin.
 - Above the last valley there are no more peaks, as where bodies are small or of every brightness.
   There a level begins at Li's threshold and moves until it lies half-way between what it has inside
   and outside, since a blurred edge has its place there. The same again on the voxels above it finds
@@ -64,6 +67,9 @@ FLANK = 0.6
 BACKGROUND_SNR = 3.0  # contrast over noise from which a background may be subtracted
 BACKGROUND_GAIN = 1.1  # times as sharp above it: what a background must gain without valleys
 VALLEY_GAIN = 2.0  # ... and where the field has a valley
+# Of MR's first valley: how deep it is where it parts air from tissue, and the quantile of the
+# tissue that stands for it
+AIR_DIP, DIM = 0.3, 0.25
 PADDING_SHARE = 0.5  # share of the outside's distance from padding within which padding is outside
 HALF_HEIGHTS = 3  # levels looked for above the last valley
 # voxels above a level: this share of all, within these bounds
@@ -274,12 +280,12 @@ def find_levels(
     noise = _noise(tiles, scale, plain)
     sight = _Sight(plain, scale.edges(), noise, finest_um)
     is_body = modality in ("CT", "MR")
-    ladder = sight.ladder(beneath=not is_body)
+    ladder = sight.ladder(modality)
     has_padding = bool(padding.counts.any())
     if has_padding and (modality == "MR" or _is_outside(counting.darkest, sight.histogram, ladder)):
         has_padding = False
         sight = _Sight(plain + padding, scale.edges(), noise, finest_um)
-        ladder = sight.ladder(beneath=not is_body)
+        ladder = sight.ladder(modality)
     above, subtracts = [tile.above for tile in tiles if tile.above is not None], False
     if above and counting.scale_above is not None and not is_body:
         edges = counting.scale_above.edges()
@@ -341,14 +347,15 @@ class _Sight:
         above, total = self.histogram.above(value).total, self.histogram.total
         return min(above, total - above) >= max(FEW_VOXELS, FEW_SHARE * total)
 
-    def ladder(self, *, beneath: bool = True) -> tuple[Level, ...]:
+    def ladder(self, modality: str = "") -> tuple[Level, ...]:
         """Return the levels, outermost first.
 
-        beneath  whether dim bodies are looked for beneath the first valley too
+        modality  DICOM's code; but in CT and MR dim bodies are looked for beneath the first valley
         """
         whole = self.histogram
         if not whole.total:
             return ()
+        beneath = modality not in ("CT", "MR")
         valleys = whole.find_valleys(self.noise)
         span = whole.quantile(0.999) - whole.quantile(0.05)
         found: list[Level] = []
@@ -357,8 +364,12 @@ class _Sight:
         ends = [-np.inf, *(valley.value for valley in valleys), np.inf]
         for valley, low, high in zip(valleys, ends, ends[2:], strict=False):
             outside = whole.between(low, valley.value).quantile(0.5)
-            value = float(np.clip((valley.peak + outside) / 2, valley.low, valley.high))
-            level = self._refined(value, whole.between(low, high), valley.dip)
+            part, inside = whole.between(low, high), valley.peak
+            is_air = modality == "MR" and valley is valleys[0] and valley.dip <= AIR_DIP
+            if is_air:
+                inside = min(inside, whole.above(valley.value).quantile(DIM))
+            value = float(np.clip((inside + outside) / 2, valley.low, valley.high))
+            level = (self.judge if is_air else self._refined)(value, part, valley.dip)
             is_high = level.contrast >= LEAST_CONTRAST * span or (beneath and level.is_edge)
             is_large = level.share * whole.total >= self._least_voxels
             if is_high and is_large and level.sharpness <= FLANK:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stereocell.report.facts import Facts, UnitFacts
 
-LOW_CONFIDENCE = 0.4  # confidence, 0..1; a channel below gets a remark
+LOW_CONFIDENCE = 0.6  # 0..1; below it about half of the surfaces were right (docs/decisions.md)
 LEAST_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
 _MOST_LINES = 30  # lines printed of one remark
 

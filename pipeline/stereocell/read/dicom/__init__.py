@@ -135,7 +135,8 @@ def _find(location: Location) -> Found:
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'no file'}; expected slices of MR, CT or the like{or_one_of(root, 'dicom')}"
+            f"{many}{held or 'no file'}; expected slices of MR, CT or the like"
+            f"{or_one_of(root, 'dicom')}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
 
