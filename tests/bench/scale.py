@@ -43,6 +43,7 @@ from reading import (
 from stereocell.building.out_folder import OutFolder
 from stereocell.model.tiling import cut
 from support.phantoms import write_ome_zarr
+from support.worker_processes import workers_of
 
 COUNTS = ((2, 2), (4, 2), (4, 4), (8, 4))  # columns x rows: 4 to 32 units
 MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512
@@ -120,9 +121,8 @@ def run_units(out: Path, workers: int) -> Run:
     while command.poll() is None:
         try:
             peaks["command"] = max(peaks["command"], _peak_of(command.pid))
-            for process in parent.children(recursive=True):
-                if "spawn_main" in " ".join(process.cmdline()):
-                    peaks["worker"] = max(peaks["worker"], _peak_of(process.pid))
+            for process in workers_of(parent):
+                peaks["worker"] = max(peaks["worker"], _peak_of(process.pid))
         except (psutil.Error, OSError):
             pass  # it ended while it was looked at
         time.sleep(0.2)

@@ -10,7 +10,7 @@ import pytest
 from stereocell.engine.cluster import ClusterError
 from stereocell.engine.run import _AHEAD, Engine, TasksFailedError, _outcome_of
 from support.server.timeouts import PATIENCE_S
-from support.worker_tasks import die, double
+from support.worker_tasks import die, double, read_variable
 
 
 @pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
@@ -28,6 +28,22 @@ def test_results_come_in_the_tasks_order_and_failures_at_the_end(workers: int) -
         "t4: ValueError: four is a bug",
         "bad: 3 of 5 failed",
     ]
+
+
+@pytest.mark.slow
+def test_workers_have_the_environment_of_the_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A server that forks workers has an older one: of this process's first engine."""
+    name = "STEREOCELL_OF_A_TEST"
+    for value in (None, "first", "second", None):
+        if value is None:
+            monkeypatch.delenv(name, raising=False)
+        else:
+            monkeypatch.setenv(name, value)
+        engine = Engine(1)
+        try:
+            assert engine.run("read", read_variable, [("a", name), ("b", name)]) == [value, value]
+        finally:
+            engine.close()
 
 
 @pytest.mark.slow

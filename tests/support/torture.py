@@ -34,6 +34,7 @@ from stereocell.storage.claim import LOCK
 from support import phantoms
 from support.digests import digests_of
 from support.object_store import ObjectStore, serving
+from support.worker_processes import workers_of
 
 PHASES = ("plan", "survey", "units", "stage", "bundle", "report")
 SURVEY = "units/survey.json"
@@ -334,12 +335,7 @@ def _await_workers_of(build: subprocess.Popen[bytes]) -> list[psutil.Process]:
     command = psutil.Process(build.pid)
     while build.poll() is None:
         with suppress(psutil.Error):  # one has ended since
-            workers = [
-                process
-                for process in command.children(recursive=True)
-                if "spawn_main" in " ".join(process.cmdline())
-            ]
-            if workers:
+            if workers := workers_of(command):
                 return workers
         time.sleep(0.02)
     return []

@@ -17,3 +17,7 @@ def die(value: int) -> int:
     if value == 1:
         os._exit(9)  # as when the system takes a process's memory back
     return value
+
+
+def read_variable(name: str) -> str | None:
+    return os.environ.get(name)

@@ -26,6 +26,7 @@ from rich.progress import (
 from stereocell.engine.cluster import ClusterError, able, join
 from stereocell.engine.interrupts import children_ignore_interrupts, interrupts_put_off
 from stereocell.engine.object_store_tasks import carried, forget_scratch
+from stereocell.engine.workers import choose_start
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.processes import shortage
 
@@ -105,7 +106,7 @@ class Engine:
                 else:
                     yield place, result, None
             return
-        client = self._start()
+        client = self._start(function)
         work, settle = carried(function)
         if self._scheduler:
             work = able(work, self._shared)
@@ -137,7 +138,7 @@ class Engine:
             yield place, None if failure else settle(result), failure
             future.release()
 
-    def _start(self) -> Any:
+    def _start(self, function: Callable[[T], R]) -> Any:
         if self._client is None and self._scheduler:
             self._client = join(self._scheduler, self._shared)
         elif self._client is None:
@@ -148,6 +149,7 @@ class Engine:
             # distributed drops a killed worker for good where a busy machine needs over 15 s for it
             dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
             with children_ignore_interrupts(), _started_in_time():
+                choose_start(function)
                 # units hold arrays of known size; distributed needs no spilling
                 self._client = Client(
                     n_workers=self.workers,
