@@ -60,3 +60,17 @@ def test_wide_integers_that_number_objects_end_the_plan(
     assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
     told = " ".join("".join(capsys.readouterr()).split())
     assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in told
+
+
+def test_objects_off_the_middle_and_in_a_region_are_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    z, y, x = np.mgrid[:24, :400, :400] // 8
+    voxels = ((z * 50 + y) * 50 + x + 1).astype(np.uint16)
+    voxels[:, 100:300, 100:300] = 0
+    path = tmp_path / "rim.ome.tif"
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+    for more in ([], ["--region", ":,0:90,0:90"]):
+        assert main(["plan", str(path), "-o", str(tmp_path / "out"), *more]) == 2
+        assert "looks like a label map" in capsys.readouterr().err

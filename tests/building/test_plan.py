@@ -215,6 +215,31 @@ def test_iso_values_go_by_name_or_by_index() -> None:
         plan_of(iso_values={"2": 3.0, "CD3ε": 4.0})
 
 
+def test_the_star_is_for_the_channels_that_no_other_key_names() -> None:
+    """As the presets of CT use it, so that a user may name the channel in any way."""
+    stars = {"iso_values": {"*": -300.0}, "windows": {"*": "-1024:2000"}}
+    for key in ("CD3ε", "2"):
+        plan = plan_of(
+            iso_values=stars["iso_values"] | {key: 3.0}, windows={"*": "1:2", key: "3:4"}
+        )
+        assert plan.settings.iso_values == {"Hoechst 33342": -300.0, "CD3ε": 3.0}
+        assert plan.settings.windows == {"Hoechst 33342": "1:2", "CD3ε": "3:4"}
+    for preset in ("ct", "ct-bone"):
+        loaded = settings_module.load(preset, None, flags={"windows": {"2": "brain"}})
+        assert list(loaded.windows) == ["*", "2"]
+
+
+def test_each_of_several_surfaces_can_be_named() -> None:
+    outer, inner = (
+        Channel(0, f"CT {rung}", (1, 1, 1), rung=rung, base="CT") for rung in ("outer", "inner")
+    )
+    other = Channel(1, "PET", (1, 0, 0))
+    plan = plan_of(channels=(outer, inner, other), paint={"CT outer": "PET", "PET": "CT"})
+    assert plan.settings.paint == {"CT outer": "PET", "PET": "CT outer"}
+    with pytest.raises(UsageError, match="several surfaces, expected one of CT outer, CT inner"):
+        plan_of(channels=(outer, inner, other), paint={"CT": "PET"})
+
+
 def test_an_iso_value_s_name_goes_before_its_index() -> None:
     channels = (Channel(0, "488", (0, 0, 1)), Channel(1, "0", (0, 1, 0)))
     plan = plan_of(channels=channels, iso_values={"0": 5.0})

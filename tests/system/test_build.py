@@ -177,9 +177,10 @@ def test_given_iso_value_is_used_in_voxels_as_they_are(tmp_path: Path) -> None:
     iso = channel["iso"]["r0_c0"]
     assert iso["value"] == 400
     assert iso["background"] == 0
-    assert iso["confidence"] is None  # nobody asked the voxels
-    assert channel["appearance"]["iso_confidence"] == 1
-    assert channel["ladder"] == []
+    # it is rated as any level is, and its alternatives are known
+    assert 0.3 < iso["confidence"] < 1
+    assert channel["appearance"]["iso_confidence"] == pytest.approx(iso["confidence"], abs=0.01)
+    assert channel["ladder"]
 
 
 # --- bad input: one line, exit code, nothing half-written

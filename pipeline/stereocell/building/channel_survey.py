@@ -245,10 +245,10 @@ def _windows(
 def _evidence(
     out_folder: OutFolder, plan: Plan, engine: Engine, windows: Mapping[str, Window]
 ) -> dict[tuple[str, str], _Result]:
-    """Return the evidence of each tile of the channels whose level is looked for."""
+    """Return the evidence of each tile of each channel that has voxels of the source."""
 
     def task_of(tile: Tile, channel: Channel) -> tuple[EvidenceTask, list[Any]] | None:
-        if given_level(plan, channel) is not None:
+        if channel.source:  # shares of tissue, whose level is known
             return None
         task = evidence_task(plan, tile, channel=channel, window=windows[channel.id])
         return task, [

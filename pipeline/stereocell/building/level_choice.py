@@ -26,8 +26,9 @@ class Found:
     """What is known of a channel's level before its solids are.
 
     window    of the channel
-    levels    what its tiles add up to; None where the level was given
-    evidence  each tile's; empty where the level was given
+    levels    what its tiles add up to; None where there is no evidence
+    evidence  each tile's; empty for shares of tissue, whose level is known
+    is_given  whether the user, or a preset, gave the level
     rungs     the levels that may have the surface: the given one, or clear ones; the first is
               taken, unless its solids speak against it
     doubt     why there is none
@@ -39,6 +40,7 @@ class Found:
     rungs: tuple[Level | float, ...]
     subtracts: bool
     doubt: str
+    is_given: bool = False
 
     @property
     def background(self) -> LatticeField | None:
@@ -49,10 +51,11 @@ class Found:
 def find_level(
     plan: Plan, channel: Channel, window: Window, evidence: Mapping[str, TileEvidence]
 ) -> Found:
-    """Return a channel's level; `evidence` by tile ID, empty where the level is given."""
+    """Return a channel's level; `evidence` by tile ID, empty where there is none."""
     given = given_level(plan, channel)
-    if given is not None:
-        return Found(window, None, {}, (given[0],), given[1], "")
+    if not evidence:
+        assert given is not None
+        return Found(window, None, {}, (given[0],), given[1], "", is_given=True)
     options = plan.settings.isovalue
     levels = find_levels(
         list(evidence.values()),
@@ -61,6 +64,11 @@ def find_level(
         modality=plan.modality,
         options=options if options.criterion in CRITERIA else None,
     )
+    if given is not None:
+        value, subtracts = given
+        # above another ground than the ladder's nothing can be said of a level
+        rated = levels.judge(value) if subtracts == levels.subtracts else value
+        return Found(window, levels, evidence, (rated,), subtracts, "", is_given=True)
     clear = levels.clear
     doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
     if options.criterion == ADAPTIVE and clear:
@@ -69,7 +77,8 @@ def find_level(
             nothing = "no clear surface: the channel's histogram has no threshold"
             return Found(window, levels, evidence, (), False, nothing)
         plain = replace(levels, subtracts=False)
-        return Found(window, plain, evidence, (threshold.value,), False, "")
+        rated = threshold.value if levels.subtracts else levels.judge(threshold.value)
+        return Found(window, plain, evidence, (rated,), False, "", is_given=True)
     rung = channel.rung or options.rung
     if clear and rung != APART:
         place = RUNGS[rung]
@@ -122,6 +131,6 @@ def level_of_tile(
         return TileIso(value, below, None, files)
     tile_evidence, value = found.evidence[tile.id], level.value
     judged = found.levels.judge_tile(level, tile_evidence)
-    if plan.settings.isovalue.scope == "tile":
+    if plan.settings.isovalue.scope == "tile" and not found.is_given:
         value = found.levels.level_of_tile(level, tile_evidence)
     return TileIso(value, below, None if judged is None else judged.confidence, files)

@@ -72,7 +72,9 @@ def find_other_levels(
 
 
 def take(channel: Channel, value: float, above: bool) -> str:
-    """Return the flag that takes a level."""
+    """Return the flag that takes a level; `--surfaces` goes before `--iso-value` where both are."""
+    if channel.rung and not above:
+        return "--surfaces " + shlex.quote(f"{channel.base or channel.name}={value:.5g}")
     return "--iso-value " + shlex.quote(f"{channel.name}={value:.5g}{'+b' if above else ''}")
 
 

@@ -22,6 +22,7 @@ from stereocell.building.plan import (
     choose_color,
     choose_level,
     make_plan,
+    parse_region,
     with_surfaces,
 )
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
@@ -32,6 +33,7 @@ from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import OutputError
+from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
 from stereocell.read.open_dataset import READERS
 from stereocell.storage.assets import viewer_dist
@@ -84,8 +86,6 @@ def settle(source: str, settings: Settings) -> Plan:
     modality = dataset.modality or options.modality
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(len(dataset.channels)) if indices is None else indices
-    if options.taken_as != INTENSITY:
-        require_intensities(dataset, chosen)
     channels = [
         Channel(
             index,
@@ -101,6 +101,9 @@ def settle(source: str, settings: Settings) -> Plan:
             told = f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
             console.print(f"plan: {told}", markup=False)
     level = choose_level(dataset.levels, len(channels), settings)
+    if options.taken_as != INTENSITY:
+        whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
+        require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
     return make_plan(
         location,

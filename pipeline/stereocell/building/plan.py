@@ -21,6 +21,7 @@ from stereocell.model.settings import AUTO
 from stereocell.model.tiling import Box, Tile, cut, cut_evenly
 
 T = TypeVar("T")
+ALL = "*"  # the key of settings by channel that stands for all that have none
 
 # Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
 UNIT_VOXELS = 1 << 27  # voxels
@@ -401,13 +402,21 @@ def _halo(
 
 
 def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
-    """Return values by channel name; a key is a name, or an index where no name equals it."""
+    """Return values by channel name; a key is a name, or an index where no name equals it.
+
+    The key ALL is for the channels that no other names; presets use it.
+    """
     found: dict[str, T] = {}
     for key, value in given.items():
+        if key == ALL:
+            continue
         name = _name(flag, key, channels)
         if name in found:
             raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
         found[name] = value
+    if ALL in given:
+        # a surface that is chosen by its rung or value has its level from there
+        found = {one.name: given[ALL] for one in channels if not one.rung} | found
     return found
 
 
@@ -415,19 +424,28 @@ def _of_all(windows: Mapping[str, str], channels: Sequence[Channel]) -> dict[str
     """Return windows by channel name; that of voxels with several surfaces goes to each."""
     found: dict[str, str] = {}
     for key, window in windows.items():
+        if key == ALL:
+            continue
         by_name = [channel.name for channel in channels if key in (channel.name, channel.base)]
         names = by_name or [channel.name for channel in channels if key == str(channel.index)]
         for name in names or [_name("--window", key, channels)]:
             if name in found:
                 raise UsageError(f"--window names channel {name!r} twice, expected once")
             found[name] = window
+    if ALL in windows:
+        found = {channel.name: windows[ALL] for channel in channels} | found
     return found
 
 
 def _painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
     """Return channel name -> name of the channel that is sampled onto its surface."""
-    by_name = _by_name("--paint", paint, channels)
-    found = {name: _name("--paint", key, channels) for name, key in by_name.items()}
+    by_name, names = _by_name("--paint", paint, channels), [channel.name for channel in channels]
+    first = list({channel.index: channel for channel in reversed(channels)}.values())[::-1]
+    found = {
+        # of voxels with several surfaces any channel has the intensity
+        name: _name("--paint", key, channels if key in names else first)
+        for name, key in by_name.items()
+    }
     for name, painted in found.items():
         if name == painted:
             raise UsageError(f"--paint {name}={painted}: expected another channel than its own")
@@ -435,14 +453,22 @@ def _painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str,
 
 
 def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
-    by_index = {str(channel.index): channel.name for channel in channels}
-    name = key if key in by_index.values() else by_index.get(key)
-    if name is None:
+    names = [channel.name for channel in channels]
+    if key in names:
+        return key
+    found = [channel.name for channel in channels if key in (channel.base, str(channel.index))]
+    if len(found) > 1:
         raise UsageError(
-            f"{flag} names channel {key!r}, expected one of "
-            f"{', '.join(by_index.values())}, or an index of {', '.join(by_index)}"
+            f"{flag} names channel {key!r}, which has several surfaces, expected one of "
+            f"{', '.join(found)}"
         )
-    return name
+    if not found:
+        indices = dict.fromkeys(str(channel.index) for channel in channels)
+        raise UsageError(
+            f"{flag} names channel {key!r}, expected one of {', '.join(names)}, or an index of "
+            f"{', '.join(indices)}"
+        )
+    return found[0]
 
 
 def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, int]:

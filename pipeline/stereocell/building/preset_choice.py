@@ -41,9 +41,11 @@ def load_for(
         chosen, reason = choose_preset(dataset, options.modality)
     except StereoCellError:
         return settings
-    if chosen is None:  # voxels as a microscope's: the defaults follow their spacing
+    if chosen is None and not dataset.modality:  # a microscope's: the defaults follow its spacing
         return settings
     console.print(f"plan: {reason}", markup=False)
+    if chosen is None:
+        return settings
     return load(chosen, None, flags=flags, where=where)
 
 

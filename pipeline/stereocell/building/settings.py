@@ -172,7 +172,7 @@ class Settings:
         Flag(
             "--iso-value",
             "use this iso-value (a voxel value, or one above the background as 162+b) for a "
-            "channel, by name or index; may be repeated",
+            "channel, by name or index, or * for all others; may be repeated",
             "CHANNEL=VALUE",
         ),
     )

@@ -46,7 +46,7 @@ class UnitFacts:
     directory   the folder of its results
     iso_value   above the background, voxel values; None: the channel has none
     background  its mean over the tile, voxel values; 0: none was subtracted
-    confidence  0..1, of the tile by itself; None: nothing is there, or the level was given
+    confidence  0..1, of the tile by itself; None: nothing is there
     reason      the reason for a missing surface; empty: there is one
     voxels      (x, y, z) of the stored volume, with its apron
     volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)

@@ -16,6 +16,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
+from stereocell.building.level_choice import given_level
 from stereocell.building.other_levels import OtherLevel, find_other_levels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
@@ -160,7 +161,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "others": _others(facts, channel, found),
                 "arcs": len(suggested.shapes),
                 "no_arcs": suggested.reason,
-                "given": not found.ladder,
+                "given": given_level(facts.plan, channel) is not None,
                 "histogram": charts.histogram(
                     found.statistics.histogram,
                     appearance.transfer_functions,
@@ -204,7 +205,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
 
 
 def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
-    """Return the histogram that the channel's levels were found on; None: the level was given."""
+    """Return the histogram that the channel's levels were found on; None: there is no evidence."""
     curve, level = found.curve, found.appearance.level
     if curve is None or len(curve.values) < 2:
         return None
