@@ -1,5 +1,6 @@
 """The engine runs everything, in order of the tasks, whatever fails."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +45,32 @@ def test_workers_have_the_environment_of_the_moment(monkeypatch: pytest.MonkeyPa
             assert engine.run("read", read_variable, [("a", name), ("b", name)]) == [value, value]
         finally:
             engine.close()
+
+
+@pytest.mark.slow
+def test_workers_start_where_the_name_of_the_temporary_folder_is_too_long_for_a_socket(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / ("long" * 30)
+    folder.mkdir()
+    text = (
+        "from stereocell.engine.run import Engine; from support.worker_tasks import double\n"
+        "if __name__ == '__main__':\n"
+        "    engine = Engine(1)\n"
+        "    print(engine.run('long', double, [('a', 1), ('b', 2)]))\n"
+        "    engine.close()\n"
+    )
+    script = tmp_path / "it's a script.py"
+    script.write_text(text)
+    ended = subprocess.run(
+        [sys.executable, script],
+        env=os.environ | {"TMPDIR": str(folder), "PYTHONPATH": str(Path(__file__).parents[1])},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert (ended.stdout, ended.returncode) == ("[2, 4]\n", 0), ended.stderr
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
         if stored.itemsize >= _WIDE and voxels.min() >= 0 and found.values <= 1:
             raise UsageError(
                 f"{dataset.shown}: channel {dataset.channels[index].name!r} may be a label map: "
-                f"found {stored.name} and {found.values or 'no'} value besides 0 in the middle, "
+                f"found {stored.name} and {found.values or 'no'} value besides 0 in one block, "
                 "expected intensities: objects can't be built yet; --as intensity takes it for an "
                 "image"
             )
@@ -74,6 +74,6 @@ def _blocks(region: Box) -> Iterator[Box]:
 def _told(dataset: Dataset, index: int, found: LabelEvidence) -> str:
     return (
         f"{dataset.shown}: channel {dataset.channels[index].name!r} looks like a label map: found "
-        f"{found.values} values in {found.pieces} pieces of equal voxels in the middle, expected "
+        f"{found.values} values in {found.pieces} pieces of equal voxels in one block, expected "
         "intensities: objects can't be built yet; --as intensity takes it for an image"
     )

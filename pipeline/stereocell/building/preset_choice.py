@@ -41,12 +41,10 @@ def load_for(
         chosen, reason = choose_preset(dataset, options.modality)
     except StereoCellError:
         return settings
-    if chosen is None and not dataset.modality:  # a microscope's: the defaults follow its spacing
-        return settings
-    console.print(f"plan: {reason}", markup=False)
-    if chosen is None:
-        return settings
-    return load(chosen, None, flags=flags, where=where)
+    # nothing is said of a microscope's voxels: they are what the defaults are for
+    if chosen or dataset.modality or options.modality:
+        console.print(f"plan: {reason}", markup=False)
+    return load(chosen, None, flags=flags, where=where) if chosen else settings
 
 
 def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str]:

@@ -192,7 +192,7 @@ class Settings:
         Flag(
             "--window",
             "the voxel values of a channel that become 0 and 255, as CT=-160:240, or a CT's window "
-            "by name: brain, bone, lung, soft; may be repeated",
+            "by name: brain, bone, lung, soft; * names all others; may be repeated",
             "CHANNEL=LOW:HIGH",
         ),
     )

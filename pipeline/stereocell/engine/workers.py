@@ -2,8 +2,9 @@
 
 A process that starts from nothing imports for 1.7 s of CPU. The server imports once for all
 workers of a command; they share its memory until they write. It has no threads, so that it can
-fork. Where the system has no such server (Windows; macOS, whose libraries don't bear a fork), and
-where the environment is another one than the server's, workers start from nothing.
+fork. Workers start from nothing where the system has no such server (Windows; macOS, whose
+libraries don't bear a fork), where it can't have its socket (a folder of temporary files with a
+long name, or a full one), and where the environment is another one than the server's.
 """
 
 import os
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from multiprocessing import forkserver
 from typing import Any
 
+_METHOD = "distributed.worker.multiprocessing-method"
 _environment: dict[str, str] = {}  # of the server; empty: there is none yet
 
 
@@ -21,14 +23,24 @@ def choose_start(function: Callable[..., Any]) -> None:
     function  the first task: the server imports its module
     """
     import dask
+
+    way = "forkserver" if sys.platform == "linux" and _has_server(function) else "spawn"
+    dask.config.set({_METHOD: way})
+
+
+def _has_server(function: Callable[..., Any]) -> bool:
+    """Return whether workers can be forked from a server; it is started where there is none."""
+    import dask
     from distributed.utils import get_mp_context
 
-    method = "spawn"
-    if sys.platform == "linux" and _environment in ({}, dict(os.environ)):
-        method = "forkserver"
-    dask.config.set({"distributed.worker.multiprocessing-method": method})
-    if method == "forkserver" and not _environment:
+    if _environment:
+        return _environment == dict(os.environ)
+    with dask.config.set({_METHOD: "forkserver"}):
         context = get_mp_context()  # which names modules to preload, and so comes first
-        context.set_forkserver_preload(["distributed", "distributed.nanny", function.__module__])
+    context.set_forkserver_preload(["distributed", "distributed.nanny", function.__module__])
+    try:
         forkserver.ensure_running()
-        _environment.update(os.environ)
+    except OSError:
+        return False
+    _environment.update(os.environ)
+    return True
