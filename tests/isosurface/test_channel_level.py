@@ -87,15 +87,21 @@ def test_of_ct_no_background_is_taken_and_bone_lies_within_skin() -> None:
     assert dice(sight) > 0.96
 
 
-def test_of_mr_the_outer_level_keeps_skin_that_is_dim_beside_a_bright_brain() -> None:
-    """As in FLAIR: skin of every brightness up to the brain's, which has the only peak."""
+@pytest.mark.parametrize("ghost", [0.0, 12.0])
+def test_of_mr_the_outer_level_keeps_skin_that_is_dim_beside_a_bright_brain(ghost: float) -> None:
+    """As in FLAIR: skin of every brightness up to the brain's, which has the only peak.
+
+    ghost  what half of the air has more than the other half: air then has a valley of its own
+    """
     rng = np.random.default_rng(4)
     z, y, x = np.mgrid[:30, :96, :96]
     away = np.sqrt((3 * (z - 15)) ** 2 + (y - 48) ** 2 + (x - 48) ** 2)
     turn = (np.arctan2(y - 48, x - 48) * 3 / np.pi) % 2 / 2
     signal = np.select([away < 36, away < 38, away < 44], [210.0, 10.0, 30 + 120 * turn**0.7], 0.0)
     signal = ndimage.gaussian_filter(signal, (0.3, 0.7, 0.7))
-    voxels = np.hypot(signal + rng.normal(0, 2, signal.shape), rng.normal(0, 2, signal.shape))
+    signal = np.maximum(signal, np.where(y > 48, ghost, 0))
+    noise = rng.normal(0, 1 if ghost else 2, (2, *signal.shape))
+    voxels = np.hypot(signal + noise[0], noise[1])
     case = Case("flair", "made", (3000.0, 1000.0, 1000.0), lambda: (voxels, away < 44), kind="MR")
     sight = look_at(case)
     inside = ndimage.binary_fill_holes(sight.values > sight.found.clear[0].value)

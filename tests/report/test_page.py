@@ -474,3 +474,24 @@ def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:
     other = LodFacts(5, 0.3, 40, 0.01, 0.2, 0.3, 1, 0, 4.0, 0.9)
     total = sum_up([_unit(lods=(one,)), _unit(lods=(other,))])
     assert total.lods == (LodFacts(15, 0.3, 140, 0.02, 0.2, 0.4, 1, 2, 4.0, 0.6),)
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_other_levels_are_shown_where_the_surface_is_or_said_to_be_out_of_sight(
+    tmp_path: Path,
+) -> None:
+    """A body in the first of three tiles, and a window that ends far below its level."""
+    z, y, x = np.mgrid[:24, :24, :96]
+    body = (z - 12) ** 2 + (y - 12) ** 2 + (x - 14) ** 2 < 80
+    rng = np.random.default_rng(0)
+    voxels = (100 + 900 * body + rng.normal(0, 8, body.shape)).astype(np.uint16)
+    source = phantoms.write_ome_tiff(tmp_path / "b.ome.tif", voxels[None], "CZYX", names=["b"])
+    out = tmp_path / "out"
+    flags = ["--grid", "3x1", "--iso-value", "b=300", "--window", "b=0:200"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    html, _ = _write(out)
+    levels = html[html.index("What to do if this is wrong") : html.index('id="tiles"')]
+    assert "tile r0_c0" in levels
+    assert "tile r0_c1" not in levels
+    assert "beyond the window of 0 to 200, so without its line here" in levels

@@ -67,8 +67,8 @@ FLANK = 0.6
 BACKGROUND_SNR = 3.0  # contrast over noise from which a background may be subtracted
 BACKGROUND_GAIN = 1.1  # times as sharp above it: what a background must gain without valleys
 VALLEY_GAIN = 2.0  # ... and where the field has a valley
-# Of MR's first valley: how deep it is where it parts air from tissue, and the quantile of the
-# tissue that stands for it
+# Of MR's outermost valley that has a level: how deep it is where it parts air from tissue, and the
+# quantile of the tissue that stands for it
 AIR_DIP, DIM = 0.3, 0.25
 PADDING_SHARE = 0.5  # share of the outside's distance from padding within which padding is outside
 HALF_HEIGHTS = 3  # levels looked for above the last valley
@@ -365,7 +365,8 @@ class _Sight:
         for valley, low, high in zip(valleys, ends, ends[2:], strict=False):
             outside = whole.between(low, valley.value).quantile(0.5)
             part, inside = whole.between(low, high), valley.peak
-            is_air = modality == "MR" and valley is valleys[0] and valley.dip <= AIR_DIP
+            # air may have valleys of its own, whose levels are too low: padding, ghosts
+            is_air = modality == "MR" and not found and valley.dip <= AIR_DIP
             if is_air:
                 inside = min(inside, whole.above(valley.value).quantile(DIM))
             value = float(np.clip((inside + outside) / 2, valley.low, valley.high))

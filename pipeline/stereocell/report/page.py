@@ -177,12 +177,12 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
 
 
 def _thresholds(facts: Facts) -> list[dict[str, Any]]:
-    """Return what the page says of the thresholds, with slices of a tile in the middle."""
-    middle = facts.plan.tiles[len(facts.plan.tiles) // 2]
+    """Return what the page says of the thresholds, with slices of a tile that shows them."""
     inner = slice(APRON, -APRON)
     rows = []
     # a tissue class has probabilities, not a histogram of bodies
-    for unit in (u for u in facts.units if u.tile == middle and not u.channel.source):
+    for channel in (one for one in facts.plan.channels if not one.source):
+        unit = _telling(facts, channel)
         found = facts.survey[unit.channel.id]
         figure = draw_threshold(found.statistics)
         share = found.appearance.threshold_normalized
@@ -195,7 +195,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
                 "name": unit.channel.name,
                 "color": css_color(unit.channel.color),
                 "figure": figure,
-                "tile": middle.id,
+                "tile": unit.tile.id,
                 "picture": picture,
             }
         )
@@ -226,17 +226,28 @@ def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
     }
 
 
+def _telling(facts: Facts, channel: Channel) -> UnitFacts:
+    """Return a channel's unit with the largest surface; without any, that in the middle."""
+    units = [unit for unit in facts.units if unit.channel == channel]
+    with_surface = [unit for unit in units if unit.lods]
+    if not with_surface:
+        return units[len(units) // 2]
+    return max(with_surface, key=lambda unit: unit.lods[0].triangles)
+
+
 def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[str, Any]]:
-    """Return the next-best levels of a channel, each with a picture of a tile in the middle."""
-    middle = facts.plan.tiles[len(facts.plan.tiles) // 2]
-    unit = next(u for u in facts.units if u.tile == middle and u.channel == channel)
+    """Return the next-best levels of a channel, each with a picture of a tile that shows them."""
+    unit = _telling(facts, channel)
+    low, high = found.statistics.window
     return [
         {
             "name": other.name,
             "value": f"{other.value:.5g}{' above the background' if other.above else ''}",
             "setting": other.setting,
             "confidence": other.confidence,
-            "tile": middle.id,
+            # the stored voxels end there: a level beyond crosses none of them
+            "window": None if other.above or low < other.value < high else (low, high),
+            "tile": unit.tile.id,
             "picture": _inline(Picture(*draw_slices(_cut(facts, unit, other)))),
         }
         for other in find_other_levels(
