@@ -21,7 +21,9 @@ from support import phantoms
 
 SPACING = (2.0, 1.0, 1.0)
 SHAPE = (20, 64, 96)
-NAMES = ("uneven", "noise", "flat", "even")
+NAMES = ("uneven", "noise", "flat", "even", "dim")
+VERDICTS = {"uneven": "clear", "even": "clear", "dim": "unsure", "noise": "none", "flat": "none"}
+BEGINNINGS = {"clear": "", "unsure": "unsure surface: at ", "none": "no clear surface: "}
 SETTINGS = """
 [surface]
 alpha_um = 0.0
@@ -32,7 +34,7 @@ max_cavity_um = 0.0
 
 
 def _voxels() -> NDArray[np.uint16]:
-    """Return balls on a ground that rises, noise alone, one value, balls on an even ground."""
+    """Return balls on a ground that rises, noise alone, one value, balls on an even ground, dim ones."""
     rng = np.random.default_rng(0)
     field = np.zeros(SHAPE, np.float32)
     for y in (16.0, 46.0):
@@ -46,6 +48,7 @@ def _voxels() -> NDArray[np.uint16]:
             np.rint(1000 + 200 * noise / noise.std()).astype(np.uint16),
             np.full(SHAPE, 7, np.uint16),
             phantoms.as_counts(field, 100, 1100, noise=10.0),
+            phantoms.as_counts(field, 200, 250, noise=40.0),
         ]
     )
 
@@ -53,7 +56,7 @@ def _voxels() -> NDArray[np.uint16]:
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return phantoms.write_ome_zarr(
-        tmp_path_factory.mktemp("stated") / "four.ome.zarr",
+        tmp_path_factory.mktemp("stated") / "five.ome.zarr",
         [_voxels()],
         "czyx",
         scales=[{"c": 1.0, **dict(zip("zyx", SPACING, strict=True))}],
@@ -134,24 +137,23 @@ def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> No
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     manifest = json.loads((out / "bundle" / "manifest.json").read_text())
     remarks = {r.title: r.lines for r in find_remarks(gather(OutFolder(out)))}
-    reasons = {}
+    reasons: dict[str, list[str]] = {}
     for channel in manifest["channels"]:
         prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel['id']}")
-        has_surface = channel["name"] in ("uneven", "even")
-        assert channel["surface"] == ("clear" if has_surface else "none")
+        verdict = VERDICTS[channel["name"]]
+        has_surface = verdict != "none"
+        assert channel["surface"] == verdict
         assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == channel["surface"]
         assert (channel["tileset"] is None) == (not has_surface)
         assert (channel["level"] is None) == (not has_surface)
         assert channel["volumes"]  # what there is can be seen all the same
         reason = prim.GetAttribute("stereocell:surfaceReason").Get() or ""
         assert channel["surface_reason"] == reason
-        assert bool(reason) != has_surface
-        if reason:
-            assert reason.startswith("no clear surface: ")
-            reasons[channel["name"]] = reason
-    assert remarks["2 channels without a surface"] == tuple(
-        f"{name}: {reason}" for name, reason in reasons.items()
-    )
+        assert reason.startswith(BEGINNINGS[verdict])
+        assert bool(reason) == (verdict != "clear")
+        reasons.setdefault(verdict, []).append(f"{channel['name']}: {reason}")
+    assert remarks["2 channels without a surface"] == tuple(reasons["none"])
+    assert remarks["1 channel with an unsure surface"] == tuple(reasons["unsure"])
     uneven = next(c for c in manifest["channels"] if c["name"] == "uneven")
     low, high = uneven["level"]["background"]
     assert 150 < low < 300 < 450 < high < 650

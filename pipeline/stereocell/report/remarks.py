@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from stereocell.report.facts import Facts, UnitFacts
 
-LOW_CONFIDENCE = 0.6  # 0..1; below it about half of the surfaces were right (docs/decisions.md)
 LEAST_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
 _MOST_LINES = 30  # lines printed of one remark
 
@@ -30,16 +29,12 @@ def find_remarks(facts: Facts) -> list[Remark]:
         if name not in with_surface
     ]
     unsure = [
-        f"{name}: {look.iso_confidence:.2f} at {look.level.words}"
-        for name, look in looks.items()
-        if look.level is not None and look.iso_confidence < LOW_CONFIDENCE
+        f"{name}: {look.surface_reason}" for name, look in looks.items() if look.surface == "unsure"
     ]
     bare = [f"{u.name}: {u.reason}" for u in units if u.reason and u.channel.name in with_surface]
     found = [
         _remark("without a surface", whole, "channel"),
-        _remark(
-            f"with low confidence in their surface (below {LOW_CONFIDENCE:g})", unsure, "channel"
-        ),
+        _remark("with an unsure surface", unsure, "channel"),
         _remark("without a surface, in channels that have some", bare, is_note=True),
         _remark(
             f"with thin triangles in lod0 (1st percentile of their angles below "
