@@ -34,7 +34,7 @@ max_cavity_um = 0.0
 
 
 def _voxels() -> NDArray[np.uint16]:
-    """Return balls on a ground that rises, noise alone, one value, balls on an even ground, dim ones."""
+    """Return balls on a rising ground, noise alone, one value, balls on an even one, dim ones."""
     rng = np.random.default_rng(0)
     field = np.zeros(SHAPE, np.float32)
     for y in (16.0, 46.0):
@@ -228,13 +228,53 @@ def test_a_surface_that_is_none_is_one_clear_line(
     assert not (tmp_path / "out").exists()
 
 
-def test_an_iso_value_beside_surfaces_is_told_to_go_unused(
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (
+            ["--surfaces", "even=inner", "--iso-value", "even=700"],
+            "even: built where --surfaces says, not at the iso-value 700",
+        ),
+        (
+            ["--surfaces", "3=outer,800", "--iso-criterion", "adaptive"],
+            "even 800: built where --surfaces says, not by adaptive",
+        ),
+        (
+            ["--iso-value", "3=700", "--iso-scope", "tile"],
+            "even: its level is given, so the same in all tiles: --iso-scope tile is for levels",
+        ),
+    ],
+)
+def test_a_setting_that_another_overrules_is_told_to_go_unused(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
+) -> None:
+    flags = ["-o", str(tmp_path / "out"), "--channels", "even", *flags]
+    assert main(["plan", str(source), *flags]) == 0
+    assert f"plan: {told}" in capsys.readouterr().err
+
+
+def test_surfaces_are_rungs_of_the_ladder_whatever_the_criterion(
+    source: Path, tmp_path: Path
+) -> None:
+    flags = ["--channels", "even", "--surfaces", "even=outer", "--workers", "0"]
+    levels = []
+    for criterion in ("ladder", "adaptive", "edges"):
+        out = tmp_path / criterion
+        plain = ["-o", str(out), *flags[:4], "--iso-criterion", criterion]
+        assert main(["plan", str(source), *plain]) == 0
+        assert main(["units", str(out), *flags[4:]]) == 0
+        levels.append(OutFolder(out).survey()["even"]["appearance"]["level"]["iso"])
+    assert levels[0] == levels[1] == levels[2]
+
+
+def test_a_window_of_ct_is_refused_where_nothing_is_a_ct(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    flags = ["-o", str(tmp_path / "out"), "--channels", "even", "--surfaces", "even=inner"]
-    assert main(["plan", str(source), *flags, "--iso-value", "even=700"]) == 0
-    told = "plan: even: built where --surfaces says, not at the iso-value 700"
-    assert told in capsys.readouterr().err
+    flags = ["-o", str(tmp_path / "out"), "--window", "even=brain"]
+    assert main(["plan", str(source), *flags]) == 2
+    error = capsys.readouterr().err
+    assert "--window even=brain: a window in Hounsfield units, of CT, and nothing says" in error
+    assert error.count("\n") == 1
 
 
 def test_a_window_given_twice_is_refused(
