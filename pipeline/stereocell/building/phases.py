@@ -34,6 +34,7 @@ from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.isosurface.options import LADDER, RUNGS
 from stereocell.meshes.alpha_wrap import find_wrapper
+from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
@@ -68,7 +69,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
         f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
-        f"{len(plan.tiles)} tiles x {len(plan.channels)} channels"
+        f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
     )
     return plan
 
@@ -83,8 +84,6 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
     dataset = open_source(as_asked(location, options))
-    for note in dataset.notes:
-        console.print(f"plan: {note}", markup=False)
     modality = dataset.modality or options.modality
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(len(dataset.channels)) if indices is None else indices
@@ -97,14 +96,12 @@ def settle(source: str, settings: Settings) -> Plan:
         for place, index in enumerate(chosen)
     ]
     channels = with_surfaces(channels, settings.surfaces)
-    for remark in _in_vain(settings, channels):
-        console.print(f"plan: {remark}", markup=False)
     level = choose_level(dataset.levels, len(channels), settings)
     if options.taken_as != INTENSITY:
         whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
         require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
-    return make_plan(
+    plan = make_plan(
         location,
         dataset.name,
         fingerprint=dataset.fingerprint,
@@ -116,6 +113,9 @@ def settle(source: str, settings: Settings) -> Plan:
         modality=modality,
         placement=dataset.placement,
     )
+    for note in (*dataset.notes, *_in_vain(settings, channels)):  # an error stands alone
+        console.print(f"plan: {note}", markup=False)
+    return plan
 
 
 def _in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
