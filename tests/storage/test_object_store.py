@@ -201,7 +201,7 @@ def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
             [*command, *ARGUMENTS], stderr=subprocess.DEVNULL, start_new_session=True
         )
         while build.poll() is None and not _objects(fs, f"bucket/killed/{part}"):
-            time.sleep(0.01)
+            time.sleep(0.05)  # the store has to answer each time
         os.killpg(build.pid, signal.SIGKILL)
         assert build.wait() == -signal.SIGKILL
         for name, found in _objects(fs, "bucket/killed/units/r0_c").items():
