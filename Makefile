@@ -68,6 +68,8 @@ $(READY): requirements.lock pyproject.toml
 	$(PIP) --no-deps --no-build-isolation -e .
 	@# once, also where Python is told to keep no bytecode; by all cores, of which pip takes one
 	@$(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib pipeline || true
+	@# loops over voxels and triangles: 25 s, so that no build waits for it
+	@$(BIN)/python -m stereocell.kernels
 	@touch $@
 
 $(VIEWER_READY): $(VIEWER)/package-lock.json

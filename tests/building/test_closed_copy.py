@@ -93,7 +93,8 @@ def test_a_copy_that_simplification_spoilt_stays_unsimplified(
     distance: NDArray[np.float32], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Simplified:
-        return Simplified(Mesh(mesh.positions, mesh.triangles[1:], mesh.normals), 0, 0)
+        spoilt = Mesh(mesh.positions, mesh.triangles[1:], mesh.normals)
+        return Simplified(spoilt, np.arange(len(mesh.positions)), 0, 0)
 
     simple = close(distance, REGION)
     monkeypatch.setattr(closed_copy, "simplify_without_defects", spoil)

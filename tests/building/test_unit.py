@@ -52,7 +52,7 @@ def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end(
 
 def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:
     given = replace(_given(1.0), step=(1, 3, 3))
-    unwrap = replace(given.settings.unwrap, texel_um=0.02)
+    unwrap = replace(given.settings.unwrap, maps=True, texel_um=0.02)
     given = replace(given, settings=replace(given.settings, unwrap=unwrap.resolved(SPACING)))
     ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
     assert build_unit(Volume(ball, SPACING), given).lods[1].mesh.uvs is not None

@@ -388,6 +388,9 @@ def swell(factor):
     return lambda mesh: set_points(mesh, lambda p: spheres.CENTER + factor * (p - spheres.CENTER))
 
 
+RISE = 0.25  # um; so far outside lie vertices of coarse levels, which keep their volume
+
+
 def radii(bundle, level):
     points = decoded_positions_m((bundle / f"channels/CD31/r0_c0/{level}.glb").read_bytes())
     return np.linalg.norm(points * 1e6 - spheres.CENTER, axis=1)
@@ -436,7 +439,7 @@ def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
     large = 1.25 * spheres.RADIUS
     assert np.abs(radii(edited, "lod0") - large).max() < 0.01
     for level in ("lod1", "lod2"):
-        assert np.abs(radii(edited, level) - large).max() < 0.1
+        assert np.abs(radii(edited, level) - large).max() < RISE
     stated = errors_um(edited)
     # chords of the finest level are within .3 um of the sphere, which all of these now approach
     assert 0 == stated["lod0"] < stated["lod1"] <= stated["lod2"] < 1
@@ -447,10 +450,11 @@ def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
     assert "lod2 within" in line
     assert read((edited / other).read_bytes())[0]["meshes"]  # the neighbour is not touched
     assert chain(edited, "r0_c1") == chain(bundle, "r0_c1")
+    # by the settings of a stage that states none
     document, _ = read((edited / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     (primitive,) = document["meshes"][0]["primitives"]
-    assert {"TEXCOORD_0", "TANGENT"} <= primitive["attributes"].keys()  # baked of the new surface
-    assert document["images"]
+    assert "TEXCOORD_0" not in primitive["attributes"]
+    assert "images" not in document
 
 
 def test_the_cut_of_levels_made_anew_is_the_edited_one(edit):
@@ -484,7 +488,7 @@ def test_levels_that_the_artist_edited_too_stay(edit):
         in_level(stage, "lod2", swell(1.5))
 
     edited = edit(change)
-    assert np.abs(radii(edited, "lod1") - 1.25 * spheres.RADIUS).max() < 0.1
+    assert np.abs(radii(edited, "lod1") - 1.25 * spheres.RADIUS).max() < RISE
     assert np.abs(radii(edited, "lod2") - 1.5 * spheres.RADIUS).max() < 0.05
     assert errors_um(edited)["lod2"] == pytest.approx(0.25 * spheres.RADIUS, rel=0.2)
     (line,) = edit.told
@@ -587,7 +591,7 @@ def test_a_transform_of_the_finest_level_alone_is_an_edit(edit):
     for level in ("lod0", "lod1", "lod2"):
         data = (edited / f"channels/CD31/r0_c0/{level}.glb").read_bytes()
         away = decoded_positions_m(data) * 1e6 - (-1, 2, 0.5) - spheres.CENTER
-        assert np.abs(np.linalg.norm(away, axis=1) - spheres.RADIUS).max() < 0.1
+        assert np.abs(np.linalg.norm(away, axis=1) - spheres.RADIUS).max() < RISE
     assert "made anew from lod0: lod1" in edit.told[0]
 
 
@@ -610,7 +614,7 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     )
     (line,) = told
     assert "lod0 (sound); made anew from lod0: lod1" in line
-    assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < 0.1
+    assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < RISE
 
     edit(lambda s: in_level(s, "lod0", swell(1.25)))
     whole = Usd.Stage.Open(str(tmp_path / "edited.usda"))
@@ -670,7 +674,10 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
     painted = replace(painted, lods=tuple(lods), paint=colors)
     tile = replace(tile, channels=(painted, *others))
     write_tile(tmp_path, tile)
-    settings = {"lod": {"errors": [0.1, 0.5, 0.8]}, "unwrap": {"first_lod": first_lod}}
+    settings = {
+        "lod": {"errors": [0.1, 0.5, 0.8]},
+        "unwrap": {"maps": True, "first_lod": first_lod},
+    }
     appearances = (replace(spheres.RED, painted_by="Hoechst_x20_33342"), spheres.BLUE)
     write_stage(
         tmp_path,

@@ -170,5 +170,5 @@ def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
     assert len(everything) > 500
     for share in (0.0, 0.02, 0.5, 1.0):
         fresh = rng.random(len(triangles)) < share
-        found = find_crossings(positions, triangles, one_fan=None, fresh=fresh)
+        found = find_crossings(positions, triangles, fresh=fresh)
         np.testing.assert_array_equal(found, everything[fresh[everything].any(axis=1)])

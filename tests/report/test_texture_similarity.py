@@ -35,7 +35,7 @@ def lods() -> tuple[Lod, ...]:
     settings = replace(
         settings,
         surface=settings.surface.resolved(SPACING),
-        unwrap=settings.unwrap.resolved(SPACING),
+        unwrap=replace(settings.unwrap, maps=True).resolved(SPACING),
     )
     iso = LatticeField(((28.0,), (36.0,), (36.0,)), np.full((1, 1, 1), 500.0))
     given = UnitInput(

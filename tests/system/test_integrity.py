@@ -44,7 +44,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     body = phantoms.f_phantom()
     voxels = np.stack([body, np.full_like(body, 300)])
     source = phantoms.write_ome_tiff(folder / "f.ome.tif", voxels, "CZYX", names=NAMES)
-    plan = ["plan", str(source), "-o", str(folder / "out"), "--grid", "2x1", "--closed-tiles"]
+    plan = ["plan", str(source), "-o", str(folder / "out"), "--grid", "2x1"]
+    plan += ["--closed-tiles", "--maps"]
     assert main(plan) == 0
     _go_on(folder / "out")
     return folder / "out"

@@ -175,7 +175,7 @@ def neighbours() -> tuple[tuple[Lod, ...], ...]:
         settings,
         surface=settings.surface.resolved(SPACING),
         lod=replace(settings.lod, errors=(0.1, 0.4, 0.8)),
-        unwrap=settings.unwrap.resolved(SPACING),
+        unwrap=replace(settings.unwrap, maps=True).resolved(SPACING),
     )
     iso = LatticeField(((24.0,), (24.0,), (32.0,)), np.full((1, 1, 1), 500.0))
     built = []

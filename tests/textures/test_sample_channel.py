@@ -67,7 +67,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source, out = folder / "ball.ome.tif", folder / "out"
     names = ["body", "marker", "other"]
     phantoms.write_ome_tiff(source, voxels, "CZYX", (1.0, 1.0, 1.0), names=names)
-    flags = ["--paint", "0=marker", "--iso-value", "body=600", "--iso-value", "other=600"]
+    flags = ["--maps", "--paint", "0=marker", "--iso-value", "body=600", "--iso-value", "other=600"]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0

@@ -33,7 +33,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("deep")
     body = phantoms.f_phantom(2)
     source = phantoms.write_ome_tiff(folder / "f.ome.tif", body[None], "CZYX", names=["F"])
-    assert make_assets(source, folder / "out", "2x1", "--workers", "0") == 0
+    assert make_assets(source, folder / "out", "2x1", "--workers", "0", plan=("--maps",)) == 0
     return folder / "out"
 
 

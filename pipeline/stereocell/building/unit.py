@@ -19,13 +19,13 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
 from stereocell.model.tile_content import APRON
 from stereocell.model.timing import Clock
-from stereocell.model.unit import Closed, Unit
+from stereocell.model.unit import Unit
 from stereocell.model.volume import Volume
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels
-from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.sample_channel import sample_channel
+from stereocell.textures.texture_lod import Texturer, VertexValues
 from stereocell.transfer.joint_histogram import to_eight_bits
 
 PAST = 3  # voxels beyond a cut that maps are baked from; the halo is larger, texels smaller
@@ -71,20 +71,26 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
         return Unit((), None, eight_bit, "the channel has no iso-value", 0, 0, clock.seconds)
 
     lattice = given.lattice.thinned(given.step)
-    fine, closed, source, dropped, filled = _fine_surface(
-        volume, given, lattice, given.iso, painted, clock
-    )
+    repaired, by_triangles = _repaired(volume, given, lattice, given.iso, clock)
+    fine = _extract(repaired, by_triangles, given, lattice, clock)
+    dropped, filled = repaired.fragments_dropped, repaired.cavities_filled
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
         return Unit((), None, eight_bit, reason, dropped, filled, clock.seconds)
+    closed = None
+    if given.settings.surface.closed_tiles:
+        with clock("close"):
+            error = given.settings.lod.errors[0] * min(volume.spacing_um)
+            closed = close_tile(repaired.distance, lattice, max_error_um=error)
+    shading = _Shading(repaired.distance, given, lattice, painted, clock)
+    del repaired
     lods = make_levels(
         fine,
         lattice.cut_planes(),
         spacing_um=volume.spacing_um,
         lod=given.settings.lod,
-        unwrap=given.settings.unwrap,
         clock=clock,
-        source=source,
+        get_texturer=shading.texturer,
     )
     return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds)
 
@@ -144,51 +150,55 @@ def _extract(
     return fine
 
 
-def _fine_surface(
-    volume: Volume,
-    given: UnitInput,
-    lattice: Lattice,
-    iso: LatticeField,
-    painted: Volume | None,
-    clock: Clock,
-) -> tuple[Mesh, Closed | None, FineSurface, int, int]:
-    """Return the repaired surface, its closed copy, the source of the baked maps, and the numbers
-    of fragments dropped and cavities filled.
+class _Shading:
+    """Ambient occlusion and the sampled channel: what levels of a unit get their values from.
+
+    It keeps the distance field only where maps are asked for: the solid takes a quarter of it.
     """
-    repaired, by_triangles = _repaired(volume, given, lattice, iso, clock)
-    fine = _extract(repaired, by_triangles, given, lattice, clock)
-    closed = None
-    if given.settings.surface.closed_tiles:
-        with clock("close"):
-            error = given.settings.lod.errors[0] * min(volume.spacing_um)
-            closed = close_tile(repaired.distance, lattice, max_error_um=error)
-    with clock("occlude"):
-        unwrapping = given.settings.unwrap.resolved(volume.spacing_um)
-        source = _with_surroundings(fine, repaired.distance, given, lattice, unwrapping, painted)
-    return fine, closed, source, repaired.fragments_dropped, repaired.cavities_filled
 
+    def __init__(
+        self,
+        distance: NDArray[np.float32],
+        given: UnitInput,
+        lattice: Lattice,
+        painted: Volume | None,
+        clock: Clock,
+    ) -> None:
+        self._given, self._lattice, self._painted, self._clock = given, lattice, painted, clock
+        self._options = given.settings.unwrap.resolved(given.lattice.spacing_um)
+        # slightly smaller, so that rays start outside of it
+        self._solid = distance > 0.25 * max(lattice.spacing_um)
+        self._distance = distance if self._options.maps else None
 
-def _with_surroundings(
-    fine: Mesh,
-    distance: NDArray[np.float32],
-    given: UnitInput,
-    lattice: Lattice,
-    options: UnwrapOptions,
-    painted: Volume | None,
-) -> FineSurface:
-    """Return the surface, some voxels beyond the cut, with its openness and the sampled channel."""
-    past = lattice.grown(PAST)
-    mesh = fine if past == lattice else extract_surface(distance, past, cut_as=lattice)
-    # slightly smaller, so that rays start outside of it
-    solid = distance > 0.25 * max(lattice.spacing_um)
-    radius, depth = float(options.occlusion_um), float(options.paint_um)
-    openness = find_ambient_visibility(solid, lattice, mesh, radius_um=radius)
-    paint = None
-    if painted is not None and given.painted is not None:
-        paint = sample_channel(
-            painted, given.lattice, mesh, intensity_window=given.painted, depth_um=depth
+    def texturer(self, mesh: Mesh, number: NDArray[np.int64]) -> Texturer:
+        """Return what gives values to levels, by the finest level; see `make_levels`."""
+        with self._clock("occlude"):
+            values = VertexValues(self._openness(mesh), self._paint(mesh))
+        return Texturer(self._options, values, self._source, self._clock)
+
+    def _source(self) -> FineSurface:
+        """Return the fine surface, some voxels beyond the cut, with its values."""
+        assert self._distance is not None
+        past = self._lattice.grown(PAST)
+        mesh = extract_surface(self._distance, past, cut_as=self._lattice)
+        return FineSurface(mesh, self._openness(mesh, thinned=True), self._paint(mesh))
+
+    def _openness(self, mesh: Mesh, thinned: bool = False) -> NDArray[np.float32]:
+        radius_um = float(self._options.occlusion_um)
+        return find_ambient_visibility(
+            self._solid, self._lattice, mesh, radius_um=radius_um, thinned=thinned
         )
-    return FineSurface(mesh, openness, paint)
+
+    def _paint(self, mesh: Mesh) -> NDArray[np.float32] | None:
+        if self._painted is None or self._given.painted is None:
+            return None
+        return sample_channel(
+            self._painted,
+            self._given.lattice,
+            mesh,
+            intensity_window=self._given.painted,
+            depth_um=float(self._options.paint_um),
+        )
 
 
 def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:

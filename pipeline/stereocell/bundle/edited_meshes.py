@@ -35,6 +35,7 @@ from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.lod_chain import make_levels
 from stereocell.textures.options import UnwrapOptions
+from stereocell.textures.texture_lod import Texturer, VertexValues
 from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_mesh import move_mesh
 from stereocell.usd.read_stage import (
@@ -164,14 +165,19 @@ def _make(
     openness = np.ones(len(bare.positions), np.float32) if mesh.openness is None else mesh.openness
     paints = [] if mesh.colors is None else list(np.ascontiguousarray(mesh.colors.T))
     sources = [FineSurface(bare, openness, paint) for paint in paints or [None]]
+
+    def get_texturer(_: Mesh, number: NDArray[np.int64]) -> Texturer:
+        paint = paints[0][number] if paints else None
+        values = VertexValues(openness[number], paint)
+        return Texturer(options.unwrap.resolved(spacing), values, lambda: sources[0], Clock())
+
     made = make_levels(
         bare,
         planes,
         spacing_um=spacing,
         lod=replace(options.lod, errors=options.lod.errors[: lods[-1].level + 1]),
-        unwrap=options.unwrap,
         clock=Clock(),
-        source=sources[0],
+        get_texturer=get_texturer,
         first=first,
     )
     others = [Baker(source) for source in sources[1:]]

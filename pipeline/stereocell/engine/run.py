@@ -27,6 +27,7 @@ from stereocell.engine.cluster import ClusterError, able, join
 from stereocell.engine.interrupts import children_ignore_interrupts, interrupts_put_off
 from stereocell.engine.object_store_tasks import carried, forget_scratch
 from stereocell.engine.workers import choose_start
+from stereocell.kernels.cache_place import are_compiled, compile_in_process
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.processes import shortage
 
@@ -148,6 +149,9 @@ class Engine:
 
             # distributed drops a killed worker for good where a busy machine needs over 15 s for it
             dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
+            if not are_compiled():  # each worker would do it, for half a minute
+                console.print("compiling loops, once on this machine", markup=False)
+                compile_in_process()
             with children_ignore_interrupts(), _started_in_time():
                 choose_start(function)
                 # units hold arrays of known size; distributed needs no spilling

@@ -14,11 +14,11 @@ algorithm", IEEE LDAV 2015. doi:10.1109/LDAV.2015.7348069
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
+from stereocell.kernels.slopes import find_downhill
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
@@ -86,7 +86,8 @@ def extract_surface(
     steps, origin = np.asarray(lattice.spacing_um), np.asarray(lattice.origin_um)
     lattice_zyx = points[:, ::-1].astype(np.float64) + (np.asarray(own.start) - margin)
     positions = zyx_to_xyz(lattice_zyx * steps + origin).astype(np.float32)
-    normals = _normals(distance, lattice_zyx - np.asarray(window.start) + margin, steps)
+    at = lattice_zyx - np.asarray(window.start) + margin
+    normals = zyx_to_xyz(find_downhill(distance, at, steps)).astype(np.float32)
     # VTK winds by the image's axes; the world mirrors y, so every triangle is turned over
     return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
 
@@ -144,20 +145,3 @@ def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDA
     points = vtk_to_numpy(output.GetPoints().GetData()).astype(np.float32)
     triangles = vtk_to_numpy(output.GetPolys().GetConnectivityArray()).reshape(-1, 3)
     return points, triangles.astype(np.uint32)
-
-
-def _normals(
-    distance: NDArray[np.float32], at: NDArray[np.float64], spacing_um: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    """Return unit normals (x, y, z), pointing out of {distance > 0}.
-
-    at  float64 (n, 3), window indices (z, y, x)
-    """
-    gradient = np.empty((3, len(at)), np.float32)
-    coordinates = at.T
-    for axis, step in enumerate(spacing_um):
-        slope = np.gradient(distance, np.float32(step), axis=axis)
-        gradient[axis] = ndimage.map_coordinates(slope, coordinates, order=1, mode="nearest")
-    outward = zyx_to_xyz(-gradient.T)
-    length = np.linalg.norm(outward, axis=1, keepdims=True)
-    return (outward / np.maximum(length, 1e-20)).astype(np.float32)

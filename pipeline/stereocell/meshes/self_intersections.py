@@ -1,9 +1,10 @@
 """Self-intersections of a mesh: pairs of triangles that share a point beside common corners.
 
 All decisions are signs of determinants, exact for float64 coordinates, as libigl has them
-(Shewchuk). Pairs without a common corner go to libigl's search tree and test (Guigue & Devillers).
-Pairs with a common corner are tested here: libigl decides those by tolerances, and misses edges
-that lie on each other.
+(Shewchuk). A grid finds the pairs that are close, and floats, which know their error, leave out
+those that surely don't meet (kernels/crossings.py). Of the few that are left, pairs without a
+common corner go to libigl's test (Guigue & Devillers). Pairs with a common corner are tested here:
+libigl decides those by tolerances, and misses edges that lie on each other.
 
 References
 J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
@@ -12,96 +13,64 @@ P. Guigue & O. Devillers, "Fast and robust triangle-triangle overlap test using 
 predicates", Journal of Graphics Tools 8(1), 2003. doi:10.1080/10867651.2003.10487580
 """
 
-from collections.abc import Iterable, Iterator
-
 import numpy as np
 from igl import predicates
 from numpy.typing import NDArray
 
+from stereocell.kernels.crossings import ERROR_3D, find_doubtful, find_maybe_flat
+from stereocell.meshes.triangle_grid import make_grid
+
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_BLOCK = 400_000  # pairs at a time
-MARGIN = 1e-6  # smaller cosines and mean normals are in doubt; float64 rounds far below it
-TINY = 1e-300  # least length: corners on no line can have an area that rounds to zero
-ERROR_BOUND = (7 + 56 * 2.0**-53) * 2.0**-53  # of orient3d, relative: Shewchuk's bound A
 
 
 def find_crossings(
-    positions: Points,
-    triangles: Indices,
-    *,
-    one_fan: NDArray[np.bool_] | None = None,
-    fresh: NDArray[np.bool_] | None = None,
+    positions: Points, triangles: Indices, *, fresh: NDArray[np.bool_] | None = None
 ) -> Indices:
     """Return the pairs of triangles that meet beside their common corners, int64 (n, 2), sorted.
 
     positions  float64 (n, 3)
     triangles  int64 (m, 3), each with three different corners on no line: others have no plane,
                and the caller leaves them out
-    one_fan    bool (n,), vertices known to have one closed fan of triangles, wound alike; most of
-               them need no exact test
     fresh      bool (m,); each pair has at least one such triangle. All triangles, if not given
     """
     if fresh is None:
         fresh = np.ones(len(triangles), bool)
     if not fresh.any():
         return np.zeros((0, 2), np.int64)
-    doubtful = np.zeros(len(positions), bool)
-    doubtful[triangles[fresh]] = True
-    if one_fan is not None:
-        whole = doubtful[triangles].any(axis=1)  # all triangles around these vertices
-        doubtful &= ~(one_fan & _spread_out(positions, triangles[whole]))
-    near = [
-        _meet(positions, triangles, pairs[fresh[pairs].any(axis=1)])
-        for pairs in _gathered(_neighbours(triangles, doubtful))
-    ]
-    pairs = np.concatenate([_apart(positions, triangles, fresh), *near])
-    return np.unique(np.sort(pairs, axis=1), axis=0)
-
-
-def _apart(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> Indices:
-    """Return the pairs (n, 2) without common corners that meet, each with a fresh triangle."""
     positions = np.ascontiguousarray(positions)
-    new, old = np.flatnonzero(fresh), np.flatnonzero(~fresh)
-    _, found, _ = predicates.find_self_intersections(
-        positions, np.ascontiguousarray(triangles[new])
+    corners = np.ascontiguousarray(triangles, np.int32)
+    grid = make_grid(positions, corners)
+    pairs = find_doubtful(
+        positions,
+        corners,
+        fresh,
+        grid.low,
+        grid.high,
+        grid.first,
+        grid.listed,
+        grid.origin,
+        grid.edge,
+        grid.shape,
     )
-    pairs = new[found.reshape(-1, 2)]
-    if len(old):
-        _, found, _ = predicates.find_intersections(
-            positions, triangles[new], positions, triangles[old]
-        )
-        found = found.reshape(-1, 2)
-        pairs = np.concatenate([pairs, np.stack([new[found[:, 0]], old[found[:, 1]]], axis=1)])
-    return pairs[~_share_corners(triangles, pairs)]
+    share = _share_corners(triangles, pairs)
+    near = _meet(positions, triangles, pairs[share])
+    apart = _apart(positions, triangles, pairs[~share])
+    return np.unique(np.sort(np.concatenate([apart, near]), axis=1), axis=0)
 
 
-def _spread_out(positions: Points, triangles: Indices) -> NDArray[np.bool_]:
-    """Return the vertices whose fan, seen along the mean normal, turns one way, and once.
-
-    Then its triangles lie beside each other in that view, and meet only in their common corners.
-    Floats suffice: a value within MARGIN, far above their rounding, counts as a no.
-    """
-    corners = positions[triangles]
-    a, b, c = corners.transpose(1, 0, 2)
-    area = np.cross(b - a, c - a)
-    area = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), TINY)
-    count = len(positions)
-    flat = triangles.ravel()
-    each = np.repeat(area, 3, axis=0)
-    mean = np.stack([np.bincount(flat, each[:, k], count) for k in range(3)], axis=1)
-    length = np.linalg.norm(mean, axis=1)
-    mean = mean / np.maximum(length, MARGIN)[:, None]
-    axis = mean[triangles]  # (m, corner, 3)
-    out = np.roll(corners, -1, axis=1) - corners
-    back = np.roll(corners, 1, axis=1) - corners
-    turn = np.einsum("mkd,mkd->mk", np.cross(out, back), axis)
-    along = np.einsum("mkd,mkd->mk", out, back)
-    along -= np.einsum("mkd,mkd->mk", out, axis) * np.einsum("mkd,mkd->mk", back, axis)
-    angles = np.bincount(flat, np.arctan2(turn, along).ravel(), count)
-    ahead = (area[:, None, :] * axis).sum(axis=2) > MARGIN
-    turns = np.bincount(flat, ahead.ravel(), count) == np.bincount(flat, minlength=count)
-    return turns & (length > MARGIN) & (angles < 2 * np.pi + 0.1)
+def _apart(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
+    """Return the pairs (n, 2), of those without common corners, that meet."""
+    if not len(pairs):
+        return pairs
+    part = np.unique(pairs)
+    _, found, _ = predicates.find_self_intersections(
+        positions, np.ascontiguousarray(triangles[part])
+    )
+    met = part[found.reshape(-1, 2)]
+    numbers = (np.sort(some, axis=1) @ [len(triangles), 1] for some in (pairs, met))
+    asked, hit = numbers
+    return pairs[np.isin(asked, hit)]
 
 
 def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
@@ -116,7 +85,7 @@ def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
         np.roll(v, -2, axis=1) * np.roll(w, -1, axis=1),
     )
     volume = (u * (first - second)).sum(axis=1)
-    bound = ERROR_BOUND * (np.abs(u) * (np.abs(first) + np.abs(second))).sum(axis=1)
+    bound = ERROR_3D * (np.abs(u) * (np.abs(first) + np.abs(second))).sum(axis=1)
     signs = np.sign(volume).astype(np.int32)
     doubtful = np.flatnonzero(np.abs(volume) <= bound)
     if len(doubtful):
@@ -144,41 +113,15 @@ def are_collinear(a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
     return flat
 
 
+def find_flat(positions: Points, triangles: Indices) -> Indices:
+    """Return the triangles (n,) whose corners lie on a line, exactly; arguments as above."""
+    maybe = np.flatnonzero(find_maybe_flat(positions, np.ascontiguousarray(triangles, np.int32)))
+    return maybe[are_collinear(*positions[triangles[maybe]].transpose(1, 0, 2))]
+
+
 def _share_corners(triangles: Indices, pairs: Indices) -> NDArray[np.bool_]:
     first, second = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
     return (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
-
-
-def _neighbours(triangles: Indices, vertices: NDArray[np.bool_]) -> Iterator[Indices]:
-    """Yield all pairs (n, 2) of triangles around each of the vertices, in blocks.
-
-    A pair that shares an edge may be yielded at both of its ends.
-    """
-    corners = np.flatnonzero(vertices[triangles])
-    place = triangles.ravel()[corners]
-    order = np.argsort(place, kind="stable")
-    around = corners[order] // 3
-    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
-    sizes = np.diff(starts, append=len(order))
-    for size in np.unique(sizes[sizes > 1]).tolist():
-        i, j = np.triu_indices(size, 1)
-        groups = starts[sizes == size]
-        step = max(1, _BLOCK // len(i))
-        for start in range(0, len(groups), step):
-            first = groups[start : start + step, None]
-            yield np.stack([around[first + i], around[first + j]], axis=-1).reshape(-1, 2)
-
-
-def _gathered(blocks: Iterable[Indices]) -> Iterator[Indices]:
-    """Yield the same pairs in few blocks: each exact test starts threads, even for few pairs."""
-    held: list[Indices] = []
-    for block in blocks:
-        held.append(block)
-        if sum(map(len, held)) >= _BLOCK:
-            yield np.concatenate(held)
-            held = []
-    if held:
-        yield np.concatenate(held)
 
 
 def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:

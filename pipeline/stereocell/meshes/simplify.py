@@ -1,66 +1,45 @@
-"""Simplify a mesh within an absolute error; boundary edges stay.
+"""Simplify a mesh within an absolute error; boundary edges stay, and so does topology.
 
-Simplification is meshoptimizer's (quadric errors, Garland & Heckbert), bounded by an error in um.
-It only removes vertices, so normals stay valid. Boundary edges are locked: the edges on a common
-plane are the same at every level, and neighbours at different levels still meet.
-
-References
-M. Garland & P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997.
-doi:10.1145/258734.258849
+Vertices move onto their neighbours (kernels/collapse.py): those that are left have not moved, and
+keep their normals and values. Vertices of boundary edges stay: the edges on a common plane are the
+same at every level, and neighbours at different levels still meet. A body stays one, with its
+handles, and never gets thinner than the errors allow, but bodies may come to cross each other:
+meshes/simplify_valid.py.
 """
 
-import ctypes
-
-import meshoptimizer
 import numpy as np
-from meshoptimizer._loader import lib
 from numpy.typing import NDArray
 
-from stereocell.meshes.validity import label_components
+from stereocell.kernels.collapse import collapse
+from stereocell.kernels.flips import flip_edges
+from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
-# meshoptimizer 0.2.30a0 declares no argument types for the only call that takes locked vertices;
-# without them ctypes passes a float as an int
-lib.meshopt_simplifyWithAttributes.argtypes = [
-    ctypes.POINTER(ctypes.c_uint),  # destination
-    ctypes.POINTER(ctypes.c_uint),  # indices
-    ctypes.c_size_t,
-    ctypes.POINTER(ctypes.c_float),  # positions
-    ctypes.c_size_t,  # how many
-    ctypes.c_size_t,  # stride
-    ctypes.POINTER(ctypes.c_float),  # attributes
-    ctypes.c_size_t,  # stride
-    ctypes.POINTER(ctypes.c_float),  # their weights
-    ctypes.c_size_t,  # how many
-    ctypes.POINTER(ctypes.c_ubyte),  # locked
-    ctypes.c_size_t,  # indices wanted
-    ctypes.c_float,  # error allowed
-    ctypes.c_uint,  # options
-    ctypes.POINTER(ctypes.c_float),  # error found
-]
-lib.meshopt_simplifyWithAttributes.restype = ctypes.c_size_t
+STRAY = 3.0  # errors; largest distance of a vertex from the result
+SHARPEST_DEG = 15.0  # degrees; smallest angle of a triangle, unless those around are sharper
+FLIP_DEG = 20.0  # degrees; edges of sharper triangles flip
 
 
-FEWEST = 8  # triangles left of a body that would vanish: an octahedron
-
-
-def simplify(mesh: Mesh, max_error_um: float) -> Mesh:
+def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) -> Mesh:
     """Return the mesh with as few triangles as the error allows; boundary vertices stay.
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
-    max_error_um  largest quadric error
+    max_error_um  largest root of the mean squared distance of a vertex from the planes of the
+                  triangles that it stands for
+    planes        the cut planes, where the mesh may be open: no triangle comes to lie in one
 
     >>> v = np.array([[i % 5, i // 5, 0] for i in range(25)], np.float32)
     >>> a = np.array([i for i in range(20) if i % 5 < 4], np.uint32)
     >>> t = np.concatenate([np.stack([a, a + 1, a + 6], 1), np.stack([a, a + 6, a + 5], 1)])
     >>> flat = Mesh(v, t, np.tile(np.float32([0, 0, 1]), (25, 1)))
     >>> len(flat.triangles), len(simplify(flat, 0.01).triangles)
-    (32, 14)
+    (32, 16)
     """
     locked = np.zeros(len(mesh.positions), bool)
-    return compact(
-        mesh, simplify_part(mesh, mesh.triangles, max_error_um=max_error_um, locked=locked)
+    left = simplify_part(
+        mesh, mesh.triangles, max_error_um=max_error_um, locked=locked, planes=planes
     )
+    return compact(mesh, left)
 
 
 def simplify_part(
@@ -69,64 +48,39 @@ def simplify_part(
     *,
     max_error_um: float,
     locked: NDArray[np.bool_],
+    planes: tuple[Plane, ...],
 ) -> NDArray[np.uint32]:
     """Return fewer triangles in place of those of some whole bodies, uint32 (k, 3).
 
-    triangles     uint32 (m, 3), by the mesh's vertices
-    max_error_um  largest quadric error
-    locked        bool (n,), vertices that stay
-
-    The simplifier's error is a mean over planes: at a bound near a body's radius the whole body
-    vanishes, or becomes flat. Such a body is simplified by itself, down to FEWEST triangles.
+    triangles  uint32 (m, 3), by the mesh's vertices
+    locked     bool (n,), vertices that stay
     """
-    kept = drop_doubles(_simplify(mesh.positions, triangles, max_error_um, 0, locked))
-    numbers = label_components(triangles, len(mesh.positions))
-    body = numbers[triangles[:, 0]]
-    vanished = np.flatnonzero(~np.isin(body, numbers[kept[:, 0]]))
-    vanished = vanished[np.argsort(body[vanished], kind="stable")]
-    ends = np.flatnonzero(np.diff(body[vanished])) + 1
-    small = [
-        _shrink(mesh, triangles[part], max_error_um, locked)
-        for part in np.split(vanished, ends)
-        if len(part)
-    ]
-    return np.concatenate([kept, *small])
-
-
-def _shrink(
-    mesh: Mesh,
-    triangles: NDArray[np.uint32],
-    max_error_um: float,
-    locked: NDArray[np.bool_],
-) -> NDArray[np.uint32]:
-    """Return FEWEST triangles, or as many as the error needs, in place of those of one body."""
-    shrunk = drop_doubles(_simplify(mesh.positions, triangles, max_error_um, FEWEST, locked))
-    return shrunk if len(shrunk) else triangles
-
-
-def _simplify(
-    positions: NDArray[np.float32],
-    triangles: NDArray[np.uint32],
-    max_error_um: float,
-    fewest: int,
-    locked: NDArray[np.bool_],
-) -> NDArray[np.uint32]:
-    # used vertices only: the simplifier's time grows with all vertices that it gets
-    used, own = renumber(triangles, len(positions))
-    source = own.ravel()
-    result = np.empty_like(source)
-    count = meshoptimizer.simplify_with_attributes(
-        result,
-        source,
-        np.ascontiguousarray(positions[used]),
-        vertex_attributes=np.zeros((len(used), 1), np.float32),
-        attribute_weights=np.zeros(0, np.float32),
-        vertex_lock=locked[used],
-        target_index_count=3 * fewest,
-        target_error=max_error_um,
-        options=meshoptimizer.SIMPLIFY_LOCK_BORDER | meshoptimizer.SIMPLIFY_ERROR_ABSOLUTE,
+    used, own = renumber(triangles, len(mesh.positions))
+    if not len(used):
+        return triangles
+    at = mesh.positions[used].astype(np.float64)
+    at -= (at.min(axis=0) + at.max(axis=0)) / 2
+    bits = _find_planes(mesh.positions[used], planes)
+    sharpest, sharp = np.cos(np.radians([SHARPEST_DEG, FLIP_DEG])).tolist()
+    left = collapse(
+        at,
+        own.astype(np.int32),
+        locked[used],
+        bits,
+        max_error_um,
+        STRAY * max_error_um,
+        sharpest,
     )
-    return used[result[:count]].astype(np.uint32).reshape(-1, 3)
+    flip_edges(at, left, bits, max_error_um, sharp)
+    return used[left].astype(np.uint32)
+
+
+def _find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:
+    """Return a bit for each plane that a vertex lies in, uint8 (n,)."""
+    bits = np.zeros(len(positions), np.uint8)
+    for bit, (column, value) in enumerate(planes):
+        bits |= (positions[:, column] == np.float32(value)).astype(np.uint8) << bit
+    return bits
 
 
 def renumber(
@@ -141,32 +95,6 @@ def renumber(
     used[triangles.ravel()] = True
     place = (np.cumsum(used) - 1).astype(np.uint32)
     return np.flatnonzero(used), place[triangles]
-
-
-def drop_doubles(triangles: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Return the triangles without collapsed and repeated ones, in the same order, uint32 (k, 3).
-
-    Two triangles of the same corners, wound in opposite directions, are a sheet without thickness:
-    both go. Each edge loses one triangle in either direction, so that a closed mesh stays closed,
-    and boundary edges stay where they are. Of triangles wound alike the first stays.
-    """
-    a, b, c = np.sort(triangles, axis=1).T
-    order = np.lexsort((c, b, a))
-    a, b, c = a[order], b[order], c[order]
-    new = np.ones(len(order), bool)
-    new[1:] = (a[1:] != a[:-1]) | (b[1:] != b[:-1]) | (c[1:] != c[:-1])
-    collapsed = (a == b) | (b == c)
-    if new.all() and not collapsed.any():
-        return triangles
-    first, middle, last = triangles[order].T
-    rising = (first < middle).astype(int) + (middle < last) + (last < first)
-    winding = np.where(rising == 2, 1, -1)  # a cyclic turn of (a, b, c), or of (c, b, a)
-    group = np.cumsum(new) - 1
-    balance = np.bincount(group, winding)[group]
-    stays = (winding * balance > 0) & ~collapsed
-    # the first of its group with the winding of most
-    _, firsts = np.unique(group[stays], return_index=True)
-    return triangles[np.sort(order[stays][firsts])]
 
 
 def compact(mesh: Mesh, triangles: NDArray[np.uint32]) -> Mesh:

@@ -11,10 +11,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from stereocell.meshes.self_intersections import are_collinear, find_crossings
+from stereocell.kernels.half_edges import CROWDED, count_fans, label_bodies, match_twins
+from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -86,30 +85,23 @@ def find_defects(
     {'open': 3}
     """
     triangles = mesh.triangles.astype(np.int64)
-    repeated = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
-    corners = mesh.positions.astype(np.float64)[triangles]
-    degenerate = repeated | are_collinear(*corners.transpose(1, 0, 2))
+    positions = mesh.positions.astype(np.float64)
+    degenerate = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    degenerate[find_flat(positions, triangles)] = True
     used = np.flatnonzero(~degenerate)
     edges, twins, is_non_manifold = match_edges(triangles)
     border_edges = np.flatnonzero((twins < 0) & ~is_non_manifold)
     lone = border_edges[~_on_planes(mesh.positions, edges[border_edges], planes)]
     non_manifold_vertices = find_non_manifold_vertices(triangles, twins, len(mesh.positions))
-    one_fan = np.ones(len(mesh.positions), bool)
-    one_fan[non_manifold_vertices] = False
-    one_fan[edges[twins < 0]] = False
-    one_fan[triangles[degenerate]] = False
     crossings = find_crossings(
-        mesh.positions.astype(np.float64),
-        triangles[used],
-        one_fan=one_fan,
-        fresh=None if fresh is None else fresh[used],
+        positions, triangles[used], fresh=None if fresh is None else fresh[used]
     )
     return Defects(
         degenerate=np.flatnonzero(degenerate),
         open=edges[lone],
         non_manifold_edges=np.unique(np.sort(edges[is_non_manifold], axis=1), axis=0),
         non_manifold_vertices=non_manifold_vertices,
-        inside_out=_inside_out(mesh, corners, edges, border_edges, planes),
+        inside_out=_inside_out(mesh, positions[triangles], edges, border_edges, planes),
         crossings=used[crossings],
         walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
@@ -121,10 +113,7 @@ def label_components(triangles: NDArray[np.integer], vertices: int) -> NDArray[n
     triangles  (m, 3)
     vertices   number of vertices, n
     """
-    a, b, c = triangles.astype(np.int64).T
-    rows, columns = np.concatenate([a, b]), np.concatenate([b, c])
-    edges = coo_matrix((np.ones(len(rows), bool), (rows, columns)), shape=(vertices, vertices))
-    return connected_components(edges, directed=False)[1]
+    return label_bodies(np.ascontiguousarray(triangles, np.int32), vertices)[0]
 
 
 def border(triangles: NDArray[np.integer]) -> Indices:
@@ -132,21 +121,8 @@ def border(triangles: NDArray[np.integer]) -> Indices:
 
     triangles  (m, 3)
     """
-    start = triangles.astype(np.int64)
-    end = np.roll(start, -1, axis=1)
-    # an edge and its twin differ in the last bit: sorted, they follow each other
-    count = int(start.max(initial=0)) + 1
-    key = (np.minimum(start, end) * count + np.maximum(start, end)) * 2 + (start > end)
-    key = np.sort(key, axis=None)
-    twin = key[:-1] ^ 1 == key[1:]
-    edge, same = key // 2, np.zeros(len(key) + 1, bool)
-    same[1:-1] = edge[:-1] == edge[1:]
-    alone = np.ones(len(key), bool)
-    pairs = np.flatnonzero(twin & ~same[:-2] & ~same[2:])
-    alone[pairs] = alone[pairs + 1] = False
-    low, high = np.divmod(edge[alone], count)
-    turned = (key[alone] & 1).astype(bool)
-    lone = np.stack([np.where(turned, high, low), np.where(turned, low, high)], axis=1)
+    edges, twins, _ = match_edges(triangles.astype(np.int64))
+    lone = edges[twins < 0]
     return lone[np.lexsort(lone.T[::-1])]
 
 
@@ -158,21 +134,9 @@ def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]
     Edge 3 t + k goes from corner k of triangle t to the next one.
     """
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    one, other = edges.T
-    low, high = np.minimum(one, other), np.maximum(one, other)
-    key = low * (high.max(initial=0) + 1) + high
-    order = np.argsort(key, kind="stable")
-    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    sizes = np.diff(starts, append=len(order))
-    twins = np.full(len(edges), -1, np.int64)
-    two = starts[sizes == 2]
-    first, second = order[two], order[two + 1]
-    opposite = edges[first, 0] == edges[second, 1]
-    opposite &= edges[first, 0] != edges[first, 1]
-    twins[first[opposite]], twins[second[opposite]] = second[opposite], first[opposite]
-    is_non_manifold = np.empty(len(edges), bool)
-    is_non_manifold[order] = np.repeat(sizes >= 2, sizes)
-    return edges, twins, is_non_manifold & (twins < 0)
+    count = int(triangles.max(initial=-1)) + 1
+    twins = match_twins(np.ascontiguousarray(triangles, np.int32), count)
+    return edges, twins.astype(np.int64), twins == CROWDED
 
 
 def _on_planes(
@@ -193,27 +157,8 @@ def find_non_manifold_vertices(triangles: Indices, twins: Indices, vertices: int
 
     It walks around each vertex and counts the triangles.
     """
-    corners = triangles.ravel()
-    valence = np.bincount(corners, minlength=vertices)
-    index = np.arange(len(corners))
-    # to the next triangle around the vertex, over the incoming edge: its twin starts at the vertex
-    onward = twins[index - index % 3 + (index + 2) % 3]
-    # a fan with a boundary is walked from its first triangle, whose outgoing edge has no twin
-    begins = np.flatnonzero(twins < 0)
-    start = np.full(vertices, -1, np.int64)
-    start[corners] = index
-    start[corners[begins]] = begins
-    at = start[start >= 0]
-    place = corners[at]
-    first, count = at.copy(), np.ones(len(at), np.int64)
-    active = np.arange(len(at))
-    while len(active):
-        step = onward[at[active]]
-        goes = (step >= 0) & (step != first[active]) & (count[active] < valence[place[active]])
-        active, step = active[goes], step[goes]
-        at[active] = step
-        count[active] += 1
-    return place[count != valence[place]]
+    corners, across = (np.ascontiguousarray(a, np.int32) for a in (triangles, twins))
+    return np.flatnonzero(count_fans(corners, across, vertices)[1] < 0)
 
 
 def _inside_out(

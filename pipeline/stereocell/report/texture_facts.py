@@ -32,7 +32,7 @@ class LevelMaps:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """The likeness of a level with its maps to lod0: SSIM, -1..1, at each view and close up."""
+    """The likeness of a level to lod0: SSIM, -1..1, at each view and close up."""
 
     unit: str
     level: int
@@ -74,15 +74,14 @@ def _level(maps: Sequence[dict[str, Any]], level: int) -> LevelMaps:
 
 
 def compare(facts: Facts) -> list[Likeness]:
-    """Return the likeness of some evenly chosen units that have a level with maps."""
+    """Return the likeness of some evenly chosen units that have several levels."""
     units = [unit for unit in facts.units if len(unit.lods) > 1]
     found = []
     every = max(1, -(-len(units) // MOST_COMPARED))
     for i in thin_out(len(units), every)[:MOST_COMPARED]:
         lods = load_lods(units[i].directory)
         level = min(COMPARED, len(lods) - 1)
-        if lods[level].normal_map is not None:
-            views = find_likeness(lods[0], lods[level])
-            close = find_close_likeness(lods[0], lods[level])
-            found.append(Likeness(units[i].name, level, views, close))
+        views = find_likeness(lods[0], lods[level])
+        close = find_close_likeness(lods[0], lods[level])
+        found.append(Likeness(units[i].name, level, views, close))
     return found

@@ -27,6 +27,7 @@ NEUTRAL = (
     "model.errors",
     "model.settings",
     "model.timing",
+    "kernels.cache_place",
     "building.settings",
     "building.plan",
     "building.plan_file",

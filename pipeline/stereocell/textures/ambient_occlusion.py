@@ -2,8 +2,8 @@
 
 Rays start at points of the surface and run through the repaired field that the surface was
 extracted from, not through its triangles. The field reaches past the tile into its halo, while a
-mesh ends at the cut: so neighbours find nearly the same values on both sides of a cut. All rays of
-one direction step together, so that no ray tracer is needed: libigl's has no radius.
+mesh ends at the cut: so neighbours find nearly the same values on both sides of a cut. A ray steps
+through voxels (kernels/visibility.py), so that no ray tracer is needed: libigl's has no radius.
 
 The directions are the same for every point and every tile: no noise, and the same bytes each time.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from stereocell.kernels.visibility import cast_rays
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import xyz_to_zyx
@@ -22,7 +23,12 @@ NEIGHBOURS = 4  # points with a value, of which others take the mean
 
 
 def find_ambient_visibility(
-    solid: NDArray[np.bool_], lattice: Lattice, mesh: Mesh, *, radius_um: float
+    solid: NDArray[np.bool_],
+    lattice: Lattice,
+    mesh: Mesh,
+    *,
+    radius_um: float,
+    thinned: bool = False,
 ) -> NDArray[np.float32]:
     """Return the ambient visibility of each vertex, float32 (n,), 0..1; 1 for a radius of 0.
 
@@ -31,6 +37,7 @@ def find_ambient_visibility(
     solid      bool (z, y, x), covers `lattice.window`
     mesh       positions and unit normals in world space, um (x, y, z); triangles are not used
     radius_um  a hit counts less the farther it is, and nothing at this distance
+    thinned    whether one vertex of each voxel casts rays, and others take the mean of those near
 
     A direction's weight is the cosine to the normal. Rays start a STEP above the surface, so that
     its own voxels don't hide it.
@@ -38,6 +45,8 @@ def find_ambient_visibility(
     points = mesh.positions
     if radius_um <= 0 or not len(points):
         return np.ones(len(points), np.float32)
+    if not thinned:
+        return _cast(solid, lattice, points, mesh.normals, radius_um)
     kept = thin_out(points, max(lattice.spacing_um))
     found = _cast(solid, lattice, points[kept], mesh.normals[kept], radius_um)
     return spread(points[kept], found, points)
@@ -82,30 +91,19 @@ def _cast(
     spacing, origin = np.asarray(lattice.spacing_um), np.asarray(lattice.origin_um)
     offset = step = STEP * max(lattice.spacing_um)
     distances = np.arange(offset, radius_um + offset, step)
-    # an empty margin on all sides, so that no ray leaves the array
-    margin = np.ceil((distances[-1] + offset) / spacing).astype(int) + 2
-    padded = np.pad(solid, [(m, m) for m in margin])
-    strides = np.array([padded.shape[1] * padded.shape[2], padded.shape[2], 1])
-    padded = padded.ravel()
     up = xyz_to_zyx(normals.astype(np.float64))
     start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin) / spacing
-    start += margin - np.asarray(lattice.window.start) + 0.5  # + 0.5: truncated, the nearest voxel
-    start, up = start.astype(np.float32), up.astype(np.float32)
-
-    whole, hidden = np.zeros(len(points), np.float32), np.zeros(len(points), np.float32)
-    for direction in sphere(DIRECTIONS):
-        cosine = up @ direction.astype(np.float32)
-        flying = np.flatnonzero(cosine > 0.05)
-        weight = cosine[flying]
-        whole[flying] += weight
-        at, delta = start[flying], (direction / spacing).astype(np.float32)
-        for distance in distances:
-            voxel = (at + np.float32(distance) * delta).astype(np.int32) @ strides
-            hit = padded[voxel]
-            hidden[flying[hit]] += weight[hit] * np.float32(max(0.0, 1 - distance / radius_um))
-            flying, weight, at = flying[~hit], weight[~hit], at[~hit]
-    share = 1 - hidden / np.maximum(whole, np.float32(1e-6))
-    return share.astype(np.float32)
+    start += 0.5 - np.asarray(lattice.window.start)  # truncated, the nearest voxel
+    directions = sphere(DIRECTIONS)
+    return cast_rays(
+        solid,
+        start.astype(np.float32),
+        up.astype(np.float32),
+        directions.astype(np.float32),
+        (directions / spacing).astype(np.float32),
+        distances.astype(np.float32),
+        np.maximum(0.0, 1 - distances / radius_um).astype(np.float32),
+    )
 
 
 def sphere(count: int) -> NDArray[np.float64]:

@@ -1,21 +1,29 @@
-"""Make all levels of detail of one unit from its fine surface; each is validated and measured."""
+"""Make all levels of detail of one unit from its fine surface; each is validated and measured.
+
+Each level is simplified from the one before, so that its vertices are some of that one's, and then
+gets back the volume that this took (meshes/keep_volume.py). Small bodies go as a whole where they
+would be thinner than the error (meshes/small_bodies.py).
+"""
+
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.meshes.distance import Nearest, measure_distance, measure_enclosure, measure_spread
-from stereocell.meshes.fairing import make_fair
+from stereocell.meshes.keep_volume import FineVolumes
 from stereocell.meshes.options import LodOptions
+from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import simplify_without_defects
-from stereocell.meshes.validity import find_defects
+from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
-from stereocell.textures.bake import Baker, FineSurface
-from stereocell.textures.options import UnwrapOptions
-from stereocell.textures.texture_lod import texture_lod
+from stereocell.textures.texture_lod import Texturer
 
-STRAY = 3.0  # errors; largest distance of a vertex from the next level; about .1 % would exceed it
-SLIDE = 0.5  # finest voxel spacings; largest slide of a vertex of lod0 along the surface
+# returns what gives values to levels, by the finest level that is made and by the numbers that its
+# vertices have in the fine surface
+GetTexturer = Callable[[Mesh, NDArray[np.int64]], Texturer]
 
 
 def make_levels(
@@ -24,48 +32,47 @@ def make_levels(
     *,
     spacing_um: tuple[float, float, float],
     lod: LodOptions,
-    unwrap: UnwrapOptions,
     clock: Clock,
-    source: FineSurface | None = None,
+    get_texturer: GetTexturer | None = None,
     first: int = 0,
 ) -> tuple[Lod, ...]:
     """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
 
-    fine        positions float32 (n, 3) in um, world space (x, y, z)
-    planes      the cut planes
-    spacing_um  of the voxels, (z, y, x)
-    source      the surface that maps are baked from: the fine one, continued past the planes;
-                None: the fine surface alone, without ambient occlusion
-    first       the first level that is made; `fine` is then the level before it
+    fine          positions float32 (n, 3) in um, world space (x, y, z)
+    planes        the cut planes
+    spacing_um    of the voxels, (z, y, x)
+    get_texturer  None: levels get no values
+    first         the first level that is made; `fine` is then the level before it
 
     Meshes are validated before the seams of charts split their vertices: positions stay the same.
     """
     lods: list[Lod] = []
-    mesh = fine
-    unwrapping = unwrap.resolved(spacing_um)
-    with clock("bake"):
-        baker = Baker(source or FineSurface.bare(fine))
+    mesh, number = fine, np.arange(len(fine.positions))  # of each vertex in the fine mesh
+    texturer: Texturer | None = None
+    place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
+    with clock("volume kept"):
+        volumes, bodies = FineVolumes(fine), SmallBodies(fine)
     with clock("measure"):
         to_fine = Nearest(fine, lod.samples)
+    gone = np.zeros(len(fine.positions), bool)
     for level, error in list(enumerate(lod.errors))[first:]:
+        length = error * min(spacing_um)
         with clock("simplify"):
-            length = error * min(spacing_um)
-            simplified = simplify_without_defects(
-                mesh, planes, max_error_um=length, max_away_um=STRAY * length
-            )
-            mesh = simplified.mesh
-        if level == 0:
-            with clock("fair"):
-                mesh = make_fair(
-                    mesh,
-                    planes,
-                    max_slide_um=SLIDE * min(spacing_um),
-                    max_turn_um=error * min(spacing_um),
-                )
-        with clock("certify"):
-            left = find_defects(mesh, planes).total
+            small = bodies.find(length)
+            if (small > gone).any():
+                gone = small
+                kept = ~gone[number[mesh.triangles[:, 0]]]
+                used = np.unique(mesh.triangles[kept])
+                mesh, number = compact(mesh, mesh.triangles[kept]), number[used]
+            simplified = simplify_without_defects(mesh, planes, max_error_um=length)
+            mesh, number = simplified.mesh, number[simplified.vertices]
+        with clock("volume kept"):
+            shown, defects = volumes.keep(mesh, number, planes, max_move_um=length)
         with clock("measure"):
-            to_mesh = Nearest(mesh, lod.samples)
+            if gone.any():
+                left = fine.triangles[~gone[fine.triangles[:, 0]]]
+                to_fine = Nearest(compact(fine, left), lod.samples)
+            to_mesh = Nearest(shown, lod.samples)
             distance = measure_distance(to_fine, to_mesh)
             # a coarser level is no more accurate: sampling errors must not break the viewers' order
             distance = max(distance, lods[-1].distance_um if lods else 0.0)
@@ -74,13 +81,17 @@ def make_levels(
                 back=measure_spread(to_mesh, to_fine),
                 mended=simplified.simplified_again,
                 fallbacks=simplified.fallbacks,
-                faults=left,
-                angle_deg=sharpest_angle(mesh),
+                faults=defects.total,
+                angle_deg=sharpest_angle(shown),
                 enclosed=measure_enclosure(to_fine, to_mesh),
             )
-        made = Lod(mesh, distance, quality=quality)
-        if len(mesh.triangles):
-            made = texture_lod(made, level, baker=baker, options=unwrapping, clock=clock)
+        made = Lod(shown, distance, quality=quality)
+        if get_texturer is not None and len(shown.triangles):
+            if texturer is None:
+                texturer = get_texturer(mesh, number)
+                place = np.zeros(len(fine.positions), np.int64)
+                place[number] = np.arange(len(number))
+            made = texturer.texture(made, level, place[number])
         lods.append(made)
     return tuple(lods)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import AUTO, length_um, setting
+from stereocell.model.settings import AUTO, Flag, length_um, setting
 
 TEXTURES = tuple(2**k for k in range(6, 14))  # allowed largest edges of a map, in texels
 MOST_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
@@ -15,11 +15,20 @@ MOST_REACH = 64.0  # coarsest voxel spacings
 
 @dataclass(frozen=True, slots=True)
 class UnwrapOptions:
-    """UVs and baked maps. Levels without maps have occlusion and sampled channel at their vertices.
+    """UVs and baked maps, for DCC tools. Levels without have their values at the vertices.
 
     Raises UsageError for a number out of range.
     """
 
+    maps: bool = setting(
+        False,
+        "whether coarser levels get UVs and baked maps, 4 to 6 times as large",
+        Flag(
+            "--maps",
+            "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools "
+            "(default: normals and values at vertices alone)",
+        ),
+    )
     first_lod: int = setting(1, "the finest level that gets UVs and baked maps")
     texel_um: float | str = setting(AUTO, "um a texel; auto: the coarsest voxel spacing")
     padding: int = setting(6, "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2")

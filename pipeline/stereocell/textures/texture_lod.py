@@ -1,35 +1,78 @@
-"""Textures of a level of detail: maps where it has UVs, values at its vertices elsewhere."""
+"""Values of a level of detail: at its vertices, or in maps where these are asked for."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.model.mesh import Baked, Lod
 from stereocell.model.timing import Clock
-from stereocell.textures.bake import Baker, bake
+from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.unwrap import unwrap
 
 
-def texture_lod(lod: Lod, level: int, *, baker: Baker, options: UnwrapOptions, clock: Clock) -> Lod:
-    """Return the level with maps, or with values at its vertices.
+@dataclass(frozen=True, slots=True)
+class VertexValues:
+    """Values at the vertices of the finest level that is made.
 
-    level    number of the level, 0: the finest
-    options  resolved
+    openness  float32 (n,) 0..1: 1 - ambient occlusion, see textures/ambient_occlusion.py
+    paint     float32 (n,) 0..1: intensity of the sampled channel; None: there is none
     """
-    reason = f"finer than lod{options.first_lod}" if level < options.first_lod else ""
-    if not reason:
-        with clock("unwrap"):
-            unwrapped = unwrap(lod.mesh, options)
-        if not isinstance(unwrapped, str):
-            with clock("bake"):
-                maps = bake(unwrapped.mesh, unwrapped.size, baker)
-            baked = Baked(maps.openness, maps.paint, unwrapped.texel_um, unwrapped.charts)
-            return replace(lod, mesh=unwrapped.mesh, normal_map=maps.normals, baked=baked)
-        reason = unwrapped
-    with clock("bake"):
-        mesh = lod.mesh
-        found = baker.look_up(mesh.positions.astype(np.float64), mesh.normals.astype(np.float64))
-        openness = np.round(found.openness * 255).astype(np.uint8)
-        paint = None if found.paint is None else np.round(found.paint * 255).astype(np.uint8)
-    return replace(lod, baked=Baked(openness, paint, reason=reason))
+
+    openness: NDArray[np.float32]
+    paint: NDArray[np.float32] | None = None
+
+    def at(self, vertices: NDArray[np.int64]) -> Baked:
+        """Return the values of some of the vertices, in 8 bits."""
+        openness = np.round(self.openness[vertices] * 255).astype(np.uint8)
+        if self.paint is None:
+            return Baked(openness)
+        return Baked(openness, np.round(self.paint[vertices] * 255).astype(np.uint8))
+
+
+class Texturer:
+    """Gives levels their values. Coarser levels have some of the finest's vertices, and its values.
+
+    options     resolved
+    values      at the vertices of the finest level
+    get_source  returns the surface that maps are baked from; it is called where maps are asked for
+    """
+
+    def __init__(
+        self,
+        options: UnwrapOptions,
+        values: VertexValues,
+        get_source: Callable[[], FineSurface],
+        clock: Clock,
+    ) -> None:
+        self._options, self._values, self._clock = options, values, clock
+        self._get_source = get_source
+        self._baker: Baker | None = None
+
+    def texture(self, lod: Lod, level: int, vertices: NDArray[np.int64]) -> Lod:
+        """Return the level with maps, or with values at its vertices.
+
+        level     number of the level, 0: the finest
+        vertices  int64 (n,), the number that each vertex has in the finest level
+        """
+        reason = self._without(level)
+        if not reason:
+            with self._clock("unwrap"):
+                unwrapped = unwrap(lod.mesh, self._options)
+            if not isinstance(unwrapped, str):
+                with self._clock("bake"):
+                    self._baker = self._baker or Baker(self._get_source())
+                    maps = bake(unwrapped.mesh, unwrapped.size, self._baker)
+                baked = Baked(maps.openness, maps.paint, unwrapped.texel_um, unwrapped.charts)
+                return replace(lod, mesh=unwrapped.mesh, normal_map=maps.normals, baked=baked)
+            reason = unwrapped
+        return replace(lod, baked=replace(self._values.at(vertices), reason=reason))
+
+    def _without(self, level: int) -> str:
+        """Return why a level gets no maps, whatever its mesh is; empty: it may."""
+        if not self._options.maps:
+            return "maps are not asked for"
+        first = self._options.first_lod
+        return f"finer than lod{first}" if level < first else ""

@@ -1,10 +1,11 @@
 """Compare a stage with its source: recompute the surfaces and volumes of each unit from voxels.
 
 Surfaces: the reference is the iso-surface of the unit's own voxels, before levels of detail are
-made. Two distances of each level to it, and back, are compared with the unit's record: the 99th
-percentile over both areas, by the same measure as a level's stated distance, and the largest of
-all, vertices included. Surfaces must face the same way; normals, occlusion, maps and UVs must be
-the unit's. Volumes: every voxel in 8 bits, and the stage's .vdb byte by byte.
+made; of a coarse level, without the small bodies that it leaves out by rule
+(meshes/small_bodies.py). Two distances of each level to it, and back, are compared with the unit's
+record: the 99th percentile over both areas, by the same measure as a level's stated distance, and
+the largest of all, vertices included. Surfaces must face the same way; normals, occlusion, maps and
+UVs must be the unit's. Volumes: every voxel in 8 bits, and the stage's .vdb byte by byte.
 """
 
 import tempfile
@@ -19,11 +20,13 @@ from PIL import Image
 
 from stereocell.building.open_source import open_source
 from stereocell.building.tasks.unit import UnitTask
-from stereocell.building.unit import find_surface, to_eight_bit
+from stereocell.building.unit import UnitInput, find_surface, to_eight_bit
 from stereocell.building.unit_files import load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import write_vdb
 from stereocell.meshes.distance import Nearest, measure_distance, measure_spread
+from stereocell.meshes.simplify import compact
+from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
@@ -88,7 +91,8 @@ def compare_unit(task: SourceTask) -> UnitFinding:
         lods = list(read_lods(tile, task.channel_id))
         composed = read_volume(tile, task.channel_id)
         record = load_record(task.unit.directory)
-        levels, faults = _compare_lods(_placed(fine, task.placement), lods, record, task.samples)
+        surfaces = _Surfaces(fine, given, task.placement, task.samples)
+        levels, faults = _compare_lods(surfaces, lods, record)
         problems += faults
         problems += _compare_shading(lods, load_lods(task.unit.directory), task.placement)
         if composed is None and not task.shares_volume:
@@ -105,23 +109,48 @@ def _placed(mesh: Mesh, placement: Matrix) -> Mesh:
     return Mesh(positions.astype(np.float32), mesh.triangles, mesh.normals)
 
 
+class _Surfaces:
+    """The iso-surface of a unit, and what each level is compared with: it without the small bodies
+    that the level's rule leaves out.
+    """
+
+    def __init__(self, fine: Mesh, given: UnitInput, placement: Matrix, samples: int) -> None:
+        self.samples = samples
+        self.triangles = fine.triangles
+        self._errors = given.settings.lod.errors
+        self._spacing = min(given.lattice.spacing_um)
+        self._bodies = SmallBodies(fine)
+        self._placed = _placed(fine, placement)
+        self._known: dict[int, Nearest] = {}
+
+    def at(self, level: int) -> Nearest:
+        """Return the surface that a level shows."""
+        error = self._errors[min(level, len(self._errors) - 1)] * self._spacing
+        gone = self._bodies.find(error)
+        key = int(gone.sum())  # bodies go in one order
+        if key not in self._known:
+            left = self.triangles[~gone[self.triangles[:, 0]]]
+            self._known[key] = Nearest(compact(self._placed, left), self.samples)
+        return self._known[key]
+
+
 def _compare_lods(
-    fine: Mesh, lods: list[ComposedLod], record: dict[str, Any], samples: int
+    surfaces: _Surfaces, lods: list[ComposedLod], record: dict[str, Any]
 ) -> tuple[tuple[tuple[float, float, float], ...], list[str]]:
-    if not len(fine.triangles) or not lods:
-        if len(fine.triangles):
+    if not len(surfaces.triangles) or not lods:
+        if len(surfaces.triangles):
             return (), [
-                f"the source has a surface of {len(fine.triangles)} triangles, the stage none"
+                f"the source has a surface of {len(surfaces.triangles)} triangles, the stage none"
             ]
         return (), ["the source has no surface, the stage has one"] if lods else []
     problems = []
     if len(lods) < len(record["lods"]):
         problems.append(f"{len(lods)} levels of detail, {len(record['lods'])} were built")
     levels = []
-    to_fine = Nearest(fine, samples)
     for lod in lods:
+        to_fine = surfaces.at(lod.level)
         stored = record["lods"][min(lod.level, len(record["lods"]) - 1)]
-        to_mesh = Nearest(lod.mesh, samples)
+        to_mesh = Nearest(lod.mesh, surfaces.samples)
         found = measure_distance(to_fine, to_mesh)
         there, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
         largest = max(there.max, back.max)

@@ -1,0 +1,1 @@
+"""Loops over voxels and triangles, compiled once a machine by numba; no file, no other package."""

@@ -1,0 +1,107 @@
+"""Where compiled kernels are kept, and whether all are there. Light to import: it leaves numba out.
+
+The place is the first of these that can be written: the folder that NUMBA_CACHE_DIR names,
+`__pycache__` beside the kernels, the user's cache. Inside it each module has a folder, named by a
+hash of the module and of the kernels that it imports: numba itself would not see that a callee in
+another file has changed.
+"""
+
+import hashlib
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+_HERE = Path(__file__).parent
+_PREFIX = "kernels-"
+_IMPORT = re.compile(r"^from stereocell\.kernels\.(\w+) import", re.MULTILINE)
+
+
+@cache
+def find_home() -> Path | None:
+    """Return the place; None: none can be written, and each process compiles what it needs."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    for home in [Path(named)] if named else [_HERE / "__pycache__", _user_cache()]:
+        with suppress(OSError, RuntimeError):
+            home.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=home):
+                return home
+    return None
+
+
+@cache
+def cache_folder(module: str) -> Path | None:
+    """Return the folder of a module's compiled kernels; None: there is no place."""
+    home, name = find_home(), module.rpartition(".")[2]
+    return home and home / f"{_PREFIX}{name}-{_digest(_reach(name))}"
+
+
+def are_compiled() -> bool:
+    """Return whether this machine's place has all kernels, or there is none."""
+    mark = _mark()
+    return mark is None or mark.exists()
+
+
+def compile_in_process() -> None:
+    """Compile all kernels in a process of its own; a kernel that fails does so again in use."""
+    subprocess.run([sys.executable, "-m", __package__], check=False, capture_output=True)
+
+
+def mark_compiled() -> None:
+    """Note that all kernels are compiled, and remove what older versions of them left."""
+    home, mark = find_home(), _mark()
+    if home is None or mark is None:
+        return
+    with suppress(OSError):
+        mark.touch()
+    own = {mark, *(cache_folder(file.stem) for file in _HERE.glob("*.py"))}
+    for old in home.glob(f"{_PREFIX}*"):
+        if old.is_dir() and old not in own:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+def _mark() -> Path | None:
+    home = find_home()
+    every = {file.stem for file in _HERE.glob("*.py")}
+    return home and home / f"{_PREFIX}{_digest(every, sys.version, _processor())}.done"
+
+
+def _digest(modules: set[str], *more: str) -> str:
+    digest = hashlib.sha256(" ".join((version("numba"), *more)).encode())
+    for name in sorted(modules):
+        digest.update((_HERE / f"{name}.py").read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _reach(name: str) -> set[str]:
+    """Return a module of this package and those of it that it imports."""
+    found, waiting = set[str](), [name]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += _IMPORT.findall((_HERE / f"{name}.py").read_text())
+    return found
+
+
+def _processor() -> str:
+    """Return what code is compiled for: numba compiles anew for another processor's features."""
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next((line for line in lines if line.startswith(("flags", "Features"))), "")
+    return platform.machine()
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "stereocell"
+    if sys.platform == "darwin":
+        return Path.home() / "Library/Caches/stereocell"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "stereocell"

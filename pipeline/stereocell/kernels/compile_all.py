@@ -1,0 +1,51 @@
+"""Compile all kernels that are not in the cache yet: by a call of each, on a tetrahedron."""
+
+import numpy as np
+
+from stereocell.kernels.cache_place import mark_compiled
+from stereocell.kernels.collapse import collapse
+from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
+from stereocell.kernels.flips import flip_edges
+from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
+from stereocell.kernels.half_edges import (
+    count_fans,
+    label_bodies,
+    match_twins,
+    measure_sizes,
+    measure_volumes,
+    sum_gains,
+    sum_normals,
+)
+from stereocell.kernels.nearest import find_nearest, find_sides
+from stereocell.kernels.slopes import find_downhill
+from stereocell.kernels.visibility import cast_rays
+
+
+def compile_all() -> None:
+    """Call every kernel with arrays of the types that the package gives it."""
+    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
+    flags = np.ones(4, bool)
+    twins = match_twins(triangles, 4)
+    count_fans(triangles, twins, 4)
+    labels, bodies = label_bodies(triangles, 4)
+    measure_volumes(at, triangles, labels, bodies)
+    measure_sizes(at, triangles, twins, labels, bodies)
+    sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
+    bits = np.zeros(4, np.uint8)
+    flip_edges(at, collapse(at, triangles, flags, bits, 0.1, 0.3, 0.9), bits, 0.1, 0.9)
+
+    low, high = bound_boxes(at, triangles)
+    origin, edge, shape = low.min(axis=0), 0.5, np.array([3, 3, 3])
+    count_entries(low, high, origin, edge)
+    first, listed = list_by_cell(low, high, origin, edge, shape)
+    find_maybe_flat(at, triangles)
+    find_doubtful(at, triangles, flags, low, high, first, listed, origin, edge, shape)
+    _, nearest, parts = find_nearest(at, at, triangles, first, listed, origin, edge, shape)
+    find_sides(at, nearest, parts, at, triangles, twins)
+
+    voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
+    find_downhill(voxels, points.astype(np.float64), np.ones(3))
+    one = np.ones(1, np.float32)
+    cast_rays(voxels > 0, points, points, points, points, one, one)
+    mark_compiled()

@@ -1,0 +1,39 @@
+"""How kernels are compiled: by numba, once a machine and version, without fast math.
+
+A kernel is a function of arrays and numbers that loops over voxels, vertices or triangles where
+array expressions would take several times the time and memory. It runs in one thread, and rounds as
+IEEE 754 says: nothing is fused or put into another order, so a result has the same bytes on
+processors with other vector units. Functions whose last bit depends on the C library (cosines,
+logarithms) decide nothing in a kernel.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+from stereocell.kernels.cache_place import cache_folder
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_CONFIG: Any = numba.config
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+
+
+def kernel(function: F) -> F:
+    """Compile a function at its first call, or take it from the cache."""
+    compiled = numba.njit(**_OPTIONS)(function)
+    folder = cache_folder(function.__module__)
+    if folder is not None:
+        past = _CONFIG.CACHE_DIR
+        _CONFIG.CACHE_DIR = str(folder)
+        try:
+            compiled.enable_caching()
+        finally:
+            _CONFIG.CACHE_DIR = past
+    return compiled
+
+
+def part(function: F) -> F:
+    """Compile a small function into each kernel that calls it."""
+    return numba.njit(forceinline=True, **_OPTIONS)(function)

@@ -1,0 +1,200 @@
+"""Triangles as half-edges: half-edge 3 t + k goes from corner k of triangle t to the next one."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.compiled import kernel, part
+from stereocell.kernels.triangles import Points, doubled_area
+
+Ints = NDArray[np.int32]
+BORDER, CROWDED = -1, -2  # no twin: none is there; several are, or one that is wound alike
+
+
+@part
+def following(h: int) -> int:
+    """Return the half-edge after this one in its triangle."""
+    return h + 1 if h % 3 < 2 else h - 2
+
+
+@part
+def preceding(h: int) -> int:
+    """Return the half-edge before this one in its triangle."""
+    return h - 1 if h % 3 > 0 else h + 2
+
+
+@kernel
+def match_twins(triangles: Ints, count: int) -> Ints:
+    """Return the twin of each half-edge, int32 (3 m,), or BORDER or CROWDED.
+
+    triangles  int32 (m, 3)
+    count      number of vertices
+    """
+    corner = triangles.ravel()
+    edges = len(corner)
+    first = np.zeros(count + 1, np.int32)  # half-edges, in lists by their lower vertex
+    for h in range(edges):
+        first[min(corner[h], corner[following(h)]) + 1] += 1
+    for v in range(count):
+        first[v + 1] += first[v]
+    place, listed = first[:-1].copy(), np.empty(edges, np.int32)
+    for h in range(edges):
+        v = min(corner[h], corner[following(h)])
+        listed[place[v]] = h
+        place[v] += 1
+    twins = np.full(edges, BORDER, np.int32)
+    for v in range(count):
+        for i in range(first[v], first[v + 1]):
+            h = listed[i]
+            start, end = corner[h], corner[following(h)]
+            opposite, others = -1, 0
+            for j in range(first[v], first[v + 1]):
+                g = listed[j]
+                if g == h:
+                    continue
+                if corner[g] == end and corner[following(g)] == start and start != end:
+                    opposite = g
+                    others += 1
+                elif corner[g] == start and corner[following(g)] == end:
+                    others += 2
+            if others == 1:
+                twins[h] = opposite
+            elif others > 1:
+                twins[h] = CROWDED
+    return twins
+
+
+@kernel
+def count_fans(triangles: Ints, twins: Ints, count: int) -> tuple[Ints, Ints]:
+    """Return an outgoing half-edge of each vertex, or -1, and the number of triangles it has.
+
+    The number is negative where these make more than one fan. The half-edge of a border's vertex
+    is its fan's first: it has no twin.
+    """
+    corner = triangles.ravel()
+    leaving, valence = np.full(count, -1, np.int32), np.zeros(count, np.int32)
+    for h in range(len(corner)):
+        v = corner[h]
+        valence[v] += 1
+        if leaving[v] < 0 or twins[h] < 0:
+            leaving[v] = h
+    for v in range(count):
+        if leaving[v] < 0:
+            continue
+        h, met = leaving[v], 1
+        while True:
+            h = twins[preceding(h)]
+            if h < 0 or h == leaving[v] or met > valence[v]:
+                break
+            met += 1
+        if met != valence[v]:
+            valence[v] = -valence[v]
+    return leaving, valence
+
+
+@part
+def _find_root(parent: Ints, v: int) -> int:
+    while parent[v] != v:
+        parent[v] = parent[parent[v]]
+        v = parent[v]
+    return v
+
+
+@kernel
+def label_bodies(triangles: Ints, count: int) -> tuple[Ints, int]:
+    """Return the connected body of each vertex, int32 (count,), and their number.
+
+    Bodies are numbered by their first vertices.
+    """
+    parent = np.arange(count).astype(np.int32)
+    for t in range(len(triangles)):
+        a = _find_root(parent, triangles[t, 0])
+        for k in range(1, 3):
+            b = _find_root(parent, triangles[t, k])
+            if a < b:
+                parent[b] = a
+            elif b < a:
+                parent[a] = b
+                a = b
+    labels, bodies = np.empty(count, np.int32), 0
+    for v in range(count):
+        root = _find_root(parent, v)
+        if root == v:
+            labels[v] = bodies
+            bodies += 1
+        else:
+            labels[v] = labels[root]
+    return labels, bodies
+
+
+@kernel
+def measure_volumes(at: Points, triangles: Ints, labels: Ints, bodies: int) -> Points:
+    """Return the signed volume of each body (bodies,): the sum of tetrahedra from the origin.
+
+    Of an open body it is a number whose differences, while its border stays, are volumes.
+    """
+    volumes = np.zeros(bodies)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        x, y, z = doubled_area(at, a, b, c)
+        volumes[labels[a]] += (at[a, 0] * x + at[a, 1] * y + at[a, 2] * z) / 6
+    return volumes
+
+
+@kernel
+def measure_sizes(
+    at: Points, triangles: Ints, twins: Ints, labels: Ints, bodies: int
+) -> tuple[Points, Points, NDArray[np.bool_]]:
+    """Return the area of each body, the diagonal of its box, and whether it is open; (bodies,)."""
+    areas, diagonals = np.zeros(bodies), np.zeros(bodies)
+    is_open = np.zeros(bodies, np.bool_)
+    low, high = np.full((bodies, 3), np.inf), np.full((bodies, 3), -np.inf)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        body = labels[a]
+        x, y, z = doubled_area(at, a, b, c)
+        areas[body] += np.sqrt(x * x + y * y + z * z) / 2
+        for k in range(3):
+            is_open[body] |= twins[3 * t + k] < 0
+            low[body, k] = min(low[body, k], min(at[a, k], min(at[b, k], at[c, k])))
+            high[body, k] = max(high[body, k], max(at[a, k], max(at[b, k], at[c, k])))
+    for body in range(bodies):
+        if areas[body] > 0:
+            x, y, z = high[body] - low[body]
+            diagonals[body] = np.sqrt(x * x + y * y + z * z)
+    return areas, diagonals, is_open
+
+
+@kernel
+def sum_normals(at: Points, triangles: Ints) -> Points:
+    """Return the unit normal of each vertex (n, 3), weighted by area; 0 where there is none."""
+    normals = np.zeros_like(at)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        x, y, z = doubled_area(at, a, b, c)
+        for v in (a, b, c):
+            normals[v, 0] += x
+            normals[v, 1] += y
+            normals[v, 2] += z
+    for v in range(len(at)):
+        x, y, z = normals[v]
+        length = np.sqrt(x * x + y * y + z * z)
+        if length > 0:
+            for k in range(3):
+                normals[v, k] /= length
+    return normals
+
+
+@kernel
+def sum_gains(
+    at: Points, triangles: Ints, labels: Ints, bodies: int, moves: Points
+) -> NDArray[np.float64]:
+    """Return by how much each body's volume grows, to first order, if its vertices move (n, 3)."""
+    gains = np.zeros(bodies)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        x, y, z = doubled_area(at, a, b, c)
+        mx = moves[a, 0] + moves[b, 0] + moves[c, 0]
+        my = moves[a, 1] + moves[b, 1] + moves[c, 1]
+        mz = moves[a, 2] + moves[b, 2] + moves[c, 2]
+        gains[labels[a]] += (x * mx + y * my + z * mz) / 6
+    return gains

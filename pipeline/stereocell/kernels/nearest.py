@@ -1,0 +1,116 @@
+"""Nearest points of a mesh, by a uniform grid of its triangles."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.compiled import kernel
+from stereocell.kernels.half_edges import Ints
+from stereocell.kernels.triangles import Points, closest
+
+
+@kernel
+def find_nearest(
+    points: Points,
+    at: Points,
+    triangles: Ints,
+    first: Ints,
+    listed: Ints,
+    origin: Points,
+    edge: float,
+    shape: NDArray[np.int64],
+) -> tuple[Points, NDArray[np.int64], NDArray[np.int8]]:
+    """Return the distance of each point (n,), the nearest triangle, and its part (see `closest`).
+
+    first, listed        of the grid: kernels/grid.py
+    origin, edge, shape  of the grid; it holds all triangles
+
+    Cells are searched in shells around the point, until nothing beyond can be nearer. Of triangles
+    at one distance the first that is met is returned.
+    """
+    distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
+    parts = np.empty(len(points), np.int8)
+    seen = np.full(len(triangles), -1, np.int32)
+    centre, inside = np.empty(3, np.int64), np.empty(3)
+    _, ny, nz = shape
+    largest = max(shape[0], max(ny, nz))
+    for i in range(len(points)):
+        beyond = 0.0  # squared distance from the grid
+        for k in range(3):
+            inside[k] = min(max(points[i, k], origin[k]), origin[k] + shape[k] * edge)
+            beyond += (points[i, k] - inside[k]) ** 2
+            centre[k] = min(int((inside[k] - origin[k]) / edge), shape[k] - 1)
+        best, triangle, where = np.inf, -1, 0
+        for reach in range(largest + 1):
+            for x in range(max(centre[0] - reach, 0), min(centre[0] + reach, shape[0] - 1) + 1):
+                on_side = abs(x - centre[0]) == reach
+                for y in range(max(centre[1] - reach, 0), min(centre[1] + reach, ny - 1) + 1):
+                    whole = on_side or abs(y - centre[1]) == reach
+                    step = 1 if whole or reach == 0 else 2 * reach
+                    for z in range(centre[2] - reach, centre[2] + reach + 1, step):
+                        if not 0 <= z < nz:
+                            continue
+                        cell = (x * ny + y) * nz + z
+                        for place in range(first[cell], first[cell + 1]):
+                            t = listed[place]
+                            if seen[t] == i:
+                                continue
+                            seen[t] = i
+                            square, side = closest(
+                                points[i, 0], points[i, 1], points[i, 2],
+                                at, triangles[t, 0], triangles[t, 1], triangles[t, 2],
+                            )  # fmt: skip
+                            if square < best:
+                                best, triangle, where = square, t, side
+            margin = np.inf  # from the grid's nearest point to what was not searched
+            for k in range(3):
+                start = origin[k] + (centre[k] - reach) * edge
+                margin = min(margin, inside[k] - start)
+                margin = min(margin, start + (2 * reach + 1) * edge - inside[k])
+            if best <= beyond + max(margin, 0.0) ** 2:
+                break
+        distance[i], nearest[i], parts[i] = np.sqrt(best), triangle, where
+    return distance, nearest, parts
+
+
+@kernel
+def find_sides(
+    points: Points,
+    nearest: NDArray[np.int64],
+    parts: NDArray[np.int8],
+    at: Points,
+    triangles: Ints,
+    twins: Ints,
+) -> NDArray[np.bool_]:
+    """Return whether each point lies inside, bool (n,): by the pseudonormal at its nearest point.
+
+    References
+    J. A. Baerentzen & H. Aanaes, "Signed distance computation using the angle weighted
+    pseudonormal", IEEE TVCG 11(3), 2005. doi:10.1109/TVCG.2005.49
+    """
+    units, around = np.zeros((len(triangles), 3)), np.zeros((len(at), 3))
+    for t in range(len(triangles)):
+        p, q, r = at[triangles[t, 0]], at[triangles[t, 1]], at[triangles[t, 2]]
+        normal = np.cross(q - p, r - p)
+        length = np.sqrt((normal * normal).sum())
+        if length <= 0:
+            continue
+        units[t] = normal / length
+        for k in range(3):
+            here = at[triangles[t, k]]
+            u, v = at[triangles[t, (k + 1) % 3]] - here, at[triangles[t, (k + 2) % 3]] - here
+            across = np.cross(u, v)
+            angle = np.arctan2(np.sqrt((across * across).sum()), (u * v).sum())
+            around[triangles[t, k]] += angle * units[t]
+    inside = np.empty(len(points), np.bool_)
+    for i in range(len(points)):
+        t, side = nearest[i], parts[i]
+        corner = at[triangles[t, side % 3]]
+        normal = units[t].copy()
+        if side < 3:
+            normal = around[triangles[t, side]].copy()
+        elif side < 6:
+            twin = twins[3 * t + side - 3]
+            if twin >= 0:
+                normal += units[twin // 3]
+        inside[i] = ((points[i] - corner) * normal).sum() < 0
+    return inside

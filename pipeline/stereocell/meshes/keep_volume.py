@@ -1,0 +1,103 @@
+"""Give each body of a simplified mesh the volume that it had: vertices move along their normals.
+
+Simplification keeps a part of the fine surface's vertices, and flat triangles between the vertices
+of a round body lie inside of it: at coarse levels bodies would lose a third of their volume. Here
+all vertices of a body move outward by one distance, until its volume is the fine one's, or the
+distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
+bit and no other reaches it. A body that comes to cross another, or itself, moves half as far, and
+at last not at all.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.half_edges import label_bodies, measure_volumes, sum_gains, sum_normals
+from stereocell.meshes.validity import Defects, border, find_defects
+from stereocell.model.lattice import Plane
+from stereocell.model.mesh import Mesh
+
+STEPS = 4  # Newton's; volume is a cubic function of the distance
+FADE = 1.25  # moves are whole from this many largest moves from a cut on
+HALVINGS = 3  # tries with half the move, before a body with defects stays
+
+Points = NDArray[np.float64]
+
+
+class FineVolumes:
+    """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._label, count = label_bodies(
+            np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions)
+        )
+        low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+        self._origin = (low.astype(np.float64) + high) / 2
+        self._volume = self._measure(mesh.positions, mesh.triangles, self._label, count)
+
+    def _measure(
+        self,
+        positions: NDArray[np.floating],
+        triangles: NDArray[np.integer],
+        label: NDArray[np.int32],
+        count: int,
+    ) -> Points:
+        corners = np.ascontiguousarray(triangles, np.int32)
+        return measure_volumes(positions - self._origin, corners, label, count)
+
+    def keep(
+        self,
+        mesh: Mesh,
+        vertices: NDArray[np.int64],
+        planes: tuple[Plane, ...],
+        *,
+        max_move_um: float,
+    ) -> tuple[Mesh, Defects]:
+        """Return a level with the fine bodies' volumes, and the defects that are left.
+
+        vertices     int64 (n,), the number that each vertex has in the fine mesh
+        planes       the cut planes
+        max_move_um  largest distance of a move
+        """
+        triangles = np.ascontiguousarray(mesh.triangles, np.int32)
+        label, count = label_bodies(triangles, len(mesh.positions))
+        first = np.unique(label, return_index=True)[1]
+        wanted = self._volume[self._label[vertices[first]]]
+        start = mesh.positions.astype(np.float64)
+        share = _fade(mesh, planes, FADE * max_move_um)
+        at, moved = start.copy(), np.zeros(count)
+        for _ in range(STEPS):
+            missing = wanted - self._measure(at, triangles, label, count)
+            ways = sum_normals(at, triangles) * share[:, None]
+            gain = sum_gains(at, triangles, label, count, ways)
+            step = np.divide(missing, gain, out=np.zeros(count), where=gain > 1e-12)
+            step = np.clip(moved + step, -max_move_um, max_move_um) - moved
+            moved += step
+            at += ways * step[label][:, None]
+        part = np.ones(count)
+        fresh = np.ones(len(triangles), bool)
+        for number in range(HALVINGS + 2):
+            moves = (at - start) * part[label][:, None]
+            positions = (start + moves).astype(np.float32)
+            # bit by bit: a sum would lose the sign of a zero
+            positions = np.where(moves == 0, mesh.positions, positions)
+            placed = replace(mesh, positions=positions)
+            defects = find_defects(placed, planes, fresh)
+            worst = np.unique(label[defects.vertices(mesh.triangles)])
+            worst = worst[part[worst] > 0]
+            if not len(worst):
+                break
+            part[worst] *= 0.5 if number < HALVINGS else 0.0
+            fresh = np.isin(label[mesh.triangles[:, 0]], worst)
+        return placed, defects
+
+
+def _fade(mesh: Mesh, planes: tuple[Plane, ...], reach_um: float) -> Points:
+    """Return the share of the move that each vertex makes (n,): 0 in a cut, 1 far from it."""
+    share = np.ones(len(mesh.positions))
+    for column, value in planes:
+        away = np.abs(mesh.positions[:, column].astype(np.float64) - value)
+        share = np.minimum(share, away / reach_um)
+    share[border(mesh.triangles)] = 0.0
+    return share

@@ -1,0 +1,41 @@
+"""Bodies that a coarse level does without: fewer bodies, rather than thinner ones.
+
+A closed body whose box has a diagonal of less than SMALL errors goes as a whole, smallest first,
+as long as all that go have at most SHARE of the surface's area. Large bodies have less area for
+their volume, so the volume that goes is a smaller share. A body that a cut opens stays: both tiles
+would have to decide alike.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.half_edges import label_bodies, match_twins, measure_sizes
+from stereocell.model.mesh import Mesh
+
+SMALL = 4.0  # errors; at the default errors only lod3's is larger than fragments that stay
+SHARE = 0.02  # of the area
+
+
+class SmallBodies:
+    """The bodies of a fine surface by their sizes."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        count = len(mesh.positions)
+        triangles = np.ascontiguousarray(mesh.triangles, np.int32)
+        self._label, bodies = label_bodies(triangles, count)
+        twins, at = match_twins(triangles, count), mesh.positions.astype(np.float64)
+        self._areas, self._diagonals, self._is_open = measure_sizes(
+            at, triangles, twins, self._label, bodies
+        )
+
+    def find(self, error_um: float) -> NDArray[np.bool_]:
+        """Return which vertices of the surface belong to bodies that go, bool (n,).
+
+        error_um  of the level
+        """
+        small = (self._diagonals < SMALL * error_um) & (self._areas > 0) & ~self._is_open
+        order = np.flatnonzero(small)
+        order = order[np.argsort(self._diagonals[order], kind="stable")]
+        goes = np.zeros(len(small), bool)
+        goes[order[np.cumsum(self._areas[order]) <= SHARE * self._areas.sum()]] = True
+        return goes[self._label]

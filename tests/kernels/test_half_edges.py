@@ -1,0 +1,76 @@
+"""Half-edges: twins, fans and bodies, against what is counted by hand or by array expressions."""
+
+import numpy as np
+import pytest
+
+from stereocell.kernels.half_edges import (
+    BORDER,
+    CROWDED,
+    count_fans,
+    label_bodies,
+    match_twins,
+    measure_sizes,
+    measure_volumes,
+    sum_gains,
+    sum_normals,
+)
+from support.meshes import SOUND, ball, enclosed_volume, joined, moved
+
+TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
+
+
+@pytest.mark.parametrize("name", [name for name in SOUND if name != "nothing"])
+def test_twins_run_along_the_same_edge_the_other_way(name: str) -> None:
+    mesh = SOUND[name]
+    triangles = mesh.triangles.astype(np.int32)
+    twins = match_twins(triangles, len(mesh.positions))
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    assert (twins >= 0).all()
+    np.testing.assert_array_equal(start[twins], end)
+    np.testing.assert_array_equal(twins[twins], np.arange(len(twins)))
+    _, valence = count_fans(triangles, twins, len(mesh.positions))
+    np.testing.assert_array_equal(valence, np.bincount(start, minlength=len(mesh.positions)))
+
+
+def test_borders_and_crowded_edges_have_no_twins() -> None:
+    assert (
+        sorted(match_twins(TETRAHEDRON[1:], 4)[match_twins(TETRAHEDRON[1:], 4) < 0]) == [BORDER] * 3
+    )
+    fan = np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]], np.int32)  # three at the edge 0-1
+    assert (match_twins(fan, 5)[[0, 3, 6]] == CROWDED).all()
+    alike = np.array([[0, 1, 2], [0, 1, 3]], np.int32)
+    assert (match_twins(alike, 4)[[0, 3]] == CROWDED).all()
+
+
+def test_vertex_with_two_fans_is_told() -> None:
+    both = np.concatenate([TETRAHEDRON, [[0, 5, 4], [0, 4, 6], [4, 5, 6], [0, 6, 5]]]).astype(
+        np.int32
+    )
+    _, valence = count_fans(both, match_twins(both, 7), 7)
+    assert (valence < 0).tolist() == [True] + [False] * 6
+
+
+def test_bodies_are_numbered_by_their_first_vertices_and_measured() -> None:
+    one, other = ball(2.0), moved(ball(1.0), (9.0, 0.0, 0.0))
+    mesh = joined(one, other)
+    triangles, count = mesh.triangles.astype(np.int32), len(mesh.positions)
+    label, bodies = label_bodies(triangles, count)
+    np.testing.assert_array_equal(
+        label, np.repeat([0, 1], [len(one.positions), len(other.positions)])
+    )
+    at = mesh.positions.astype(np.float64)
+    volumes = measure_volumes(at, triangles, label, bodies)
+    np.testing.assert_allclose(volumes, [enclosed_volume(one), enclosed_volume(other)], rtol=1e-5)
+    opened = triangles[:-1]
+    areas, diagonals, is_open = measure_sizes(at, opened, match_twins(opened, count), label, bodies)
+    assert is_open.tolist() == [False, True]
+    np.testing.assert_allclose(areas, 4 * np.pi * np.array([4, 1]), rtol=0.03)
+    np.testing.assert_allclose(diagonals, np.sqrt(3) * np.array([4, 2]), rtol=0.02)
+
+
+def test_gain_is_the_area_where_all_move_outwards() -> None:
+    mesh = ball(2.0, 60)
+    at, triangles = mesh.positions.astype(np.float64), mesh.triangles.astype(np.int32)
+    label, bodies = label_bodies(triangles, len(at))
+    gain = sum_gains(at, triangles, label, bodies, sum_normals(at, triangles))
+    np.testing.assert_allclose(gain, 4 * np.pi * 4, rtol=0.01)

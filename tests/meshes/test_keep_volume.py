@@ -1,0 +1,54 @@
+"""Volumes that simplification takes are given back."""
+
+import numpy as np
+import pytest
+
+from stereocell.meshes.keep_volume import FineVolumes
+from stereocell.meshes.simplify_valid import simplify_without_defects
+from stereocell.meshes.validity import border, find_defects
+from stereocell.model.mesh import Mesh
+from support.meshes import ball, enclosed_volume, joined, kinds, moved, turned
+
+ERROR = 0.6
+
+
+def kept(fine: Mesh, planes: tuple[tuple[int, float], ...] = ()) -> tuple[Mesh, Mesh]:
+    """Return the simplified mesh, and the same with its volumes."""
+    simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
+    mesh, defects = FineVolumes(fine).keep(simple.mesh, simple.vertices, planes, max_move_um=ERROR)
+    assert defects.counts == find_defects(mesh, planes).counts
+    return simple.mesh, mesh
+
+
+@pytest.mark.parametrize("fine", [ball(5.0, 60), joined(ball(5.0, 60), turned(ball(3.0, 40)))])
+def test_bodies_and_cavities_have_their_volume(fine: Mesh) -> None:
+    simple, mesh = kept(fine)
+    assert abs(enclosed_volume(simple) / enclosed_volume(fine) - 1) > 0.03
+    assert enclosed_volume(mesh) == pytest.approx(enclosed_volume(fine), rel=1e-3)
+    assert np.linalg.norm(mesh.positions - simple.positions, axis=1).max() <= ERROR + 1e-6
+
+
+def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
+    sphere = ball(5.0, 60)
+    flat = np.float32([[1, 1, 1]]) * sphere.positions
+    flat[:, 2] = np.where(np.abs(flat[:, 2]) < 1e-3, 0, flat[:, 2])
+    upper = (flat[:, 2] >= 0)[sphere.triangles].all(axis=1)
+    half = Mesh(flat, sphere.triangles[upper], sphere.normals)
+    planes = ((2, float(flat[np.unique(border(half.triangles)), 2].min())),)
+    assert kinds(find_defects(half, planes)) == set()
+    simple, mesh = kept(half, planes)
+    rim = np.unique(border(simple.triangles))
+    np.testing.assert_array_equal(mesh.positions[rim], simple.positions[rim])
+    assert mesh.positions[:, 2].min() == planes[0][1]
+    whole = 2 / 3 * np.pi * 125
+    assert abs(enclosed_volume(mesh) - enclosed_volume(half)) < 0.002 * whole
+    assert abs(enclosed_volume(simple) - enclosed_volume(half)) > 0.02 * whole
+
+
+def test_bodies_that_would_cross_stay_apart() -> None:
+    """Two boxes of coarse balls, nearly in touch: whole moves would make them cross."""
+    one = ball(5.0, 60)
+    pair = joined(one, moved(one, (10.02, 0.0, 0.0)))
+    _, mesh = kept(pair)
+    assert kinds(find_defects(mesh)) == set()
+    assert enclosed_volume(mesh) > 0.9 * enclosed_volume(pair)
