@@ -90,7 +90,7 @@ describe("the viewer's state", () => {
     const [first] = clear.channels;
     const reason = "unsure surface: at 162 with a confidence of 0.40";
     const channels = [{ ...first, surface: "unsure" as const, surface_reason: reason }];
-    const [unsure, trusted] = [{ ...clear, channels }, clear].map(initialState);
+    const [unsure, trusted] = [{ ...clear, channels }, clear].map((one) => initialState(one));
     expect(unsure.channels[0].surfaceReason).toBe(reason);
     const drawn = (state: ViewerState) =>
       state.tiles.map((tile) => representationOf(state, state.channels[0], tile, NO_FOCUS));
