@@ -11,6 +11,7 @@ import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
+import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
 import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
@@ -88,6 +89,8 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         command("top", "Top"),
         command("reset", "Reset"),
       ]),
+      // a screen has fingers, wheel and arrow keys for it
+      ...(facts.isStereo ? [section("move", "Move", MOVES)] : []),
       section("stereo", "Stereo", stereoItems(state, facts, view)),
       section("measure", "Measure", measureItems(state, facts.values)),
       section("cut", "Cut open", cutItems(state, facts.shown)),

@@ -23,7 +23,7 @@ import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
 import { GazeCarry } from "./carry_handle";
 import { Controllers, type Hand, type HandEvent } from "./controllers";
-import { moveByCommand, moveByHolders, moveByStick } from "./hold_specimen";
+import { moveByCommand, moveByHolders, moveByStick, STEPS_PER_S } from "./hold_specimen";
 import { RoomNotice } from "./panel/notice";
 import { RoomPanel } from "./panel/panel";
 import { hullOf, middleOf } from "./shown_hull";
@@ -58,6 +58,8 @@ type Press = {
   isUsed: boolean;
 };
 
+type GoesOn = { readonly met: Met; readonly source: XRInputSource | null; elapsed_s: number };
+
 export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
@@ -74,6 +76,8 @@ export class Hands {
   private taps = 0;
   private isRunning = false;
   private shown = "";
+  /** What is gone on with: as long as the source's button is held, or null, as the gaze stays. */
+  private goesOn: GoesOn | null = null;
 
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
@@ -93,11 +97,11 @@ export class Hands {
 
   /** What is no opaque thing, which the pass for the depth has to leave out. */
   get overlays() {
-    return [this.ring.group, this.notice.mesh];
+    return [this.panel.group, this.ring.group, this.notice.mesh];
   }
 
   private get groups() {
-    return [this.panel.group, this.controllers.group, ...this.overlays];
+    return [this.controllers.group, ...this.overlays];
   }
 
   /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
@@ -130,6 +134,7 @@ export class Hands {
     this.presses.clear();
     this.held.clear();
     this.taps = 0;
+    this.goesOn = null;
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
@@ -145,10 +150,11 @@ export class Hands {
     if (this.isRunning) this.notice.announce(text);
   }
 
-  /** What would move the camera of a flat screen; false: the command is another's. */
-  run(command: Command, state: ViewerState): boolean {
+  /** What would move the camera of a flat screen, by a step; false: the command is another's. */
+  run(command: Command, state: ViewerState, share = 1): boolean {
     const { specimen } = this.options;
-    const pose = moveByCommand(specimen.pose, command, middleOf(this.around(state)));
+    const pivot = middleOf(this.around(state));
+    const pose = moveByCommand(specimen.pose, command, pivot, this.gaze.origin, share);
     if (pose === null) return false;
     specimen.moveTo(pose, this.gaze.origin);
     return true;
@@ -171,9 +177,13 @@ export class Hands {
     const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
-    if (fired !== null) this.choose(fired);
+    if (fired !== null) {
+      this.choose(fired);
+      if (fired.repeats !== undefined) this.goesOn = { met: fired, source: null, elapsed_s: 0 };
+    }
+    const hasGone = this.goOn(dt_s, state);
     const hasCarried = this.carry.follow(this.gaze);
-    return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasCarried;
+    return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasGone || hasCarried;
   }
 
   dispose(): void {
@@ -226,6 +236,7 @@ export class Hands {
     // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
     const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
     if (met !== null && isUsed) met.target.choose(met, met.ray);
+    if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
     return { met, at, elapsed_s: 0, isUsed };
   }
@@ -279,6 +290,24 @@ export class Hands {
     if (!isFar && press.elapsed_s < HOLD_S) return;
     press.isUsed = true;
     this.held.set(source, null);
+  }
+
+  /** What was chosen by a gaze that stays, or a button that is held, goes on; whether it has moved. */
+  private goOn(dt_s: number, state: ViewerState): boolean {
+    const { goesOn } = this;
+    if (goesOn === null) return false;
+    const { met, source } = goesOn;
+    const isHeld = source === null || this.presses.has(source);
+    const ray = source === null ? this.gaze : (this.handOf(source)?.ray ?? this.gaze);
+    if (!isHeld || meetFirst(ray, this.free)?.key !== met.key || met.repeats === undefined) {
+      this.goesOn = null;
+      return false;
+    }
+    goesOn.elapsed_s += dt_s;
+    if (goesOn.elapsed_s < HOLD_S) return false;
+    const press = source === null ? undefined : this.presses.get(source);
+    if (press !== undefined) press.isUsed = true; // letting go of it is no further step
+    return this.run(met.repeats, state, STEPS_PER_S * dt_s);
   }
 
   private moveBySticks(dt_s: number, state: ViewerState): boolean {

@@ -33,7 +33,18 @@ const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
   layOut(state, FACTS, { ...START_VIEW, ...view });
 
 const TABS = [
-  ...["channels", "volumes", "light", "tiles", "view", "stereo", "measure", "cut", "quality"],
+  ...[
+    "channels",
+    "volumes",
+    "light",
+    "tiles",
+    "view",
+    "move",
+    "stereo",
+    "measure",
+    "cut",
+    "quality",
+  ],
 ];
 
 /** Every page of every section. */
@@ -112,6 +123,19 @@ describe("the panel on a plane", () => {
         }
       }
     }
+  });
+
+  it("has all ten moves on one page, each going on while it is held", () => {
+    const { regions } = pageOf(laidOut(start()), { tab: "move", page: 0 });
+    const moves = regions.filter(({ repeats }) => repeats !== undefined);
+    expect(new Set(moves.map((move) => move.repeats))).toEqual(
+      new Set([
+        ...["zoom-in", "zoom-out", "turn-left", "turn-right", "turn-up", "turn-down"],
+        ...["pan-left", "pan-right", "pan-up", "pan-down"],
+      ]),
+    );
+    for (const move of moves) expect(move.to(0.5)).toBe(move.repeats);
+    expect(regions.some(({ id }) => id === "more")).toBe(false);
   });
 
   it("reports why something is refused", () => {
