@@ -7,7 +7,7 @@ import { Specimen } from "../render/specimen_pose";
 import type { Command } from "../state/commands";
 import { advanceFocus, FAR_AWAY } from "../state/focus_tiles";
 import { START_VOLUMES } from "../state/parameters/volumes";
-import { moveByCommand, moveByHolders, moveByStick } from "./hold_specimen";
+import { moveByCommand, moveByFingers, moveByHolders, moveByStick } from "./hold_specimen";
 
 const START: SpecimenPose = {
   position: new Vector3(0, 0, -1.5),
@@ -140,6 +140,34 @@ describe("a command", () => {
     const up = moveByCommand(START, "turn-up", pivot, fromTheLeft);
     const axis = new Vector3(0, 0, 1); // its right
     expect(turned(axis, up).distanceTo(axis)).toBeLessThan(1e-12);
+  });
+});
+
+describe("fingers on the split screen", () => {
+  const pivot = START.position;
+  const eye = new Vector3();
+
+  it("turn what faces the viewer along with them, about its middle", () => {
+    const right = moveByFingers(START, { kind: "drag", x: 0.25, y: 0 }, pivot, eye);
+    const front = new Vector3(0, 0, 1).applyQuaternion(right.orientation);
+    expect(front.x).toBeCloseTo(Math.SQRT1_2, 12); // a quarter of the height is 45 degrees
+    const down = moveByFingers(START, { kind: "drag", x: 0, y: 0.25 }, pivot, eye);
+    expect(new Vector3(0, 0, 1).applyQuaternion(down.orientation).y).toBeCloseTo(-Math.SQRT1_2, 12);
+    expect(right.position.distanceTo(START.position)).toBeLessThan(1e-12);
+  });
+
+  it("bring it nearer by pinching out, and shift it with their middle", () => {
+    const near = moveByFingers(START, { kind: "pinch", factor: 2, x: 0, y: 0 }, pivot, eye);
+    expect(near.position.distanceTo(new Vector3(0, 0, -0.75))).toBeLessThan(1e-12);
+    expect(near.scale).toBe(1);
+    const aside = moveByFingers(START, { kind: "pinch", factor: 1, x: 0.1, y: 0.2 }, pivot, eye);
+    const { x, y } = aside.position;
+    expect(x).toBeCloseTo(0.1 * 2 * 1.5 * Math.tan((40 * Math.PI) / 180), 12);
+    expect(y).toBeCloseTo(-2 * x, 12);
+  });
+
+  it("move nothing by a tap", () => {
+    expect(moveByFingers(START, { kind: "tap" }, pivot, eye)).toBe(START);
   });
 });
 

@@ -8,6 +8,7 @@ import {
   zoomAbout,
 } from "../math/grab";
 import type { Command } from "../state/commands";
+import type { Gesture } from "./cardboard/fingers";
 import type { Stick } from "./controllers";
 
 const UP = new Vector3(0, 1, 0);
@@ -18,6 +19,10 @@ const ZOOM_PER_S = 2.5;
 const STEP_RAD = Math.PI / 12;
 const ZOOM = 0.8;
 const STEP_M = 0.1;
+/** Turn by a finger that goes over the height of the screen, radians. */
+const TURN_BY_FINGER_RAD = Math.PI;
+/** Height of an eye's picture as a multiple of the distance: a Cardboard shows 40 degrees up and down. */
+const HEIGHT_OF_VIEW = 2 * Math.tan(MathUtils.degToRad(40));
 /** So near and so far the middle of what is shown may come, m: no way in leads out at the back. */
 const NEAREST_M = 0.1;
 const FARTHEST_M = 5;
@@ -111,6 +116,30 @@ export function moveByCommand(
   if (command === "zoom-in") return bringNearer(pose, pivot, eye, ZOOM ** share);
   if (command === "zoom-out") return bringNearer(pose, pivot, eye, ZOOM ** -share);
   return null;
+}
+
+/**
+ * One finger turns the specimen about `pivot`, two bring it nearer and shift it with their middle.
+ * It follows the fingers: what lies under one in each eye's picture goes with it.
+ */
+export function moveByFingers(
+  pose: SpecimenPose,
+  gesture: Gesture,
+  pivot: Vector3,
+  eye: Vector3,
+): SpecimenPose {
+  if (gesture.kind !== "drag" && gesture.kind !== "pinch") return pose;
+  const { x, y } = gesture;
+  const toEye = headingTo(pivot, eye);
+  if (gesture.kind === "drag") {
+    const right = RIGHT.clone().applyQuaternion(toEye);
+    const turn = about(UP, TURN_BY_FINGER_RAD * x).multiply(about(right, TURN_BY_FINGER_RAD * y));
+    return turnAbout(pose, turn, pivot);
+  }
+  const near = bringNearer(pose, pivot, eye, 1 / gesture.factor);
+  const height_m = pivot.distanceTo(eye) * HEIGHT_OF_VIEW;
+  const shift = new Vector3(x, -y, 0).multiplyScalar(height_m).applyQuaternion(toEye);
+  return { ...near, position: near.position.clone().add(shift) };
 }
 
 /** With the pivot's distance from the eye multiplied by a factor, within limits. */

@@ -21,9 +21,16 @@ import type { Specimen } from "../render/specimen_pose";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
+import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
 import { Controllers, type Hand, type HandEvent } from "./controllers";
-import { moveByCommand, moveByHolders, moveByStick, STEPS_PER_S } from "./hold_specimen";
+import {
+  moveByCommand,
+  moveByFingers,
+  moveByHolders,
+  moveByStick,
+  STEPS_PER_S,
+} from "./hold_specimen";
 import { RoomNotice } from "./panel/notice";
 import { RoomPanel } from "./panel/panel";
 import { hullOf, middleOf } from "./shown_hull";
@@ -58,7 +65,12 @@ type Press = {
   isUsed: boolean;
 };
 
-type GoesOn = { readonly met: Met; readonly source: XRInputSource | null; elapsed_s: number };
+/** `source`: of the button that is held; null: the gaze stays. */
+type GoesOn = {
+  readonly met: Met;
+  readonly source: XRInputSource | "finger" | null;
+  elapsed_s: number;
+};
 
 export class Hands {
   readonly panel: RoomPanel;
@@ -76,7 +88,10 @@ export class Hands {
   private taps = 0;
   private isRunning = false;
   private shown = "";
-  /** What is gone on with: as long as the source's button is held, or null, as the gaze stays. */
+  private gestures: Gesture[] = [];
+  /** A finger that rests on the split screen. */
+  private touched: { isUsed: boolean } | null = null;
+  /** What is gone on with. */
   private goesOn: GoesOn | null = null;
 
   constructor(private readonly options: HandsOptions) {
@@ -134,15 +149,22 @@ export class Hands {
     this.presses.clear();
     this.held.clear();
     this.taps = 0;
+    this.gestures = [];
+    this.touched = null;
     this.goesOn = null;
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
   }
 
-  /** The only button of the split screen. */
+  /** The only button of the split screen, or a key in its place. */
   tap(): void {
     this.taps++;
+  }
+
+  /** What fingers do on the split screen. */
+  touch(gesture: Gesture): void {
+    this.gestures.push(gesture);
   }
 
   /** Say something where the head looks. */
@@ -169,10 +191,11 @@ export class Hands {
     this.tiles.clip = state.clip;
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
+    const hasTouched = this.followFingers(state);
     for (; this.taps > 0; this.taps--) this.press(this.gaze);
     this.forgetTheLost();
     const hasHeld = this.hold(dt_s);
-    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld;
+    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched;
     const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
     const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
@@ -241,6 +264,27 @@ export class Hands {
     return { met, at, elapsed_s: 0, isUsed };
   }
 
+  /** What fingers on the split screen have done since the frame before; whether anything has moved. */
+  private followFingers(state: ViewerState): boolean {
+    const { specimen } = this.options;
+    const before = specimen.pose;
+    for (const gesture of this.gestures.splice(0)) {
+      if (gesture.kind === "press") {
+        this.touched = { isUsed: false };
+        const met = meetFirst(this.gaze, this.free);
+        if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
+      } else if (gesture.kind === "release") this.touched = null;
+      else if (gesture.kind === "tap") {
+        if (this.touched?.isUsed === false) this.taps++;
+      } else {
+        const pivot = middleOf(this.around(state));
+        const pose = moveByFingers(specimen.pose, gesture, pivot, this.gaze.origin);
+        specimen.moveTo(pose, this.gaze.origin);
+      }
+    }
+    return specimen.pose !== before;
+  }
+
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
   private press(ray: RoomRay): void {
     const met = meetFirst(ray, this.free) ?? meetFirst(this.gaze, this.free);
@@ -297,16 +341,16 @@ export class Hands {
     const { goesOn } = this;
     if (goesOn === null) return false;
     const { met, source } = goesOn;
-    const isHeld = source === null || this.presses.has(source);
-    const ray = source === null ? this.gaze : (this.handOf(source)?.ray ?? this.gaze);
+    const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
+    const isHeld = source === null || press != null;
+    const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.gaze;
     if (!isHeld || meetFirst(ray, this.free)?.key !== met.key || met.repeats === undefined) {
       this.goesOn = null;
       return false;
     }
     goesOn.elapsed_s += dt_s;
     if (goesOn.elapsed_s < HOLD_S) return false;
-    const press = source === null ? undefined : this.presses.get(source);
-    if (press !== undefined) press.isUsed = true; // letting go of it is no further step
+    if (press != null) press.isUsed = true; // letting go of it is no further step
     return this.run(met.repeats, state, STEPS_PER_S * dt_s);
   }
 
