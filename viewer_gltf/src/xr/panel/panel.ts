@@ -19,7 +19,7 @@ import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
 import { CanvasQuad, type Spot } from "./canvas_quad";
-import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } from "./placement";
+import { extentOf, followHead, headBearing, openerPitch, placePanel, pointAt } from "./placement";
 
 const DISTANCE_M = 1.2;
 /** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
@@ -124,7 +124,7 @@ export class RoomPanel {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
     this.openerYaw = followHead(this.openerYaw ?? bearing.yaw, bearing, dt_s);
-    const at = pointAt({ yaw: this.openerYaw, pitch: OPENER_PITCH }, eye, OPENER_M);
+    const at = pointAt({ yaw: this.openerYaw, pitch: openerPitch(this.isOpen) }, eye, OPENER_M);
     this.opener.place(at, eye);
     let isChanged = false;
     if (this.wantsPlace) {
