@@ -18,10 +18,6 @@ const NOT_LOADED =
   "The part of the page that splits the screen could not be loaded. Check the connection, load " +
   "the page again, and tap again.";
 
-/** Said as stereo begins: nobody looks down by chance. */
-const HOW_TO_BEGIN =
-  "Look down for the menu. What you look at for 1.5 s is chosen; the button chooses it at once.";
-
 export class Stereo {
   readonly headset: XrSession;
   readonly hands: Hands;
@@ -158,7 +154,6 @@ export class Stereo {
   private begin(session: XRSession | null): void {
     this.options.onStart();
     this.hands.start(session);
-    this.announce(HOW_TO_BEGIN);
   }
 
   private leave(): void {
