@@ -88,7 +88,8 @@ describeInChromium("the share link", () => {
     const moved = await written();
     expect(moved).toHaveLength(flat.length + 8);
     expect(moved.slice(0, 6)).toEqual(flat.slice(0, 6));
-    expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2); // and not a headset's metre away
+    // nearer by a fifth of a headset's 1.1 m, and not by that metre itself
+    expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2 + 0.2 * 1.1);
     const address = page().url();
 
     await press("V");
