@@ -30,7 +30,7 @@ const SLAB_OPACITY = 0.03;
 const FUNCTION = "soft";
 
 const BACKGROUND_RED = 11;
-const VIEWPORT = { width: 704, height: 400 };
+const VIEWPORT = { width: 960, height: 544 };
 
 type Vec3 = readonly [number, number, number];
 type Spot = Readonly<{ x: number; y: number }>;
