@@ -205,7 +205,7 @@ else
 	$(RUN) check out/$(SHOWN) --deep --workers="$$WORKERS"
 endif
 	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
-	$(RUN) build out/samples/brain-cells.ome.tif --out out/brain-cells --workers="$$WORKERS" --preset lightsheet --grid 2x2
+	$(RUN) build out/samples/brain-cells.ome.tif --out out/brain-cells --workers="$$WORKERS" --preset lightsheet --grid 2x2 --maps
 	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
 	rm -rf out/f && $(SUPPORT).phantoms out/f

@@ -45,6 +45,22 @@ def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
     assert abs(enclosed_volume(simple) - enclosed_volume(half)) > 0.02 * whole
 
 
+def test_no_vertex_leaves_the_tile_s_box_or_the_fine_mesh_s() -> None:
+    fine = ball(5.0, 60)
+    simple = simplify_without_defects(fine, (), max_error_um=ERROR)
+    box = np.array([-9.0, -9.0, -4.0]), np.array([9.0, 4.0, 9.0])
+    volumes = FineVolumes(fine, box)
+    mesh, _ = volumes.keep(simple.mesh, simple.vertices, (), max_move_um=ERROR)
+    free, _ = FineVolumes(fine).keep(simple.mesh, simple.vertices, (), max_move_um=ERROR)
+    low, high = fine.positions.min(axis=0), fine.positions.max(axis=0)
+    assert free.positions[:, 2].min() < low[2] - 0.05
+    assert free.positions[:, 1].max() > high[1] + 0.05
+    assert mesh.positions[:, 2].min() >= low[2]
+    assert mesh.positions[:, 1].max() <= high[1]
+    assert np.linalg.norm(mesh.positions, axis=1).max() > 5.05  # elsewhere they moved out
+    assert enclosed_volume(mesh) == pytest.approx(enclosed_volume(fine), rel=0.003)
+
+
 def test_bodies_that_would_cross_stay_apart() -> None:
     """Two boxes of coarse balls, nearly in touch: whole moves would make them cross."""
     one = ball(5.0, 60)

@@ -198,7 +198,7 @@ def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
         assert ended.returncode == -signal.SIGKILL
         (tile,) = out.glob(f"{made}/r0_c[01]")
         finished = {file.relative_to(tile): file.stat().st_mtime_ns for file in tile.rglob("*.*")}
-        assert len(finished) > 3
+        assert len(finished) >= 3  # of the stage: layer and two volumes
         capsys.readouterr()
         assert main([phase, str(out), "--workers", "0"]) == 0
         (told,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]

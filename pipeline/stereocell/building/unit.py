@@ -90,6 +90,7 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
         spacing_um=volume.spacing_um,
         lod=given.settings.lod,
         clock=clock,
+        box=lattice.own_box(),
         get_texturer=shading.texturer,
     )
     return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds)

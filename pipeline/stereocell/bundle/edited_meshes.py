@@ -177,6 +177,7 @@ def _make(
         spacing_um=spacing,
         lod=replace(options.lod, errors=options.lod.errors[: lods[-1].level + 1]),
         clock=Clock(),
+        box=_box(tile, channel_id),
         get_texturer=get_texturer,
         first=first,
     )

@@ -4,8 +4,9 @@ Simplification keeps a part of the fine surface's vertices, and flat triangles b
 of a round body lie inside of it: at coarse levels bodies would lose a third of their volume. Here
 all vertices of a body move outward by one distance, until its volume is the fine one's, or the
 distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
-bit and no other reaches it. A body that comes to cross another, or itself, moves half as far, and
-at last not at all.
+bit and no other reaches it. No vertex leaves the tile's box, or the fine mesh's where the caps of
+the data's end lie outside of that. A body that comes to cross another, or itself, moves half as
+far, and at last not at all.
 """
 
 from dataclasses import replace
@@ -23,17 +24,24 @@ FADE = 1.25  # moves are whole from this many largest moves from a cut on
 HALVINGS = 3  # tries with half the move, before a body with defects stays
 
 Points = NDArray[np.float64]
+Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 
 
 class FineVolumes:
-    """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it."""
+    """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it.
 
-    def __init__(self, mesh: Mesh) -> None:
+    box  of the tile; None: vertices may move anywhere
+    """
+
+    def __init__(self, mesh: Mesh, box: Box | None = None) -> None:
         self._label, count = label_bodies(
             np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions)
         )
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         self._origin = (low.astype(np.float64) + high) / 2
+        self._low, self._high = np.full(3, -np.inf), np.full(3, np.inf)
+        if box is not None:
+            self._low, self._high = np.minimum(low, box[0]), np.maximum(high, box[1])
         self._volume = self._measure(mesh.positions, mesh.triangles, self._label, count)
 
     def _measure(
@@ -74,7 +82,7 @@ class FineVolumes:
             step = np.divide(missing, gain, out=np.zeros(count), where=gain > 1e-12)
             step = np.clip(moved + step, -max_move_um, max_move_um) - moved
             moved += step
-            at += ways * step[label][:, None]
+            at = np.clip(at + ways * step[label][:, None], self._low, self._high)
         part = np.ones(count)
         fresh = np.ones(len(triangles), bool)
         for number in range(HALVINGS + 2):

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.model.tiling import Box
 from stereocell.model.volume import zyx_to_xyz
@@ -78,6 +79,12 @@ class Lattice:
                 yield axis, self.own.start[axis]
             if self.own.stop[axis] != self.region.stop[axis]:
                 yield axis, self.own.stop[axis] - 1
+
+    def own_box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the least and largest corner of the tile's own points, float64 (x, y, z), um."""
+        ends = np.array([self.own.start, np.array(self.own.stop) - 1])
+        corners = zyx_to_xyz(ends * np.array(self.spacing_um) + np.array(self.origin_um))
+        return corners.min(axis=0), corners.max(axis=0)
 
     def cut_planes(self) -> tuple[Plane, ...]:
         """Return the planes in which an extracted mesh is open: another tile follows there.

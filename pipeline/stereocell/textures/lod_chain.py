@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.meshes.distance import Nearest, measure_distance, measure_enclosure, measure_spread
-from stereocell.meshes.keep_volume import FineVolumes
+from stereocell.meshes.keep_volume import Box, FineVolumes
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import simplify_without_defects
@@ -33,6 +33,7 @@ def make_levels(
     spacing_um: tuple[float, float, float],
     lod: LodOptions,
     clock: Clock,
+    box: Box | None = None,
     get_texturer: GetTexturer | None = None,
     first: int = 0,
 ) -> tuple[Lod, ...]:
@@ -41,6 +42,7 @@ def make_levels(
     fine          positions float32 (n, 3) in um, world space (x, y, z)
     planes        the cut planes
     spacing_um    of the voxels, (z, y, x)
+    box           of the tile, least and largest corner (x, y, z), um, which vertices don't leave
     get_texturer  None: levels get no values
     first         the first level that is made; `fine` is then the level before it
 
@@ -51,7 +53,7 @@ def make_levels(
     texturer: Texturer | None = None
     place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
     with clock("volume kept"):
-        volumes, bodies = FineVolumes(fine), SmallBodies(fine)
+        volumes, bodies = FineVolumes(fine, box), SmallBodies(fine)
     with clock("measure"):
         to_fine = Nearest(fine, lod.samples)
     gone = np.zeros(len(fine.positions), bool)

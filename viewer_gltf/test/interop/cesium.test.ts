@@ -3,7 +3,7 @@ import { describe, expect, it } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
 import { hasColor, isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
-import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
+import { DEMO_BUNDLE, MAPS_BUNDLE, prepareStand } from "../support/browser/stand";
 import { FIXTURE_LETTER } from "../support/fixture/letter";
 import { CESIUM, Globe, type View } from "../support/interop/globe";
 
@@ -71,9 +71,23 @@ describeInChromium("CesiumJS", () => {
       }
       const asked = stand.host.requests.map(({ path }) => path);
       expect(asked.filter((path) => path.endsWith("/lod0.glb"))).not.toEqual([]);
-      // Only the pipeline's surfaces have textures, which Cesium transcodes from KTX2.
+    });
+  });
+
+  describe.skipIf(!MAPS_BUNDLE)("with a bundle whose surfaces have baked maps", () => {
+    const stand = prepareStand({ ...options, bundle: MAPS_BUNDLE });
+
+    it("transcodes their images from KTX2", async () => {
+      const { specimen, channels } = stand.manifest;
+      const globe = await Globe.open(stand.viewer.page, stand.host);
+      const address = `/bundle/${channels.find(({ tileset }) => tileset !== null)?.tileset?.path}`;
+      for (const error_px of [COARSEST, FINEST]) {
+        const { failed } = await globe.draw(address, viewOf(specimen), error_px);
+        expect([...failed, ...globe.errors]).toEqual([]);
+      }
+      const asked = stand.host.requests.map(({ path }) => path);
       const transcoder = asked.filter((path) => path.endsWith("/basis_transcoder.wasm"));
-      expect(transcoder).toHaveLength(DEMO_BUNDLE === undefined ? 0 : 1);
+      expect(transcoder).toHaveLength(1);
     });
   });
 });

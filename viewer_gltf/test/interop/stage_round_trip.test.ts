@@ -30,6 +30,7 @@ const SLAB_OPACITY = 0.03;
 const FUNCTION = "soft";
 
 const BACKGROUND_RED = 11;
+/** So large that a finest level is due: an error of .175 um is over two pixels. */
 const VIEWPORT = { width: 960, height: 544 };
 
 type Vec3 = readonly [number, number, number];
@@ -144,11 +145,13 @@ describeInChromium("an artist's layer over the stage", () => {
 
     /** Whether a pixel lies where the edits change the silhouettes, those of a coarse surface too. */
     function isTouched(picture: Picture, x: number, y: number): boolean {
-      const places = [HIDDEN, MOVED, COARSE].map(centerOf);
-      places.push(plus(centerOf(MOVED), MOVE_UM));
-      return places.some((place) => {
+      const places: [Vec3, number][] = [HIDDEN, MOVED].map((tile) => [centerOf(tile), 1.4]);
+      places.push([plus(centerOf(MOVED), MOVE_UM), 1.4]);
+      // few corners that keep the ball's volume reach farther than it
+      places.push([centerOf(COARSE), 1.6]);
+      return places.some(([place, radii]) => {
         const at = spot(picture, stand.manifest, place);
-        return Math.hypot(x - at.x, y - at.y) < 1.4 * at.radius;
+        return Math.hypot(x - at.x, y - at.y) < radii * at.radius;
       });
     }
 

@@ -6,7 +6,7 @@ import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { addHeadset } from "../support/browser/chromium";
 import { Host } from "../support/browser/host";
 import { describeInChromium } from "../support/browser/skip";
-import { DEMO_BUNDLE, DIST, prepareStand } from "../support/browser/stand";
+import { DEMO_BUNDLE, DIST, MAPS_BUNDLE, prepareStand } from "../support/browser/stand";
 
 const VIOLATION = /content.security.policy/i;
 
@@ -20,6 +20,27 @@ describe("the policy", () => {
     expect(policy).toContain(`script-src 'self' 'wasm-unsafe-eval' 'sha256-${hash}';`);
     expect(policy).toMatch(/^default-src 'none';/);
     expect(policy).not.toMatch(/unsafe-inline|'unsafe-eval'|\*/);
+  });
+});
+
+describe.skipIf(!MAPS_BUNDLE)("surfaces with baked maps", () => {
+  describeInChromium("under the page's policy", () => {
+    const stand = prepareStand({ bundle: MAPS_BUNDLE, viewport: { width: 480, height: 270 } });
+
+    it("are drawn, their images transcoded", async () => {
+      const told: string[] = [];
+      const fetched: string[] = [];
+      stand.viewer.page.on("console", (message) => {
+        if (VIOLATION.test(message.text())) told.push(message.text());
+      });
+      stand.viewer.page.on("request", (request) => fetched.push(request.url()));
+      await stand.open("&mode=off");
+      await stand.viewer.settled();
+      expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
+      expect((await stand.viewer.snapshot()).state.notices).toEqual([]);
+      expect(fetched.some((url) => /basis|transcod/i.test(url))).toBe(true);
+      expect(told).toEqual([]);
+    });
   });
 });
 
@@ -44,7 +65,7 @@ describeInChromium("the page's policy", () => {
     return told;
   }
 
-  it("lets surfaces with their maps, volumes and stereo be drawn", async () => {
+  it("lets surfaces, volumes and stereo be drawn", async () => {
     const told = watch();
     await addHeadset(stand.viewer.page);
     await stand.open("&mode=tile&switch=9");

@@ -13,6 +13,8 @@ import { openBrowser } from "./shared_browser";
 export const DIST = new URL("../../../dist/", import.meta.url).pathname;
 /** The bundle that `make test` built of the demo, if it did. */
 export const DEMO_BUNDLE = process.env.STEREOCELL_TEST_BUNDLE;
+/** A bundle that was built with `--maps`, of real data. */
+export const MAPS_BUNDLE = process.env.STEREOCELL_REAL_BUNDLE;
 
 export type Stand = Readonly<{
   /** Its folder. */
