@@ -49,7 +49,7 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for
+    from stereocell.building.preset_choice import load_for, tell
     from stereocell.engine.run import Engine
     from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
@@ -76,7 +76,7 @@ def build(
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)
-    wanted = load_for(source, preset, file, flags=settings or {}, where="settings")
+    wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
     with ExitStack() as stack:
         if place.is_local:
@@ -88,6 +88,7 @@ def build(
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
         phases.make(str(source), folder, wanted)
+        tell(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
         phases.run_bundle(folder, engine)

@@ -56,6 +56,16 @@ def test_micrometres_follow_the_spacing(tmp_path: Path) -> None:
     assert choose_preset(open_dataset(source))[0] is None
 
 
+def test_the_plan_of_a_microscope_s_voxels_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "a.ome.tif"
+    phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().err
+    assert told.count("plan: no preset: voxels of 0.5 um, as of a microscope: lengths follow") == 1
+
+
 def test_the_plan_says_which_and_why_and_flags_go_over_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -86,6 +96,7 @@ def test_a_source_that_cannot_be_read_is_told_once(
 ) -> None:
     source = tmp_path / "a.nii"
     source.write_bytes(b"no image")
-    assert load_for(source, None, None, flags={}).plan.modality == ""
+    settings, choice = load_for(source, None, None, flags={})
+    assert (settings.plan.modality, choice) == ("", "")
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err.count("\n") == 1

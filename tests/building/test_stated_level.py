@@ -21,7 +21,9 @@ from support import phantoms
 
 SPACING = (2.0, 1.0, 1.0)
 SHAPE = (20, 64, 96)
-NAMES = ("uneven", "noise", "flat", "even")
+NAMES = ("uneven", "noise", "flat", "even", "dim")
+VERDICTS = {"uneven": "clear", "even": "clear", "dim": "unsure", "noise": "none", "flat": "none"}
+BEGINNINGS = {"clear": "", "unsure": "unsure surface: at ", "none": "no clear surface: "}
 SETTINGS = """
 [surface]
 alpha_um = 0.0
@@ -32,7 +34,7 @@ max_cavity_um = 0.0
 
 
 def _voxels() -> NDArray[np.uint16]:
-    """Return balls on a ground that rises, noise alone, one value, balls on an even ground."""
+    """Return balls on a rising ground, noise alone, one value, balls on an even one, dim ones."""
     rng = np.random.default_rng(0)
     field = np.zeros(SHAPE, np.float32)
     for y in (16.0, 46.0):
@@ -46,6 +48,7 @@ def _voxels() -> NDArray[np.uint16]:
             np.rint(1000 + 200 * noise / noise.std()).astype(np.uint16),
             np.full(SHAPE, 7, np.uint16),
             phantoms.as_counts(field, 100, 1100, noise=10.0),
+            phantoms.as_counts(field, 200, 250, noise=40.0),
         ]
     )
 
@@ -53,7 +56,7 @@ def _voxels() -> NDArray[np.uint16]:
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return phantoms.write_ome_zarr(
-        tmp_path_factory.mktemp("stated") / "four.ome.zarr",
+        tmp_path_factory.mktemp("stated") / "five.ome.zarr",
         [_voxels()],
         "czyx",
         scales=[{"c": 1.0, **dict(zip("zyx", SPACING, strict=True))}],
@@ -134,24 +137,23 @@ def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> No
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     manifest = json.loads((out / "bundle" / "manifest.json").read_text())
     remarks = {r.title: r.lines for r in find_remarks(gather(OutFolder(out)))}
-    reasons = {}
+    reasons: dict[str, list[str]] = {}
     for channel in manifest["channels"]:
         prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel['id']}")
-        has_surface = channel["name"] in ("uneven", "even")
-        assert channel["surface"] == ("clear" if has_surface else "none")
+        verdict = VERDICTS[channel["name"]]
+        has_surface = verdict != "none"
+        assert channel["surface"] == verdict
         assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == channel["surface"]
         assert (channel["tileset"] is None) == (not has_surface)
         assert (channel["level"] is None) == (not has_surface)
         assert channel["volumes"]  # what there is can be seen all the same
         reason = prim.GetAttribute("stereocell:surfaceReason").Get() or ""
         assert channel["surface_reason"] == reason
-        assert bool(reason) != has_surface
-        if reason:
-            assert reason.startswith("no clear surface: ")
-            reasons[channel["name"]] = reason
-    assert remarks["2 channels without a surface"] == tuple(
-        f"{name}: {reason}" for name, reason in reasons.items()
-    )
+        assert reason.startswith(BEGINNINGS[verdict])
+        assert bool(reason) == (verdict != "clear")
+        reasons.setdefault(verdict, []).append(f"{channel['name']}: {reason}")
+    assert remarks["2 channels without a surface"] == tuple(reasons["none"])
+    assert remarks["1 channel with an unsure surface"] == tuple(reasons["unsure"])
     uneven = next(c for c in manifest["channels"] if c["name"] == "uneven")
     low, high = uneven["level"]["background"]
     assert 150 < low < 300 < 450 < high < 650
@@ -226,13 +228,53 @@ def test_a_surface_that_is_none_is_one_clear_line(
     assert not (tmp_path / "out").exists()
 
 
-def test_an_iso_value_beside_surfaces_is_told_to_go_unused(
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (
+            ["--surfaces", "even=inner", "--iso-value", "even=700"],
+            "even: built where --surfaces says, not at the iso-value 700",
+        ),
+        (
+            ["--surfaces", "3=outer,800", "--iso-criterion", "adaptive"],
+            "even 800: built where --surfaces says, not by adaptive",
+        ),
+        (
+            ["--iso-value", "3=700", "--iso-scope", "tile"],
+            "even: its level is given, so the same in all tiles: --iso-scope tile is for levels",
+        ),
+    ],
+)
+def test_a_setting_that_another_overrules_is_told_to_go_unused(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
+) -> None:
+    flags = ["-o", str(tmp_path / "out"), "--channels", "even", *flags]
+    assert main(["plan", str(source), *flags]) == 0
+    assert f"plan: {told}" in capsys.readouterr().err
+
+
+def test_surfaces_are_rungs_of_the_ladder_whatever_the_criterion(
+    source: Path, tmp_path: Path
+) -> None:
+    flags = ["--channels", "even", "--surfaces", "even=outer", "--workers", "0"]
+    levels = []
+    for criterion in ("ladder", "adaptive", "edges"):
+        out = tmp_path / criterion
+        plain = ["-o", str(out), *flags[:4], "--iso-criterion", criterion]
+        assert main(["plan", str(source), *plain]) == 0
+        assert main(["units", str(out), *flags[4:]]) == 0
+        levels.append(OutFolder(out).survey()["even"]["appearance"]["level"]["iso"])
+    assert levels[0] == levels[1] == levels[2]
+
+
+def test_a_window_of_ct_is_refused_where_nothing_is_a_ct(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    flags = ["-o", str(tmp_path / "out"), "--channels", "even", "--surfaces", "even=inner"]
-    assert main(["plan", str(source), *flags, "--iso-value", "even=700"]) == 0
-    told = "plan: even: built where --surfaces says, not at the iso-value 700"
-    assert told in capsys.readouterr().err
+    flags = ["-o", str(tmp_path / "out"), "--window", "even=brain"]
+    assert main(["plan", str(source), *flags]) == 2
+    error = capsys.readouterr().err
+    assert "--window even=brain: a window in Hounsfield units, of CT, and nothing says" in error
+    assert error.count("\n") == 1
 
 
 def test_a_window_given_twice_is_refused(

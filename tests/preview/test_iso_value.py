@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
 from stereocell.preview.iso_value import COLORS, Candidate, preview, table
@@ -128,10 +129,42 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
         out=tmp_path / "a.png",
         settings=load(None, None, flags=flags),
     )
-    (chosen,) = result.candidates
-    assert (chosen.name, chosen.level, chosen.raw, chosen.confidence) == ("given", 600, 600, None)
+    chosen, *others = result.candidates
+    assert (chosen.name, chosen.level, chosen.raw) == ("given", 600, 600)
     assert chosen.is_chosen
-    assert table(result)[-1] == "* a build takes it; given"
+    assert chosen.confidence is not None
+    assert chosen.confidence > 0.8  # it is half of the ball's height
+    assert others
+    assert all(one.setting and not one.is_chosen for one in others)
+    assert table(result)[-1] == "* a build takes it; given, and judged on all tiles"
+
+
+def test_a_level_for_each_tile_is_the_build_s(tmp_path: Path) -> None:
+    balls = [
+        height * phantoms.blurred_ball((24, 32, 64), SPACING, (12.0, 16.0, x), 8.0, 1.0)
+        for height, x in ((0.6, 16.0), (1.0, 48.0))
+    ]
+    counts = phantoms.as_counts(balls[0] + balls[1], 100, 1100, noise=10.0)
+    source = tmp_path / "two.ome.tif"
+    phantoms.write_ome_tiff(source, counts, spacing=SPACING)
+    flags = ["--tile-size", "24,32,32", "--iso-scope", "tile"]
+    out = tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (survey,) = OutFolder(out).survey().values()
+    settings = {"plan": {"tile_size": [24, 32, 32]}, "isovalue": {"scope": "tile"}}
+    levels = []
+    for tile, built in survey["iso"].items():
+        result, _ = preview(
+            str(source),
+            "0",
+            tile_id=tile,
+            out=tmp_path / "a.png",
+            settings=load(None, None, flags=settings),
+        )
+        assert result.candidates[0].level == built["value"]
+        levels.append(built["value"])
+    assert levels[0] < 0.9 * levels[1]
 
 
 def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:

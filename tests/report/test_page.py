@@ -411,13 +411,13 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
     looks = {
         name: replace(
             facts.survey["empty"].appearance,
+            surface=verdict,
             surface_reason=reason,
             level=level,
-            iso_confidence=0.1,
         )
-        for name, reason, level in (
-            ("CD31", "", SurfaceLevel(100.0, None, 1.0)),
-            ("dim", "no clear surface: as the test has it", None),
+        for name, verdict, reason, level in (
+            ("CD31", "unsure", "unsure surface: so too", SurfaceLevel(100.0, None, 1.0)),
+            ("dim", "none", "no clear surface: as the test has it", None),
         )
     }
     survey = {name: replace(facts.survey["empty"], appearance=look) for name, look in looks.items()}
@@ -428,7 +428,7 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
     }
     assert titles == {
         "1 channel without a surface": ("dim: no clear surface: as the test has it",),
-        "1 channel with low confidence in their surface (below 0.6)": ("CD31: 0.10 at 100",),
+        "1 channel with an unsure surface": ("CD31: unsure surface: so too",),
         "1 unit without a surface, in channels that have some": (
             "r0_c0/CD31: no voxel crosses the iso-value",
         ),

@@ -11,6 +11,7 @@ import sys
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 Array = NDArray[np.float64]
 
@@ -34,15 +35,8 @@ class Medium:
         x = p[:, 0] / self.spacing[0] + 1
         y = (self.edges[1] - p[:, 1]) / self.spacing[1] + 1
         z = p[:, 2] / self.spacing[2] + 1
-        at = np.stack([np.clip(z, 0, nz - 1), np.clip(y, 0, ny - 1), np.clip(x, 0, nx - 1)], 1)
-        low = np.minimum(at.astype(int), np.array([nz, ny, nx]) - 2)
-        share = at - low
-        found = np.zeros(len(p))
-        for corner in range(8):
-            side = np.array([corner >> 2 & 1, corner >> 1 & 1, corner & 1])
-            weight = np.prod(np.where(side, share, 1 - share), axis=1)
-            found += weight * self.texels[tuple((low + side).T)]
-        return found
+        at = np.stack([np.clip(z, 0, nz - 1), np.clip(y, 0, ny - 1), np.clip(x, 0, nx - 1)])
+        return ndimage.map_coordinates(self.texels, at, order=1, mode="nearest")
 
     def extinction(self, p: Array) -> Array:
         return np.interp(self.intensity(p) * 255, np.arange(256), self.sigma)

@@ -146,7 +146,7 @@ def test_without_a_surface_nothing_begins_at_a_level_or_a_threshold() -> None:
     peaks = np.concatenate([rng.normal(60, 8, 20_000), rng.normal(180, 8, 9000)])
     statistics = find_statistics(peaks.round().astype(np.uint8), WindowOptions(0, 100))
     assert statistics.threshold is not None
-    clear, none = (
+    unsure, none = (
         make_appearance(
             "CD31", (0, 1, 0), statistics=statistics, level=level, confidence=0.3, doubt=doubt
         )
@@ -154,7 +154,9 @@ def test_without_a_surface_nothing_begins_at_a_level_or_a_threshold() -> None:
     )
     assert none.surface == "none"
     assert none.surface_reason == "no clear surface"
+    assert unsure.surface == "unsure"
+    assert unsure.surface_reason.startswith("unsure surface: at 120 with a confidence of 0.30;")
     assert none.threshold is None
-    assert clear.threshold is not None
-    assert set(clear.transfer_functions) - set(none.transfer_functions) == {"threshold"}
-    assert none.transfer_functions["sharp"] != clear.transfer_functions["sharp"]
+    assert unsure.threshold is not None
+    assert set(unsure.transfer_functions) - set(none.transfer_functions) == {"threshold"}
+    assert none.transfer_functions["sharp"] != unsure.transfer_functions["sharp"]

@@ -55,7 +55,7 @@ from stereocell.building.tasks.window import (
 )
 from stereocell.engine.run import Engine, console
 from stereocell.isosurface.channel_level import Level
-from stereocell.isosurface.options import CRITERIA
+from stereocell.isosurface.options import CRITERIA, LADDER
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
@@ -198,7 +198,7 @@ def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
 
 def evidence_task(plan: Plan, tile: Tile, *, channel: Channel, window: Window) -> EvidenceTask:
     """Return the task that gathers one tile's evidence."""
-    criterion = plan.settings.isovalue.criterion
+    criterion = LADDER if channel.rung else plan.settings.isovalue.criterion
     return EvidenceTask(
         source_of(plan, channel),
         plan.level_of(channel),

@@ -11,7 +11,7 @@ from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
 from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
 from stereocell.isosurface.level_evidence import TileEvidence
-from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, RUNGS, parse_level
+from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUNGS, parse_level
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 
@@ -57,12 +57,13 @@ def find_level(
         assert given is not None
         return Found(window, None, {}, (given[0],), given[1], "", is_given=True)
     options = plan.settings.isovalue
+    criterion = LADDER if channel.rung else options.criterion
     levels = find_levels(
         list(evidence.values()),
         counting=window.counting,
         finest_um=min(plan.spacing_um),
         modality=plan.modality,
-        options=options if options.criterion in CRITERIA else None,
+        options=options if criterion in CRITERIA else None,
     )
     if given is not None:
         value, subtracts = given
@@ -71,7 +72,7 @@ def find_level(
         return Found(window, levels, evidence, (rated,), subtracts, "", is_given=True)
     clear = levels.clear
     doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
-    if options.criterion == ADAPTIVE and clear:
+    if criterion == ADAPTIVE and clear:
         threshold = window.statistics.threshold
         if threshold is None:
             nothing = "no clear surface: the channel's histogram has no threshold"

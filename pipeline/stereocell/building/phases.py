@@ -5,7 +5,7 @@ Every phase skips finished work: a result is named by everything that it depends
 
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
 from stereocell.building.plan import (
+    ALL,
     Channel,
     Plan,
     choose_color,
@@ -31,7 +32,9 @@ from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import evidence, solids, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
+from stereocell.isosurface.options import LADDER, RUNGS
 from stereocell.meshes.alpha_wrap import find_wrapper
+from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
@@ -66,7 +69,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
         f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
-        f"{len(plan.tiles)} tiles x {len(plan.channels)} channels"
+        f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
     )
     return plan
 
@@ -81,8 +84,6 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
     dataset = open_source(as_asked(location, options))
-    for note in dataset.notes:
-        console.print(f"plan: {note}", markup=False)
     modality = dataset.modality or options.modality
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(len(dataset.channels)) if indices is None else indices
@@ -95,17 +96,12 @@ def settle(source: str, settings: Settings) -> Plan:
         for place, index in enumerate(chosen)
     ]
     channels = with_surfaces(channels, settings.surfaces)
-    for channel in channels:
-        given = settings.iso_values.get(channel.name, settings.iso_values.get(str(channel.index)))
-        if channel.rung and given is not None:
-            told = f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
-            console.print(f"plan: {told}", markup=False)
     level = choose_level(dataset.levels, len(channels), settings)
     if options.taken_as != INTENSITY:
         whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
         require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
-    return make_plan(
+    plan = make_plan(
         location,
         dataset.name,
         fingerprint=dataset.fingerprint,
@@ -117,6 +113,27 @@ def settle(source: str, settings: Settings) -> Plan:
         modality=modality,
         placement=dataset.placement,
     )
+    for note in (*dataset.notes, *_in_vain(settings, channels)):  # an error stands alone
+        console.print(f"plan: {note}", markup=False)
+    return plan
+
+
+def _in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield what is said of each setting that another one overrules."""
+    options = settings.isovalue
+    for channel in channels:
+        keys = (channel.name, str(channel.index), ALL)
+        given = next((settings.iso_values[k] for k in keys if k in settings.iso_values), None)
+        if channel.rung and given is not None and given != settings.iso_values.get(ALL):
+            yield f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
+        if channel.rung and options.criterion != LADDER:
+            yield f"{channel.name}: built where --surfaces says, not by {options.criterion}"
+        is_number = channel.rung not in RUNGS if channel.rung else given is not None
+        if is_number and options.scope == "tile":
+            yield (
+                f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "
+                "is for levels that are found"
+            )
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from stereocell.model.identifiers import to_identifier
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.settings import AUTO
 from stereocell.model.tiling import Box, Tile, cut, cut_evenly
+from stereocell.transfer.windows import NAMED
 
 T = TypeVar("T")
 ALL = "*"  # the key of settings by channel that stands for all that have none
@@ -290,7 +291,7 @@ def make_plan(
         unwrap=settings.unwrap.resolved(chosen.spacing_um),
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
         iso_values=_by_name("--iso-value", settings.iso_values, channels),
-        windows=_of_all(settings.windows, channels),
+        windows=_of_all(settings.windows, channels, modality),
         paint=_painted(settings.paint, channels),
     )
     _require_planes(settings, chosen.spacing_um)
@@ -420,8 +421,17 @@ def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> 
     return found
 
 
-def _of_all(windows: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
+def _of_all(
+    windows: Mapping[str, str], channels: Sequence[Channel], modality: str
+) -> dict[str, str]:
     """Return windows by channel name; that of voxels with several surfaces goes to each."""
+    for key, window in windows.items():
+        if window in NAMED and modality != "CT":
+            kind = f"this is {modality}" if modality else "nothing says that this is one"
+            raise UsageError(
+                f"--window {key}={window}: a window in Hounsfield units, of CT, and {kind}: "
+                "expected LOW:HIGH in voxel values, or --preset ct"
+            )
     found: dict[str, str] = {}
     for key, window in windows.items():
         if key == ALL:

@@ -25,14 +25,15 @@ def load_for(
     *,
     flags: Mapping[str, Any],
     where: str = "command line",
-) -> Settings:
+) -> tuple[Settings, str]:
     """Return the settings of a build, by the preset that suits the source where none is given.
 
-    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The choice is
-    printed with its reason. A source that can't be read is left to whoever reads it next.
+    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The text is the
+    choice with its reason, for `tell`; empty where there was none. A source that can't be read is
+    left to whoever reads it next.
     """
     if preset is not None or config is not None:
-        return load(preset, config, flags=flags, where=where)
+        return load(preset, config, flags=flags, where=where), ""
     settings = load(None, None, flags=flags, where=where)
     options = settings.plan
     try:
@@ -40,11 +41,14 @@ def load_for(
         dataset = open_source(as_asked(location, options))
         chosen, reason = choose_preset(dataset, options.modality)
     except StereoCellError:
-        return settings
-    # nothing is said of a microscope's voxels: they are what the defaults are for
-    if chosen or dataset.modality or options.modality:
-        console.print(f"plan: {reason}", markup=False)
-    return load(chosen, None, flags=flags, where=where) if chosen else settings
+        return settings, ""
+    return (load(chosen, None, flags=flags, where=where) if chosen else settings), reason
+
+
+def tell(choice: str) -> None:
+    """Print the choice of a preset, once the source proved to be one: errors stand alone."""
+    if choice:
+        console.print(f"plan: {choice}", markup=False)
 
 
 def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str]:

@@ -115,10 +115,12 @@ def plan(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for
+    from stereocell.building.preset_choice import load_for, tell
 
-    wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
+    flags = flags_of(options)
+    wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     made = phases.make(options.input, options.out, wanted)
+    tell(choice)
     return Answer(
         {
             "out": str(options.shown),
@@ -136,13 +138,15 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
-    from stereocell.building.preset_choice import load_for
+    from stereocell.building.preset_choice import load_for, tell
     from stereocell.preview import iso_value as iso_preview
 
-    wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
+    flags = flags_of(options)
+    wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     found, path = iso_preview.preview(
         options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
+    tell(choice)
     print_unless_json(options, "\n".join(iso_preview.table(found)))
     print_unless_json(options, f"wrote {path}")
     return Answer({"picture": str(path), **asdict(found)})
@@ -211,13 +215,15 @@ def slices(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for
+    from stereocell.building.preset_choice import load_for, tell
     from stereocell.preview.png_slices import without_surface, write_slices
     from stereocell.storage.location import require_apart
 
-    wanted = load_for(options.input, options.preset, options.config, flags=flags_of(options))
+    flags = flags_of(options)
+    wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     require_apart(options.input, options.out)
     plan = phases.settle(options.input, without_surface(wanted))
+    tell(choice)
     written = write_slices(plan, options.out, options.plane)
     print_unless_json(options, f"wrote to {options.out}: {written.line}")
     return Answer({"out": str(options.out), "slices": written.count, "plane": written.plane})

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.lattice_field import LatticeField
 
-SurfaceConfidence = Literal["clear", "none"]
+SurfaceVerdict = Literal["clear", "unsure", "none"]
+LOW_CONFIDENCE = 0.6  # 0..1; below it about half of the surfaces were right (docs/decisions.md)
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 ShapeKind = Literal["rectangle", "triangle"]
 
@@ -98,12 +99,12 @@ class Appearance:
     window            the voxel values that become 0 and 1 in the 8-bit volumes
     iso_value         with the background's mean, in voxel values; None: there is no surface
     iso_confidence    0..1, of the channel
-    surface           whether there is one
+    surface           whether there is one, and whether it is to be trusted
     painted_by        id of the channel whose intensity is painted on the surface; empty: none
     transfer_functions  opacity points by name; `default` is among them
     transfer_2d       those functions that are two-dimensional
     threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
-    surface_reason    why there is no surface; empty: there is one
+    surface_reason    why there is no surface, or why it is unsure; empty: a clear one
     level             where exactly the surface lies; None: there is none
     """
 
@@ -112,7 +113,7 @@ class Appearance:
     window: tuple[float, float]
     iso_value: float | None
     iso_confidence: float
-    surface: SurfaceConfidence
+    surface: SurfaceVerdict
     transfer_functions: dict[str, OpacityPoints]
     painted_by: str = ""
     transfer_2d: TransferFunctions2d = field(default_factory=TransferFunctions2d)

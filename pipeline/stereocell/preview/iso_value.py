@@ -5,7 +5,7 @@ it is found on tiles spread evenly, and the table says so.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels, Level
-from stereocell.isosurface.options import CRITERIA
+from stereocell.isosurface.options import LADDER
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError, UsageError
 from stereocell.model.tiling import Tile
@@ -96,7 +96,7 @@ def preview(
     tiles = _spread(plan, tile)
     evidence = {
         one.id: measure_evidence(evidence_task(plan, one, channel=channel, window=window))
-        for one in (() if given_level(plan, channel) else tiles)
+        for one in tiles
     }
     found = find_level(plan, channel, window, evidence)
     volume = open_source(source_of(plan, channel)).read(channel.index, tile.box, plan.level)
@@ -104,16 +104,19 @@ def preview(
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
         under = window.statistics.background.at(tile.box)
-    chosen = _choose(plan, found, field, under)
+    chosen = _choose(plan, found, tile, field, under)
     candidates = _candidates(plan, channel, found, chosen, field, under)
     if not candidates:
         raise NoSurfaceError(
             f"{tile.id}/{channel.name}: all voxels are nearly equal: no surface to look at"
         )
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
-    basis = "given" if found.levels is None else "found on all tiles"
-    if len(tiles) < len(plan.tiles) and found.levels is not None:
-        basis = f"found on {len(tiles)} of {len(plan.tiles)} tiles; a build takes all"
+    where = f"{len(tiles)} of {len(plan.tiles)}" if len(tiles) < len(plan.tiles) else "all"
+    basis = f"{'given, and judged' if found.is_given else 'found'} on {where} tiles"
+    if where != "all":
+        basis += "; a build takes all"
+    if window.holder is not None:
+        basis += f"; a build leaves out a table or holder: {', '.join(window.holder.pieces)}"
     result = Preview(candidates, found.doubt, basis)
     picture = _compose(
         paint_slices(
@@ -179,6 +182,18 @@ def _find_tile(plan: Plan, tile_id: str) -> Tile:
 
 
 def _choose(
+    plan: Plan, found: Found, tile: Tile, field: NDArray[np.float32], under: NDArray[np.float32]
+) -> Level | float | None:
+    """Return the level that a build would take of this tile."""
+    rung = _choose_rung(plan, found, field, under)
+    if found.levels is None or not isinstance(rung, Level) or found.is_given:
+        return rung
+    if plan.settings.isovalue.scope != "tile":
+        return rung
+    return replace(rung, value=found.levels.level_of_tile(rung, found.evidence[tile.id]))
+
+
+def _choose_rung(
     plan: Plan, found: Found, field: NDArray[np.float32], under: NDArray[np.float32]
 ) -> Level | float | None:
     """Return the rung that a build would take if all tiles were like this one."""
@@ -215,11 +230,13 @@ def _candidates(
     value = chosen.value if isinstance(chosen, Level) else chosen
     candidates = []
     if value is not None:
-        name = "given" if found.levels is None else plan.settings.isovalue.criterion
-        if isinstance(chosen, Level) and name not in CRITERIA:
+        is_given, name = given_level(plan, channel) is not None, plan.settings.isovalue.criterion
+        if is_given:
+            name = "given"
+        elif channel.rung or name == LADDER:
             name = channel.rung or plan.settings.isovalue.rung
         confidence = chosen.confidence if isinstance(chosen, Level) else None
-        setting = take(channel, value, found.subtracts) if found.levels is None else ""
+        setting = take(channel, value, found.subtracts) if is_given else ""
         candidates.append(candidate(name, value, found.subtracts, confidence, setting, True))
     threshold = found.window.statistics.threshold
     for other in find_other_levels(

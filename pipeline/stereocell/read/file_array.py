@@ -120,14 +120,17 @@ def unpack(
     with open(path, "rb") as file:
         file.seek(offset)
         stream = _opened(file, packing)
-        while skip > 0 and (passed := len(stream.read(min(skip, _PIECE)))):
-            skip -= passed
         parts, left = [], size
-        while left > 0 and (part := stream.read(min(left, _PIECE))):
-            parts.append(part)
-            left -= len(part)
+        try:
+            while skip > 0 and (passed := len(stream.read(min(skip, _PIECE)))):
+                skip -= passed
+            while left > 0 and (part := stream.read(min(left, _PIECE))):
+                parts.append(part)
+                left -= len(part)
+        except EOFError:  # of gzip and bzip2, in words about streams
+            raise EOFError("the packed voxels are cut short") from None
     if left > 0:
-        raise EOFError(f"found {size - left} bytes after unpacking, {size} are needed")
+        raise EOFError(f"the packed voxels are cut short: {size - left} of {size} bytes")
     return np.frombuffer(b"".join(parts), dtype).reshape(tuple(shape))
 
 

@@ -10,6 +10,7 @@ References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/
 """
 
 import logging
+import math
 import os
 import warnings
 import zlib
@@ -103,6 +104,7 @@ def read_image(location: Location) -> Image:
     counts: dict[int, int] = {}
     load = partial(_load, location, canonical, skewed, dtype, counts)
     voxels = WholeArray((times, z, y, x), dtype, load)
+    _require_whole(image, where)
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),
@@ -116,6 +118,19 @@ def read_image(location: Location) -> Image:
         notes=tuple(notes),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _require_whole(image: Any, where: str) -> None:
+    """Raise SourceError where the file of the voxels, if it isn't packed, ends before them."""
+    name, data = image.file_map["image"].filename, image.dataobj
+    if name.lower().endswith(tuple(filter(None, ImageOpener.compress_ext_map))):
+        return
+    end, size = data.offset + math.prod(data.shape) * data.dtype.itemsize, os.path.getsize(name)
+    if end > size:
+        raise SourceError(
+            f"{where}: found {size} bytes, expected at least {end} for {tuple(data.shape)} of "
+            f"{data.dtype.name} (the file is cut short)"
+        )
 
 
 def _labels(header: Any) -> str:
@@ -221,9 +236,8 @@ def _load(
         values = rescale(raw, float(data.slope), float(data.inter), dtype)
     except _FAULTS as error:
         raise_if_short(error, location.shown)
-        raise SourceError(
-            f"{location.shown}: its voxels can't be read, expected {NAME} that is whole"
-        ) from None
+        found = "it is cut short" if isinstance(error, EOFError) else "its voxels can't be read"
+        raise SourceError(f"{location.shown}: {found}, expected {NAME} that is whole") from None
     if values.dtype.kind == "f":
         values, counts[time] = _without_nan(values, location.shown)
     if skewed is not None:

@@ -205,9 +205,9 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
 
 
 def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
-    """Return the histogram that the channel's levels were found on; None: there is no evidence."""
+    """Return the histogram that the channel's levels were found on; None: none was found."""
     curve, level = found.curve, found.appearance.level
-    if curve is None or len(curve.values) < 2:
+    if curve is None or len(curve.values) < 2 or not found.ladder:
         return None
     along = np.linspace(0, 1, len(curve.values))
     places = {one.value: float(np.interp(one.value, curve.values, along)) for one in found.ladder}

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from stereocell.model.counted import counted
 from stereocell.report.facts import Facts, UnitFacts
 
-LOW_CONFIDENCE = 0.6  # 0..1; below it about half of the surfaces were right (docs/decisions.md)
 LEAST_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
 _MOST_LINES = 30  # lines printed of one remark
 
@@ -30,16 +30,12 @@ def find_remarks(facts: Facts) -> list[Remark]:
         if name not in with_surface
     ]
     unsure = [
-        f"{name}: {look.iso_confidence:.2f} at {look.level.words}"
-        for name, look in looks.items()
-        if look.level is not None and look.iso_confidence < LOW_CONFIDENCE
+        f"{name}: {look.surface_reason}" for name, look in looks.items() if look.surface == "unsure"
     ]
     bare = [f"{u.name}: {u.reason}" for u in units if u.reason and u.channel.name in with_surface]
     found = [
         _remark("without a surface", whole, "channel"),
-        _remark(
-            f"with low confidence in their surface (below {LOW_CONFIDENCE:g})", unsure, "channel"
-        ),
+        _remark("with an unsure surface", unsure, "channel"),
         _remark("without a surface, in channels that have some", bare, is_note=True),
         _remark(
             f"with thin triangles in lod0 (1st percentile of their angles below "
@@ -49,8 +45,8 @@ def find_remarks(facts: Facts) -> list[Remark]:
             is_note=True,
         ),
         _remark("with a table or a holder left out", _holders(facts), "channel", is_note=True),
-        _counts("fragments dropped", units, lambda u: u.fragments_dropped),
-        _counts("cavities filled", units, lambda u: u.cavities_filled),
+        _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
+        _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
     ]
     return [remark for remark in found if remark is not None]
 
@@ -83,12 +79,11 @@ def _remark(
 ) -> Remark | None:
     if not lines:
         return None
-    title = f"{len(lines):,} {noun}{'' if len(lines) == 1 else 's'} {what}"
-    return Remark(title, _cut(lines), is_note)
+    return Remark(f"{counted(len(lines), noun)} {what}", _cut(lines), is_note)
 
 
 def _counts(
-    what: str, units: Iterable[UnitFacts], count: Callable[[UnitFacts], int]
+    nouns: tuple[str, str], what: str, units: Iterable[UnitFacts], count: Callable[[UnitFacts], int]
 ) -> Remark | None:
     """Return a note with the sum of `count` over the units, its lines by channel."""
     by_channel: dict[str, list[UnitFacts]] = {}
@@ -99,12 +94,12 @@ def _counts(
     for channel, touched in by_channel.items():
         most = max(touched, key=count)
         total = sum(count(unit) for unit in touched)
-        tiles = f"{len(touched):,} {'tile' if len(touched) == 1 else 'tiles'}"
+        tiles = counted(len(touched), "tile")
         lines.append(f"{channel}: {total:,} in {tiles}, most in {most.tile.id} ({count(most):,})")
     if not lines:
         return None
     total = sum(count(unit) for touched in by_channel.values() for unit in touched)
-    return Remark(f"{total:,} {what}", _cut(lines), is_note=True)
+    return Remark(f"{counted(total, *nouns)} {what}", _cut(lines), is_note=True)
 
 
 def _cut(lines: Sequence[str]) -> tuple[str, ...]:

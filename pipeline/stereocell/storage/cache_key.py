@@ -67,7 +67,8 @@ def _digest(module: str) -> str:
     files, libraries = _reach(module, NEUTRAL)
     digest = hashlib.sha256(json.dumps(libraries).encode())
     for file in files:
-        digest.update(_code(file).encode() if file.suffix == ".py" else file.read_bytes())
+        content = file.read_bytes()
+        digest.update(_code(content).encode() if file.suffix == ".py" else content)
     return digest.hexdigest()
 
 
@@ -104,13 +105,26 @@ def _is_below(name: str, parts: Collection[str]) -> bool:
 
 
 @cache
-def _code(file: Path) -> str:
+def _code(content: bytes) -> str:
     """Return a module's syntax tree as text, without docstrings and texts of messages."""
-    return ast.dump(_Bare().visit(ast.parse(file.read_bytes())))
+    return ast.dump(_Bare(has_settings=b"setting" in content).visit(ast.parse(content)))
 
 
 class _Bare(ast.NodeTransformer):
-    """Removes from a syntax tree all parts that change no result."""
+    """Removes from a syntax tree all parts that change no result.
+
+    has_settings  whether the module may define settings, the one such part of an expression; most
+        modules don't, and expressions are most of a tree
+    """
+
+    def __init__(self, *, has_settings: bool) -> None:
+        self.has_settings = has_settings
+
+    def visit(self, node: ast.AST) -> Any:
+        """Visit statements, and expressions where one may hold such a part."""
+        if isinstance(node, ast.expr) and not self.has_settings:
+            return node
+        return super().visit(node)
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         """Visit a node's own; a body of which nothing is left does nothing."""

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.channel import Appearance, SurfaceLevel, TransferFunctions2d
+from stereocell.model.channel import (
+    LOW_CONFIDENCE,
+    Appearance,
+    SurfaceLevel,
+    SurfaceVerdict,
+    TransferFunctions2d,
+)
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
@@ -98,13 +104,20 @@ def make_appearance(
         iso_value = level.iso + below
         # where nothing tells a surface from noise, peaks of the histogram are noise too
         threshold = statistics.threshold
+    verdict: SurfaceVerdict = "none" if level is None else "clear"
+    if level is not None and confidence < LOW_CONFIDENCE:
+        verdict = "unsure"
+        doubt = (
+            f"unsure surface: at {level.words} with a confidence of {confidence:.2f}; "
+            f"below {LOW_CONFIDENCE:g} about half of such surfaces are right"
+        )
     appearance = Appearance(
         name,
         color,
         statistics.window,
         iso_value,
         confidence,
-        "none" if level is None else "clear",
+        verdict,
         {},
         threshold=None if threshold is None else threshold.value,
         surface_reason=doubt,

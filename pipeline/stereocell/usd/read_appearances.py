@@ -11,7 +11,7 @@ from pxr import Usd, UsdShade
 from stereocell.formats.gltf import Material
 from stereocell.model.channel import (
     OpacityPoints,
-    SurfaceConfidence,
+    SurfaceVerdict,
     TransferFunctions2d,
     normalized,
 )
@@ -53,8 +53,8 @@ class ComposedAppearance:
 
     window         the voxel values to be shown as 0 and 1
     volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
-    surface        whether there is one
-    surface_reason  why there is none, or empty
+    surface        whether there is one, and whether it is to be trusted
+    surface_reason  why there is none, or why it is unsure; or empty
     level          where the surface lies above the background, which is left out here but for its
                    ends; None: not stated
     chosen         a transfer function
@@ -68,7 +68,7 @@ class ComposedAppearance:
     window: tuple[float, float]
     volume_window: tuple[float, float]
     iso_value: float | None
-    surface: SurfaceConfidence
+    surface: SurfaceVerdict
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
     transfer_2d: TransferFunctions2d
@@ -151,7 +151,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         # only stages of other programs lack it
         _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
         _number(prim, "stereocell:isoValue"),
-        _surface_confidence(prim, "stereocell:surfaceVerdict"),
+        _surface_verdict(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
         TransferFunctions2d(functions=shapes, **read_numbers(prim)),
@@ -184,14 +184,14 @@ def _number(prim: Usd.Prim, name: str) -> float | None:
     return None if value is None else shortest(value)
 
 
-def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
+def _surface_verdict(prim: Usd.Prim, name: str) -> SurfaceVerdict:
     value = prim.GetAttribute(name).Get()
     if value is None:  # only stages of other programs lack it
         return "clear"
-    for confidence in get_args(SurfaceConfidence):
-        if value == confidence:
-            return confidence
-    known = ", ".join(get_args(SurfaceConfidence))
+    for verdict in get_args(SurfaceVerdict):
+        if value == verdict:
+            return verdict
+    known = ", ".join(get_args(SurfaceVerdict))
     raise StageError(f"{prim.GetPath()}.{name}: {value!r}, expected one of {known}")
 
 

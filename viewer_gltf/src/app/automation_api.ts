@@ -27,6 +27,8 @@ export type Snapshot = Readonly<{
   gazed: string | null;
   /** Of the disc as it is now; 0: closed. */
   discRadius_deg: number;
+  /** Where the limit of tiles in the disc ends it; null: it covers no more. */
+  discLimit_deg: number | null;
   /** Between two frames of a moving picture. */
   frame_ms: number;
   /** The settings of the last frame. */

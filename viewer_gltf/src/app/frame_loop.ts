@@ -94,7 +94,6 @@ export class FrameLoop {
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
-    this.isStale = true;
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
@@ -134,7 +133,9 @@ export class FrameLoop {
     const isMoving = isStereo || this.isStale;
     // a picture that came to rest is drawn once more, as well as can be
     const isWanted = isMoving || this.wasMoving || isGathering || isDue;
-    if (!isWanted && !wasLoading && !this.hasCome) return;
+    // someone waits: what is missing is looked for, and a picture that shows all is not drawn again
+    const isAwaited = this.waiting.length > 0;
+    if (!isWanted && !wasLoading && !this.hasCome && !isAwaited) return;
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;

@@ -12,8 +12,8 @@ import { loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { keepOffline } from "../offline/register";
-import { Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
-import { findXrSupport } from "../xr/support";
+import { Notices, ProgressBar, Said, StereoButton, showFatal } from "../panel/html/overlays";
+import { findXrSupport, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
 import { Viewer } from "./viewer";
@@ -48,7 +48,8 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     () => viewer.run("retry"),
   );
   const said = new Said();
-  const over = [progress.root, said.root, notices.root];
+  const stereoButton = new StereoButton();
+  const over = [progress.root, said.root, notices.root, stereoButton.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   const viewer: Viewer = new Viewer(
@@ -72,7 +73,10 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(location.search, location.hash);
-  controller.setStereo(await findXrSupport(navigator.xr, isSecureContext));
+  const support = await findXrSupport(navigator.xr, isSecureContext);
+  controller.setStereo(support);
+  const way = wayToStereo(support, matchMedia("(pointer: coarse)").matches);
+  stereoButton.offer(way, () => way && controller.perform(way));
   return viewer;
 }
 

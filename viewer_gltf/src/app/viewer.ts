@@ -19,6 +19,7 @@ import type { CameraView } from "../share/camera_link";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
+import { discLimit } from "../state/focus_tiles";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
@@ -246,6 +247,7 @@ export class Viewer {
       traced: this.contents.traced.status(),
       gazed: this.hybrid.focusTiles.focusTile,
       discRadius_deg: (this.hybrid.outer_rad * 180) / Math.PI,
+      discLimit_deg: discLimit(this.hybrid.focusTiles, this.state.discRadius_deg),
       frame_ms: this.loop.frame_ms,
       settings: this.loop.settings,
       measuredValues: this.contents.marks.values,

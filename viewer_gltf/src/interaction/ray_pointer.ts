@@ -3,6 +3,7 @@
  * Metres of the room.
  */
 import { type Matrix4, Vector3 } from "three";
+import type { Command } from "../state/commands";
 import { advanceDwell, type Dwell, dwellProgress, fire, NO_DWELL } from "./dwell";
 
 /** `direction` has unit length. */
@@ -17,6 +18,8 @@ export type Hit = Readonly<{
    * too, and where there is no button to hold, from one choice to the next.
    */
   hold?: "slide" | "carry";
+  /** Goes on, little by little, while the button is held or the gaze stays. */
+  repeats?: Command;
 }>;
 
 /** Something that rays meet: the panel, handles, the specimen's tiles. */

@@ -135,7 +135,14 @@ export type Colour = Base &
     palettes: readonly Palette[];
     to: (hex: string) => Wish;
   }>;
-export type Button = Base & Readonly<{ kind: "button"; isPrimary?: boolean; to: () => Wish }>;
+export type Button = Base &
+  Readonly<{
+    kind: "button";
+    isPrimary?: boolean;
+    /** Goes on with it, little by little, while it is held or gazed at. */
+    repeats?: Command;
+    to: () => Wish;
+  }>;
 export type MapTile = Readonly<{
   id: string;
   row: number;

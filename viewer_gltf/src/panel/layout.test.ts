@@ -172,6 +172,14 @@ describe("the panel's layout", () => {
     expect(choose()).toEqual(["r0_c3", null]);
   });
 
+  it("tells where the limit of tiles ends the disc, and only there", () => {
+    const now = (state: ViewerState, discLimit_deg: number | null) =>
+      find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "text", "disc-now").value;
+    expect(now(start(), 3.2)).toMatch(/^3°: at most 4 tiles/);
+    expect(now(start(), null)).toBe("");
+    expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe("");
+  });
+
   it("lists the tiles where their names are no rows and columns", () => {
     const state = { ...start(), tiles: [{ id: "left", representation: "mesh" }] } as const;
     const list = find(laid(state), "choice", "tile-choice");

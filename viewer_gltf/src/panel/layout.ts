@@ -2,6 +2,7 @@
 import { distanceBetween, distanceText } from "../annotations/measure";
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
+import { MAX_DISC_TILES } from "../state/focus_tiles";
 import { MEASURE_PARAMETERS, QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { VOLUMES } from "../state/parameters/volumes";
 import type { QualitySettings } from "../state/quality_controller";
@@ -11,6 +12,7 @@ import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
+import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
 import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
@@ -29,6 +31,8 @@ export type Facts = StereoSupport &
     histogram?: Histogram | null;
     /** The tile that is looked at. */
     focusTile: string | null;
+    /** Where the limit of tiles in the disc ends it; null or absent: it covers no more. */
+    discLimit_deg?: number | null;
     isStereo: boolean;
     /** null: not known yet. */
     frame_ms: number | null;
@@ -79,7 +83,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         ? [section("notices", "Notices", noticeItems(state))]
         : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
-      section("volumes", "Volumes", controlsOf(VOLUMES, state)),
+      section("volumes", "Volumes", [...controlsOf(VOLUMES, state), discNow(state, facts)]),
       section("light", "Light", lightItems(state, view, facts.isStereo)),
       section("tiles", "Tiles", tileItems(state, facts.focusTile)),
       section("view", "View", [
@@ -88,6 +92,8 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         command("top", "Top"),
         command("reset", "Reset"),
       ]),
+      // a screen has fingers, wheel and arrow keys for it
+      ...(facts.isStereo ? [section("move", "Move", MOVES)] : []),
       section("stereo", "Stereo", stereoItems(state, facts, view)),
       section("measure", "Measure", measureItems(state, facts.values)),
       section("cut", "Cut open", cutItems(state, facts.shown)),
@@ -102,6 +108,15 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     ],
     status: statusOf(facts),
   };
+}
+
+/** Why the disc is smaller than it was set; "": it is not, and so there is nothing to see. */
+function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
+  const isCut = mode === "disc" && discLimit_deg !== null;
+  const value = isCut
+    ? `${discLimit_deg.toFixed(0)}°: at most ${MAX_DISC_TILES} tiles are volumes in it. "All" draws every tile.`
+    : "";
+  return { kind: "text", id: "disc-now", label: "Disc now", value };
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */

@@ -2,6 +2,7 @@ import { describe, expect, it } from "vitest";
 import { WHOLE } from "../math/clip";
 import {
   advanceFocus,
+  discLimit,
   discReach,
   FAR_AWAY,
   type GazeInput,
@@ -97,6 +98,16 @@ describe("the disc", () => {
     const wide = { ...input(25, -10.1, 10), discRadius_rad: 1.2 };
     expect(advanceFocus(FAR_AWAY, wide).disc).toHaveLength(MAX_DISC_TILES);
     expect(advanceFocus(FAR_AWAY, input(9, -9, 25)).disc).toEqual([]);
+  });
+
+  it("knows where that limit ends it", () => {
+    const wide = { ...input(25, -10.1, 10), discRadius_rad: 1.2 };
+    const state = advanceFocus(FAR_AWAY, wide);
+    const limit = discLimit(state, 1.2);
+    expect(limit).toBe(discReach(state, 1.2, (id) => state.disc.includes(id)));
+    expect(limit).toBeLessThan(1.2);
+    expect(discLimit(advanceFocus(FAR_AWAY, input(9, -9, 10)), 0.2)).toBeNull(); // just four
+    expect(discLimit(FAR_AWAY, 1.2)).toBeNull();
   });
 
   it("ends before the first tile without its volume", () => {

@@ -135,3 +135,12 @@ export function discReach(
   if (first === -1) return felt.length === 0 ? 0 : discRadius_rad;
   return (Math.floor(first / SPOKES) / RINGS) * discRadius_rad;
 }
+
+/**
+ * The radius at which the disc ends because no more than MAX_DISC_TILES are volumes in it; null: it
+ * covers no more.
+ */
+export function discLimit({ felt, near, disc }: FocusState, discRadius_rad: number): number | null {
+  const first = felt.findIndex((id) => id !== null && near.has(id) && !disc.includes(id));
+  return first === -1 ? null : (Math.floor(first / SPOKES) / RINGS) * discRadius_rad;
+}

@@ -18,7 +18,7 @@ import { MAX_CHANNELS, type Representation, type ViewerState } from "./viewer_st
 function unclear(given: Manifest, ...indices: number[]): Manifest {
   const channels = given.channels.map((channel, i) =>
     indices.includes(i)
-      ? { ...channel, surface_reason: "no clear surface: all is noise" }
+      ? { ...channel, tileset: null, surface_reason: "no clear surface: all is noise" }
       : channel,
   );
   return { ...given, channels };
@@ -83,6 +83,18 @@ describe("the viewer's state", () => {
     expect(marched(state)).toEqual([]);
     expect(marched(state, near("r0_c2", "r0_c1"))).toEqual(["r0_c2", "r0_c1"]);
     expect(state.middle).toBe("r0_c2");
+  });
+
+  it("draws an unsure surface from afar as it does a clear one", () => {
+    const clear = sampleManifest(1);
+    const [first] = clear.channels;
+    const reason = "unsure surface: at 162 with a confidence of 0.40";
+    const channels = [{ ...first, surface: "unsure" as const, surface_reason: reason }];
+    const [unsure, trusted] = [{ ...clear, channels }, clear].map((one) => initialState(one));
+    expect(unsure.channels[0].surfaceReason).toBe(reason);
+    const drawn = (state: ViewerState) =>
+      state.tiles.map((tile) => representationOf(state, state.channels[0], tile, NO_FOCUS));
+    expect(drawn(unsure)).toEqual(drawn(trusted));
   });
 
   it("lets the channel that was shown longest leave for a fifth, which is no fault", () => {

@@ -35,7 +35,7 @@ export function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string 
 
 /** Whether a channel is drawn as a volume wherever that is possible. */
 function prefersVolume(channel: ChannelState): boolean {
-  return channel.surfaceReason !== "";
+  return !channel.hasSurface && channel.surfaceReason !== "";
 }
 
 /** How a channel is drawn in a tile, once all has arrived; null: not at all. */

@@ -155,7 +155,9 @@ export class Controllers {
 
   private add(source: XRInputSource): void {
     const material = new MeshBasicMaterial({ color: 0x9fb4d0, toneMapped: false });
+    material.transparent = true; // so that it is drawn after the panel, to which it leads
     const line = new Mesh(this.tube, material);
+    line.renderOrder = RENDER_ORDER;
     line.visible = false;
     leaveUncut(line);
     this.group.add(line);
@@ -189,6 +191,8 @@ export class Controllers {
   }
 }
 
+/** Over the panel, under notices and the ring. */
+const RENDER_ORDER = 1850;
 const FORWARD = new Vector3(0, 0, -1);
 
 /** null: the headset doesn't know. */

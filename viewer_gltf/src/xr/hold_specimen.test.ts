@@ -1,7 +1,13 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { HandPose, SpecimenPose } from "../math/grab";
-import { moveByCommand, moveByHolders, moveByStick } from "./hold_specimen";
+import { XR_DISTANCE_M } from "../render/placement";
+import { Specimen } from "../render/specimen_pose";
+import type { Command } from "../state/commands";
+import { advanceFocus, FAR_AWAY } from "../state/focus_tiles";
+import { START_VOLUMES } from "../state/parameters/volumes";
+import { moveByCommand, moveByFingers, moveByHolders, moveByStick } from "./hold_specimen";
 
 const START: SpecimenPose = {
   position: new Vector3(0, 0, -1.5),
@@ -60,9 +66,15 @@ describe("a stick", () => {
 
 describe("a command", () => {
   const pivot = new Vector3(0.2, 0, -1.4);
+  const eye = new Vector3(0.2, 0, 0);
   const toViewer = new Vector3(0, 0, 1);
   const turned = (axis: Vector3, pose: SpecimenPose | null) =>
     axis.clone().applyQuaternion(pose?.orientation ?? new Quaternion());
+  const moved = (command: Command, from = eye, share = 1) => {
+    const pose = moveByCommand(START, command, pivot, from, share);
+    if (pose === null) throw new Error(`${command} moves nothing`);
+    return pose.position.clone().sub(START.position);
+  };
 
   it("brings the side that it names to face the viewer, however it was turned", () => {
     const tilted = moveByStick(START, { x: 0.7, y: 0 }, pivot, 1);
@@ -71,19 +83,120 @@ describe("a command", () => {
       ["side", new Vector3(1, 0, 0)],
       ["top", new Vector3(0, 1, 0)],
     ] as const) {
-      const pose = moveByCommand(tilted, command, pivot);
+      const pose = moveByCommand(tilted, command, pivot, eye);
       expect(turned(axis, pose).distanceTo(toViewer)).toBeLessThan(1e-12);
       expect(pose?.position.distanceTo(pivot)).toBeCloseTo(START.position.distanceTo(pivot), 12);
     }
   });
 
-  it("zooms about the pivot and turns by a step, or is another's", () => {
-    expect(moveByCommand(START, "zoom-in", pivot)?.scale).toBeCloseTo(1.25, 12);
-    const left = moveByCommand(START, "turn-left", pivot);
+  it("comes nearer without growing, turns by a step, or is another's", () => {
+    expect(moveByCommand(START, "zoom-in", pivot, eye)?.scale).toBe(1);
+    expect(moved("zoom-in").distanceTo(new Vector3(0, 0, 0.2 * 1.4))).toBeLessThan(1e-12);
+    expect(moved("zoom-out").distanceTo(new Vector3(0, 0, -0.25 * 1.4))).toBeLessThan(1e-12);
+    const left = moveByCommand(START, "turn-left", pivot, eye);
     expect(left?.orientation.angleTo(new Quaternion())).toBeCloseTo(Math.PI / 12, 12);
     expect(turned(new Vector3(0, 0, 1), left).x).toBeGreaterThan(0);
-    const aside = moveByCommand(START, "pan-left", pivot)?.position.clone().sub(START.position);
-    expect(aside?.toArray()).toEqual([0.1, 0, 0]); // as if the viewer went to the left
-    expect(moveByCommand(START, "share", pivot)).toBeNull();
+    expect(moved("pan-left").toArray()).toEqual([0.1, 0, 0]); // as if the viewer went to the left
+    expect(moveByCommand(START, "share", pivot, eye)).toBeNull();
+  });
+
+  it("stays before the eye, and in sight, however long it goes on", () => {
+    const from = (distance: number): SpecimenPose => ({
+      ...START,
+      position: pivot.clone().setZ(-distance),
+    });
+    const goOn = (pose: SpecimenPose, command: Command) => {
+      let next = pose;
+      for (let i = 0; i < 200; i++) {
+        next = moveByCommand(next, command, next.position, eye, 0.3) ?? next;
+      }
+      return next.position.distanceTo(eye);
+    };
+    expect(goOn(from(1.4), "zoom-in")).toBeCloseTo(0.1, 9);
+    expect(goOn(from(1.4), "zoom-out")).toBeCloseTo(5, 9);
+    expect(goOn(from(0.04), "zoom-in")).toBeCloseTo(0.04, 9); // where hands put it: it does not jump
+    const there = moveByCommand(from(0), "zoom-in", eye, eye);
+    expect(there?.position.toArray().every(Number.isFinite)).toBe(true);
+  });
+
+  it("goes on by parts of a step as far as by whole ones", () => {
+    const parts = (command: Command) => {
+      let next = START;
+      for (let i = 0; i < 10; i++) {
+        const middle = next.position.clone().add(pivot).sub(START.position);
+        next = moveByCommand(next, command, middle, eye, 0.1) ?? next;
+      }
+      return next.position.clone().sub(START.position);
+    };
+    // to the side it goes round the eye
+    for (const command of ["zoom-in", "zoom-out", "pan-up"] as const) {
+      expect(parts(command).distanceTo(moved(command)), command).toBeLessThan(1e-9);
+    }
+  });
+
+  it("means the left and the right of an eye that looks at it", () => {
+    const fromTheLeft = new Vector3(-1.2, 0.3, -1.4); // it looks along x
+    expect(moved("pan-left", fromTheLeft).distanceTo(new Vector3(0, 0, 0.1))).toBeLessThan(1e-12);
+    const up = moveByCommand(START, "turn-up", pivot, fromTheLeft);
+    const axis = new Vector3(0, 0, 1); // its right
+    expect(turned(axis, up).distanceTo(axis)).toBeLessThan(1e-12);
+  });
+});
+
+describe("fingers on the split screen", () => {
+  const pivot = START.position;
+  const eye = new Vector3();
+
+  it("turn what faces the viewer along with them, about its middle", () => {
+    const right = moveByFingers(START, { kind: "drag", x: 0.25, y: 0 }, pivot, eye);
+    const front = new Vector3(0, 0, 1).applyQuaternion(right.orientation);
+    expect(front.x).toBeCloseTo(Math.SQRT1_2, 12); // a quarter of the height is 45 degrees
+    const down = moveByFingers(START, { kind: "drag", x: 0, y: 0.25 }, pivot, eye);
+    expect(new Vector3(0, 0, 1).applyQuaternion(down.orientation).y).toBeCloseTo(-Math.SQRT1_2, 12);
+    expect(right.position.distanceTo(START.position)).toBeLessThan(1e-12);
+  });
+
+  it("bring it nearer by pinching out, and shift it with their middle", () => {
+    const near = moveByFingers(START, { kind: "pinch", factor: 2, x: 0, y: 0 }, pivot, eye);
+    expect(near.position.distanceTo(new Vector3(0, 0, -0.75))).toBeLessThan(1e-12);
+    expect(near.scale).toBe(1);
+    const aside = moveByFingers(START, { kind: "pinch", factor: 1, x: 0.1, y: 0.2 }, pivot, eye);
+    const { x, y } = aside.position;
+    expect(x).toBeCloseTo(0.1 * 2 * 1.5 * Math.tan((40 * Math.PI) / 180), 12);
+    expect(y).toBeCloseTo(-2 * x, 12);
+  });
+
+  it("move nothing by a tap", () => {
+    expect(moveByFingers(START, { kind: "tap" }, pivot, eye)).toBe(START);
+  });
+});
+
+describe("the way to the specimen", () => {
+  it("leads through the switch distance: surfaces from afar, volumes when near", () => {
+    const { specimen: about, tiles } = sampleManifest(1);
+    const specimen = new Specimen(about.bounds_um);
+    specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
+    const eye = new Vector3();
+    const near = () => {
+      const { matrixWorld } = specimen.group;
+      const origin = eye.clone().applyMatrix4(matrixWorld.clone().invert());
+      return advanceFocus(FAR_AWAY, {
+        gaze: { origin: origin.toArray(), direction: [0, 0, -1] },
+        tiles,
+        clip: { box: null, plane: null },
+        switchDistance_um: START_VOLUMES.switchDistance_m / matrixWorld.getMaxScaleOnAxis(),
+        discRadius_rad: 0.2,
+        dt_s: 0.1,
+      }).near.size;
+    };
+    const go = (command: Command) => {
+      const pose = moveByCommand(specimen.pose, command, specimen.pose.position, eye);
+      if (pose !== null) specimen.moveTo(pose, eye);
+    };
+    expect(near()).toBeGreaterThan(0);
+    for (let i = 0; i < 3; i++) go("zoom-out");
+    expect(near()).toBe(0);
+    for (let i = 0; i < 5; i++) go("zoom-in");
+    expect(near()).toBe(tiles.length);
   });
 });

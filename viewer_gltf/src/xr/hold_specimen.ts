@@ -8,6 +8,7 @@ import {
   zoomAbout,
 } from "../math/grab";
 import type { Command } from "../state/commands";
+import type { Gesture } from "./cardboard/fingers";
 import type { Stick } from "./controllers";
 
 const UP = new Vector3(0, 1, 0);
@@ -18,6 +19,15 @@ const ZOOM_PER_S = 2.5;
 const STEP_RAD = Math.PI / 12;
 const ZOOM = 0.8;
 const STEP_M = 0.1;
+/** Turn by a finger that goes over the height of the screen, radians. */
+const TURN_BY_FINGER_RAD = Math.PI;
+/** Height of an eye's picture as a multiple of the distance: a Cardboard shows 40 degrees up and down. */
+const HEIGHT_OF_VIEW = 2 * Math.tan(MathUtils.degToRad(40));
+/** So near and so far the middle of what is shown may come, m: no way in leads out at the back. */
+const NEAREST_M = 0.1;
+const FARTHEST_M = 5;
+/** Steps in a second of a move that goes on. */
+export const STEPS_PER_S = 3;
 
 /** By holder: its pose now, null where tracking is lost. At most two count. */
 export type Holders<K> = ReadonlyMap<K, HandPose | null>;
@@ -60,12 +70,12 @@ const FACING: Readonly<Partial<Record<Command, Quaternion>>> = {
   side: about(UP, -Math.PI / 2),
   top: about(RIGHT, Math.PI / 2),
 };
-/** Where the camera would go to the left, the specimen turns to the right. */
-const TURNS: Readonly<Partial<Record<Command, Quaternion>>> = {
-  "turn-left": about(UP, STEP_RAD),
-  "turn-right": about(UP, -STEP_RAD),
-  "turn-up": about(RIGHT, STEP_RAD),
-  "turn-down": about(RIGHT, -STEP_RAD),
+/** Where the camera would go to the left, the specimen turns to the right: about which axis. */
+const TURNS: Readonly<Partial<Record<Command, readonly [Vector3, number]>>> = {
+  "turn-left": [UP, STEP_RAD],
+  "turn-right": [UP, -STEP_RAD],
+  "turn-up": [RIGHT, STEP_RAD],
+  "turn-down": [RIGHT, -STEP_RAD],
 };
 
 /** And to the right, where it would go to the left. */
@@ -78,24 +88,81 @@ const SHIFTS: Readonly<Partial<Record<Command, Vector3>>> = {
 
 /**
  * In stereo nobody moves the eyes but the head, so that what would move a camera moves the
- * specimen, about `pivot`. null: the command is another's.
+ * specimen: about `pivot`, or along the line from the eye to it. It comes nearer, as to a camera, and
+ * does not grow: so the distance at which volumes take over can be walked through. Left and right are
+ * those of an eye that looks at the pivot. null: the command is another's.
+ *
+ * @param share of a step
  */
 export function moveByCommand(
   pose: SpecimenPose,
   command: Command,
   pivot: Vector3,
+  eye: Vector3,
+  share = 1,
 ): SpecimenPose | null {
   const facing = FACING[command];
   if (facing !== undefined) {
     return turnAbout(pose, facing.clone().multiply(pose.orientation.clone().invert()), pivot);
   }
+  const toEye = headingTo(pivot, eye);
   const turn = TURNS[command];
-  if (turn !== undefined) return turnAbout(pose, turn, pivot);
-  const shift = SHIFTS[command];
+  if (turn !== undefined) {
+    const [axis, angle] = turn;
+    return turnAbout(pose, about(axis.clone().applyQuaternion(toEye), share * angle), pivot);
+  }
+  const shift = SHIFTS[command]?.clone().multiplyScalar(share).applyQuaternion(toEye);
   if (shift !== undefined) return { ...pose, position: pose.position.clone().add(shift) };
-  if (command === "zoom-in") return zoomAbout(pose, pivot, 1 / ZOOM);
-  if (command === "zoom-out") return zoomAbout(pose, pivot, ZOOM);
+  if (command === "zoom-in") return bringNearer(pose, pivot, eye, ZOOM ** share);
+  if (command === "zoom-out") return bringNearer(pose, pivot, eye, ZOOM ** -share);
   return null;
+}
+
+/**
+ * One finger turns the specimen about `pivot`, two bring it nearer and shift it with their middle.
+ * It follows the fingers: what lies under one in each eye's picture goes with it.
+ */
+export function moveByFingers(
+  pose: SpecimenPose,
+  gesture: Gesture,
+  pivot: Vector3,
+  eye: Vector3,
+): SpecimenPose {
+  if (gesture.kind !== "drag" && gesture.kind !== "pinch") return pose;
+  const { x, y } = gesture;
+  const toEye = headingTo(pivot, eye);
+  if (gesture.kind === "drag") {
+    const right = RIGHT.clone().applyQuaternion(toEye);
+    const turn = about(UP, TURN_BY_FINGER_RAD * x).multiply(about(right, TURN_BY_FINGER_RAD * y));
+    return turnAbout(pose, turn, pivot);
+  }
+  const near = bringNearer(pose, pivot, eye, 1 / gesture.factor);
+  const height_m = pivot.distanceTo(eye) * HEIGHT_OF_VIEW;
+  const shift = new Vector3(x, -y, 0).multiplyScalar(height_m).applyQuaternion(toEye);
+  return { ...near, position: near.position.clone().add(shift) };
+}
+
+/** With the pivot's distance from the eye multiplied by a factor, within limits. */
+function bringNearer(
+  pose: SpecimenPose,
+  pivot: Vector3,
+  eye: Vector3,
+  factor: number,
+): SpecimenPose {
+  const away = pivot.clone().sub(eye);
+  const distance = away.length();
+  if (distance === 0) return pose;
+  const wanted = MathUtils.clamp(distance * factor, NEAREST_M, FARTHEST_M);
+  // what hands have put beyond a limit goes no further, and does not jump
+  const next = factor < 1 ? Math.min(distance, wanted) : Math.max(distance, wanted);
+  const by = away.multiplyScalar(next / distance - 1);
+  return { ...pose, position: pose.position.clone().add(by) };
+}
+
+/** The turn about the vertical of an eye that looks from `eye` to `pivot`; none straight below it. */
+function headingTo(pivot: Vector3, eye: Vector3): Quaternion {
+  const { x, z } = pivot.clone().sub(eye);
+  return about(UP, Math.hypot(x, z) < NEAREST_M ? 0 : Math.atan2(-x, -z));
 }
 
 function about(axis: Vector3, angle: number): Quaternion {

@@ -21,9 +21,16 @@ import type { Specimen } from "../render/specimen_pose";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
+import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
 import { Controllers, type Hand, type HandEvent } from "./controllers";
-import { moveByCommand, moveByHolders, moveByStick } from "./hold_specimen";
+import {
+  moveByCommand,
+  moveByFingers,
+  moveByHolders,
+  moveByStick,
+  STEPS_PER_S,
+} from "./hold_specimen";
 import { RoomNotice } from "./panel/notice";
 import { RoomPanel } from "./panel/panel";
 import { hullOf, middleOf } from "./shown_hull";
@@ -58,6 +65,13 @@ type Press = {
   isUsed: boolean;
 };
 
+/** `source`: of the button that is held; null: the gaze stays. */
+type GoesOn = {
+  readonly met: Met;
+  readonly source: XRInputSource | "finger" | null;
+  elapsed_s: number;
+};
+
 export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
@@ -74,6 +88,11 @@ export class Hands {
   private taps = 0;
   private isRunning = false;
   private shown = "";
+  private gestures: Gesture[] = [];
+  /** A finger that rests on the split screen. */
+  private touched: { isUsed: boolean } | null = null;
+  /** What is gone on with. */
+  private goesOn: GoesOn | null = null;
 
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
@@ -93,11 +112,11 @@ export class Hands {
 
   /** What is no opaque thing, which the pass for the depth has to leave out. */
   get overlays() {
-    return [this.ring.group, this.notice.mesh];
+    return [this.panel.group, this.ring.group, this.notice.mesh];
   }
 
   private get groups() {
-    return [this.panel.group, this.controllers.group, ...this.overlays];
+    return [this.controllers.group, ...this.overlays];
   }
 
   /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
@@ -130,14 +149,22 @@ export class Hands {
     this.presses.clear();
     this.held.clear();
     this.taps = 0;
+    this.gestures = [];
+    this.touched = null;
+    this.goesOn = null;
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
   }
 
-  /** The only button of the split screen. */
+  /** The only button of the split screen, or a key in its place. */
   tap(): void {
     this.taps++;
+  }
+
+  /** What fingers do on the split screen. */
+  touch(gesture: Gesture): void {
+    this.gestures.push(gesture);
   }
 
   /** Say something where the head looks. */
@@ -145,10 +172,11 @@ export class Hands {
     if (this.isRunning) this.notice.announce(text);
   }
 
-  /** What would move the camera of a flat screen; false: the command is another's. */
-  run(command: Command, state: ViewerState): boolean {
+  /** What would move the camera of a flat screen, by a step; false: the command is another's. */
+  run(command: Command, state: ViewerState, share = 1): boolean {
     const { specimen } = this.options;
-    const pose = moveByCommand(specimen.pose, command, middleOf(this.around(state)));
+    const pivot = middleOf(this.around(state));
+    const pose = moveByCommand(specimen.pose, command, pivot, this.gaze.origin, share);
     if (pose === null) return false;
     specimen.moveTo(pose, this.gaze.origin);
     return true;
@@ -163,17 +191,22 @@ export class Hands {
     this.tiles.clip = state.clip;
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
+    const hasTouched = this.followFingers(state);
     for (; this.taps > 0; this.taps--) this.press(this.gaze);
     this.forgetTheLost();
     const hasHeld = this.hold(dt_s);
-    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld;
+    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched;
     const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
     const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
-    if (fired !== null) this.choose(fired);
+    if (fired !== null) {
+      this.choose(fired);
+      if (fired.repeats !== undefined) this.goesOn = { met: fired, source: null, elapsed_s: 0 };
+    }
+    const hasGone = this.goOn(dt_s, state);
     const hasCarried = this.carry.follow(this.gaze);
-    return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasCarried;
+    return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasGone || hasCarried;
   }
 
   dispose(): void {
@@ -226,8 +259,30 @@ export class Hands {
     // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
     const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
     if (met !== null && isUsed) met.target.choose(met, met.ray);
+    if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
     return { met, at, elapsed_s: 0, isUsed };
+  }
+
+  /** What fingers on the split screen have done since the frame before; whether anything has moved. */
+  private followFingers(state: ViewerState): boolean {
+    const { specimen } = this.options;
+    const before = specimen.pose;
+    for (const gesture of this.gestures.splice(0)) {
+      if (gesture.kind === "press") {
+        this.touched = { isUsed: false };
+        const met = meetFirst(this.gaze, this.free);
+        if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
+      } else if (gesture.kind === "release") this.touched = null;
+      else if (gesture.kind === "tap") {
+        if (this.touched?.isUsed === false) this.taps++;
+      } else {
+        const pivot = middleOf(this.around(state));
+        const pose = moveByFingers(specimen.pose, gesture, pivot, this.gaze.origin);
+        specimen.moveTo(pose, this.gaze.origin);
+      }
+    }
+    return specimen.pose !== before;
   }
 
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
@@ -279,6 +334,24 @@ export class Hands {
     if (!isFar && press.elapsed_s < HOLD_S) return;
     press.isUsed = true;
     this.held.set(source, null);
+  }
+
+  /** What was chosen by a gaze that stays, or a button that is held, goes on; whether it has moved. */
+  private goOn(dt_s: number, state: ViewerState): boolean {
+    const { goesOn } = this;
+    if (goesOn === null) return false;
+    const { met, source } = goesOn;
+    const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
+    const isHeld = source === null || press != null;
+    const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.gaze;
+    if (!isHeld || meetFirst(ray, this.free)?.key !== met.key || met.repeats === undefined) {
+      this.goesOn = null;
+      return false;
+    }
+    goesOn.elapsed_s += dt_s;
+    if (goesOn.elapsed_s < HOLD_S) return false;
+    if (press != null) press.isUsed = true; // letting go of it is no further step
+    return this.run(met.repeats, state, STEPS_PER_S * dt_s);
   }
 
   private moveBySticks(dt_s: number, state: ViewerState): boolean {

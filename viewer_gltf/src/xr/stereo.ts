@@ -75,7 +75,7 @@ export class Stereo {
       this.renderer,
       () => this.begin(null),
       () => this.leave(),
-      () => this.hands.tap(),
+      (gesture) => this.hands.touch(gesture),
     );
   }
 

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { findXrSupport } from "./support";
+import { findXrSupport, wayToStereo } from "./support";
 
 const system = (answer: () => Promise<boolean>) => ({ isSessionSupported: answer });
 
@@ -25,5 +25,14 @@ describe("stereo", () => {
     ).toContain("No headset");
     const refuse = () => Promise.reject(new DOMException("policy", "SecurityError"));
     expect(await reasonOf(system(refuse), true)).toContain("refuses WebXR here: policy");
+  });
+});
+
+describe("the button on the picture", () => {
+  it("leads to a headset, on a phone without one to the split screen, else nowhere", () => {
+    const had = { isAvailable: true, reason: "" };
+    const none = { isAvailable: false, reason: "none" };
+    expect([wayToStereo(had, true), wayToStereo(had, false)]).toEqual(["stereo", "stereo"]);
+    expect([wayToStereo(none, true), wayToStereo(none, false)]).toEqual(["split", null]);
   });
 });

@@ -1,6 +1,12 @@
 /** Whether a headset can be used, and if not, why, in words. */
 import type { XrSupport } from "../state/stereo";
 
+/** What leads into stereo here at a touch; null: nothing that would be of use. */
+export function wayToStereo({ isAvailable }: XrSupport, isPhone: boolean) {
+  if (isAvailable) return "stereo";
+  return isPhone ? "split" : null;
+}
+
 /** @param xr `navigator.xr`, absent in browsers without WebXR or outside a secure context */
 export async function findXrSupport(
   xr: Pick<XRSystem, "isSessionSupported"> | undefined,

@@ -23,12 +23,6 @@ describeInChromium("marks", () => {
     browser = await openBrowser({ viewport: { width: WIDTH, height: HEIGHT } });
     const built = await bundled(new URL("../support/annotations/harness.ts", import.meta.url));
     script = built.replaceAll("{}.url", "location.href"); // a classic script has no import.meta
-  });
-
-  afterAll(() => browser?.close());
-
-  beforeEach(async () => {
-    await page?.close();
     page = await browser.context.newPage();
     // a page with an address: a worker's address is relative to it
     await page.route("http://marks.test/", (route) =>
@@ -37,6 +31,13 @@ describeInChromium("marks", () => {
         body: '<main class="view"><div class="stage"></div></main>',
       }),
     );
+  });
+
+  afterAll(() => browser?.close());
+
+  beforeEach(async () => {
+    await page.goto("about:blank");
+    await page.mouse.move(-1, -1);
     await page.goto("http://marks.test/");
     for (const sheet of ["panel/html/page.css", "annotations/annotations.css"]) {
       const content = await readFile(new URL(`../../src/${sheet}`, import.meta.url), "utf8");

@@ -47,10 +47,10 @@ function centerOf(tile: string): Vec3 {
 
 const plus = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 
-/** Show one channel alone. */
+/** Show one channel alone; the others go first, so that few are drawn on the way. */
 async function only(stand: Stand, id: string, as: "surface" | "volume"): Promise<Picture> {
   for (const channel of stand.manifest.channels) {
-    await stand.viewer.show(channel.id, channel.id === id);
+    if (channel.id !== id) await stand.viewer.show(channel.id, false);
   }
   await stand.viewer.showAs(id, as);
   return takePicture(stand.viewer.page);
@@ -134,7 +134,13 @@ describeInChromium("an artist's layer over the stage", () => {
   });
 
   describe("the layer", () => {
-    const stand = prepareStand({ bundle: EDITED, viewport: VIEWPORT });
+    const stand = prepareStand({ bundle: EDITED, viewport: VIEWPORT, sharesPage: true });
+    let isOpen = false;
+    /** The page as an earlier test left it: each chooses all that it looks at. */
+    async function openOnce(): Promise<void> {
+      if (!isOpen) await stand.open();
+      isOpen = true;
+    }
 
     /** Whether a pixel lies where the edits change the silhouettes, those of a coarse surface too. */
     function isTouched(picture: Picture, x: number, y: number): boolean {
@@ -148,10 +154,53 @@ describeInChromium("an artist's layer over the stage", () => {
       });
     }
 
+    async function chooseQuality(level: "low" | "high"): Promise<void> {
+      await stand.viewer.unfold("quality");
+      const choice = stand.viewer.page.locator(`[data-quality="${level}"]`);
+      await choice.check({ force: true });
+      await stand.viewer.settled();
+    }
+
+    /** The greatest difference of two pictures of the balls in one tile's. */
+    function apartIn(tile: string, a: Picture, b: Picture): number {
+      const { x, y, radius } = spot(a, stand.manifest, centerOf(tile));
+      let farthest = 0;
+      for (let dy = -Math.ceil(1.4 * radius); dy <= 1.4 * radius; dy++) {
+        for (let dx = -Math.ceil(1.4 * radius); dx <= 1.4 * radius; dx++) {
+          if (Math.hypot(dx, dy) >= 1.4 * radius) continue;
+          farthest = Math.max(farthest, apart(a, b, x + dx, y + dy));
+        }
+      }
+      return farthest;
+    }
+
+    it("opens with a tile as its volume and no surface, one as both, the others as surfaces", async () => {
+      await stand.open(); // anew: this is of how it opens
+      isOpen = true;
+      await stand.viewer.show("Slab", false);
+      await stand.viewer.show("Sheet", false);
+      const opened = await takePicture(stand.viewer.page);
+      const [surface, volume] = ["surface", "volume"].map((as) => remembered(`balls as a ${as}`));
+      expect(apartIn(AS_VOLUME, opened, volume)).toBeLessThanOrEqual(2);
+      expect(apartIn(AS_VOLUME, opened, surface)).toBeGreaterThan(20);
+      expect(apartIn(PLAIN, opened, surface)).toBeLessThanOrEqual(2);
+      expect(apartIn(PLAIN, opened, volume)).toBeGreaterThan(20);
+      expect(apartIn(AS_BOTH, opened, surface)).toBeGreaterThan(20);
+      expect(apartIn(AS_BOTH, opened, volume)).toBeGreaterThan(20);
+      const { volumes } = await stand.viewer.snapshot();
+      expect(volumes.map(({ tile }) => tile).sort()).toEqual([AS_BOTH, AS_VOLUME]);
+
+      // the user has the last word
+      await stand.viewer.drawVolume("Balls", false);
+      const asked = await takePicture(stand.viewer.page);
+      expect(apartIn(AS_VOLUME, asked, surface)).toBeLessThanOrEqual(2);
+      expect(apartIn(AS_BOTH, asked, surface)).toBeLessThanOrEqual(2);
+    });
+
     it.each(["surface", "volume"] as const)(
       "recolours the balls, hides one and moves another, as a %s, and leaves the others",
       async (as) => {
-        await stand.open();
+        await openOnce();
         const before = remembered(`balls as a ${as}`);
         const after = await only(stand, "Balls", as);
         const at = (point: Vec3) => spot(after, stand.manifest, point);
@@ -187,43 +236,9 @@ describeInChromium("an artist's layer over the stage", () => {
       },
     );
 
-    /** The greatest difference of two pictures of the balls in one tile's. */
-    function apartIn(tile: string, a: Picture, b: Picture): number {
-      const { x, y, radius } = spot(a, stand.manifest, centerOf(tile));
-      let farthest = 0;
-      for (let dy = -Math.ceil(1.4 * radius); dy <= 1.4 * radius; dy++) {
-        for (let dx = -Math.ceil(1.4 * radius); dx <= 1.4 * radius; dx++) {
-          if (Math.hypot(dx, dy) >= 1.4 * radius) continue;
-          farthest = Math.max(farthest, apart(a, b, x + dx, y + dy));
-        }
-      }
-      return farthest;
-    }
-
-    it("opens with a tile as its volume and no surface, one as both, the others as surfaces", async () => {
-      await stand.open();
-      await stand.viewer.show("Slab", false);
-      await stand.viewer.show("Sheet", false);
-      const opened = await takePicture(stand.viewer.page);
-      const [surface, volume] = ["surface", "volume"].map((as) => remembered(`balls as a ${as}`));
-      expect(apartIn(AS_VOLUME, opened, volume)).toBeLessThanOrEqual(2);
-      expect(apartIn(AS_VOLUME, opened, surface)).toBeGreaterThan(20);
-      expect(apartIn(PLAIN, opened, surface)).toBeLessThanOrEqual(2);
-      expect(apartIn(PLAIN, opened, volume)).toBeGreaterThan(20);
-      expect(apartIn(AS_BOTH, opened, surface)).toBeGreaterThan(20);
-      expect(apartIn(AS_BOTH, opened, volume)).toBeGreaterThan(20);
-      const { volumes } = await stand.viewer.snapshot();
-      expect(volumes.map(({ tile }) => tile).sort()).toEqual([AS_BOTH, AS_VOLUME]);
-
-      // the user has the last word
-      await stand.viewer.drawVolume("Balls", false);
-      const asked = await takePicture(stand.viewer.page);
-      expect(apartIn(AS_VOLUME, asked, surface)).toBeLessThanOrEqual(2);
-      expect(apartIn(AS_BOTH, asked, surface)).toBeLessThanOrEqual(2);
-    });
-
     it("draws a tile at the level of detail that was chosen, and the others finer", async () => {
-      await stand.open("&quality=high");
+      await openOnce();
+      await chooseQuality("high");
       const picture = await only(stand, "Balls", "surface");
       const tiles = [AS_BOTH, AS_VOLUME, COARSE, MOVED, PLAIN];
       const sums = [0, 1, 2].map(async (level) => {
@@ -235,12 +250,14 @@ describeInChromium("an artist's layer over the stage", () => {
       // all balls are alike, so all others are drawn at one level, as fine as the view asks
       expect(await Promise.all(sums)).toContain((await stand.viewer.snapshot()).triangles);
       expect(apartIn(COARSE, picture, remembered("balls as a surface"))).toBeGreaterThan(40);
+      await chooseQuality("low");
     });
 
     it("makes a block as opaque as its new opacity points", async () => {
-      await stand.open();
+      await openOnce();
+      await only(stand, "Slab", "volume");
       await stand.viewer.recolor("Slab", "#ffffff");
-      const picture = await only(stand, "Slab", "volume");
+      const picture = await takePicture(stand.viewer.page);
       const point = centerOf("r1_c0");
       const { specimen } = stand.manifest;
       const { cosine } = project(point, specimen.bounds_um, picture.width, picture.height);
@@ -250,7 +267,7 @@ describeInChromium("an artist's layer over the stage", () => {
     });
 
     it("opens with the transfer function of the chosen variant", async () => {
-      await stand.open();
+      await openOnce();
       const chosen = await only(stand, "Sheet", "volume");
       // In a tile that was neither hidden nor moved: as if a person had chosen it in the panel.
       const { x, y, radius } = spot(chosen, stand.manifest, centerOf("r1_c0"));

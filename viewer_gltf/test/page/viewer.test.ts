@@ -1,7 +1,7 @@
 /** The built viewer in headless Chromium, on the synthetic fixture and on the demo's bundle. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { expect, it } from "vitest";
+import { beforeAll, expect, it } from "vitest";
 import { addHeadset } from "../support/browser/chromium";
 import { hasColor, isBackground, type Pixel, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
@@ -21,14 +21,30 @@ async function showOnly({ viewer }: Stand, id: string): Promise<void> {
 }
 
 describeInChromium("the demo", () => {
-  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: VIEWPORT });
+  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: VIEWPORT, sharesPage: true });
+  /** Of the requests that the page made until it had all: levels of surfaces, in their order. */
+  let lods: readonly number[];
+
+  beforeAll(async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    lods = stand.host.requests.flatMap(({ path }) => {
+      const lod = /\/lod(\d+)\.glb$/.exec(path)?.[1];
+      return lod === undefined ? [] : [Number(lod)];
+    });
+  });
+
+  it("fetches every tile's coarsest surface before any finer one", () => {
+    const coarsest = Math.max(...lods);
+    const first = lods.findIndex((lod) => lod < coarsest);
+    const overview = first === -1 ? lods : lods.slice(0, first);
+    expect(overview.length).toBe(lods.filter((lod) => lod === coarsest).length);
+  });
 
   it("loads the bundle and draws each channel in its colour", async () => {
-    await stand.open();
     const { overview } = await stand.viewer.snapshot();
     expect(overview.isComplete).toBe(true);
     expect(overview.total).toBeGreaterThan(0);
-    await stand.viewer.settled();
     const all = await takePicture(stand.viewer.page);
     expect(all.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     for (const { id, color } of withSurface(stand)) {
@@ -37,18 +53,6 @@ describeInChromium("the demo", () => {
         100,
       );
     }
-  });
-
-  it("fetches every tile's coarsest surface before any finer one", async () => {
-    await stand.open();
-    await stand.viewer.settled();
-    const lods = stand.host.requests.flatMap(
-      ({ path }) => /\/lod(\d+)\.glb$/.exec(path)?.[1] ?? [],
-    );
-    const coarsest = Math.max(...lods.map(Number));
-    const first = lods.findIndex((lod) => Number(lod) < coarsest);
-    const overview = first === -1 ? lods : lods.slice(0, first);
-    expect(overview.length).toBe(lods.filter((lod) => Number(lod) === coarsest).length);
   });
 });
 

@@ -96,12 +96,14 @@ describeInChromium("the path-traced page", () => {
   async function press(...keys: readonly string[]): Promise<void> {
     for (const key of keys) await page().keyboard.press(key);
   }
-  /** Of a picture with no announcement over it. */
+  /** Of so many samples at least, also where they began anew in between. */
   async function shoot(least = 5): Promise<Picture> {
-    await gathered(least);
-    const said = () => page().locator("[data-said]").textContent();
-    await expect.poll(said, PATIENT).toBe("");
-    return takePicture(page());
+    await stand.viewer.settled();
+    for (;;) {
+      await gathered(least);
+      const picture = await takePicture(page());
+      if ((await samples()) >= least) return picture;
+    }
   }
 
   it("shows a scan, gathers, and changes only what a key or a slider is for", async () => {

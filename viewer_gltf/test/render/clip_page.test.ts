@@ -251,10 +251,6 @@ describeInChromium("a cut", () => {
     const eye = eyeOf("side", AWAY_M, 40, whole);
     const press = async (key: string) => {
       await page().keyboard.press(key);
-      // the page's announcement of it lies over the picture
-      await expect
-        .poll(() => page().locator("[data-said]").textContent(), { timeout: 30_000 })
-        .toBe("");
       await stand.viewer.still();
       return takePicture(page());
     };

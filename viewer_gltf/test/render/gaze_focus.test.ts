@@ -22,7 +22,13 @@ describeInChromium("surface or volume", () => {
     return takePicture(stand.viewer.page);
   }
 
-  const as = (mode: Mode) => pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}`);
+  const drawn = new Map<Mode, Picture>();
+  /** Drawn once for all tests that look at it. */
+  async function as(mode: Mode): Promise<Picture> {
+    const picture = drawn.get(mode) ?? (await pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}`));
+    drawn.set(mode, picture);
+    return picture;
+  }
 
   /** How many pixels of a ring round the middle differ by more than `by`. */
   function apart(a: Picture, b: Picture, from_deg: number, to_deg: number, by = 2): number {

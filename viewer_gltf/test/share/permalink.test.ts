@@ -37,7 +37,6 @@ describeInChromium("the share link", () => {
     await viewer.chooseMode("all");
     for (const key of ["n", "j", "p", "l"]) await page().keyboard.press(key);
     await viewer.still();
-    await expect.poll(said, { timeout: 10_000 }).toBe(""); // it lies over the picture
     const [before, picture] = [viewOf(await viewer.snapshot()), await takePicture(page())];
     const address = page().url();
     expect(address).toContain("#v=1&");
@@ -65,10 +64,8 @@ describeInChromium("the share link", () => {
       const parts = new URLSearchParams((await hash()).slice(1));
       return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
     };
-    const silent = async () => {
-      await expect.poll(said, { timeout: 10_000 }).toBe(""); // it lies over the picture
-      await expect.poll(told, { timeout: 20_000 }).toEqual([]);
-    };
+    /** What is announced before the eyes has gone. */
+    const silent = () => expect.poll(told, { timeout: 20_000 }).toEqual([]);
     const told = async () => (await stand.viewer.snapshot()).told;
     const expectSame = (found: readonly number[], wanted: readonly number[]) => {
       expect(found).toHaveLength(wanted.length);
@@ -91,7 +88,8 @@ describeInChromium("the share link", () => {
     const moved = await written();
     expect(moved).toHaveLength(flat.length + 8);
     expect(moved.slice(0, 6)).toEqual(flat.slice(0, 6));
-    expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2); // and not a headset's metre away
+    // nearer by a fifth of a headset's 1.1 m, and not by that metre itself
+    expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2 + 0.2 * 1.1);
     const address = page().url();
 
     await press("V");

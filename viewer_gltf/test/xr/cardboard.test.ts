@@ -232,10 +232,22 @@ describeInChromium("stereo without WebXR", () => {
     expect(await page.locator("#stage").evaluate(({ clientWidth }) => clientWidth)).toBe(WIDTH);
   });
 
-  it("takes a tap as a selection", async () => {
+  it("takes a tap as its button, once the finger is up", async () => {
     await start();
-    await page.mouse.click(500, 100);
-    expect((await status()).log).toEqual(["start", "select"]);
+    await page.mouse.move(500, 100);
+    await page.mouse.down();
+    expect((await status()).log).toEqual(["start", "press"]);
+    await page.mouse.up();
+    expect((await status()).log).toEqual(["start", "press", "tap", "release"]);
+  });
+
+  it("takes a drag for no tap", async () => {
+    await start();
+    await page.mouse.move(500, 100);
+    await page.mouse.down();
+    await page.mouse.move(560, 100);
+    await page.mouse.up();
+    expect((await status()).log).toEqual(["start", "press", "release", "drag"]);
   });
 
   it.each([

@@ -238,3 +238,59 @@ describeInChromium("the gaze in stereo", () => {
     expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r0_c2"]);
   });
 });
+
+describeInChromium("the page of moves", () => {
+  const hands = prepareHands();
+  const away = async () => Math.hypot(...(await hands().status()).position);
+
+  async function openMoves(): Promise<void> {
+    await hands().openPanel();
+    await hands().wait(0.1);
+    await hands().lookAt(await hands().controlAt("tab=move"));
+    await hands().tap();
+    await hands().wait(0.1);
+  }
+
+  it("brings the specimen near by a gaze that stays, and stops when it leaves", async () => {
+    await hands().gazeOnly();
+    await openMoves();
+    const before = await away();
+    await hands().lookAt(await hands().controlAt("nearer"));
+    await hands().wait(1.4);
+    expect(await away()).toBe(before);
+    await hands().wait(0.1);
+    const stepped = await away();
+    expect(stepped).toBeLessThan(before); // a step at once, so that a short look is one
+    await hands().wait(0.25);
+    expect(await away()).toBe(stepped);
+    await hands().wait(2);
+    const near = await away();
+    expect(near).toBeLessThan(0.5 * stepped);
+    expect((await hands().status()).scale).toBe(1); // nearer, not larger: so volumes come
+    await hands().lookAt(AWAY);
+    await hands().wait(1);
+    expect(await away()).toBe(near);
+  });
+
+  it("takes a tap as one step, and what is held by a trigger as many", async () => {
+    await hands().gazeOnly();
+    await openMoves();
+    const at = await hands().controlAt("shift-right");
+    await hands().lookAt(at);
+    const x = async () => (await hands().status()).position[0];
+    const before = await x();
+    await hands().tap();
+    await hands().wait(1);
+    expect(await x()).toBeCloseTo(before + 0.1, 6);
+    await hands().lookAt(AWAY);
+    await hands().connect("right", true);
+    await hands().point("right", RIGHT, at);
+    await hands().button("right", "trigger", 1);
+    await hands().wait(1.35);
+    const held = await x();
+    expect(held).toBeGreaterThan(before + 0.3);
+    await hands().button("right", "trigger", 0);
+    await hands().wait(1);
+    expect(await x()).toBe(held);
+  });
+});

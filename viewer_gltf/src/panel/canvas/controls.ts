@@ -1,9 +1,20 @@
 /**
  * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
-import type { Control, Group, Toggle } from "../controls";
+import type { Button, Control, Group, Toggle } from "../controls";
 import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
-import { type Block, box, type Mark, type Rect, type Region, ROW, SMALL, text } from "./draw_list";
+import {
+  type Block,
+  box,
+  GAP,
+  type Mark,
+  type Rect,
+  type Region,
+  ROW,
+  SMALL,
+  split,
+  text,
+} from "./draw_list";
 import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
 import { sliderRow, windowRow } from "./sliders";
 import { histogramBlock } from "./transfer_function_2d";
@@ -29,15 +40,7 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "toggle":
       return [toggleRow(item, row)];
     case "button":
-      return [
-        one(
-          [
-            box(row, item.isPrimary && !item.refusal ? "accent" : "raised"),
-            text(row, item.label, { align: "center", tone: toneOf(item, item.isPrimary) }),
-          ],
-          unlessRefused(item, [region(item.id, item.label, row, item.to)]),
-        ),
-      ];
+      return [buttonIn(item, row)];
     case "slider":
       return [sliderRow(item, row)];
     case "window":
@@ -56,6 +59,39 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "link":
       return [];
   }
+}
+
+/** The blocks of a section; buttons that go on while they are held share a row with their opposite. */
+export function blocksOfAll(items: readonly (Control | Group)[], width: number): readonly Block[] {
+  const blocks: Block[] = [];
+  for (let i = 0; i < items.length; i++) {
+    const [item, next] = [items[i], items[i + 1]];
+    if (isRepeating(item) && next !== undefined && isRepeating(next)) {
+      const rects = split({ x: 0, y: 0, width, height: ROW }, 2);
+      const [left, right] = [buttonIn(item, rects[0]), buttonIn(next, rects[1])];
+      blocks.push(
+        one([...left.marks, ...right.marks], [...left.regions, ...right.regions], ROW + GAP),
+      );
+      i++;
+    } else blocks.push(...blocksOf(item, width));
+  }
+  return blocks;
+}
+
+function isRepeating(item: Control | Group): item is Button {
+  return item.kind === "button" && item.repeats !== undefined;
+}
+
+function buttonIn(item: Button, rect: Rect): Block {
+  const place = region(item.id, item.name ?? item.label, rect, item.to);
+  const { repeats } = item;
+  return one(
+    [
+      box(rect, item.isPrimary && !item.refusal ? "accent" : "raised"),
+      text(rect, item.label, { align: "center", tone: toneOf(item, item.isPrimary) }),
+    ],
+    unlessRefused(item, [repeats === undefined ? place : { ...place, repeats }]),
+  );
 }
 
 function toggleRow(toggle: Toggle, row: Rect): Block {

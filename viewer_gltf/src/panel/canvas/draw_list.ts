@@ -1,5 +1,6 @@
 /** What the panel on a canvas is made of: marks to paint and regions to point at. Pixels. Pure. */
 
+import type { Command } from "../../state/commands";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import type { Wish } from "../controls";
 
@@ -63,6 +64,8 @@ export type Region = Readonly<{
   to: (across: number, down?: number) => CanvasWish | null;
   /** What taking hold of it does, where that is something else than to drag it. */
   press?: (across: number, down: number) => CanvasWish;
+  /** Goes on, little by little, while it is held or gazed at. */
+  repeats?: Command;
 }>;
 
 /** A row, or what must not be broken; its upper left corner is 0, 0. */

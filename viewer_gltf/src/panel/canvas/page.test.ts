@@ -33,7 +33,18 @@ const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
   layOut(state, FACTS, { ...START_VIEW, ...view });
 
 const TABS = [
-  ...["channels", "volumes", "light", "tiles", "view", "stereo", "measure", "cut", "quality"],
+  ...[
+    "channels",
+    "volumes",
+    "light",
+    "tiles",
+    "view",
+    "move",
+    "stereo",
+    "measure",
+    "cut",
+    "quality",
+  ],
 ];
 
 /** Every page of every section. */
@@ -112,6 +123,55 @@ describe("the panel on a plane", () => {
         }
       }
     }
+  });
+
+  it("has a way for every control of the flat panel, but for what needs a keyboard or the page", () => {
+    const view = { ...START_VIEW, picked: "c2", isHistogramOpen: true, lenses: "own" } as const;
+    const traced = reduce(start(), { type: "set", id: "mode", value: "traced" });
+    const offered = new Set<string>();
+    const inStereo = new Set<string>();
+    for (const state of [start(), traced]) {
+      const split = { isAvailable: true, reason: "" };
+      const flat = layOut(state, { ...FACTS, isStereo: false, split, canScan: true }, view);
+      for (const item of flat.sections.flatMap(({ items }) => items)) {
+        const all = item.kind === "group" ? [...item.controls, ...item.more] : [item];
+        for (const { id, kind, refusal } of item.kind !== "group" || item.isOpen ? all : []) {
+          if (kind !== "text" && !refusal) offered.add(id);
+        }
+      }
+      for (const { regions } of allPages(state, view)) {
+        for (const { id } of regions) inStereo.add(id.split("=")[0]);
+      }
+    }
+    const missing = [...offered].filter((id) => !inStereo.has(id)).sort();
+    // the way in, which is taken; the list of keys; a link, of which a headset has no clipboard; typing;
+    // a file of the user's
+    expect(missing).toEqual(
+      [
+        "stereo",
+        "lenses",
+        "lens-code",
+        "scan",
+        "split",
+        "share",
+        "help",
+        "find-channel",
+        "own-light",
+      ].sort(),
+    );
+  });
+
+  it("has all ten moves on one page, each going on while it is held", () => {
+    const { regions } = pageOf(laidOut(start()), { tab: "move", page: 0 });
+    const moves = regions.filter(({ repeats }) => repeats !== undefined);
+    expect(new Set(moves.map((move) => move.repeats))).toEqual(
+      new Set([
+        ...["zoom-in", "zoom-out", "turn-left", "turn-right", "turn-up", "turn-down"],
+        ...["pan-left", "pan-right", "pan-up", "pan-down"],
+      ]),
+    );
+    for (const move of moves) expect(move.to(0.5)).toBe(move.repeats);
+    expect(regions.some(({ id }) => id === "more")).toBe(false);
   });
 
   it("reports why something is refused", () => {

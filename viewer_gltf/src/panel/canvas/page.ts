@@ -3,7 +3,7 @@
  * large enough for the gaze. Pure.
  */
 import type { Layout, Section } from "../controls";
-import { blocksOf } from "./controls";
+import { blocksOfAll } from "./controls";
 import {
   type Block,
   box,
@@ -42,7 +42,7 @@ export type Page = Readonly<{ marks: readonly Mark[]; regions: readonly Region[]
 /** A section with nothing for a headset is left out. */
 function shownSections({ sections }: Layout): readonly (readonly [Section, readonly Block[]])[] {
   return sections
-    .map((each) => [each, each.items.flatMap((item) => blocksOf(item, CONTENT.width))] as const)
+    .map((each) => [each, blocksOfAll(each.items, CONTENT.width)] as const)
     .filter(([, blocks]) => blocks.length > 0);
 }
 

@@ -28,7 +28,7 @@ export function unlessRefused(
 ): readonly Region[] {
   if (!refusal) return regions;
   const to = () => ({ canvas: "announce", text: refusal }) as const;
-  return regions.map(({ press: _, ...each }) => ({ ...each, isSlide: false, to }));
+  return regions.map(({ press: _, repeats: __, ...each }) => ({ ...each, isSlide: false, to }));
 }
 
 export function toneOf({ refusal }: Pick<Control, "refusal">, isOnAccent = false) {

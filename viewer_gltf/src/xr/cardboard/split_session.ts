@@ -29,6 +29,7 @@ import {
 import { BundleError } from "../../bundle/errors";
 import { DistortionPass } from "./distortion_pass";
 import { type Eye, EyeCameras } from "./eye_cameras";
+import { type Gesture, listenForFingers } from "./fingers";
 import { cssPixelsPerInch, screenOf } from "./lens";
 import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
 import type { ScreenHold } from "./screen";
@@ -58,7 +59,7 @@ export class SplitSession {
     private readonly renderer: WebGLRenderer,
     private readonly onStart: () => void,
     private readonly onEnd: () => void,
-    private readonly onSelect: () => void,
+    private readonly onGesture: (gesture: Gesture) => void,
     private readonly options: SplitOptions = { cssPixelsPerInch: null },
   ) {
     const { stencil = false } = renderer.getContext().getContextAttributes() ?? {};
@@ -96,7 +97,7 @@ export class SplitSession {
     if (this.running !== null) return;
     this.profile = profile;
     this.layout = "";
-    const running = new Running(asked, () => this.end(), this.onSelect);
+    const running = new Running(asked, () => this.end(), this.onGesture);
     this.running = running;
     const [found, { problems }] = await Promise.all([asked.orientation, asked.screen]);
     if (this.running !== running) return; // ended while the browser asked
@@ -171,7 +172,7 @@ class Running {
   /** Its own number, since a page that was loaded again keeps the state of its last session. */
   private readonly step = Math.random();
 
-  constructor({ stage, screen }: Asked, end: () => void, select: () => void) {
+  constructor({ stage, screen }: Asked, end: () => void, onGesture: (gesture: Gesture) => void) {
     const { signal } = this.stopped;
     this.stage = stage;
     this.hold = screen;
@@ -185,7 +186,7 @@ class Running {
       height: "100%",
       zIndex,
     });
-    stage.addEventListener("pointerdown", select, { signal });
+    listenForFingers(stage, onGesture, signal);
     const onKey = (event: KeyboardEvent) => {
       if (event.key !== "Escape") return;
       event.preventDefault(); // on the page the key means another step back

@@ -71,6 +71,15 @@ export class CanvasQuad {
     this.mesh.add(this.lit);
   }
 
+  /** Draw it over all that has a lower render order, also over what is nearer. */
+  drawOver(renderOrder: number): void {
+    for (const [i, mesh] of [this.mesh, this.lit].entries()) {
+      mesh.material.transparent = true;
+      mesh.material.depthTest = mesh.material.depthWrite = false;
+      mesh.renderOrder = renderOrder + i;
+    }
+  }
+
   /** True if the picture differs from what was painted before. */
   show(marks: readonly Mark[]): boolean {
     const text = JSON.stringify(marks);

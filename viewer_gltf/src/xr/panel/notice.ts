@@ -27,10 +27,7 @@ export class RoomNotice {
   private wantsPlace = false;
 
   constructor() {
-    const { material } = this.quad.mesh;
-    material.transparent = true;
-    material.depthTest = material.depthWrite = false;
-    this.quad.mesh.renderOrder = RENDER_ORDER;
+    this.quad.drawOver(RENDER_ORDER);
     this.quad.mesh.name = "notice";
   }
 

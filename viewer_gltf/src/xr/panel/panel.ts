@@ -19,9 +19,11 @@ import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
 import { CanvasQuad, type Spot } from "./canvas_quad";
-import { extentOf, followHead, headBearing, OPENER_PITCH, placePanel, pointAt } from "./placement";
+import { extentOf, followHead, headBearing, openerPitch, placePanel, pointAt } from "./placement";
 
 const DISTANCE_M = 1.2;
+/** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
+const RENDER_ORDER = 1800;
 const OPENER_M = 0.7;
 const OPENER: Rect = { x: 0, y: 0, width: 208, height: 80 };
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
@@ -66,15 +68,16 @@ export class RoomPanel {
     this.group.visible = false;
     this.group.add(this.quad.mesh, this.opener.mesh);
     this.opener.mesh.visible = true;
+    for (const quad of [this.quad, this.opener]) quad.drawOver(RENDER_ORDER);
     this.targets = [
       {
-        isOnTop: false,
+        isOnTop: true,
         meet: (ray) => this.meet(ray),
         choose: (hit, ray) => this.choose(hit, ray),
         drag: (key, ray) => this.drag(key, ray),
       },
       {
-        isOnTop: false,
+        isOnTop: true,
         meet: (ray) => this.meetOpener(ray),
         choose: () => this.toggle(),
       },
@@ -121,7 +124,7 @@ export class RoomPanel {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
     this.openerYaw = followHead(this.openerYaw ?? bearing.yaw, bearing, dt_s);
-    const at = pointAt({ yaw: this.openerYaw, pitch: OPENER_PITCH }, eye, OPENER_M);
+    const at = pointAt({ yaw: this.openerYaw, pitch: openerPitch(this.isOpen) }, eye, OPENER_M);
     this.opener.place(at, eye);
     let isChanged = false;
     if (this.wantsPlace) {
@@ -198,10 +201,12 @@ export class RoomPanel {
     if (spot === null) return null;
     const region = this.regionAt(spot);
     const key = region && PANEL + region.id;
-    if (!region?.isSlide) return { key, distance_m: spot.distance_m };
+    const { distance_m } = spot;
+    if (region?.repeats !== undefined) return { key, distance_m, repeats: region.repeats };
+    if (!region?.isSlide) return { key, distance_m };
     // what is first taken hold of can be carried by the gaze alone
     const hold = region.press === undefined ? "slide" : "carry";
-    return { key, distance_m: spot.distance_m, hold };
+    return { key, distance_m, hold };
   }
 
   private meetOpener(ray: RoomRay): Hit | null {

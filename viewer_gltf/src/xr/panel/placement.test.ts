@@ -1,6 +1,14 @@
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { bearingOf, extentOf, followHead, noticeBearing, placePanel, pointAt } from "./placement";
+import {
+  bearingOf,
+  extentOf,
+  followHead,
+  noticeBearing,
+  openerPitch,
+  placePanel,
+  pointAt,
+} from "./placement";
 
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.3, 1.6, -0.2);
@@ -59,6 +67,13 @@ describe("a notice", () => {
 });
 
 describe("the panel's button", () => {
+  it("hangs where a level gaze finds it, and out of the panel's way while that is open", () => {
+    expect(openerPitch(false)).toBeCloseTo(-30 * DEG, 12);
+    const button = 2 * DEG; // half of its height, 0.7 m away
+    const lowest = -35 * DEG - HALF.pitch;
+    expect(openerPitch(true) + button).toBeLessThan(lowest);
+  });
+
   it("stays while the head turns a little, or looks down", () => {
     expect(followHead(0, { yaw: 0.5, pitch: 0 }, 1)).toBe(0);
     expect(followHead(0, { yaw: 2, pitch: -0.8 }, 1)).toBe(0);

@@ -17,8 +17,12 @@ const LOWEST = -35 * DEG;
 const FARTHEST = 62 * DEG;
 /** Pitch of the panel, radians: the user looks down on it a little, as on a page. */
 const COMFORT = -15 * DEG;
-/** Pitch of the button, radians: under the specimen, and under the panel. */
-export const OPENER_PITCH = -52 * DEG;
+/**
+ * Pitch of the button, radians: as far below a level gaze as eyes and neck go without thinking. While
+ * the panel is open it hangs under that, which may be straight below the specimen.
+ */
+const OPENER_PITCH = -30 * DEG;
+const OPENER_PITCH_WHILE_OPEN = -52 * DEG;
 /** The head turns this far, radians, before the button follows. */
 const SLACK = 35 * DEG;
 /** Pitch of the head, radians: a user who looks down further looks for the button, so it waits. */
@@ -32,6 +36,10 @@ const NOTICE_LOWEST = -60 * DEG;
 
 export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
   return { yaw, pitch: Math.max(pitch - NOTICE_BELOW, Math.min(pitch, NOTICE_LOWEST)) };
+}
+
+export function openerPitch(isPanelOpen: boolean): number {
+  return isPanelOpen ? OPENER_PITCH_WHILE_OPEN : OPENER_PITCH;
 }
 
 export function bearingOf(direction: Vector3): Bearing {

@@ -44,11 +44,11 @@ export function difference(a: Picture, b: Picture): number {
   return differing / (a.width * a.height);
 }
 
-/** Scale bar, axes and names lie over the picture: they are no part of what is measured. */
+/** Scale bar, axes, names and announcements lie over the picture: they are no part of it. */
 export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promise<T> {
   const show = (visibility: string) =>
     page.evaluate((value) => {
-      const marks = ".scale-bar, .orientation-mark, .name-mark";
+      const marks = ".scale-bar, .orientation-mark, .name-mark, .said";
       for (const mark of document.querySelectorAll<HTMLElement | SVGElement>(marks)) {
         mark.style.visibility = value;
       }

@@ -2,7 +2,7 @@
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, inject } from "vitest";
+import { afterAll, afterEach, beforeAll, inject } from "vitest";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { type FixtureOptions, writeFixture } from "../fixture/bundle";
 import type { Browser } from "./chromium";
@@ -21,7 +21,7 @@ export type Stand = Readonly<{
   bundle: string;
   manifest: Manifest;
   host: Host;
-  /** A page, by itself one for each test, not opened yet. */
+  /** A page, not opened yet. Tests have it one after another: only a test can leave traces in it. */
   viewer: ViewerPage;
   /** Open the bundle in it; `query` goes behind the bundle's address. */
   open: (query?: string) => Promise<void>;
@@ -37,7 +37,7 @@ export type StandOptions = Readonly<{
   /** Of the device to one of CSS; less where no picture is looked at. */
   pixelRatio?: number;
   hasTouch?: boolean;
-  /** One page for all tests of the `describe`, none of which disturbs another. */
+  /** The page stays open from test to test of the `describe`, none of which disturbs another. */
   sharesPage?: boolean;
   /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
   mounts?: (bundle: string) => Readonly<Record<string, string>>;
@@ -64,7 +64,7 @@ export function prepareStand(options: StandOptions): Stand {
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
     // its own requests would be counted with the page's
     browser = await openBrowser({ viewport, pixelRatio, hasTouch, serviceWorkers: "block" });
-    if (sharesPage) await openPage();
+    await openPage();
   });
 
   afterAll(async () => {
@@ -73,17 +73,36 @@ export function prepareStand(options: StandOptions): Stand {
     if (folder !== undefined) await rm(folder, { recursive: true, force: true });
   });
 
+  /** Whether the page has scripts that run before its own: there is no way to take them away. */
+  let isAltered = false;
+
   const openPage = async () => {
-    viewer = new ViewerPage(await browser.context.newPage());
+    const page = await browser.context.newPage();
+    const addInitScript = page.addInitScript.bind(page);
+    page.addInitScript = (...given: Parameters<typeof addInitScript>) => {
+      isAltered = true;
+      return addInitScript(...given);
+    };
+    isAltered = false;
+    viewer = new ViewerPage(page);
   };
 
-  beforeEach(async () => {
-    if (!sharesPage) await openPage();
-  });
+  /** A page that navigates costs half of what a new one does. */
+  const clearPage = async () => {
+    const { page } = viewer;
+    await page.goto("about:blank");
+    await page.unrouteAll();
+    page.removeAllListeners();
+    await page.mouse.move(-1, -1);
+    await page.setViewportSize(viewport);
+  };
 
-  afterEach(async () => {
-    host.reset();
-    if (!sharesPage) await viewer.page.close();
+  afterEach(async ({ task }) => {
+    if (!sharesPage && (isAltered || task.result?.state === "fail")) {
+      await viewer.page.close();
+      await openPage();
+    } else if (!sharesPage) await clearPage();
+    host.reset(); // what the page still asked for is forgotten, too
   });
 
   return {

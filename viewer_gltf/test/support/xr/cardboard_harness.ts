@@ -49,7 +49,7 @@ class Stand {
       this.renderer,
       () => this.log.push("start"),
       () => this.log.push("end"),
-      () => this.log.push("select"),
+      ({ kind }) => this.log.push(kind),
       { cssPixelsPerInch: PIXELS_PER_INCH },
     );
   }

@@ -117,7 +117,10 @@ class Stand {
       handles: [this.handle],
       layOut: (view) => layOut(this.state, FACTS, view),
       onAction: (action) => this.dispatch(action),
-      onCommand: (command) => this.commands.push(command),
+      onCommand: (command) => {
+        this.commands.push(command);
+        this.hands.run(command, this.state);
+      },
       onChoose: (ray, tile) => {
         this.chosen.push({ ray, tile });
         this.dispatch(chosenTile(this.state, tile));

@@ -1,0 +1,65 @@
+/** Fingers on the split screen: one turns, two bring nearer, a tap chooses, and no press does. */
+import { expect, it } from "vitest";
+import { difference, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const SIZE = { width: 640, height: 300 };
+type Finger = Readonly<{ x: number; y: number; id: number }>;
+
+describeInChromium("fingers in a Cardboard", () => {
+  const stand = prepareStand({ viewport: SIZE, hasTouch: true });
+
+  it("turn, bring nearer and choose, and choose nothing on the way", async () => {
+    await stand.open("&mode=off");
+    const { page } = stand.viewer;
+    await page.keyboard.press("j"); // the gaze alone chooses nothing
+    await page.locator('[data-overlay="stereo"]').tap(); // on the picture: a phone has no headset
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+    const told = async () => (await stand.viewer.snapshot()).told.length;
+    await expect.poll(told, { timeout: 30_000 }).toBe(0);
+    const chosen = async () => {
+      const { selected, isolated } = (await stand.viewer.snapshot()).state;
+      return [selected, isolated];
+    };
+    const devtools = await page.context().newCDPSession(page);
+    const touch = async (type: "touchStart" | "touchMove" | "touchEnd", touchPoints: Finger[]) => {
+      await devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
+      await page.waitForTimeout(150); // a few frames
+    };
+    const leftEye = () => takePicture(page, { x: 0, y: 0, width: SIZE.width / 2, height: 300 });
+    const drawn = async () => (await leftEye()).count((pixel) => Math.max(...pixel) > 60);
+    const finger = (x: number, y = 150, id = 1): Finger => ({ x, y, id });
+
+    const before = await leftEye();
+    await touch("touchStart", [finger(300)]);
+    expect(await chosen()).toEqual([null, null]);
+    for (const x of [320, 345, 370]) await touch("touchMove", [finger(x)]);
+    await touch("touchEnd", []);
+    expect(await chosen()).toEqual([null, null]);
+    expect(difference(before, await leftEye())).toBeGreaterThan(0.02);
+    for (const x of [370, 345, 320, 300]) {
+      await touch(x === 370 ? "touchStart" : "touchMove", [finger(x)]);
+    }
+    await touch("touchEnd", []);
+    expect(difference(before, await leftEye())).toBeLessThan(0.01); // the same way back
+
+    const far = await drawn();
+    await touch("touchStart", [finger(280)]);
+    await touch("touchStart", [finger(280), finger(360, 150, 2)]);
+    await touch("touchMove", [finger(260), finger(380, 150, 2)]);
+    await touch("touchEnd", []);
+    expect(await drawn()).toBeGreaterThan(1.15 * far);
+    expect(await chosen()).toEqual([null, null]);
+
+    await touch("touchStart", [finger(300)]);
+    expect(await chosen()).toEqual([null, null]);
+    await touch("touchEnd", []);
+    await expect.poll(async () => (await chosen())[0]).not.toBeNull();
+    for (const type of ["touchStart", "touchMove"] as const) {
+      await touch(type, [finger(type === "touchStart" ? 300 : 360)]);
+    }
+    await touch("touchEnd", []);
+    expect((await chosen())[1]).toBeNull(); // a drag over a chosen tile isolates nothing
+  });
+});
