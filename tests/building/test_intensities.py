@@ -28,9 +28,36 @@ def test_a_label_map_ends_the_plan_by_a_line_that_names_both_ways(
         assert main([command[0], str(labels), "-o", str(out), *command[1:]]) == 2
         told = capsys.readouterr().err.strip()
         assert told.count("\n") == 0
-        assert f"{labels}: channel 'Channel0' looks like a label map: found 192 values" in told
+        assert f"{labels}: channel 'Channel0' looks like a label map of 192 objects: found" in told
         assert "--as intensity" in told
         assert not out.exists() or not list(out.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["uint8", "float32", "float64"])
+def test_few_objects_far_from_each_other_are_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    """Each block that is looked at holds one at most."""
+    voxels = np.zeros((40, 400, 400), kind)
+    for number, (y, x) in enumerate([(60, 60), (60, 300), (300, 60), (300, 300)], 1):
+        voxels[5:30, y : y + 50, x : x + 50] = number
+    path = tmp_path / "few of mine.ome.tif"
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "looks like a label map of 4 objects" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["uint8", "float32"])
+def test_a_mask_and_an_image_of_whole_numbers_are_none(tmp_path: Path, kind: str) -> None:
+    rng = np.random.default_rng(0)
+    mask = np.zeros((20, 64, 64), kind)
+    mask[5:15, 10:50, 10:50] = 1
+    for name, voxels in (("mask", mask), ("image", rng.poisson(40, mask.shape).astype(kind))):
+        path = tmp_path / f"{name}.ome.tif"
+        sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+        tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+        assert main(["plan", str(path), "-o", str(tmp_path / name)]) == 0
 
 
 def test_it_is_built_where_it_is_said_to_be_an_image(labels: Path, tmp_path: Path) -> None:

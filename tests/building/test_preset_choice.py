@@ -44,6 +44,22 @@ def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
     assert "no Hounsfield units" in reason
 
 
+def test_few_negative_values_make_no_ct(tmp_path: Path) -> None:
+    voxels = _body(3700, 12_000)
+    voxels[:4, :4, :4] = -610  # as an atlas has it, resampled by splines
+    chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels)))
+    assert chosen == "mri"
+    assert "no Hounsfield units" in reason
+
+
+def test_a_level_above_the_background_is_refused_of_ct(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = _nifti(tmp_path / "a.nii", _body(-1000, 40))
+    assert main(["plan", str(source), "-o", str(tmp_path / "o"), "--iso-value", "0=200+b"]) == 2
+    assert "above the background, which is never subtracted of CT" in capsys.readouterr().err
+
+
 def test_what_the_input_says_goes_first(tmp_path: Path) -> None:
     dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400)))
     assert choose_preset(dataset, "CT")[0] == "ct"

@@ -33,6 +33,7 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--surfaces": (["CT=outer,300"], "surfaces", "CT", "outer,300"),
     "--iso-scope": (["tile"], "isovalue", "scope", "tile"),
     "--paint": (["CD31=MART1"], "paint", "CD31", "MART1"),
+    "--maps": ([], "unwrap", "maps", True),
 }
 
 

@@ -105,6 +105,21 @@ def _empty(camera: str, fault: str) -> NDArray[np.uint16]:
 FAULTS = ("plain", "hot pixels", "vignetting", "zero padding", "black border", "black corner")
 
 
+LIGHTS = ("ramp x 2", "ramp x 3", "depth x 2", "depth x 4")
+
+
+def _uneven_light(camera: str, light: str) -> NDArray[np.uint16]:
+    """Return a tile of nothing but a ground that the light makes uneven."""
+    z, _, x = _axes()
+    kind, _, factor = light.split()
+    along = x / x.max() if kind == "ramp" else z / z.max()
+    times, sees = float(factor), CAMERAS[camera]
+    dark = min(40.0, 0.2 * sees.largest / sees.gain)  # so that the bright end isn't saturated
+    photons = dark * (1 + (times - 1) * along if kind == "ramp" else times ** (1 - along))
+    whole = np.broadcast_to(photons, SHAPE).astype(np.float64)
+    return sees.shoot(whole, _rng(f"light {camera} {light}"))
+
+
 def _inside_tissue(camera: str, sigma: float) -> NDArray[np.uint16]:
     """Return a tile wholly inside tissue: soft texture, no boundary anywhere."""
     rng = _rng(f"inside {camera} {sigma}")
@@ -233,6 +248,15 @@ def empty_cases() -> Iterator[Case]:
                 "empty",
                 SPACING,
                 lambda c=camera, f=fault: (_empty(c, f), None),
+                held_out=count % 2 == 1,
+            )
+            count += 1
+        for light in LIGHTS:
+            yield Case(
+                f"empty, {camera}, {light}",
+                "empty",
+                SPACING,
+                lambda c=camera, f=light: (_uneven_light(c, f), None),
                 held_out=count % 2 == 1,
             )
             count += 1

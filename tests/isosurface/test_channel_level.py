@@ -42,7 +42,8 @@ def test_finds_the_bodies(name: str) -> None:
     sweep(
         list(EMPTY),
         kept=[f"empty, {c}, {f}" for c, f in zip(CAMERAS, FAULTS[1::2], strict=True)]
-        + ["empty, scmos, zero padding", "inside tissue, detector, 6", "inside tissue, scmos, 2"],
+        + ["empty, emccd, ramp x 3", "empty, scmos, depth x 4", "empty, scmos, zero padding"]
+        + ["inside tissue, detector, 6", "inside tissue, scmos, 2"],
     ),
 )
 def test_finds_nothing_where_nothing_is(name: str) -> None:

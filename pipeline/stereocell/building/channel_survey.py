@@ -129,6 +129,9 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             plan, channel, one, chosen, iso, of_rungs[chosen] if of_rungs else {}, files[channel.id]
         )
     save_survey(out_folder, survey)
+    for look in (of_channel.appearance for of_channel in survey.values()):
+        if look.surface_reason:
+            console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey
 
 

@@ -7,23 +7,29 @@ that holds one or two values, which tells nothing else, is taken for a part of a
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box
-from stereocell.objects.label_rule import LabelEvidence, recognise
+from stereocell.objects.label_rule import Kind, recognise
 from stereocell.read import Dataset
 
 _SIDE = 128  # voxels: largest edge of the block that is looked at
 _WIDE = 4  # bytes
+_MOST_EXACT = 2.0**53  # whole numbers below are exact as float64
 _MOST = 4  # channels that are looked at: a label map comes alone, or with few others
 
 
 def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, level: int) -> None:
     """Raise UsageError where a channel looks like a label map.
 
-    A block of the first channels is read at full resolution: that in the middle of what is built,
-    or, where it has one value alone, the next one that has more.
+    Blocks of the first channels are read at full resolution, from the middle of what is built on,
+    until one has three values: two tell nothing.
 
     region  voxels of the level that is built
     """
@@ -34,8 +40,6 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
             "of one object"
         )
     stored = dataset.stored_dtype
-    if stored.kind not in "iu":
-        return
     (z0, y0, x0), (z1, y1, x1) = (
         [place * n // m for place, n, m in zip(places, fine, coarse, strict=True)]
         for fine, coarse in [(dataset.levels[0].shape, dataset.levels[level].shape)]
@@ -43,20 +47,59 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
     )
     finest = Box((z0, y0, x0), (z1, y1, x1))
     for index in channels[:_MOST]:
-        for box in _blocks(finest):
-            voxels = dataset.read_stored(index, box)
-            if voxels.min() < voxels.max():
-                break
-        found = recognise(voxels)
+        found = _look_at(dataset, index, finest)
         if found.kind == "labels":
             raise UsageError(_told(dataset, index, found))
-        if stored.itemsize >= _WIDE and voxels.min() >= 0 and found.values <= 1:
+        if stored.kind in "iu" and stored.itemsize >= _WIDE and found.is_plain:
             raise UsageError(
                 f"{dataset.shown}: channel {dataset.channels[index].name!r} may be a label map: "
                 f"found {stored.name} and {found.values or 'no'} value besides 0 in one block, "
                 "expected intensities: objects can't be built yet; --as intensity takes it for an "
                 "image"
             )
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What the blocks of a channel hold; `is_plain`: one or two values, none of them negative."""
+
+    kind: Kind
+    values: int
+    pieces: int
+    is_plain: bool
+
+
+def _look_at(dataset: Dataset, index: int, finest: Box) -> _Found:
+    """Return what the first block with three values or more holds; where none has, all blocks.
+
+    Blocks with one object each have two values each, and are a label map where these differ.
+    """
+    values: set[int] = set()
+    is_plain = True
+    for box in _blocks(finest):
+        voxels = _whole_numbers(dataset.read_stored(index, box))
+        if voxels is None:
+            return _Found("image", 0, 0, is_plain=False)
+        found = recognise(voxels)
+        own = np.unique(voxels)
+        if len(own) > 2:
+            return _Found(found.kind, found.values, found.pieces, is_plain=False)
+        is_plain &= bool(own[0] >= 0)
+        values.update(int(value) for value in own if value)
+    kind: Kind = "labels" if len(values) > 2 and is_plain else "mask"
+    return _Found(kind, len(values), len(values), is_plain=is_plain and len(values) <= 2)
+
+
+def _whole_numbers(voxels: NDArray[Any]) -> NDArray[Any] | None:
+    """Return the voxels as integers: programs save labels as floats too. None: some are no labels.
+
+    voxels  (z, y, x), as stored
+    """
+    if voxels.dtype.kind in "iu":
+        return voxels
+    if voxels.dtype.kind != "f" or not np.isfinite(voxels).all() or (voxels % 1 != 0).any():
+        return None
+    return voxels.astype(np.int64) if np.abs(voxels).max() < _MOST_EXACT else None
 
 
 def _blocks(region: Box) -> Iterator[Box]:
@@ -71,9 +114,9 @@ def _blocks(region: Box) -> Iterator[Box]:
         yield Box((z0, y0, x0), (z1, y1, x1))
 
 
-def _told(dataset: Dataset, index: int, found: LabelEvidence) -> str:
+def _told(dataset: Dataset, index: int, found: _Found) -> str:
     return (
-        f"{dataset.shown}: channel {dataset.channels[index].name!r} looks like a label map: found "
-        f"{found.values} values in {found.pieces} pieces of equal voxels in one block, expected "
+        f"{dataset.shown}: channel {dataset.channels[index].name!r} looks like a label map of "
+        f"{found.values} objects: found {found.pieces} pieces of equal voxels, expected "
         "intensities: objects can't be built yet; --as intensity takes it for an image"
     )

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import SMOOTHING_REACH
-from stereocell.isosurface.options import RUNGS
+from stereocell.isosurface.options import RUNGS, parse_level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
@@ -295,6 +295,12 @@ def make_plan(
         paint=_painted(settings.paint, channels),
     )
     _require_planes(settings, chosen.spacing_um)
+    for name, value in settings.iso_values.items():
+        if modality in ("CT", "MR") and parse_level(f"--iso-value {name}", value)[1]:
+            raise UsageError(
+                f"--iso-value {name}={value}: a level above the background, which is never "
+                f"subtracted of {modality}, expected a voxel value"
+            )
     return Plan(
         source=source,
         name=name,

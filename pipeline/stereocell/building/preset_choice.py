@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import NO_PRESET, Settings, load
 from stereocell.engine.run import console
@@ -15,6 +17,8 @@ from stereocell.storage.location import Location
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
+# of the voxels looked at so many lie this near to air, and 99 % below metal
+AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MOST_HU = -1000.0, 150.0, 0.02, 4000.0
 _SIDE = 64  # voxels: edge of the block that is looked at for Hounsfield units
 
 
@@ -82,5 +86,10 @@ def _has_hounsfield_units(dataset: Dataset) -> bool:
     corner = Box((0, 0, 0), (z, y, x))  # air
     z0, y0, x0 = ((n - side) // 2 for n, side in zip(shape, (z, y, x), strict=True))
     middle = Box((z0, y0, x0), (z0 + z, y0 + y, x0 + x))  # body
-    lowest = min(float(dataset.read(0, box).voxels.min()) for box in (corner, middle))
-    return lowest <= LEAST_HU
+    voxels = np.concatenate([dataset.read(0, box).voxels.ravel() for box in (corner, middle)])
+    is_air = np.abs(voxels - AIR_HU) <= _AIR_SPREAD
+    return (
+        float(voxels.min()) <= LEAST_HU
+        and float(is_air.mean()) >= _AIR_SHARE
+        and float(np.quantile(voxels, 0.99)) <= _MOST_HU
+    )

@@ -70,6 +70,9 @@ VALLEY_GAIN = 2.0  # ... and where the field has a valley
 # Of MR's outermost valley that has a level: how deep it is where it parts air from tissue, and the
 # quantile of the tissue that stands for it
 AIR_DIP, DIM = 0.3, 0.25
+# Slope at a level over the least of the slopes at its inside and outside: where values rise evenly
+# through the volume, as light falls off, all three are the noise's
+LEAST_RISE, MOST_RISE = 1.35, 1000.0
 PADDING_SHARE = 0.5  # share of the outside's distance from padding within which padding is outside
 HALF_HEIGHTS = 3  # levels looked for above the last valley
 # voxels above a level: this share of all, within these bounds
@@ -100,6 +103,7 @@ class Level:
     stability   Dice, 0..1, between what lies above the level moved down and up by a tenth of the
                 contrast
     share       of all voxels that lie above it, 0..1
+    rise        slope at the level over the lesser one of those at its inside and outside
     """
 
     value: float
@@ -111,6 +115,7 @@ class Level:
     dip: float
     stability: float
     share: float
+    rise: float
 
     @property
     def contrast(self) -> float:
@@ -149,6 +154,11 @@ class Level:
             return (
                 f"at {self.value:.5g} the edges rise by {self.sharpness:.1%} of their height a "
                 f"voxel, expected at least {LEAST_SHARPNESS:.0%}"
+            )
+        if self.rise < LEAST_RISE:
+            return (
+                f"values rise evenly there: at {self.value:.5g} the slope is {self.rise:.2f} times "
+                f"that beside it, expected at least {LEAST_RISE:g}"
             )
         if self.dip <= DIP or self.separation >= LEAST_SEPARATION:
             return ""
@@ -435,7 +445,9 @@ class _Sight:
         above, below = part.above(value), part.below(value)
         inside, outside = above.quantile(INSIDE), below.quantile(OUTSIDE)
         contrast = max(inside - outside, 1e-12)
-        slope = self._slope(value, max(WIDTH_SHARE * contrast, 2 * part.width_at(value)))
+        width = max(WIDTH_SHARE * contrast, 2 * part.width_at(value))
+        slope = self._slope(value, width)
+        beside = min(self._slope(inside, width), self._slope(outside, width))
         low, high = (part.above(value + d * contrast).total for d in (-TENTH, TENTH))
         return Level(
             value=value,
@@ -447,6 +459,8 @@ class _Sight:
             dip=dip,
             stability=2 * high / max(1.0, low + high),
             share=self.histogram.above(value).total / self.histogram.total,
+            # noise-free values have no slope beside
+            rise=min(slope / beside, MOST_RISE) if beside > 0 else MOST_RISE,
         )
 
     def _slope(self, value: float, width: float) -> float:

@@ -163,11 +163,12 @@ class Location:
     def _format_by_content(self, last: str) -> str | None:
         """Return the format of a file whose name leaves it open; `last` is the name, lower case."""
         begins = first_bytes(self.path)
+        if begins[128:132] == b"DICM":  # its preamble may be the beginning of a TIFF
+            return "dicom"
         found = next((name for magic, name in _MAGIC.items() if begins.startswith(magic)), None)
         if found is not None:
             return found
-        is_named = last.endswith(_DICOM_SUFFIXES)
-        if is_named or os.path.isdir(self.source) or begins[128:132] == b"DICM":
+        if last.endswith(_DICOM_SUFFIXES) or os.path.isdir(self.source):
             return "dicom"
         if last.endswith(_ANALYZE_SUFFIXES):
             return "nifti"

@@ -271,3 +271,18 @@ def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> 
     told = refusal(tmp_path)
     assert "by its own name (2 NIfTI or Analyze, 1 OME-Zarr)" in told
     assert "DOE" not in told
+
+
+def test_a_preamble_that_begins_as_a_tiff_does_changes_nothing(tmp_path: Path) -> None:
+    """DICOM leaves it to the writer: some make a file that readers of TIFF open too."""
+    path = tmp_path / "both of mine"
+    write_enhanced(path, grid(shape=SHAPE), SHAPE)
+    content = path.read_bytes()
+    path.write_bytes(b"II*\0" + content[4:])
+    assert whole(read.open(path)).shape == whole(read.open(_plain(tmp_path, content))).shape
+
+
+def _plain(folder: Path, content: bytes) -> Path:
+    path = folder / "plain.dcm"
+    path.write_bytes(content)
+    return path
