@@ -295,10 +295,10 @@ def make_plan(
         paint=_painted(settings.paint, channels),
     )
     _require_planes(settings, chosen.spacing_um)
-    for name, value in settings.iso_values.items():
-        if modality in ("CT", "MR") and parse_level(f"--iso-value {name}", value)[1]:
+    for key, value in settings.iso_values.items():
+        if modality in ("CT", "MR") and parse_level(f"--iso-value {key}", value)[1]:
             raise UsageError(
-                f"--iso-value {name}={value}: a level above the background, which is never "
+                f"--iso-value {key}={value}: a level above the background, which is never "
                 f"subtracted of {modality}, expected a voxel value"
             )
     return Plan(
