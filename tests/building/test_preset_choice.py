@@ -44,6 +44,12 @@ def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
     assert "no Hounsfield units" in reason
 
 
+def test_padding_darker_than_air_hides_no_ct(tmp_path: Path) -> None:
+    voxels = _body(-1000, 40)
+    voxels[:, :8, :8] = voxels[:, -8:, -8:] = -3024  # outside of the scanner's round field
+    assert choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels)))[0] == "ct"
+
+
 def test_few_negative_values_make_no_ct(tmp_path: Path) -> None:
     voxels = _body(3700, 12_000)
     voxels[:4, :4, :4] = -610  # as an atlas has it, resampled by splines

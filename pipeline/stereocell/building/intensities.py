@@ -53,7 +53,7 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
         if stored.kind in "iu" and stored.itemsize >= _WIDE and found.is_plain:
             raise UsageError(
                 f"{dataset.shown}: channel {dataset.channels[index].name!r} may be a label map: "
-                f"found {stored.name} and {found.values or 'no'} value besides 0 in one block, "
+                f"found {stored.name} and {found.values or 'no'} value besides 0 in what was looked at, "
                 "expected intensities: objects can't be built yet; --as intensity takes it for an "
                 "image"
             )
@@ -85,9 +85,10 @@ def _look_at(dataset: Dataset, index: int, finest: Box) -> _Found:
         if len(own) > 2:
             return _Found(found.kind, found.values, found.pieces, is_plain=False)
         is_plain &= bool(own[0] >= 0)
-        values.update(int(value) for value in own if value)
+        values.update(int(value) for value in own)
     kind: Kind = "labels" if len(values) > 2 and is_plain else "mask"
-    return _Found(kind, len(values), len(values), is_plain=is_plain and len(values) <= 2)
+    objects = len(values - {0})
+    return _Found(kind, objects, objects, is_plain=is_plain and len(values) <= 2)
 
 
 def _whole_numbers(voxels: NDArray[Any]) -> NDArray[Any] | None:

@@ -9,7 +9,6 @@ import numpy as np
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import NO_PRESET, Settings, load
 from stereocell.engine.run import console
-from stereocell.isosurface.holder import LEAST_HU
 from stereocell.model.errors import StereoCellError
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
@@ -18,8 +17,8 @@ from stereocell.storage.location import Location
 _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
 # of the voxels looked at so many lie this near to air, and 99 % below metal
-AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MOST_HU = -1000.0, 150.0, 0.02, 4000.0
-_SIDE = 64  # voxels: edge of the block that is looked at for Hounsfield units
+_AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MOST_HU = -1000.0, 150.0, 0.02, 4000.0
+_PLANES = 8  # in the middle, that are looked at for Hounsfield units
 
 
 def load_for(
@@ -81,15 +80,10 @@ def _told(chosen: str | None, reason: str) -> str:
 def _has_hounsfield_units(dataset: Dataset) -> bool:
     if dataset.dtype.kind == "u":
         return False
-    shape = dataset.levels[0].shape
-    z, y, x = (min(n, _SIDE) for n in shape)
-    corner = Box((0, 0, 0), (z, y, x))  # air
-    z0, y0, x0 = ((n - side) // 2 for n, side in zip(shape, (z, y, x), strict=True))
-    middle = Box((z0, y0, x0), (z0 + z, y0 + y, x0 + x))  # body
-    voxels = np.concatenate([dataset.read(0, box).voxels.ravel() for box in (corner, middle)])
-    is_air = np.abs(voxels - AIR_HU) <= _AIR_SPREAD
-    return (
-        float(voxels.min()) <= LEAST_HU
-        and float(is_air.mean()) >= _AIR_SHARE
-        and float(np.quantile(voxels, 0.99)) <= _MOST_HU
-    )
+    depth, height, width = dataset.levels[0].shape
+    first = max(0, (depth - _PLANES) // 2)
+    # planes through the whole: corners alone may be padding, and the middle all body
+    middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
+    voxels = dataset.read(0, middle).voxels
+    is_air = np.abs(voxels - _AIR_HU) <= _AIR_SPREAD
+    return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= _MOST_HU
