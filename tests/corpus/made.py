@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -240,32 +241,15 @@ def family_cases() -> Iterator[Case]:
 
 def empty_cases() -> Iterator[Case]:
     """Yield the volumes of nothing; every other one is held out."""
-    count = 0
+    makers: dict[str, Callable[[], NDArray[np.uint16]]] = {}
     for camera in CAMERAS:
-        for fault in FAULTS:
-            yield Case(
-                f"empty, {camera}, {fault}",
-                "empty",
-                SPACING,
-                lambda c=camera, f=fault: (_empty(c, f), None),
-                held_out=count % 2 == 1,
-            )
-            count += 1
-        for light in LIGHTS:
-            yield Case(
-                f"empty, {camera}, {light}",
-                "empty",
-                SPACING,
-                lambda c=camera, f=light: (_uneven_light(c, f), None),
-                held_out=count % 2 == 1,
-            )
-            count += 1
-        for sigma in (2.0, 6.0):
-            yield Case(
-                f"inside tissue, {camera}, {sigma:g}",
-                "empty",
-                SPACING,
-                lambda c=camera, s=sigma: (_inside_tissue(c, s), None),
-                held_out=count % 2 == 1,
-            )
-            count += 1
+        makers |= {f"empty, {camera}, {one}": partial(_empty, camera, one) for one in FAULTS}
+        makers |= {f"empty, {camera}, {one}": partial(_uneven_light, camera, one) for one in LIGHTS}
+        makers |= {
+            f"inside tissue, {camera}, {sigma:g}": partial(_inside_tissue, camera, sigma)
+            for sigma in (2.0, 6.0)
+        }
+    for count, (name, make) in enumerate(makers.items()):
+        yield Case(
+            name, "empty", SPACING, lambda make=make: (make(), None), held_out=count % 2 == 1
+        )

@@ -53,7 +53,7 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
         if stored.kind in "iu" and stored.itemsize >= _WIDE and found.is_plain:
             raise UsageError(
                 f"{dataset.shown}: channel {dataset.channels[index].name!r} may be a label map: "
-                f"found {stored.name} and {found.values or 'no'} value besides 0 in what was looked at, "
+                f"found {stored.name} and {found.values or 'no'} value besides 0, "
                 "expected intensities: objects can't be built yet; --as intensity takes it for an "
                 "image"
             )
