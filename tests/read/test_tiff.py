@@ -444,8 +444,12 @@ def test_axes_that_do_not_fit_are_told(tmp_path: Path, axes: str) -> None:
 @pytest.mark.parametrize("option", [{"axes": "zyx"}, {"pattern": "{z}"}, {"series": 2}])
 def test_an_option_of_another_format_is_told(tmp_path: Path, option: dict[str, Any]) -> None:
     (name,) = option
-    source = tmp_path / ("x.tif" if name != "axes" else "x.nii")
-    tifffile.imwrite(source, counted("ZYX"))
+    if name == "axes":
+        source = tmp_path / "x.nii"
+        source.write_bytes(bytes(344) + b"n+1\0")
+    else:
+        source = tmp_path / "x.tif"
+        tifffile.imwrite(source, counted("ZYX"))
     with pytest.raises(UsageError, match=rf"--{name} .*: found .*, expected .* or no --{name}"):
         read.open(source, **option)
 
@@ -473,7 +477,7 @@ def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
         (text.replace("x-Z0", "gone"), "FileName: found 'gone.ome.tiff'"),
         (text.replace("x-Z0", "../x-Z0"), "leads to"),
         (text[:200], "OME-XML:"),
-        ("", "OME-XML: found none"),
+        ("", "found an empty file (copy or download it again), expected OME-XML"),
     ):
         source.write_text(spoilt)
         assert told in refusal(source)

@@ -11,7 +11,6 @@ import math
 import os
 import warnings
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import mrcfile
@@ -39,11 +38,6 @@ def read_image(location: Location) -> Image:
     where = location.shown
     require_file(location)
     path = os.path.realpath(location.path)
-    if Path(path).suffix.lower() == ".rec" and (header_file := _par_beside(Path(path))):
-        raise SourceError(
-            f"{where}: found the voxels of a Philips PAR/REC pair, beside {header_file!r:.100}, "
-            "expected an MRC or CCP4 file: make NIfTI of the pair by dcm2niix"
-        )
     with one_line(where, "an MRC or CCP4 file"):
         header, packing = _header(path)
         dtype = data_dtype_from_header(header)
@@ -74,12 +68,6 @@ def read_image(location: Location) -> Image:
     return Image(
         (voxels,), (Grid(voxels.shape, _spacing(header)),), (None,), (None,), 1, notes=note
     )
-
-
-def _par_beside(path: Path) -> str:
-    """Return the name of the header of Philips beside a .rec; empty: there is none."""
-    names = (path.with_suffix(suffix).name for suffix in (".PAR", ".par"))
-    return next((name for name in names if path.with_name(name).is_file()), "")
 
 
 def _header(path: str) -> tuple[Any, str]:

@@ -14,6 +14,7 @@ import numpy as np
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.cast import TAKEN, built_dtype, cast_note
 from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
+from stereocell.read.file_kind import require_kind
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.first_bytes import describe
@@ -102,6 +103,7 @@ def _find(source: str | Path) -> tuple[Location, Reader]:
     if named is None and not import_module(OTHER.module).can_read(location):
         raise _unknown(location)
     reader = READERS.get(named or "", OTHER)
+    require_kind(location, named or "", reader.title.partition(" (")[0])
     if not location.is_local and not reader.is_remote:
         raise SourceError(
             f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
