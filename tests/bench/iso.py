@@ -70,6 +70,10 @@ class Figures:
     tiles: list[tuple[float, float]] = field(default_factory=list)
     confidence: float = 0.0
 
+    @property
+    def has_truth(self) -> bool:
+        return self.group not in ("empty", "looked at")
+
 
 def dice(found: Mask, truth: Mask) -> float:
     return float(2 * (found & truth).sum() / max(1, found.sum() + truth.sum()))
@@ -180,7 +184,9 @@ def main() -> None:
         for case in pool.map(measure, chosen):
             cases.append(case)
             print(f"{len(cases)} of {len(chosen)}: {case.name}", file=sys.stderr, flush=True)
-    print_methods(cases)
+    if any(case.group != "looked at" for case in cases):
+        print_methods([case for case in cases if case.group != "looked at"])
+    print_looks([case for case in cases if case.group == "looked at"])
     print_confidence(cases)
     if options.each:
         print_cases(cases)
@@ -189,7 +195,7 @@ def main() -> None:
 def _groups(cases: list[Figures]) -> dict[str, list[Figures]]:
     names = ["labelled", "outlined", "made"]
     found = {name: [c for c in cases if c.group == name] for name in names}
-    found["held out"] = [c for c in cases if c.held_out and c.group != "empty"]
+    found["held out"] = [c for c in cases if c.held_out and c.has_truth]
     return {name: some for name, some in found.items() if some}
 
 
@@ -205,7 +211,7 @@ def print_methods(cases: list[Figures]) -> None:
         for some in groups.values():
             scores = [c.found[method].dice for c in some]
             cells.append(f"{np.mean(scores):.3f}, {np.min(scores):.2f}")
-        with_truth = [c.found[method] for c in cases if c.group != "empty"]
+        with_truth = [c.found[method] for c in cases if c.has_truth]
         cells.append(f"{np.nanmedian([f.away for f in with_truth]):.2f}")
         cells.append(f"{sum(c.found[method].inside > 0 for c in empty)}")
         ratios = [_ratio(f.levels) for f in with_truth if len(f.levels) > 1]
@@ -234,10 +240,19 @@ def print_confidence(cases: list[Figures]) -> None:
             )
 
 
+def print_looks(cases: list[Figures]) -> None:
+    """Print what share of a volume without a truth each method takes for inside."""
+    for case in cases:
+        shares = ", ".join(f"{name} {found.inside:.2%}" for name, found in case.found.items())
+        print(f"\n{case.name}, inside: {shares}; confidence {case.confidence:.2f}")
+
+
 def print_cases(cases: list[Figures]) -> None:
     print()
     for case in cases:
         mine = case.found[OURS]
+        if not case.has_truth:
+            continue
         best = max(case.found.items(), key=lambda item: np.nan_to_num(item[1].dice))
         print(
             f"{case.group:9} {case.name:36} Dice {mine.dice:.3f} "
