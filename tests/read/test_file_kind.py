@@ -3,14 +3,17 @@
 import gzip
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
+import mrcfile
 import numpy as np
 import pytest
+import zarr
 
 from stereocell import read
 from stereocell.model.errors import SourceError
-from support.array_files import write_czi, write_ims, write_lif
+from support.array_files import write_bdv_xml, write_czi, write_ims, write_lif, write_n5
 from support.dicom_series import write_f_nifti
 from support.phantoms import f_phantom, write_ome_tiff
 
@@ -32,8 +35,8 @@ STUBS = {
 }
 
 
-def _read_whole(path: Path) -> None:
-    dataset = read.open(path)
+def _read_whole(path: Path, **options: Any) -> None:
+    dataset = read.open(path, **options)
     dataset.read(0, dataset.levels[0].box)
 
 
@@ -95,7 +98,7 @@ def _packed_nifti(path: Path) -> None:
         (_tiff, "a.ims", "found a TIFF file, expected Imaris: if"),
         (_tiff, "a.dcm", None),  # DICOM's ending goes with any content: the content decides
         (_nifti, "a.nii.gz", f"found a NIfTI file, expected {NIFTI}, packed by gzip{NAMED} .nii"),
-        (_packed_nifti, "a.nii", f"a gzip file of a NIfTI file, expected {NIFTI}{NAMED} .nii.gz"),
+        (_packed_nifti, "a.nii", f"NIfTI file (gunzip it), expected {NIFTI}{NAMED} .nii.gz"),
         (_nifti, "a.tif", "found a NIfTI file, expected TIFF: if"),
     ],
 )  # fmt: skip
@@ -112,6 +115,71 @@ def test_another_format_under_its_name_says_how_to_name_it(
     if ending.startswith("."):
         renamed = path.rename(tmp_path / f"b{ending}")
         assert read.open(renamed).levels[0].shape == f_phantom().shape
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "c/0/0/0"])
+def test_the_files_of_a_zarr_in_git_lfs_are_said(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.zarr"
+    zarr.create_array(str(path), data=f_phantom(), chunks=(4, 24, 18))
+    (path / name).write_bytes(LFS)
+    with pytest.raises(SourceError, match="found a pointer of Git LFS"):
+        _read_whole(path, spacing_um=(1, 1, 1))
+
+
+@pytest.mark.parametrize("name", ["attributes.json", "0/0/0"])
+def test_the_files_of_an_n5_in_git_lfs_are_said(tmp_path: Path, name: str) -> None:
+    path = write_n5(tmp_path / "a.n5")
+    (path / name).write_bytes(LFS)
+    with pytest.raises(SourceError, match="found a pointer of Git LFS"):
+        _read_whole(path, spacing_um=(1, 1, 1))
+
+
+def test_a_container_that_an_xml_names_is_looked_at(tmp_path: Path) -> None:
+    write_bdv_xml(tmp_path, "a.h5", "nm")
+    (tmp_path / "a.h5").write_bytes(LFS)
+    (xml,) = tmp_path.glob("*.xml")
+    with pytest.raises(SourceError, match=r"a\.h5: found a pointer of Git LFS"):
+        read.open(xml)
+
+
+def test_folders_say_what_lies_in_them(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="found an empty folder"):
+        read.open(tmp_path)
+    for number in range(3):
+        (tmp_path / f"{number}.dcm").write_bytes(LFS)
+    with pytest.raises(SourceError, match=r"3 not DICOM \(the first is a pointer of Git LFS"):
+        read.open(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("head", "told"),
+    [
+        (b"MATLAB 7.3 MAT-file", "it holds HDF5: name it .h5"),
+        (b"MATLAB 5.0 MAT-file", "save it with -v7.3"),
+        (b"\x93NUMPY\x01\0", "a NumPy array"),
+        (b"\x89PNG\r\n\x1a\n", "one plane"),
+    ],
+)
+def test_other_peoples_files_have_a_way_out(tmp_path: Path, head: bytes, told: str) -> None:
+    path = tmp_path / f"a.{'png' if b'PNG' in head else 'mat'}"
+    path.write_bytes(head + bytes(600))
+    assert told in refusal(path)
+
+
+def test_hdf5_without_a_volume_says_what_it_holds(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["flat"] = f_phantom()[0]
+        file["names"] = "x"
+    line = refusal(tmp_path / "a.h5")
+    assert "found no volume but /flat (48, 36) " in line
+    assert "/names () object" in line
+
+
+def test_an_mrc_that_ends_in_its_header_says_where(tmp_path: Path) -> None:
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(f_phantom().astype(np.float32))
+    (tmp_path / "b.mrc").write_bytes((tmp_path / "a.mrc").read_bytes()[:500])
+    assert "cut short at byte 500" in refusal(tmp_path / "b.mrc")
 
 
 def test_hdf5_behind_a_users_block_is_one(tmp_path: Path) -> None:

@@ -143,6 +143,18 @@ def test_nan_is_told_of_the_point_in_time_that_is_read(tmp_path: Path) -> None:
     assert any("1 voxels are NaN" in note for note in read.open(path, time=1).notes)
 
 
+def test_a_spacing_of_0_is_told(tmp_path: Path) -> None:
+    """nibabel reads it as 1."""
+    image = nibabel.Nifti1Image(np.zeros((4, 5, 6), np.uint8), None)
+    image.header.set_zooms((2.0, 2.0, 2.0))
+    nibabel.save(image, tmp_path / "a.nii")
+    assert not any("pixdim" in note for note in read.open(tmp_path / "a.nii").notes)
+    patch(tmp_path / "a.nii", 80, np.zeros(1, "<f4"))
+    dataset = read.open(tmp_path / "a.nii")
+    assert any("pixdim: found 0, read as 1" in note for note in dataset.notes)
+    assert sorted(dataset.levels[0].spacing_um) == [1000, 2000, 2000]
+
+
 def test_infinity_is_read_as_nan_is(tmp_path: Path) -> None:
     values = sample(grid(), SHAPE).astype(np.float32)
     values[1, 2, 3], values[0, 0, 0], values[4, 4, 4] = np.inf, np.nan, -np.inf

@@ -470,6 +470,22 @@ def test_ndtiff_with_its_index(tmp_path: Path) -> None:
     assert "NDTiff.index: '../" in refusal(path)
 
 
+@pytest.mark.parametrize("photometric", ["minisblack", "rgb"])
+def test_planes_that_were_written_one_by_one_are_a_stack(tmp_path: Path, photometric: Any) -> None:
+    """As a loop over `TiffWriter.write` leaves them: each is an array by itself to tifffile."""
+    planes = counted("ZYX") if photometric == "minisblack" else counted("ZYXS")[..., :3]
+    with tifffile.TiffWriter(tmp_path / "x.tif") as writer:
+        for plane in planes:
+            writer.write(plane, photometric=photometric)
+    dataset = read.open(tmp_path / "x.tif", spacing_um=GIVEN)
+    assert dataset.levels[0].shape == planes.shape[:3]
+    colours = planes[..., None] if photometric == "minisblack" else planes
+    for channel in range(colours.shape[-1]):
+        found = dataset.read(channel, dataset.levels[0].box).voxels
+        np.testing.assert_array_equal(found, colours[..., channel])
+    assert any(f"read as {len(planes)} slices along z" in note for note in dataset.notes)
+
+
 def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
     text = companion_set(tmp_path, counted("ZYX"), [f"x-Z{index}.ome.tiff" for index in range(5)])
     source = tmp_path / "y.companion.ome"

@@ -74,6 +74,8 @@ def _header(path: str) -> tuple[Any, str]:
     """Return the header, and how the file is packed. Raises ValueError where it isn't MRC."""
     with open(path, "rb") as file:
         packing = _MAGIC.get(file.read(2), "")
+    if not packing and (size := os.path.getsize(path)) < _HEADER:
+        raise ValueError(f"cut short at byte {size}: a header has {_HEADER}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # on what permits reading all the same
         with mrcfile.open(path, permissive=True, header_only=True) as opened:

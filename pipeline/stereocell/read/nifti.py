@@ -89,6 +89,8 @@ def read_image(location: Location) -> Image:
         notes.append(
             "neither sform nor qform: which side is left is a guess, x to the left of the patient"
         )
+    if is_nifti and not header["sform_code"] and _states_zero(image):
+        notes.append("pixdim: found 0, read as 1: is the voxel spacing known? (--spacing-um z,y,x)")
     if unit == "unknown":
         notes.append("no unit of length in the header: mm are assumed")
     grid, skewed = (shape[0], shape[1], shape[2]), None
@@ -131,6 +133,15 @@ def _require_whole(image: Any, where: str) -> None:
             f"{where}: found {size} bytes, expected at least {end} for {tuple(data.shape)} of "
             f"{data.dtype.name} (the file is cut short)"
         )
+
+
+def _states_zero(image: Any) -> bool:
+    """Whether the file has a voxel spacing of 0, which nibabel has mended in its header."""
+    held, header = image.file_map.get("header") or image.file_map["image"], image.header
+    with ImageOpener(held.filename) as file:
+        raw = file.read(len(header.binaryblock))
+    stored = type(header)(raw, endianness=header.endianness, check=False)
+    return bool((stored["pixdim"][1:4] == 0).any())
 
 
 def _labels(header: Any) -> str:

@@ -22,6 +22,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
+_PICTURES = (".png", ".jpg", ".jpeg")  # which are planes of a folder
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
@@ -130,7 +131,13 @@ def _unknown(location: Location) -> SourceError:
             f"{location.shown}: found the voxels of {_shown(header):.200}, expected that file"
         )
     elif location.is_local:
-        found += f": found {describe(first_bytes(location.source))}"
+        content = describe(first_bytes(location.source))
+        if last.endswith(_PICTURES) and content.endswith(" image"):
+            return SourceError(
+                f"{location.shown}: one plane (2D): found {content}, expected a volume: name the "
+                "folder of its planes"
+            )
+        found += f": found {content}"
     formats = ", ".join(reader.title for reader in READERS.values())
     return SourceError(f"{location.shown}: {found}; expected {formats}, or {OTHER.title}")
 

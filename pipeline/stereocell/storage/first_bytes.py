@@ -5,9 +5,15 @@ import zlib
 from dataclasses import dataclass
 
 _AGAIN = "copy or download it again"
-_MAGIC = (
+_POINTERS = (
     (b"version https://git-lfs", "a pointer of Git LFS (`git lfs pull` gets the file)"),
     (b"/annex/objects", "a pointer of git-annex (`git annex get` gets the file)"),
+)
+_MAGIC = (
+    *_POINTERS,
+    (b"MATLAB 7.3", "a MATLAB 7.3 file (it holds HDF5: name it .h5)"),
+    (b"MATLAB 5.0", "a MATLAB file (save it with -v7.3, which holds HDF5, and name it .h5)"),
+    (b"\x93NUMPY", "a NumPy array (tifffile.imwrite makes a TIFF of it)"),
     (b"PK\x03\x04", "a zip archive (unzip it, and name the file or folder in it)"),
     (b"PK\x05\x06", "an empty zip archive"),
     (b"\x89PNG\r\n", "a PNG image"),
@@ -85,6 +91,11 @@ def identify(head: bytes) -> Content:
     return _text(head)
 
 
+def pointer_words(head: bytes) -> str:
+    """Return what a file is that stands for another one, in words; empty: it is its own content."""
+    return next((words for magic, words in _POINTERS if head.startswith(magic)), "")
+
+
 def _text(head: bytes) -> Content:
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if text.startswith((b"<!doctype html", b"<html")):
@@ -117,7 +128,9 @@ def _packed(head: bytes) -> Content:
     within = identify(inside) if not inside.startswith(_GZIP) else Content("a gzip file")
     if not within.is_known:
         return Content("a gzip file (gunzip it)")
-    return Content(f"a gzip file of {within.words}", f"{within.format}.gz" if within.format else "")
+    if within.format:
+        return Content(f"a gzip file of {within.words} (gunzip it)", f"{within.format}.gz")
+    return Content(f"a gzip file of {within.words}")
 
 
 def unpacked(head: bytes) -> bytes | None:
