@@ -7,19 +7,29 @@ it: the rule for padding (isosurface/level_evidence.py) knows it, and tiles agre
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.model.tiling import Box
-
-if TYPE_CHECKING:
-    from stereocell.read.dataset import VoxelArray
 
 _SLAB_BYTES = 1 << 26  # that are read at once, where the chunks permit
 
 
-def least_finite(array: "VoxelArray", time: int, channel: int) -> float | None:
+class Searched(Protocol):
+    """What is asked of a level's voxels (dataset.VoxelArray)."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+    @property
+    def chunk(self) -> tuple[int, int, int]: ...
+    @property
+    def array(self) -> Any: ...
+    def stored_window(self, time: int, channel: int, box: Box) -> NDArray[Any]: ...
+
+
+def least_finite(array: Searched, time: int, channel: int) -> float | None:
     """Return the smallest finite voxel; None: there is none. All voxels are read."""
     least = math.inf
     for box in _slabs(array):
@@ -28,7 +38,7 @@ def least_finite(array: "VoxelArray", time: int, channel: int) -> float | None:
     return None if least == math.inf else least
 
 
-def share_of_gaps(array: "VoxelArray", time: int, channel: int, boxes: Iterable[Box]) -> float:
+def share_of_gaps(array: Searched, time: int, channel: int, boxes: Iterable[Box]) -> float:
     """Return the share (0..1) of the voxels in some boxes that are NaN or infinite."""
     gaps = total = 0
     for box in boxes:
@@ -38,7 +48,7 @@ def share_of_gaps(array: "VoxelArray", time: int, channel: int, boxes: Iterable[
     return gaps / max(1, total)
 
 
-def _slabs(array: "VoxelArray") -> Iterator[Box]:
+def _slabs(array: Searched) -> Iterator[Box]:
     """Yield boxes that fill the array, whole chunks along z and y."""
     depth, height, width = array.shape
     deep, high, _ = array.chunk
