@@ -142,6 +142,11 @@ def test_a_container_that_an_xml_names_is_looked_at(tmp_path: Path) -> None:
         read.open(xml)
 
 
+def test_a_link_to_nothing_says_where_it_leads(tmp_path: Path) -> None:
+    (tmp_path / "a.tif").symlink_to("gone.tif")
+    assert "a.tif: a link to gone.tif, which isn't there" in refusal(tmp_path / "a.tif")
+
+
 def test_folders_say_what_lies_in_them(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="found an empty folder"):
         read.open(tmp_path)

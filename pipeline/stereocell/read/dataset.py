@@ -262,7 +262,8 @@ class Dataset:
 
     def _remedy(self, wanted: str) -> str:
         names = [channel.name for channel in self.channels]
-        range_ = f"an index from 0 to {len(self.channels) - 1}"
+        most = len(self.channels) - 1
+        range_ = f"an index from 0 to {most}" if most else "its index 0"
         if wanted.isdecimal():
             return f"not found, expected {range_}"
         if not any(channel.is_named for channel in self.channels):

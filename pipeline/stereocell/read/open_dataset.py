@@ -1,6 +1,7 @@
 """Open a source: find its format, read its metadata, check that it is a volume we can build."""
 
 import math
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -97,6 +98,12 @@ def _find(source: str | Path) -> tuple[Location, Reader]:
     """Return the place of a source that is there, and the reader of its format."""
     location = Location.of(source)
     if location.is_local and not Path(location.path).exists():
+        if os.path.islink(location.path):
+            target = os.readlink(location.path)
+            raise SourceError(
+                f"{location.shown}: a link to {_shown(target):.200}, which isn't there, expected "
+                "a file or a folder"
+            )
         raise SourceError(f"{location.shown}: not found, expected a file or a folder")
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
