@@ -113,6 +113,18 @@ def test_fields_out_of_order_are_named(
     assert "\n" not in str(caught.value)
 
 
+def test_a_map_of_another_ending_is_known_by_its_content(tmp_path: Path) -> None:
+    """IMOD ends a tilt series in .st, and an aligned one in .ali."""
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(np.arange(4 * 5 * 6, dtype=np.int16).reshape(4, 5, 6))
+        file.voxel_size = 10.0
+    content = (tmp_path / "a.mrc").read_bytes()
+    (tmp_path / "a.st").write_bytes(content)
+    np.testing.assert_array_equal(
+        whole(read.open(tmp_path / "a.st")), whole(read.open(tmp_path / "a.mrc"))
+    )
+
+
 @pytest.mark.parametrize("content", [b"", b"no map", bytes(2000), b"\x1f\x8bno gzip"])
 def test_what_is_no_map_is_one_line(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.mrc").write_bytes(content)

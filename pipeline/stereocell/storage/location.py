@@ -15,7 +15,7 @@ from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
-from stereocell.storage.first_bytes import HEAD_BYTES, TIFF_MAGIC
+from stereocell.storage.first_bytes import HEAD_BYTES, identify
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
 _TIFF_SUFFIXES = (
@@ -46,14 +46,8 @@ _FILE_SUFFIXES = {
     "lif": (".lif",),
     "nd2": (".nd2",),
 }
-# first bytes -> format, of a file with another name
-_MAGIC = {
-    **dict.fromkeys(TIFF_MAGIC, "tiff"),
-    b"\x89HDF\r\n\x1a\n": "hdf5",
-    b"NRRD0": "nrrd",
-    b"ZISRAWFILE": "czi",
-    b"\xda\xce\xbe\x0a": "nd2",
-}
+# formats that are known by a file's first bytes, whatever its name (IMOD calls MRC .st, .ali, ...)
+_BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
 _KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs repeats it
@@ -162,11 +156,8 @@ class Location:
 
     def _format_by_content(self, last: str) -> str | None:
         """Return the format of a file whose name leaves it open; `last` is the name, lower case."""
-        begins = first_bytes(self.path)
-        if begins[128:132] == b"DICM":  # its preamble may be the beginning of a TIFF
-            return "dicom"
-        found = next((name for magic, name in _MAGIC.items() if begins.startswith(magic)), None)
-        if found is not None:
+        found = identify(first_bytes(self.path)).format
+        if found in _BY_CONTENT:
             return found
         if last.endswith(_DICOM_SUFFIXES) or os.path.isdir(self.source):
             return "dicom"
