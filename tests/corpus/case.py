@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
-Group = Literal["labelled", "outlined", "made", "empty"]
+Group = Literal["labelled", "outlined", "made", "nested", "empty"]
 Kind = Literal["microscopy", "CT", "MR"]
 
 
@@ -17,7 +17,8 @@ class Case:
     """A volume of one channel.
 
     group       labelled: a person or a model marked each voxel; outlined: physics or a plain
-                threshold says where the outside ends; made: by script; empty: nothing is there
+                threshold says where the outside ends; made: by script; nested: by script too,
+                bodies within bodies; empty: nothing is there
     spacing_um  (z, y, x)
     load        returns the voxels (z, y, x) and the truth, bool (z, y, x); None: nothing is there
     grid        rows and columns of the tiles it is cut into

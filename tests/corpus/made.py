@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -200,6 +201,34 @@ def _shells() -> tuple[NDArray[np.uint16], Mask]:
         away[0] = np.where(nearer, d, away[0])
     mask = away[1] - away[0] < 0.42
     return CAMERAS["scmos"].shoot(_seen(mask, 90.0, 8.0), rng), mask
+
+
+def _nested(photons: float, times: float) -> tuple[NDArray[np.uint16], Mask]:
+    """Cells with nuclei `times` as bright as they are; the truth is the nuclei."""
+    rng = _rng(f"nested {photons} {times}")
+    z, y, x = _axes()
+    cells, nuclei = np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)
+    for _ in range(14):
+        r = rng.uniform(2.2, 3.2)
+        c = [rng.uniform(1.5, n * h - 1.5) for n, h in zip(SHAPE, SPACING, strict=True)]
+        away = np.sqrt((z - c[0]) ** 2 + (y - c[1]) ** 2 + (x - c[2]) ** 2)
+        cells |= away < r
+        nuclei |= away < r * rng.uniform(0.45, 0.6)
+    height = photons * np.where(nuclei, times, 1.0)
+    return CAMERAS["scmos"].shoot(_seen(cells, height, 0.1 * photons), rng), nuclei
+
+
+def nested_cases() -> Iterator[Case]:
+    """Yield cells with nuclei, whose level is the second; every other one is held out."""
+    for count, (photons, times) in enumerate(product((10.0, 40.0, 160.0), (1.5, 2.5, 5.0))):
+        yield Case(
+            f"nested, {photons:g} photons, x {times:g}",
+            "nested",
+            SPACING,
+            partial(_nested, photons, times),
+            held_out=count % 2 == 1,
+            rung=1,
+        )
 
 
 def _case_of(name: str, make: Callable[[], tuple[NDArray[Any], Mask]], held_out: bool) -> Case:

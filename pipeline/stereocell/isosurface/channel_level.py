@@ -104,6 +104,7 @@ class Level:
                 contrast
     share       of all voxels that lie above it, 0..1
     rise        slope at the level over the lesser one of those at its inside and outside
+    stands_out  slope at the level over that at its outside
     """
 
     value: float
@@ -116,6 +117,7 @@ class Level:
     stability: float
     share: float
     rise: float
+    stands_out: float
 
     @property
     def contrast(self) -> float:
@@ -174,6 +176,14 @@ class Level:
     def is_clear_within(self) -> bool:
         """Whether the level is clear, given that it lies within one that is."""
         return self.is_clear or self._reaches(WITHIN)
+
+    @property
+    def is_flank(self) -> bool:
+        """Whether, within a clear level, it lies on the inner flank of that level's own edge.
+
+        There the slope falls inwards. What has an edge of its own is steeper there than outside.
+        """
+        return self.dip > DIP and self.stands_out < 1.0
 
     def _reaches(self, bounds: Mapping[str, float]) -> bool:
         return all(getattr(self, name) >= least for name, least in bounds.items())
@@ -275,6 +285,7 @@ def find_levels(
     finest_um: float,
     modality: str = "",
     options: IsoValueOptions | None = None,
+    subtracts: bool | None = None,
 ) -> ChannelLevels:
     """Return a channel's levels.
 
@@ -283,6 +294,7 @@ def find_levels(
     finest_um  the finest voxel spacing
     modality   DICOM's code; of CT and MR no background is subtracted
     options    of a criterion that scores edges, whose level is then the only rung; None: the ladder
+    subtracts  whether the levels are to be above the background; None: where that gains
     """
     scale = counting.scale
     plain = reduce(Sums.__add__, (tile.plain for tile in tiles))
@@ -296,16 +308,16 @@ def find_levels(
         has_padding = False
         sight = _Sight(plain + padding, scale.edges(), noise, finest_um)
         ladder = sight.ladder(modality)
-    above, subtracts = [tile.above for tile in tiles if tile.above is not None], False
-    if above and counting.scale_above is not None and not is_body:
+    above, is_raised = [tile.above for tile in tiles if tile.above is not None], False
+    if above and counting.scale_above is not None and not is_body and subtracts is not False:
         edges = counting.scale_above.edges()
         raised = _Sight(reduce(Sums.__add__, above), edges, noise, finest_um)
         other = raised.ladder()
-        subtracts = _gains(_first(ladder), _first(other))
-        if subtracts:
+        is_raised = bool(subtracts) or _gains(_first(ladder), _first(other))
+        if is_raised:
             sight, ladder = raised, other
     found = ChannelLevels(
-        ladder, subtracts, has_padding, noise, finest_um, sight.sums, sight.histogram
+        ladder, is_raised, has_padding, noise, finest_um, sight.sums, sight.histogram
     )
     return found if options is None else _by_edges(found, tiles, options)
 
@@ -386,7 +398,10 @@ class _Sight:
             if is_high and is_large and level.sharpness <= FLANK:
                 found.append(level)
         last = max([ends[-2], *(level.value for level in found)])
-        return (*found, *self._half_heights(whole.above(last)))
+        for level in self._half_heights(whole.above(last)):
+            if not (level.is_flank and clear_of(found)):
+                found.append(level)
+        return tuple(found)
 
     @property
     def _least_voxels(self) -> float:
@@ -447,7 +462,8 @@ class _Sight:
         contrast = max(inside - outside, 1e-12)
         width = max(WIDTH_SHARE * contrast, 2 * part.width_at(value))
         slope = self._slope(value, width)
-        beside = min(self._slope(inside, width), self._slope(outside, width))
+        slope_outside = self._slope(outside, width)
+        beside = min(self._slope(inside, width), slope_outside)
         low, high = (part.above(value + d * contrast).total for d in (-TENTH, TENTH))
         return Level(
             value=value,
@@ -461,6 +477,7 @@ class _Sight:
             share=self.histogram.above(value).total / self.histogram.total,
             # noise-free values have no slope beside
             rise=min(slope / beside, MOST_RISE) if beside > 0 else MOST_RISE,
+            stands_out=min(slope / slope_outside, MOST_RISE) if slope_outside > 0 else MOST_RISE,
         )
 
     def _slope(self, value: float, width: float) -> float:

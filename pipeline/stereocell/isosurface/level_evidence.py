@@ -79,11 +79,13 @@ class Counting:
     scale        of the values
     scale_above  of the values above the background; None: none is tried
     darkest      the channel's least value, that of its padding; None: it has none
+    mask         the only two values that its voxels have; None: they have more
     """
 
     scale: Scale
     scale_above: Scale | None
     darkest: float | None
+    mask: tuple[float, float] | None = None
 
 
 def denoising_reach(
