@@ -44,11 +44,25 @@ def test_finds_the_bodies(name: str) -> None:
         list(EMPTY),
         kept=[f"empty, {c}, {f}" for c, f in zip(CAMERAS, FAULTS[1::2], strict=True)]
         + ["empty, emccd, ramp x 3", "empty, scmos, depth x 4", "empty, scmos, zero padding"]
-        + ["inside tissue, detector, 6", "inside tissue, scmos, 2"],
+        + ["inside tissue, detector, 6", "inside tissue, scmos, 2"]
+        + ["empty, scmos, depth x 10", "empty, emccd, two fields", "empty, detector, tissue x 4"],
     ),
 )
 def test_finds_nothing_where_nothing_is(name: str) -> None:
     assert look_at(EMPTY[name]).found.clear == ()
+
+
+def test_of_uneven_light_is_said_that_it_is_light() -> None:
+    found = look_at(EMPTY["empty, emccd, two fields"]).found
+    assert found.light > 0.95
+    assert found.doubt.endswith(
+        "% of what varies lies along the axes alone, as light does and no body, expected at most 85%"
+    )
+
+
+@pytest.mark.parametrize("name", ["slab", "bodies in depth"])
+def test_bodies_are_found_in_light_that_falls_off_and_so_is_a_section(name: str) -> None:
+    assert dice(look_at(MADE[name])) > 0.85
 
 
 def test_the_cut_into_tiles_changes_no_level() -> None:

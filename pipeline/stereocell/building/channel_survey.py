@@ -55,7 +55,7 @@ from stereocell.building.tasks.window import (
     write_window,
 )
 from stereocell.engine.run import Engine, console
-from stereocell.isosurface.channel_level import Level
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import CRITERIA, LADDER
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel

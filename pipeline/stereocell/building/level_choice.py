@@ -10,7 +10,8 @@ import numpy as np
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
-from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
+from stereocell.isosurface.channel_level import ChannelLevels, find_levels
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUNGS, parse_level
 from stereocell.model.lattice_field import LatticeField

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from stereocell.building.level_choice import given_level
 from stereocell.building.plan import Channel, Plan
-from stereocell.isosurface.channel_level import Level, clear_of
+from stereocell.isosurface.level import Level, clear_of
 from stereocell.isosurface.options import ADAPTIVE, RUNGS
 
 MOST = 3
@@ -54,7 +54,9 @@ def find_other_levels(
     """
     if not ladder:
         return []
-    named, doubtful = _rungs(plan, channel, ladder, subtracts)
+    # a channel that has no surface has no rung that could be named
+    clear = () if taken is None else clear_of(ladder)
+    named, doubtful = _rungs(plan, channel, ladder, clear, subtracts)
     likely = [level for level in doubtful if (level.confidence or 0.0) >= LIKELY]
     levels = [*named, *likely]
     if threshold is not None and plan.settings.isovalue.criterion != ADAPTIVE:
@@ -94,7 +96,11 @@ def _surfaces(plan: Plan, channel: Channel, rung: str) -> str:
 
 
 def _rungs(
-    plan: Plan, channel: Channel, ladder: Sequence[Level], subtracts: bool
+    plan: Plan,
+    channel: Channel,
+    ladder: Sequence[Level],
+    clear: Sequence[Level],
+    subtracts: bool,
 ) -> tuple[list[OtherLevel], list[OtherLevel]]:
     """Return the clear rungs by their names, and the doubtful ones, best first.
 
@@ -103,7 +109,6 @@ def _rungs(
     """
     by_name = given_level(plan, channel) is None and plan.settings.isovalue.scope == "channel"
     built = {one.rung for one in plan.channels if channel.base and one.base == channel.base}
-    clear = clear_of(ladder)
     doubtful = [level for level in ladder if level not in clear]
     named = [
         OtherLevel(

@@ -22,7 +22,8 @@ from stereocell.building.settings import Settings
 from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
-from stereocell.isosurface.channel_level import ChannelLevels, Level
+from stereocell.isosurface.channel_level import ChannelLevels
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import LADDER
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError, UsageError
