@@ -55,9 +55,7 @@ def test_finds_nothing_where_nothing_is(name: str) -> None:
 def test_of_uneven_light_is_said_that_it_is_light() -> None:
     found = look_at(EMPTY["empty, emccd, two fields"]).found
     assert found.light > 0.95
-    assert found.doubt.endswith(
-        "% of what varies lies along the axes alone, as light does and no body, expected at most 85%"
-    )
+    assert "of what varies lies along the axes alone, as light does and no body" in found.doubt
 
 
 @pytest.mark.parametrize("name", ["slab", "bodies in depth"])
