@@ -139,10 +139,13 @@ def _rungs(
 def _aside(
     plan: Plan, channel: Channel, ladder: Sequence[Level], taken: float | None, subtracts: bool
 ) -> list[OtherLevel]:
-    best = max(ladder, key=lambda level: level.confidence)
-    start = best.value if taken is None else taken
+    if taken is None:
+        rung = max(ladder, key=lambda level: level.confidence)
+    else:  # the one that it is, or that is nearest to it
+        rung = min(ladder, key=lambda level: abs(level.value - taken))
+    start = rung.value if taken is None else taken
     return [
         OtherLevel(name, value, subtracts, take(plan, channel, value, above=subtracts), None)
         for name, share in _ASIDE.items()
-        for value in [start + share * best.contrast]
+        for value in [start + share * rung.contrast]
     ]
