@@ -50,6 +50,7 @@ def build(
     """
     from stereocell.building import phases
     from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
     from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
@@ -76,7 +77,8 @@ def build(
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)
-    wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
+    with named_as_settings():
+        wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
     with ExitStack() as stack:
         if place.is_local:
@@ -87,7 +89,8 @@ def build(
             folder = stack.enter_context(opened(place.source, "build"))
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
-        phases.make(str(source), folder, wanted)
+        with named_as_settings():
+            phases.make(str(source), folder, wanted)
         tell(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
@@ -112,5 +115,7 @@ def open_volume(source: str | Path, **options: Any) -> "Dataset":
         volume = dataset.read(0, dataset.levels[-1].box, level=len(dataset.levels) - 1)
     """
     from stereocell import read
+    from stereocell.building.setting_names import named_as_settings
 
-    return read.open(source, **options)
+    with named_as_settings(has_sections=False):
+        return read.open(source, **options)

@@ -72,6 +72,10 @@ class Figures:
     rung: int = 0  # of the truth
     rungs: int = 0  # clear ones that were found
 
+    @property
+    def has_truth(self) -> bool:
+        return self.group not in ("empty", "looked at")
+
 
 def dice(found: Mask, truth: Mask) -> float:
     return float(2 * (found & truth).sum() / max(1, found.sum() + truth.sum()))
@@ -183,8 +187,10 @@ def main() -> None:
         for case in pool.map(measure, chosen):
             cases.append(case)
             print(f"{len(cases)} of {len(chosen)}: {case.name}", file=sys.stderr, flush=True)
-    whole = [case for case in cases if case.group != "nested"]
-    print_methods(whole)
+    whole = [case for case in cases if case.group not in ("nested", "looked at")]
+    if whole:
+        print_methods(whole)
+    print_looks([case for case in cases if case.group == "looked at"])
     print_confidence("a tile", [tile for case in whole for tile in case.tiles])
     print_inner(cases)
     if options.each:
@@ -194,7 +200,7 @@ def main() -> None:
 def _groups(cases: list[Figures]) -> dict[str, list[Figures]]:
     names = ["labelled", "outlined", "made"]
     found = {name: [c for c in cases if c.group == name] for name in names}
-    found["held out"] = [c for c in cases if c.held_out and c.group != "empty"]
+    found["held out"] = [c for c in cases if c.held_out and c.has_truth]
     return {name: some for name, some in found.items() if some}
 
 
@@ -210,7 +216,7 @@ def print_methods(cases: list[Figures]) -> None:
         for some in groups.values():
             scores = [c.found[method].dice for c in some]
             cells.append(f"{np.mean(scores):.3f}, {np.min(scores):.2f}")
-        with_truth = [c.found[method] for c in cases if c.group != "empty"]
+        with_truth = [c.found[method] for c in cases if c.has_truth]
         cells.append(f"{np.nanmedian([f.away for f in with_truth]):.2f}")
         cells.append(f"{sum(c.found[method].inside > 0 for c in empty)}")
         ratios = [_ratio(f.levels) for f in with_truth if len(f.levels) > 1]
@@ -251,10 +257,19 @@ def print_inner(cases: list[Figures]) -> None:
     print(f"further rungs on {len(alike)} volumes whose bodies are all alike: {further}")
 
 
+def print_looks(cases: list[Figures]) -> None:
+    """Print what share of a volume without a truth each method takes for inside."""
+    for case in cases:
+        shares = ", ".join(f"{name} {found.inside:.2%}" for name, found in case.found.items())
+        print(f"\n{case.name}, inside: {shares}; confidence {case.confidence:.2f}")
+
+
 def print_cases(cases: list[Figures]) -> None:
     print()
     for case in cases:
         mine = case.found[OURS]
+        if not case.has_truth:
+            continue
         best = max(case.found.items(), key=lambda item: np.nan_to_num(item[1].dice))
         print(
             f"{case.group:9} {case.name:36} Dice {mine.dice:.3f} "

@@ -69,7 +69,7 @@ def test_it_is_taken_for_nothing_else(
     labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["plan", str(labels), "-o", str(tmp_path / "out"), "--as", "labels"]) == 2
-    assert "plan.taken_as is 'labels', expected intensity" in capsys.readouterr().err
+    assert "--as is 'labels', expected intensity" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("kind", ["uint32", "int32"])
@@ -88,6 +88,36 @@ def test_wide_integers_that_number_objects_end_the_plan(
     assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
     told = " ".join("".join(capsys.readouterr()).split())
     assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in told
+
+
+@pytest.mark.parametrize("place", [4, 11])
+def test_a_label_map_among_many_channels_is_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], place: int
+) -> None:
+    rng = np.random.default_rng(0)
+    z, y, x = np.mgrid[:24, :96, :96] // 12
+    voxels = rng.poisson(40, (12, *z.shape)).astype(np.uint16)
+    voxels[place] = rng.permutation(1000)[(z * 8 + y) * 8 + x] + 1
+    path = tmp_path / "many of mine.ome.tif"
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    tifffile.imwrite(path, voxels, metadata={"axes": "CZYX", **sizes}, ome=True)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert f"channel 'Channel{place}' looks like a label map of" in capsys.readouterr().err
+    others = ",".join(str(channel) for channel in range(12) if channel != place)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--channels", others]) == 0
+
+
+def test_labels_stored_as_floats_with_nan_around_are_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    z, y, x = np.mgrid[:24, :64, :64] // 8
+    voxels = ((z * 8 + y) * 8 + x + 1).astype(np.float32)
+    voxels[:, :8] = np.nan
+    path = tmp_path / "floats of mine.ome.tif"
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "looks like a label map" in capsys.readouterr().err
 
 
 def test_objects_off_the_middle_and_in_a_region_are_seen(

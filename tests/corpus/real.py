@@ -38,6 +38,11 @@ def real_cases() -> Iterator[Case]:
         )
     yield Case("MRI head", "outlined", (1400.0, 1333.0, 1333.0), lambda: _mri(folder), kind="MR")
     yield Case("mouse brain", "outlined", (50.0, 50.0, 50.0), lambda: _mouse(folder))
+    for channel, name in enumerate(("cells", "autofluorescence")):
+        yield Case(
+            f"light sheet, {name}", "looked at", (5.0, 2.0, 2.0),
+            lambda channel=channel: (_sheet(folder, channel), None),
+        )  # fmt: skip
 
 
 def _nuclei(folder: Path) -> tuple[NDArray[Any], Mask]:
@@ -76,6 +81,12 @@ def _mri(folder: Path) -> tuple[NDArray[Any], Mask]:
 def _mouse(folder: Path) -> tuple[NDArray[Any], Mask]:
     voxels = tifffile.imread(next((folder / "mouse_brain").glob("*.tif")))[::2, ::2, ::2]
     return voxels, _above_air(voxels)
+
+
+def _sheet(folder: Path, channel: int) -> NDArray[Any]:
+    """Of labelled cells in a mouse's brain, and of the tissue itself: no one has marked either."""
+    voxels = tifffile.imread(next((folder / "brain_cells_2ch").glob("*.tif")))
+    return np.ascontiguousarray(voxels[:, channel])
 
 
 def _above_air(voxels: NDArray[Any]) -> Mask:

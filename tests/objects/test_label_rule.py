@@ -74,8 +74,9 @@ CASES = [case for case in all_cases() if not case.name.startswith(("balls", "tub
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_no_image_of_the_corpus_is_refused(case) -> None:  # type: ignore[no-untyped-def]
     voxels, _ = case.load()
-    middle = tuple(slice(max(0, n // 2 - 64), n // 2 + 64) for n in voxels.shape)
-    assert recognise(voxels[middle]).kind == "image"
+    for half in (64, 32, 16):  # of many channels smaller blocks are looked at
+        middle = tuple(slice(max(0, n // 2 - half), n // 2 + half) for n in voxels.shape)
+        assert recognise(voxels[middle]).kind == "image"
 
 
 @pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")

@@ -217,6 +217,12 @@ def test_microscopy_has_planes_by_its_axes_with_square_pixels(
     assert "--plane axial: " in told
     assert "states no place in a body, expected acquired, xy, xz, yz" in told
     assert not (tmp_path / "no").exists()
+    two = phantoms.write_ome_tiff(tmp_path / "two.ome.tif", np.stack([voxels, voxels]), "CZYX")
+    assert main(["slices", str(two), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
+    assert "states no place in a body" in capsys.readouterr().err  # whatever channels are asked for
+    assert main(["slices", str(two), "-o", str(tmp_path / "no")]) == 2
+    assert "found Channel0, Channel1, expected --channels with one" in capsys.readouterr().err
+    written(two, tmp_path / "one", "--channels", "Channel1")
 
 
 def test_spacings_far_apart_make_no_huge_picture() -> None:

@@ -51,8 +51,10 @@ def test_missing_names_matter_only_where_channels_are_named(
     assert [channel.color for channel in dataset.channels] == [None, None]
     assert not any(channel.is_named for channel in dataset.channels)
     assert dataset.find_channels(["1"]) == (1,)
-    with pytest.raises(UsageError, match="no channel names, expected an index from 0 to 1"):
-        dataset.find_channels(["Channel0"])
+    assert dataset.find_channels(["Channel1", "Channel0"]) == (1, 0)  # as it is shown everywhere
+    expected = "no channel names, expected Channel0 to Channel1, or an index from 0 to 1"
+    with pytest.raises(UsageError, match=expected):
+        dataset.find_channels(["DNA"])
 
 
 @pytest.mark.parametrize("suffix", [".zarr", ".ome.tif"])
@@ -60,16 +62,17 @@ def test_one_missing_name_leaves_the_others_usable(tmp_path: Path, suffix: str) 
     dataset = _with_names(tmp_path, ["DNA", None, "CD8"], suffix)
     assert _names(dataset) == ["DNA", "Channel1", "CD8"]
     assert dataset.find_channels(["CD8", "1", "DNA"]) == (2, 1, 0)
+    assert dataset.find_channels(["Channel1"]) == (1,)
     with pytest.raises(
-        UsageError, match=r"'Channel1': not found.*expected one of DNA, CD8 or an index from 0 to 2"
+        UsageError, match=r"'CD3': .*expected one of DNA, Channel1, CD8 or an index from 0 to 2"
     ):
-        dataset.find_channels(["Channel1"])
+        dataset.find_channels(["CD3"])
 
 
 def test_a_made_up_name_gives_way_to_a_real_one(tmp_path: Path) -> None:
     dataset = _with_names(tmp_path, ["Channel1", None])
     assert _names(dataset) == ["Channel1", "Channel1_"]
-    assert dataset.find_channels(["Channel1"]) == (0,)
+    assert dataset.find_channels(["Channel1", "Channel1_"]) == (0, 1)
 
 
 def test_equal_names_are_told_apart(tmp_path: Path) -> None:

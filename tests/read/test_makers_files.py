@@ -150,7 +150,9 @@ def test_nd2_has_positions_times_and_channels(
     import nd2
 
     monkeypatch.setattr(nd2, "ND2File", Nd2)
-    (tmp_path / "a.nd2").touch()
+    (tmp_path / "a.nd2").write_bytes(
+        b"\xda\xce\xbe\n" + bytes(40) + b"ND2 CHUNK MAP SIGNATURE 0000001!" + bytes(8)
+    )
     dataset = read.open(tmp_path / "a.nd2", series=2, time=1)
     assert dataset.levels[0].spacing_um == SIZE_UM
     assert [channel.name for channel in dataset.channels] == ["DAPI", "Channel1"]
@@ -191,7 +193,8 @@ def test_without_its_extra_a_format_says_how_to_get_it(
         raise ImportError(name)
 
     monkeypatch.setattr("stereocell.read.extras.import_module", absent)
-    (tmp_path / f"a.{suffix}").write_bytes(b"abc")
+    begins = {"czi": b"ZISRAWFILE", "lif": b"p\0\0\0....*", "nd2": b"\xda\xce\xbe\n"}
+    (tmp_path / f"a.{suffix}").write_bytes(begins[suffix])
     assert f'pip install "stereocell[{extra}]"' in refusal(tmp_path / f"a.{suffix}")
 
 

@@ -244,4 +244,4 @@ def test_attributes_that_are_no_table_are_one_line(tmp_path: Path) -> None:
 
 def test_a_file_in_place_of_a_folder_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.n5").write_bytes(b"packed")
-    assert "is a file, expected a folder of N5" in refusal(tmp_path / "a.n5")
+    assert "found a file (a text file), expected a folder of N5" in refusal(tmp_path / "a.n5")

@@ -124,7 +124,8 @@ def test_nan_is_the_smallest_finite_value_and_is_told(tmp_path: Path) -> None:
     bare = values.copy()
     bare[:, :5] = np.nan
     dataset = read.open(write(tmp_path / "a.nii.gz", grid(), bare))
-    assert dataset.notes == (f"{22 * 5 * 26:,} voxels are NaN: read as the smallest finite value",)
+    told = f"{22 * 5 * 26:,} voxels are NaN or infinite: read as the smallest finite value"
+    assert dataset.notes == (told,)
     expected = np.nan_to_num(bare, nan=float(np.nanmin(bare)))
     write(tmp_path / "b.nii.gz", grid(), expected)
     voxels = whole(read.open(tmp_path / "b.nii.gz"))
@@ -142,6 +143,29 @@ def test_nan_is_told_of_the_point_in_time_that_is_read(tmp_path: Path) -> None:
     assert any("1 voxels are NaN" in note for note in read.open(path, time=1).notes)
 
 
+def test_a_spacing_of_0_is_told(tmp_path: Path) -> None:
+    """nibabel reads it as 1."""
+    image = nibabel.Nifti1Image(np.zeros((4, 5, 6), np.uint8), None)
+    image.header.set_zooms((2.0, 2.0, 2.0))
+    nibabel.save(image, tmp_path / "a.nii")
+    assert not any("pixdim" in note for note in read.open(tmp_path / "a.nii").notes)
+    patch(tmp_path / "a.nii", 80, np.zeros(1, "<f4"))
+    dataset = read.open(tmp_path / "a.nii")
+    assert any("pixdim: found 0, read as 1" in note for note in dataset.notes)
+    assert sorted(dataset.levels[0].spacing_um) == [1000, 2000, 2000]
+
+
+def test_infinity_is_read_as_nan_is(tmp_path: Path) -> None:
+    values = sample(grid(), SHAPE).astype(np.float32)
+    values[1, 2, 3], values[0, 0, 0], values[4, 4, 4] = np.inf, np.nan, -np.inf
+    dataset = read.open(write(tmp_path / "a.nii", grid(), values))
+    assert any("3 voxels are NaN or infinite" in note for note in dataset.notes)
+    least = values[np.isfinite(values)].min()
+    expected = np.where(np.isfinite(values), values, least)
+    write(tmp_path / "b.nii", grid(), expected)
+    np.testing.assert_array_equal(whole(dataset), whole(read.open(tmp_path / "b.nii")))
+
+
 def patch(path: Path, start: int, values: NDArray[Any]) -> None:
     """Overwrite what the header has at a place, packed or not."""
     is_packed = path.suffix == ".gz"
@@ -153,12 +177,6 @@ def patch(path: Path, start: int, values: NDArray[Any]) -> None:
 def stretched(path: Path) -> None:
     write(path, grid(), scene_on(grid()))
     patch(path, 112, np.array([1e38, 0], "<f4"))  # scl_slope, scl_inter
-
-
-def endless(path: Path) -> None:
-    values = np.zeros((4, 5, 6), np.float32)
-    values[1, 2, 3], values[0, 0, 0] = np.inf, np.nan
-    nibabel.save(nibabel.Nifti1Image(values, np.eye(4)), path)
 
 
 def empty(path: Path) -> None:
@@ -210,7 +228,7 @@ def huge(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (nothing, "not readable as NIfTI"),
+        (nothing, "found an empty file"),
         (cut, "cut short|not readable"),
         (colours, "datatype"),
         (flat, "dim: found"),
@@ -218,8 +236,7 @@ def huge(path: Path) -> None:
         (collapsed, "three axes"),
         (huge, "expected at most 4 GiB|cut short"),
         (a_little_too_large, "found 4.01 GiB, expected at most 4 GiB|cut short"),
-        (stretched, "NaN or infinite"),
-        (endless, "found 1 NaN or infinite"),
+        (stretched, "beyond float32"),
         (empty, "found no finite voxel"),
     ],
 )

@@ -444,8 +444,12 @@ def test_axes_that_do_not_fit_are_told(tmp_path: Path, axes: str) -> None:
 @pytest.mark.parametrize("option", [{"axes": "zyx"}, {"pattern": "{z}"}, {"series": 2}])
 def test_an_option_of_another_format_is_told(tmp_path: Path, option: dict[str, Any]) -> None:
     (name,) = option
-    source = tmp_path / ("x.tif" if name != "axes" else "x.nii")
-    tifffile.imwrite(source, counted("ZYX"))
+    if name == "axes":
+        source = tmp_path / "x.nii"
+        source.write_bytes(bytes(344) + b"n+1\0")
+    else:
+        source = tmp_path / "x.tif"
+        tifffile.imwrite(source, counted("ZYX"))
     with pytest.raises(UsageError, match=rf"--{name} .*: found .*, expected .* or no --{name}"):
         read.open(source, **option)
 
@@ -466,6 +470,22 @@ def test_ndtiff_with_its_index(tmp_path: Path) -> None:
     assert "NDTiff.index: '../" in refusal(path)
 
 
+@pytest.mark.parametrize("photometric", ["minisblack", "rgb"])
+def test_planes_that_were_written_one_by_one_are_a_stack(tmp_path: Path, photometric: Any) -> None:
+    """As a loop over `TiffWriter.write` leaves them: each is an array by itself to tifffile."""
+    planes = counted("ZYX") if photometric == "minisblack" else counted("ZYXS")[..., :3]
+    with tifffile.TiffWriter(tmp_path / "x.tif") as writer:
+        for plane in planes:
+            writer.write(plane, photometric=photometric)
+    dataset = read.open(tmp_path / "x.tif", spacing_um=GIVEN)
+    assert dataset.levels[0].shape == planes.shape[:3]
+    colours = planes[..., None] if photometric == "minisblack" else planes
+    for channel in range(colours.shape[-1]):
+        found = dataset.read(channel, dataset.levels[0].box).voxels
+        np.testing.assert_array_equal(found, colours[..., channel])
+    assert any(f"read as {len(planes)} slices along z" in note for note in dataset.notes)
+
+
 def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
     text = companion_set(tmp_path, counted("ZYX"), [f"x-Z{index}.ome.tiff" for index in range(5)])
     source = tmp_path / "y.companion.ome"
@@ -473,7 +493,7 @@ def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
         (text.replace("x-Z0", "gone"), "FileName: found 'gone.ome.tiff'"),
         (text.replace("x-Z0", "../x-Z0"), "leads to"),
         (text[:200], "OME-XML:"),
-        ("", "OME-XML: found none"),
+        ("", "found an empty file (copy or download it again), expected OME-XML"),
     ):
         source.write_text(spoilt)
         assert told in refusal(source)

@@ -240,12 +240,39 @@ def test_all_zero_volume_builds_without_a_surface(tmp_path: Path) -> None:
     assert manifest["channels"][0]["tileset"] is None
 
 
-def test_nan_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    voxels = np.ones((4, 24, 24), np.float32)
-    voxels[2, 3, 4] = np.nan
+def test_nan_outside_the_field_of_view_is_built_as_the_darkest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    body = phantoms.f_phantom().astype(np.float32)
+    body[:, :6] = np.nan  # as a stack has it that was registered
+    body[3, 20, 5], body[4, 21, 6] = np.inf, -np.inf
+    for name, voxels in (
+        ("gaps", body),
+        ("none", np.where(np.isfinite(body), body, body[np.isfinite(body)].min())),
+    ):
+        source = phantoms.write_ome_tiff(tmp_path / f"{name}.ome.tif", voxels)
+        assert main(["build", str(source), "-o", str(tmp_path / name), "--workers", "0"]) == 0
+        told = " ".join(capsys.readouterr().err.split())
+        assert ("of the voxels are NaN or infinite: read as the smallest" in told) == (
+            name == "gaps"
+        )
+    levels = [
+        json.loads((tmp_path / name / "bundle" / "manifest.json").read_text())["channels"][0][
+            "level"
+        ]
+        for name in ("gaps", "none")
+    ]
+    assert levels[0] == levels[1]
+    assert levels[0] is not None
+
+
+def test_nothing_but_nan_is_named_by_the_plan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    voxels = np.full((4, 24, 24), np.nan, np.float32)
     source = phantoms.write_ome_tiff(tmp_path / "nan.ome.tif", voxels)
-    assert main(["build", str(source), "-o", str(tmp_path / "out"), "--workers", "0"]) == 1
-    assert "NaN" in _one_line(capsys)
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 1
+    assert "all are NaN or infinite, expected an image" in _one_line(capsys)
 
 
 @pytest.mark.parametrize("phase", ["units", "stage", "bundle", "report"])

@@ -43,7 +43,7 @@ def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["--channels", "nope"], "channel 'nope': not found, expected one of F body, F again or"),
         (["--channels", "2"], "channel '2': not found, expected an index from 0 to 1"),
         (["--time", "9"], "--time: found 9, expected 0 to 0"),
-        (["--time=-1"], "plan.time is -1, expected 0 or more"),
+        (["--time=-1"], "--time is -1, expected 0 or more"),
         (
             ["--iso-value", "7=500"],
             "--iso-value names channel '7', expected one of F body,",

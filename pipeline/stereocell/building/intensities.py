@@ -19,17 +19,20 @@ from stereocell.model.tiling import Box
 from stereocell.objects.label_rule import Kind, recognise
 from stereocell.read import Dataset
 
-_SIDE = 128  # voxels: largest edge of the block that is looked at
+_SIDE = 128  # voxels: largest edge of a block that is looked at
+_LEAST_SIDE = 32  # of many channels, whose blocks together are to be as those of _MOST
 _WIDE = 4  # bytes
 _MOST_EXACT = 2.0**53  # whole numbers below are exact as float64
-_MOST = 4  # channels that are looked at: a label map comes alone, or with few others
+_MOST = (
+    4  # channels that are looked at in blocks of _SIDE: a label map mostly comes with few others
+)
 
 
 def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, level: int) -> None:
     """Raise UsageError where a channel looks like a label map.
 
-    Blocks of the first channels are read at full resolution, from the middle of what is built on,
-    until one has three values: two tell nothing.
+    Blocks of every channel are read at full resolution, from the middle of what is built on, until
+    one has three values: two tell nothing. The more channels, the smaller the blocks.
 
     region  voxels of the level that is built
     """
@@ -46,8 +49,9 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
         for places in (region.start, region.stop)
     )
     finest = Box((z0, y0, x0), (z1, y1, x1))
-    for index in channels[:_MOST]:
-        found = _look_at(dataset, index, finest)
+    side = max(_LEAST_SIDE, min(_SIDE, round(_SIDE * (_MOST / max(1, len(channels))) ** (1 / 3))))
+    for index in channels:
+        found = _look_at(dataset, index, finest, side)
         if found.kind == "labels":
             raise UsageError(_told(dataset, index, found))
         if stored.kind in "iu" and stored.itemsize >= _WIDE and found.is_plain:
@@ -69,14 +73,14 @@ class _Found:
     is_plain: bool
 
 
-def _look_at(dataset: Dataset, index: int, finest: Box) -> _Found:
+def _look_at(dataset: Dataset, index: int, finest: Box, side: int) -> _Found:
     """Return what the first block with three values or more holds; where none has, all blocks.
 
     Blocks with one object each have two values each, and are a label map where these differ.
     """
     values: set[int] = set()
     is_plain = True
-    for box in _blocks(finest):
+    for box in _blocks(finest, side):
         voxels = _whole_numbers(dataset.read_stored(index, box))
         if voxels is None:
             return _Found("image", 0, 0, is_plain=False)
@@ -94,21 +98,27 @@ def _look_at(dataset: Dataset, index: int, finest: Box) -> _Found:
 def _whole_numbers(voxels: NDArray[Any]) -> NDArray[Any] | None:
     """Return the voxels as integers: programs save labels as floats too. None: some are no labels.
 
-    voxels  (z, y, x), as stored
+    voxels  (z, y, x), as stored; NaN is no object
     """
     if voxels.dtype.kind in "iu":
         return voxels
-    if voxels.dtype.kind != "f" or not np.isfinite(voxels).all() or (voxels % 1 != 0).any():
+    if voxels.dtype.kind != "f":
+        return None
+    voxels = np.where(np.isnan(voxels), 0, voxels)
+    if not np.isfinite(voxels).all() or (voxels % 1 != 0).any():
         return None
     return voxels.astype(np.int64) if np.abs(voxels).max() < _MOST_EXACT else None
 
 
-def _blocks(region: Box) -> Iterator[Box]:
-    """Yield blocks of the region: its middle, then the middles of its eight octants."""
+def _blocks(region: Box, most: int) -> Iterator[Box]:
+    """Yield blocks of the region: its middle, then the middles of its eight octants.
+
+    most  voxels of a block's edge
+    """
     for z, y, x in ((2, 2, 2), *product((1, 3), repeat=3)):
         sides = []
         for start, n, quarters in zip(region.start, region.shape, (z, y, x), strict=True):
-            side = min(n, _SIDE)
+            side = min(n, most)
             low = start + min(max(n * quarters // 4 - side // 2, 0), n - side)
             sides.append((low, low + side))
         (z0, z1), (y0, y1), (x0, x1) = sides

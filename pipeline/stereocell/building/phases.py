@@ -5,7 +5,7 @@ Every phase skips finished work: a result is named by everything that it depends
 
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,6 @@ from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
 from stereocell.building.plan import (
-    ALL,
     Channel,
     Plan,
     choose_color,
@@ -26,13 +25,13 @@ from stereocell.building.plan import (
     parse_region,
     with_surfaces,
 )
+from stereocell.building.plan_notes import told_in_vain, told_of_gaps
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import evidence, solids, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
-from stereocell.isosurface.options import LADDER, RUNGS
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError
@@ -113,27 +112,10 @@ def settle(source: str, settings: Settings) -> Plan:
         modality=modality,
         placement=dataset.placement,
     )
-    for note in (*dataset.notes, *_in_vain(settings, channels)):  # an error stands alone
+    gaps = told_of_gaps(dataset, plan)
+    for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
-
-
-def _in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield what is said of each setting that another one overrules."""
-    options = settings.isovalue
-    for channel in channels:
-        keys = (channel.name, str(channel.index), ALL)
-        given = next((settings.iso_values[k] for k in keys if k in settings.iso_values), None)
-        if channel.rung and given is not None and given != settings.iso_values.get(ALL):
-            yield f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
-        if channel.rung and options.criterion != LADDER:
-            yield f"{channel.name}: built where --surfaces says, not by {options.criterion}"
-        is_number = channel.rung not in RUNGS if channel.rung else given is not None
-        if is_number and options.scope == "tile":
-            yield (
-                f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "
-                "is for levels that are found"
-            )
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

@@ -484,6 +484,7 @@ def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
     if key in names:
         return key
     found = [channel.name for channel in channels if key in (channel.base, str(channel.index))]
+    found = found or [channel.name for channel in channels if key == channel.id]
     if len(found) > 1:
         raise UsageError(
             f"{flag} names channel {key!r}, which has several surfaces, expected one of "

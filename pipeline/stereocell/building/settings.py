@@ -132,22 +132,20 @@ class PlanOptions:
         if self.max_voxels < 1:
             raise UsageError(f"plan.max_voxels is {self.max_voxels}, expected at least 1")
         if self.time < 0:
-            raise UsageError(f"plan.time is {self.time}, expected 0 or more (--time)")
+            raise UsageError(f"plan.time is {self.time}, expected 0 or more")
         if self.series < 0:
-            raise UsageError(f"plan.series is {self.series}, expected 0 or more (--series)")
+            raise UsageError(f"plan.series is {self.series}, expected 0 or more")
         if self.axes and not is_axes(axes_of(self.axes)):
             raise UsageError(
                 f"plan.axes is {self.axes!r:.40}, expected z, y and x, and t and c where there are "
-                "any, each once, as czyx (--axes)"
+                "any, each once, as czyx"
             )
         if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
             found = ",".join(f"{value:g}" for value in self.spacing_um)
-            raise UsageError(
-                f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0 (--spacing-um)"
-            )
+            raise UsageError(f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0")
         if self.taken_as not in ("", INTENSITY):
             raise UsageError(
-                f"plan.taken_as is {self.taken_as!r:.40}, expected {INTENSITY}, or nothing (--as)"
+                f"plan.taken_as is {self.taken_as!r:.40}, expected {INTENSITY}, or nothing"
             )
         if self.modality and self.modality not in MODALITIES:
             raise UsageError(

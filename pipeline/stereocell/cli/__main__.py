@@ -47,7 +47,7 @@ def _main(words: Sequence[str]) -> int:
         with answering_sigterm():
             return _run(options)
     except StereoCellError as error:
-        return _fail(options, str(error), error.exit_code)
+        return _fail(options, flags.as_typed(options, str(error)), error.exit_code)
     except (MemoryError, RuntimeError, ImportError, OSError) as error:
         return _fail(options, _reason(error), 1)
     except KeyboardInterrupt as stop:

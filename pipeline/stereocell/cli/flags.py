@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, fields
+from dataclasses import Field
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -65,15 +65,25 @@ def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
 
 def _settings() -> Iterator[tuple[Flag, tuple[str, ...], Field[Any]]]:
     """Yield each setting that has a flag: the flag, the section and key, the field."""
-    from stereocell.building.settings import Settings
+    from stereocell.building.setting_names import flagged_settings
 
-    for section in fields(Settings()):
-        if section.metadata:
-            yield section.metadata["flag"], (section.name,), section
-            continue
-        for field in fields(getattr(Settings(), section.name)):
-            if field.metadata["flag"] is not None:
-                yield field.metadata["flag"], (section.name, field.name), field
+    return flagged_settings()
+
+
+def as_typed(options: argparse.Namespace, line: str) -> str:
+    """Return an error's line with flags in place of the settings that were given by them."""
+    if not hasattr(options, "spacing_um"):  # a command without a source
+        return line
+    from stereocell.building.setting_names import in_flags
+
+    flags = (flag.name for flag, _, _ in _settings())
+    return in_flags(
+        line, [name for name in flags if getattr(options, _attribute(name)) is not None]
+    )
+
+
+def _attribute(flag: str) -> str:
+    return flag.removeprefix("--").replace("-", "_")
 
 
 def declare_workers(parser: argparse.ArgumentParser) -> None:
@@ -180,7 +190,7 @@ def flags_of(options: argparse.Namespace) -> dict[str, Any]:
         raise UsageError("--grid and --tile-size both say how to cut, expected one of them")
     given: dict[str, Any] = {}
     for flag, place, _ in _settings():
-        value = getattr(options, flag.name.removeprefix("--").replace("-", "_"))
+        value = getattr(options, _attribute(flag.name))
         if value is None:
             continue
         section = given.setdefault(place[0], {})

@@ -23,7 +23,15 @@ from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.version import GENERATOR
-from stereocell.preview.cut_planes import ACQUIRED, Cut, cut_planes, extent_words, is_patient
+from stereocell.preview.cut_planes import (
+    ACQUIRED,
+    Cut,
+    choose_view,
+    cut_planes,
+    extent_words,
+    is_patient,
+)
+from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing_folder
 
 INDEX = "slices.json"
@@ -54,12 +62,14 @@ def write_slices(plan: Plan, folder: Path, plane: str = ACQUIRED) -> Written:
     Raises UsageError for more than one channel and for a plane that the source hasn't, OutputError
     for a folder with other content, SourceError where the source can't be read.
     """
+    dataset, channel = open_source(source_of(plan)), plan.channels[0]
+    views = views_of(plan.placement, is_neurological=plan.settings.plan.neurological)
+    choose_view(views, dataset.acquired.axis, plane, dataset.shown)  # before what else is wrong
     if len(plan.channels) != 1:
         found = ", ".join(channel.name for channel in plan.channels)
         raise UsageError(f"slices are of one channel: found {found}, expected --channels with one")
     if folder.exists() and not (folder / INDEX).is_file() and _holds(folder):
         raise OutputError(f"{folder}: exists and holds no slices: no {INDEX} in it")
-    dataset, channel = open_source(source_of(plan)), plan.channels[0]
     cut = cut_planes(dataset, plan, channel.index, plane)
     window = measure_statistics(statistics_task(plan, channel)).window
     count = len(cut.first_um)

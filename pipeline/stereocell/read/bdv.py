@@ -8,6 +8,7 @@ import os
 from stereocell.model.errors import SourceError
 from stereocell.read import hdf5, n5
 from stereocell.read.bdv_xml import container_of
+from stereocell.read.file_kind import require_kind
 from stereocell.read.image import Image
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, is_own, require_own
@@ -36,4 +37,5 @@ def read_image(location: Location) -> Image:
     container = Location.of(path)
     if not os.path.exists(path) or container.format not in _READERS:
         raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")
+    require_kind(container, "" if container.format == "n5" else container.format, "HDF5")
     return _READERS[container.format](container)

@@ -9,6 +9,7 @@ References: https://zeiss.github.io/libczi/
 
 import os
 import re
+import struct
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -29,7 +30,9 @@ from stereocell.storage.location import Location, require_file
 
 _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
-_MAGIC = b"ZISRAWFILE"
+_SEGMENT = struct.Struct("<16s2q")  # a segment's name, its length, and how much of it is used
+_PLACES = struct.Struct("<2q")  # of the directory of voxels, and of the metadata
+_PLACES_AT = 84  # bytes from the file's start
 _UM_PER_METER = 1e6
 _Rectangle = tuple[int, int, int, int]  # x, y, width, height
 
@@ -43,9 +46,7 @@ class _File:
         library = extras.load("pylibCZIrw.czi", "czi", self.where, "CZI")
         with one_line(self.where, "a CZI file that is whole"):
             path = os.path.realpath(location.path)
-            with open(path, "rb") as file:
-                if file.read(len(_MAGIC)) != _MAGIC:
-                    raise ValueError("no `ZISRAWFILE` at the start")
+            _require_whole(path, self.where)
             self.czi = stack.enter_context(library.open_czi(path))
             self.bounds: dict[str, tuple[int, int]] = dict(self.czi.total_bounding_box)
             self.types: list[str] = [str(kind) for _, kind in sorted(self.czi.pixel_types.items())]
@@ -72,6 +73,29 @@ class _File:
             )
             for _, (_, _, width, height) in self.scenes
         ]
+
+
+def _require_whole(path: str, where: str) -> None:
+    """Raise SourceError where the directory or the metadata, mostly written last, are not there."""
+    size = os.path.getsize(path)
+    with open(path, "rb") as file:
+        file.seek(_PLACES_AT)
+        head = file.read(_PLACES.size)
+        needed = _PLACES_AT + _PLACES.size
+        if len(head) == _PLACES.size:
+            needed = 0
+            for place in _PLACES.unpack(head):
+                if place <= 0:
+                    continue
+                file.seek(place)
+                segment = file.read(_SEGMENT.size)
+                length = _SEGMENT.unpack(segment)[2] if len(segment) == _SEGMENT.size else 0
+                needed = max(needed, place + _SEGMENT.size + max(0, length))
+    if needed > size:
+        raise SourceError(
+            f"{where}: cut short at byte {size} of {needed} or more, expected a CZI file that is "
+            "whole (copy or download it again)"
+        )
 
 
 def read_image(location: Location, series: int = 0) -> Image:

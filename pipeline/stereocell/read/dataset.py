@@ -2,7 +2,7 @@
 
 import difflib
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.identifiers import to_identifier
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
@@ -18,6 +19,7 @@ from stereocell.read.acquired import Acquired
 from stereocell.read.cast import built_dtype, cast
 from stereocell.read.fingerprint import fingerprint_of
 from stereocell.read.spacing import Level
+from stereocell.read.unmeasured import least_finite, share_of_gaps
 from stereocell.storage.library_errors import one_line
 
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
@@ -131,6 +133,7 @@ class Dataset:
     remarks: tuple[str, ...] = ()
     labels: str = ""
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
+    _darkest: dict[tuple[int, int], float] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.on_close is not None:
@@ -163,8 +166,9 @@ class Dataset:
         box      voxels of `level`; only the chunks that it touches are read
 
         The result's `origin_um` is (z, y, x), um, from the centre of level 0's voxel (0, 0, 0).
-        Raises SourceError where a chunk can't be decoded or holds NaN or infinity, ValueError
-        where the channel, the level or the box is out of range.
+        NaN and infinity are read as the smallest finite value (read/unmeasured.py). Raises
+        SourceError where a chunk can't be decoded, where no voxel of the channel is finite or where
+        one is beyond MAX_VALUE; ValueError where the channel, the level or the box is out of range.
         """
         if not 0 <= channel < len(self.channels) or not 0 <= level < len(self.levels):
             raise ValueError(f"channel {channel} of level {level} doesn't exist")
@@ -177,11 +181,15 @@ class Dataset:
             f"voxels {_range(box)}"
         )
         with one_line(where, "chunks that are whole"):
-            voxels = self.arrays[level].window(self.time, channel, box)
+            stored = self.arrays[level].stored_window(self.time, channel, box)
+            voxels = cast(stored, built_dtype(stored.dtype) or stored.dtype)
+        if stored.dtype.kind == "f" and not (is_measured := np.isfinite(stored)).all():
+            least = self.darkest(channel, level)
+            voxels = np.where(is_measured, voxels, voxels.dtype.type(least))
         if voxels.dtype.kind == "f" and not np.abs(voxels).max(initial=0) <= MAX_VALUE:
-            bad = int(np.count_nonzero(~np.isfinite(voxels)))
-            found = f"{bad} NaN or infinite" if bad else f"voxels beyond {MAX_VALUE:g}"
-            raise SourceError(f"{where}: found {found}, expected finite voxels")
+            raise SourceError(
+                f"{where}: found voxels beyond {MAX_VALUE:g}, expected smaller ones: scale them"
+            )
         z, y, x = (
             origin + start * spacing
             for origin, start, spacing in zip(
@@ -195,6 +203,33 @@ class Dataset:
         """The dtype in the file, in this machine's byte order."""
         return np.dtype(self.arrays[0].array.dtype).newbyteorder("=")
 
+    def darkest(self, channel: int, level: int) -> float:
+        """Return the smallest finite voxel of a level. All of it is read, at the first call.
+
+        Raises SourceError where a chunk can't be decoded or no voxel is finite.
+        """
+        if (channel, level) not in self._darkest:
+            where = f"{self.shown}: channel {self.channels[channel].name!r}, level {level}"
+            with one_line(where, "chunks that are whole"):
+                found = least_finite(self.arrays[level], self.time, channel)
+            if found is None:
+                raise SourceError(
+                    f"{where}: found no finite voxel: all are NaN or infinite, expected an image"
+                )
+            self._darkest[channel, level] = found
+        return self._darkest[channel, level]
+
+    def share_of_gaps(self, channel: int, boxes: Iterable[Box], level: int) -> float:
+        """Return the share (0..1) of the voxels in boxes of a level that are NaN or infinite.
+
+        Raises SourceError where a chunk can't be decoded.
+        """
+        if self.stored_dtype.kind != "f":
+            return 0.0
+        where = f"{self.shown}: channel {self.channels[channel].name!r}, level {level}"
+        with one_line(where, "chunks that are whole"):
+            return share_of_gaps(self.arrays[level], self.time, channel, boxes)
+
     def read_stored(self, channel: int, box: Box) -> NDArray[Any]:
         """Return the voxels of a box of level 0, (z, y, x), in the file's dtype.
 
@@ -205,29 +240,35 @@ class Dataset:
             return self.arrays[0].stored_window(self.time, channel, box)
 
     def find_channels(self, selection: Sequence[str]) -> tuple[int, ...]:
-        """Return the indices of channels given by name or index, in that order, each once.
+        """Return the indices of channels by name, index or identifier, in that order, each once.
 
-        A name takes precedence over an index; made-up names don't count. Raises UsageError where
-        the source lacks a channel; the message lists the channels that exist.
+        A name takes precedence over an index, and both over an identifier. Made-up names
+        (`Channel0`) are names as well, since plans, reports and stages show them. Raises UsageError
+        where the source lacks a channel; the message lists the channels that exist.
         """
-        indices = {c.name: index for index, c in enumerate(self.channels) if c.is_named}
+        indices = {channel.name: index for index, channel in enumerate(self.channels)}
+        by_id = {to_identifier(name): index for name, index in indices.items()}
         found = []
         for wanted in selection:
             if wanted in indices:
                 found.append(indices[wanted])
             elif wanted.isdecimal() and int(wanted) < len(self.channels):
                 found.append(int(wanted))
+            elif wanted in by_id:  # as files and prims are called
+                found.append(by_id[wanted])
             else:
                 raise UsageError(f"{self.shown}: channel {wanted!r}: {self._remedy(wanted)}")
         return tuple(dict.fromkeys(found))
 
     def _remedy(self, wanted: str) -> str:
-        names = [channel.name for channel in self.channels if channel.is_named]
-        range_ = f"an index from 0 to {len(self.channels) - 1}"
+        names = [channel.name for channel in self.channels]
+        most = len(self.channels) - 1
+        range_ = f"an index from 0 to {most}" if most else "its index 0"
         if wanted.isdecimal():
             return f"not found, expected {range_}"
-        if not names:
-            return f"the source holds no channel names, expected {range_}"
+        if not any(channel.is_named for channel in self.channels):
+            last = f" to {names[-1]}" if len(names) > 1 else ""
+            return f"the source holds no channel names, expected {names[0]}{last}, or {range_}"
         lower = {name.lower(): name for name in reversed(names)}
         near = difflib.get_close_matches(wanted.lower(), list(lower), n=1, cutoff=0.5)
         hint = f" (did you mean {lower[near[0]]!r}?)" if near else ""

@@ -128,10 +128,17 @@ def unpack(
                 parts.append(part)
                 left -= len(part)
         except EOFError:  # of gzip and bzip2, in words about streams
-            raise EOFError("the packed voxels are cut short") from None
+            raise EOFError(_short(path, size - left, size)) from None
     if left > 0:
-        raise EOFError(f"the packed voxels are cut short: {size - left} of {size} bytes")
+        raise EOFError(_short(path, size - left, size))
     return np.frombuffer(b"".join(parts), dtype).reshape(tuple(shape))
+
+
+def _short(path: str, found: int, size: int) -> str:
+    return (
+        f"the packed voxels are cut short: the file ends at byte {os.path.getsize(path)} with "
+        f"{found} of {size} bytes (copy or download it again)"
+    )
 
 
 def _opened(file: IO[bytes], packing: str) -> _Stream:

@@ -72,9 +72,11 @@ def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:
     if len(found) == 1:
         return found[0], (f"dataset {found[0].name}, the only volume of the file",)
     if not found:
+        others = [f"{one.name} {one.shape} {one.dtype}" for one in tree.datasets(node, _LISTED)]
+        held = f" but {', '.join(others):.300}" if others else ""
         raise SourceError(
-            f"{tree.where}{':' + key if key else ''}: found no volume, "
-            "expected a dataset of numbers with at least three axes"
+            f"{tree.where}{':' + key if key else ''}: found no volume{held}, "
+            "expected a dataset of numbers with at least three axes longer than 1"
         )
     listed = ", ".join(f"{one.name} {one.shape} {one.dtype}" for one in found[:_LISTED])
     more = ", ..." if len(found) > _LISTED else ""

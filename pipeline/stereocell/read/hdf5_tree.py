@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack
 from importlib import import_module
+from itertools import islice
 from typing import Any
 
 import h5py
@@ -84,7 +85,15 @@ class Hdf5Tree:
         raise SourceError(f"{self.where}: {path!r:.200}: links in a circle, expected a dataset")
 
     def volumes(self, start: h5py.Group) -> Iterator[h5py.Dataset]:
-        """Yield the datasets of numbers with three axes longer than 1, below a group, by name.
+        """Yield the datasets of numbers with three axes longer than 1, below a group, by name."""
+        return (dataset for dataset in self._all(start) if is_volume(dataset))
+
+    def datasets(self, start: h5py.Group, most: int) -> list[h5py.Dataset]:
+        """Return up to `most` datasets below a group, whatever they hold."""
+        return list(islice(self._all(start), most))
+
+    def _all(self, start: h5py.Group) -> Iterator[h5py.Dataset]:
+        """Yield the datasets below a group, by name.
 
         Links are not followed: what they lead to is in the file under its own name, or elsewhere.
         """
@@ -101,7 +110,7 @@ class Hdf5Tree:
                 if isinstance(node, h5py.Group) and hash(node.id) not in seen:
                     seen.add(hash(node.id))
                     waiting.append(node)
-                elif isinstance(node, h5py.Dataset) and is_volume(node):
+                elif isinstance(node, h5py.Dataset):
                     yield node
 
 

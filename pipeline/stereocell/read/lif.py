@@ -5,6 +5,7 @@ round by the axes' names. readlif, which bioio-lif stands on, is under GPL-3.0.
 """
 
 import os
+import struct
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -22,7 +23,9 @@ from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
-_MAGIC = b"\x70\x00\x00\x00"  # other files of Leica's name files elsewhere
+_BLOCK = struct.Struct("<2I")  # 0x70, and the length of what says what follows
+_MARK, _TEST = 0x70, 0x2A
+_MAX_BLOCKS = 100_000
 _UM_PER_METER = 1e6
 _OTHERS = {
     "\u03bb": "wavelengths (a lambda stack)",
@@ -64,14 +67,40 @@ def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candi
     library = extras.load("liffile", "lif", location.shown, "LIF")
     with one_line(location.shown, "a LIF file that is whole"):
         path = os.path.realpath(location.path)
-        with open(path, "rb") as file:
-            if file.read(len(_MAGIC)) != _MAGIC:
-                raise ValueError("not the first bytes of LIF")
+        _require_whole(path, location.shown)
         images = list(stack.enter_context(library.LifFile(path)).images)
         candidates = [_candidate(image) for image in images]  # the library reads the XML here
     if not images:
         raise SourceError(f"{location.shown}: found no image, expected one")
     return images, candidates
+
+
+def _require_whole(path: str, where: str) -> None:
+    """Raise SourceError where a block ends behind the end of the file.
+
+    A file is a chain of blocks: first the XML, then voxels, each behind their length.
+    """
+    size, at = os.path.getsize(path), 0
+    with open(path, "rb") as file:
+        for _ in range(_MAX_BLOCKS):
+            file.seek(at)
+            head = file.read(_BLOCK.size)
+            if not head:
+                return
+            if len(head) < _BLOCK.size or int.from_bytes(head[:4], "little") != _MARK:
+                break
+            length = _BLOCK.unpack(head)[1]
+            end = at + _BLOCK.size + length
+            about = file.read(14)
+            if at and len(about) >= 10:  # the length of voxels has 4 bytes, or 8
+                is_short = about[5] == _TEST
+                end += int.from_bytes(about[1 : 5 if is_short else 9], "little")
+            if end > size:
+                raise SourceError(
+                    f"{where}: cut short at byte {size} of {end} or more, expected a LIF file that "
+                    "is whole (copy or download it again)"
+                )
+            at = end
 
 
 def _candidate(image: Any) -> Candidate:

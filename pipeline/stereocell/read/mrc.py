@@ -11,7 +11,6 @@ import math
 import os
 import warnings
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import mrcfile
@@ -39,11 +38,6 @@ def read_image(location: Location) -> Image:
     where = location.shown
     require_file(location)
     path = os.path.realpath(location.path)
-    if Path(path).suffix.lower() == ".rec" and (header_file := _par_beside(Path(path))):
-        raise SourceError(
-            f"{where}: found the voxels of a Philips PAR/REC pair, beside {header_file!r:.100}, "
-            "expected an MRC or CCP4 file: make NIfTI of the pair by dcm2niix"
-        )
     with one_line(where, "an MRC or CCP4 file"):
         header, packing = _header(path)
         dtype = data_dtype_from_header(header)
@@ -76,16 +70,12 @@ def read_image(location: Location) -> Image:
     )
 
 
-def _par_beside(path: Path) -> str:
-    """Return the name of the header of Philips beside a .rec; empty: there is none."""
-    names = (path.with_suffix(suffix).name for suffix in (".PAR", ".par"))
-    return next((name for name in names if path.with_name(name).is_file()), "")
-
-
 def _header(path: str) -> tuple[Any, str]:
     """Return the header, and how the file is packed. Raises ValueError where it isn't MRC."""
     with open(path, "rb") as file:
         packing = _MAGIC.get(file.read(2), "")
+    if not packing and (size := os.path.getsize(path)) < _HEADER:
+        raise ValueError(f"cut short at byte {size}: a header has {_HEADER}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # on what permits reading all the same
         with mrcfile.open(path, permissive=True, header_only=True) as opened:

@@ -9,6 +9,7 @@ from typing import Any
 import fsspec
 
 from stereocell.model.errors import SourceError
+from stereocell.storage.first_bytes import pointer_words
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own, require_own_key
 
@@ -39,11 +40,14 @@ class N5Files:
                 return None
             require_own(file, [self._folder], named=named)
             with open(file, "rb") as opened:
-                return opened.read()
+                content = opened.read()
+            if words := pointer_words(content):
+                raise SourceError(f"{named}: found {words}, expected a file of N5")
+            return content
         require_own_key(path, named)
         files, root = self._remote
         try:
-            content: bytes = files.cat_file(f"{root.rstrip('/')}/{path}")
+            content = bytes(files.cat_file(f"{root.rstrip('/')}/{path}"))
         except FileNotFoundError:
             return None
         return content

@@ -1,10 +1,10 @@
 """NIfTI-1 and -2, .nii and .nii.gz, their pairs .hdr and .img, and Analyze 7.5, read by nibabel.
 
 nibabel chooses the affine: sform, else qform, else a guess by the shape, which a note reports. NaN
-marks voxels outside a brain that was cut out; it is read as the smallest finite value of its time
-point. Analyze states no orientation; nibabel takes x to run to the patient's left, and a matrix of
-SPM beside the pair (.mat) for the affine. Texts in the header (`descrip`, `db_name`, ...) and the
-file's name may identify a patient and are not read.
+marks voxels outside a brain that was cut out; it and infinity are read as the smallest finite value
+of their time point. Analyze states no orientation; nibabel takes x to run to the patient's left,
+and a matrix of SPM beside the pair (.mat) for the affine. Texts in the header (`descrip`,
+`db_name`, ...) and the file's name may identify a patient and are not read.
 
 References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/
 """
@@ -89,6 +89,8 @@ def read_image(location: Location) -> Image:
         notes.append(
             "neither sform nor qform: which side is left is a guess, x to the left of the patient"
         )
+    if is_nifti and not header["sform_code"] and _states_zero(image):
+        notes.append("pixdim: found 0, read as 1: is the voxel spacing known? (--spacing-um z,y,x)")
     if unit == "unknown":
         notes.append("no unit of length in the header: mm are assumed")
     grid, skewed = (shape[0], shape[1], shape[2]), None
@@ -133,6 +135,15 @@ def _require_whole(image: Any, where: str) -> None:
         )
 
 
+def _states_zero(image: Any) -> bool:
+    """Whether the file has a voxel spacing of 0, which nibabel has mended in its header."""
+    held, header = image.file_map.get("header") or image.file_map["image"], image.header
+    with ImageOpener(held.filename) as file:
+        raw = file.read(len(header.binaryblock))
+    stored = type(header)(raw, endianness=header.endianness, check=False)
+    return bool((stored["pixdim"][1:4] == 0).any())
+
+
 def _labels(header: Any) -> str:
     """Return what in the header says that voxels number objects; of a table only its presence."""
     if header["intent_code"] == _INTENT_LABEL:
@@ -159,10 +170,11 @@ def _image_axis(named: int | None, canonical: Canonical) -> int:
 
 
 def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:
-    """Note the number of NaN at a time point. This reads the point, and the array caches it."""
+    """Note the number of NaN and infinities at a time point, which this reads; it is cached."""
     _ = voxels[time, slice(0, 0), 0, 0]
     found = counts.get(time, 0)
-    return (f"{found:,} voxels are NaN: read as the smallest finite value",) if found else ()
+    told = f"{found:,} voxels are NaN or infinite: read as the smallest finite value"
+    return (told,) if found else ()
 
 
 def _open(location: Location) -> Any:
@@ -233,28 +245,39 @@ def _load(
         place = (slice(None),) * 3 + (time, 0, 0, 0)[: len(data.shape) - 3]
         with ImageOpener(image.file_map["image"].filename) as file:
             raw = fileslice(file, place, data.shape, data.dtype, data.offset, data.order)  # type: ignore[no-untyped-call]
+        is_measured = np.isfinite(raw)
         values = rescale(raw, float(data.slope), float(data.inter), dtype)
     except _FAULTS as error:
         raise_if_short(error, location.shown)
-        found = "it is cut short" if isinstance(error, EOFError) else "its voxels can't be read"
+        found = "its voxels can't be read"
+        if isinstance(error, EOFError):
+            found = f"cut short at byte {os.path.getsize(location.source)}"
         raise SourceError(f"{location.shown}: {found}, expected {NAME} that is whole") from None
     if values.dtype.kind == "f":
-        values, counts[time] = _without_nan(values, location.shown)
+        values, counts[time] = _without_gaps(values, is_measured, location.shown)
     if skewed is not None:
         values, _ = resample_sheared(values, skewed)
     return canonical.apply(values)
 
 
-def _without_nan(values: NDArray[Any], where: str) -> tuple[NDArray[Any], int]:
-    """Return the values with the smallest finite one in place of NaN, and the number of NaN.
+def _without_gaps(
+    values: NDArray[Any], is_measured: NDArray[np.bool_], where: str
+) -> tuple[NDArray[Any], int]:
+    """Return the values with the smallest finite one in the place of others, and their number.
 
-    Raises SourceError where no value is finite.
+    is_measured  where the stored values are finite
+
+    Raises SourceError where none is, or one is beyond float32.
     """
-    is_nan = np.isnan(values)
-    count = int(np.count_nonzero(is_nan))
+    if (is_measured & ~np.isfinite(values)).any():
+        raise SourceError(
+            f"{where}: found voxels beyond float32, expected smaller ones: scale them"
+        )
+    count = is_measured.size - int(np.count_nonzero(is_measured))
     if count == 0:
         return values, 0
-    finite = values[np.isfinite(values)]
-    if finite.size == 0:
-        raise SourceError(f"{where}: found no finite voxel, expected finite voxels")
-    return np.where(is_nan, finite.min(), values), count
+    if count == is_measured.size:
+        raise SourceError(
+            f"{where}: found no finite voxel: all are NaN or infinite, expected an image"
+        )
+    return np.where(is_measured, values, values[is_measured].min()), count

@@ -1,6 +1,7 @@
 """Open a source: find its format, read its metadata, check that it is a volume we can build."""
 
 import math
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.cast import TAKEN, built_dtype, cast_note
 from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
+from stereocell.read.file_kind import require_kind
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.first_bytes import describe
@@ -21,6 +23,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
+_PICTURES = (".png", ".jpg", ".jpeg")  # which are planes of a folder
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
 
@@ -95,6 +98,12 @@ def _find(source: str | Path) -> tuple[Location, Reader]:
     """Return the place of a source that is there, and the reader of its format."""
     location = Location.of(source)
     if location.is_local and not Path(location.path).exists():
+        if os.path.islink(location.path):
+            target = os.readlink(location.path)
+            raise SourceError(
+                f"{location.shown}: a link to {_shown(target):.200}, which isn't there, expected "
+                "a file or a folder"
+            )
         raise SourceError(f"{location.shown}: not found, expected a file or a folder")
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
@@ -102,6 +111,7 @@ def _find(source: str | Path) -> tuple[Location, Reader]:
     if named is None and not import_module(OTHER.module).can_read(location):
         raise _unknown(location)
     reader = READERS.get(named or "", OTHER)
+    require_kind(location, named or "", reader.title.partition(" (")[0])
     if not location.is_local and not reader.is_remote:
         raise SourceError(
             f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
@@ -128,7 +138,13 @@ def _unknown(location: Location) -> SourceError:
             f"{location.shown}: found the voxels of {_shown(header):.200}, expected that file"
         )
     elif location.is_local:
-        found += f": found {describe(first_bytes(location.source))}"
+        content = describe(first_bytes(location.source))
+        if last.endswith(_PICTURES) and content.endswith(" image"):
+            return SourceError(
+                f"{location.shown}: one plane (2D): found {content}, expected a volume: name the "
+                "folder of its planes"
+            )
+        found += f": found {content}"
     formats = ", ".join(reader.title for reader in READERS.values())
     return SourceError(f"{location.shown}: {found}; expected {formats}, or {OTHER.title}")
 

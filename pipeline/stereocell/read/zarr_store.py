@@ -22,6 +22,7 @@ from zarr.abc.store import ByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
+from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
 from stereocell.storage.library_errors import one_line, without_warning
 from stereocell.storage.location import Location, require_own, require_own_key
 
@@ -68,6 +69,8 @@ class GuardedStore(WrapperStore[Store]):
         if value is None and self._array and not await self._store.exists(self._array):
             raise OSError(f"{self._array} is gone since it was opened")
         if value is not None and not is_metadata and byte_range is None and self._chunk is not None:
+            if words := pointer_words(value[:HEAD_BYTES].to_bytes()):
+                raise OSError(f"chunk {key}: found {words}")
             self._require_fit(key, value)
         return value
 

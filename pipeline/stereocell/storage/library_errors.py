@@ -15,6 +15,7 @@ from zstandard import ZstdError
 
 import stereocell.storage.location as location
 from stereocell.model.errors import SourceError, StereoCellError
+from stereocell.storage.first_bytes import HEAD_BYTES, identify
 from stereocell.storage.processes import address_limit, shortage
 
 # Seen with truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError
@@ -108,7 +109,9 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, RecursionError):
         return "metadata: nested too deeply"
     if isinstance(error, JSONDecodeError):
-        return f"metadata: {error}"
+        content = identify(error.doc.encode("utf-8", "replace")[:HEAD_BYTES])
+        is_json = not content.is_known or content.words.startswith(("JSON", "a text file"))
+        return f"metadata: {error}" if is_json else f"metadata: found {content.words}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     if isinstance(error, TimeoutError):  # aiohttp's text is longer for silence than for other waits

@@ -79,8 +79,8 @@ def junk_in(syntax: str) -> Change:
 REFUSED: dict[str, tuple[Change, str]] = {
     "no position": (without("ImagePositionPatient"), "6 without a place in the patient"),
     "no orientation": (without("ImageOrientationPatient"), "6 without a place"),
-    "no spacing": (without("PixelSpacing"), "6 without a place"),
-    "spacing of 0": (setting(PixelSpacing=[0, 1]), "6 without a place"),
+    "no spacing": (without("PixelSpacing"), "6 without a PixelSpacing above 0"),
+    "spacing of 0": (setting(PixelSpacing=[0, 1]), "6 without a PixelSpacing"),
     "orientation of no frame": (
         setting(ImageOrientationPatient=[1, 0, 0, 1, 0, 0]), "6 without a place"
     ),
@@ -212,7 +212,7 @@ def test_files_without_images_are_named_by_their_kind(tmp_path: Path) -> None:
 
 
 def test_empty_folder_is_refused(tmp_path: Path) -> None:
-    assert "found no file; expected slices" in refusal(tmp_path)
+    assert "found an empty folder; expected slices" in refusal(tmp_path)
 
 
 def test_several_frames_without_places_are_refused(tmp_path: Path) -> None:

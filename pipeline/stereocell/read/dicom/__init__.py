@@ -31,7 +31,8 @@ from stereocell.read.plane_stack import StackLayout
 from stereocell.read.resample import resample_stack
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
-from stereocell.storage.location import Location, is_own
+from stereocell.storage.first_bytes import identify
+from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "objects can't be built yet: expected the image that it was drawn on"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
@@ -127,6 +128,10 @@ def _find(location: Location) -> Found:
         else:
             frames[f"{frame.file} {frame.index} {frame.tile}".encode()] = frame
     if not frames:
+        other = next((path for path in files if not is_dicom(path)), None)
+        if other is not None and (what := identify(first_bytes(str(other)))).is_known:
+            first = f"the first is {what.words}" if left_out["not DICOM"] > 1 else what.words
+            left_out[f"not DICOM ({first})"] = left_out.pop("not DICOM")
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
         if not root.is_dir():
             held = f"one file, {next(iter(left_out), 'which is none')}"
@@ -135,7 +140,8 @@ def _find(location: Location) -> Found:
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'no file'}; expected slices of MR, CT or the like"
+            f"{many}{held or 'an empty folder'}; expected slices of MR, CT or the like"
+            f"{'' if paths else ', or a volume of another format'}"
             f"{or_one_of(root, 'dicom')}"
         )
     return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)

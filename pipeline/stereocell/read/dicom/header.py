@@ -72,6 +72,7 @@ _TAGS: list[Any] = [
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _SEGMENTATIONS = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
 _NO_PLACE = "without a place in the patient"
+_NO_SPACING = "without a PixelSpacing above 0"
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
@@ -327,13 +328,13 @@ def _found(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
     return header.get(key)
 
 
-def _numbers(value: Any, count: int) -> tuple[float, ...]:
+def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, ...]:
     try:
         numbers = tuple(float(v) for v in value)
     except DICOM_FAULTS:
         numbers = ()
     if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
-        raise NoPlaneError(_NO_PLACE)
+        raise NoPlaneError(lacking)
     return numbers
 
 
@@ -341,12 +342,14 @@ def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tu
     """Return unit vectors along a row and along a column, and mm between (rows, columns)."""
     orientation = _found(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
     spacing = _found(header, groups, "PixelMeasuresSequence", "PixelSpacing")
-    between = _numbers(spacing, 2)
     cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
     lengths = np.linalg.norm(cosines, axis=1)
     is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
-    if min(between) <= 0 or not is_frame:
+    if not is_frame:
         raise NoPlaneError(_NO_PLACE)
+    between = _numbers(spacing, 2, _NO_SPACING)
+    if min(between) <= 0:
+        raise NoPlaneError(_NO_SPACING)
     if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
         shown = " and ".join(f"{value:g}" for value in between)
         raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")

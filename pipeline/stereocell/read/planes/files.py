@@ -25,6 +25,7 @@ TIFF = (".tif", ".tiff", ".stk", ".lsm")
 PNG = (".png",)
 JPEG = (".jpg", ".jpeg")
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+_TAIL = 1024  # bytes in which a PNG ends; some programs add a few of their own
 _PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
 _JPEG_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
 
@@ -114,11 +115,24 @@ def _png_head(path: str, named: str) -> Head:
     columns, rows, bits, colour = struct.unpack(">2I2B", head[16:26])
     if colour not in _PNG_SAMPLES:
         raise SourceError(f"{named}: found a palette, expected grey or RGB pixels")
+    _require_end(path, named)
     if not (rows and columns):
         raise SourceError(f"{named}: found {columns} x {rows} pixels, expected at least one")
     return Head(
         (rows, columns, _PNG_SAMPLES[colour]), np.dtype(np.uint16 if bits == 16 else np.uint8)
     )
+
+
+def _require_end(path: str, named: str) -> None:
+    """Raise SourceError for a PNG without the chunk that ends one."""
+    size = os.path.getsize(path)
+    with open(path, "rb") as file:
+        file.seek(max(0, size - _TAIL))
+        if b"IEND" not in file.read():
+            raise SourceError(
+                f"{named}: cut short at byte {size}, expected the whole file (copy or download it "
+                "again)"
+            )
 
 
 def _png_plane(path: str, named: str) -> NDArray[Any]:

@@ -46,6 +46,9 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         tiff, indexed = _with_index(location, tiff, stack)
         _require_imagej_whole(where, tiff)
         found = list(tiff.series)
+        if _are_planes(found):
+            tiff = open_tiff(location, stack, is_shaped=False)
+            found = list(tiff.series)
     if not found:
         raise SourceError(f"{where}: found no image, expected pages")
     series = max(found, key=lambda one: one.size)  # the first of those
@@ -86,6 +89,20 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         stack.close,
         notes=tuple(notes),
     )
+
+
+def _are_planes(found: Sequence[TiffPageSeries]) -> bool:
+    """Whether a program wrote a stack plane by plane, each as an array by itself, by tifffile."""
+    first = found[0] if found else None
+    return (
+        first is not None
+        and len(found) > 1
+        and all(
+            one.kind == "shaped" and len(one.pages) == 1
+            and (one.shape, one.dtype) == (first.shape, first.dtype)
+            for one in found
+        )
+    )  # fmt: skip
 
 
 def _left_out(others: int) -> list[str]:

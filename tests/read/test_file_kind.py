@@ -1,0 +1,223 @@
+"""What is no file of its kind is told in one line, the same for every format."""
+
+import gzip
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import mrcfile
+import numpy as np
+import pytest
+import zarr
+
+from stereocell import read
+from stereocell.model.errors import SourceError
+from support.array_files import write_bdv_xml, write_czi, write_ims, write_lif, write_n5
+from support.dicom_series import write_f_nifti
+from support.phantoms import f_phantom, write_ome_tiff
+
+NAMES = (
+    *("a.tif", "a.ome.tiff", "a.lsm", "a.h5", "a.ims", "a.mrc", "a.rec", "a.map.gz", "a.nii"),
+    *("a.nii.gz", "a.hdr", "a.nrrd", "a.nhdr", "a.mha", "a.mhd", "a.czi", "a.lif", "a.nd2"),
+    *("a.dcm", "a.png", "a.zarr", "a.n5", "a.companion.ome"),
+)
+LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12\n"
+NIFTI, NAMED = "NIfTI or Analyze", ": if that is what it is meant to be, name it"
+STUBS = {
+    "pointer of Git LFS": (LFS, "`git lfs pull` gets the file"),
+    "HTML page": (b"\n<!DOCTYPE html>\n<html><body>Log in</body></html>", "download it again"),
+    "empty file": (b"", "copy or download it again"),
+    "JSON": (b'{"message": "Not Found"}', "a server's error"),
+    "XML error": (b"<?xml version='1.0'?><Error><Code>AccessDenied</Code></Error>", "download"),
+    "zip archive": (b"PK\x03\x04" + bytes(600), "unzip it"),
+    "PDF document": (b"%PDF-1.7\n" + bytes(600), "PDF"),
+}
+
+
+def _read_whole(path: Path, **options: Any) -> None:
+    dataset = read.open(path, **options)
+    dataset.read(0, dataset.levels[0].box)
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(SourceError) as caught:
+        _read_whole(path)
+    line = str(caught.value)
+    assert line.startswith(f"{path}: ")
+    assert "\n" not in line
+    assert "expected " in line
+    return line
+
+
+@pytest.mark.parametrize("stub", list(STUBS))
+@pytest.mark.parametrize("name", NAMES)
+def test_what_stands_in_a_files_place_is_said(tmp_path: Path, name: str, stub: str) -> None:
+    content, remedy = STUBS[stub]
+    (tmp_path / name).write_bytes(content)
+    line = refusal(tmp_path / name)
+    assert stub in line
+    assert remedy in line
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "a.rec"])
+def test_zeros_are_a_copy_that_did_not_finish(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(bytes(20_000))
+    assert "zeros (a copy or a download that did not finish" in refusal(tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [b"", LFS, b"<html>", b"{}"])
+@pytest.mark.parametrize("name", ["a.nii.gz", "a.hdr.gz", "a.mrc.gz"])
+def test_a_packed_file_is_looked_into(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(gzip.compress(content))
+    line = refusal(tmp_path / name)
+    told = {b"": "nothing", LFS: "a pointer of Git LFS", b"<html>": "an HTML page", b"{}": "JSON"}
+    assert f"a gzip file of {told[content]}" in line
+
+
+def _tiff(path: Path) -> None:
+    write_ome_tiff(path.with_name("t.ome.tif"), f_phantom()).rename(path)
+
+
+def _nifti(path: Path) -> None:
+    write_f_nifti(path.with_name("n.nii"), f_phantom(), (0.5, 0.2, 0.2))
+    path.with_name("n.nii").rename(path)
+
+
+def _packed_nifti(path: Path) -> None:
+    write_f_nifti(path.with_name("n.nii.gz"), f_phantom(), (0.5, 0.2, 0.2))
+    path.with_name("n.nii.gz").rename(path)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "told"),
+    [
+        (_tiff, "a.mrc", f"found a TIFF file, expected MRC{NAMED} .tif"),
+        (_tiff, "a.nii.gz", "found a TIFF file, expected NIfTI or Analyze, packed by gzip: if"),
+        (_tiff, "a.mha", "found a TIFF file, expected MetaImage: if"),
+        (_tiff, "a.ims", "found a TIFF file, expected Imaris: if"),
+        (_tiff, "a.dcm", None),  # DICOM's ending goes with any content: the content decides
+        (_nifti, "a.nii.gz", f"found a NIfTI file, expected {NIFTI}, packed by gzip{NAMED} .nii"),
+        (_packed_nifti, "a.nii", f"NIfTI file (gunzip it), expected {NIFTI}{NAMED} .nii.gz"),
+        (_nifti, "a.tif", "found a NIfTI file, expected TIFF: if"),
+    ],
+)  # fmt: skip
+def test_another_format_under_its_name_says_how_to_name_it(
+    tmp_path: Path, make: Callable[[Path], None], name: str, told: str | None
+) -> None:
+    path = tmp_path / name
+    make(path)
+    if told is None:
+        read.open(path)
+        return
+    assert told in refusal(path)
+    ending = told.rpartition("name it ")[2]
+    if ending.startswith("."):
+        renamed = path.rename(tmp_path / f"b{ending}")
+        assert read.open(renamed).levels[0].shape == f_phantom().shape
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "c/0/0/0"])
+def test_the_files_of_a_zarr_in_git_lfs_are_said(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.zarr"
+    zarr.create_array(str(path), data=f_phantom(), chunks=(4, 24, 18))
+    (path / name).write_bytes(LFS)
+    with pytest.raises(SourceError, match="found a pointer of Git LFS"):
+        _read_whole(path, spacing_um=(1, 1, 1))
+
+
+@pytest.mark.parametrize("name", ["attributes.json", "0/0/0"])
+def test_the_files_of_an_n5_in_git_lfs_are_said(tmp_path: Path, name: str) -> None:
+    path = write_n5(tmp_path / "a.n5")
+    (path / name).write_bytes(LFS)
+    with pytest.raises(SourceError, match="found a pointer of Git LFS"):
+        _read_whole(path, spacing_um=(1, 1, 1))
+
+
+def test_a_container_that_an_xml_names_is_looked_at(tmp_path: Path) -> None:
+    write_bdv_xml(tmp_path, "a.h5", "nm")
+    (tmp_path / "a.h5").write_bytes(LFS)
+    (xml,) = tmp_path.glob("*.xml")
+    with pytest.raises(SourceError, match=r"a\.h5: found a pointer of Git LFS"):
+        read.open(xml)
+
+
+def test_a_link_to_nothing_says_where_it_leads(tmp_path: Path) -> None:
+    (tmp_path / "a.tif").symlink_to("gone.tif")
+    assert "a.tif: a link to gone.tif, which isn't there" in refusal(tmp_path / "a.tif")
+
+
+def test_folders_say_what_lies_in_them(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="found an empty folder"):
+        read.open(tmp_path)
+    for number in range(3):
+        (tmp_path / f"{number}.dcm").write_bytes(LFS)
+    with pytest.raises(SourceError, match=r"3 not DICOM \(the first is a pointer of Git LFS"):
+        read.open(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("head", "told"),
+    [
+        (b"MATLAB 7.3 MAT-file", "it holds HDF5: name it .h5"),
+        (b"MATLAB 5.0 MAT-file", "save it with -v7.3"),
+        (b"\x93NUMPY\x01\0", "a NumPy array"),
+        (b"\x89PNG\r\n\x1a\n", "one plane"),
+    ],
+)
+def test_other_peoples_files_have_a_way_out(tmp_path: Path, head: bytes, told: str) -> None:
+    path = tmp_path / f"a.{'png' if b'PNG' in head else 'mat'}"
+    path.write_bytes(head + bytes(600))
+    assert told in refusal(path)
+
+
+def test_hdf5_without_a_volume_says_what_it_holds(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["flat"] = f_phantom()[0]
+        file["names"] = "x"
+    line = refusal(tmp_path / "a.h5")
+    assert "found no volume but /flat (48, 36) " in line
+    assert "/names () object" in line
+
+
+def test_an_mrc_that_ends_in_its_header_says_where(tmp_path: Path) -> None:
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(f_phantom().astype(np.float32))
+    (tmp_path / "b.mrc").write_bytes((tmp_path / "a.mrc").read_bytes()[:500])
+    assert "cut short at byte 500" in refusal(tmp_path / "b.mrc")
+
+
+def test_hdf5_behind_a_users_block_is_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["raw"] = f_phantom()
+        file["raw"].attrs["element_size_um"] = (1.0, 1.0, 1.0)
+    assert path.read_bytes()[:8] == bytes(8)
+    dataset = read.open(path)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
+
+
+def test_the_files_of_a_folder_in_git_lfs_are_no_volume(tmp_path: Path) -> None:
+    for z in range(3):
+        (tmp_path / f"plane_{z}.png").write_bytes(LFS)
+    with pytest.raises(SourceError, match="pointer of Git LFS"):
+        read.open(tmp_path)
+
+
+@pytest.mark.parametrize("ending", [".czi", ".lif", ".h5", ".ims"])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_file_that_ends_too_soon_says_where(tmp_path: Path, ending: str, share: float) -> None:
+    path = tmp_path / f"a{ending}"
+    if ending == ".czi":
+        write_czi(path, {None: f_phantom()[None, None]})
+    elif ending == ".lif":
+        write_lif(path, {"a": ("ZYX", f_phantom())})
+    elif ending == ".ims":
+        write_ims(path, np.stack([f_phantom()] * 2))
+    else:
+        with h5py.File(path, "w") as file:
+            file.create_dataset("raw", data=f_phantom(), chunks=(4, 24, 18))
+            file["raw"].attrs["element_size_um"] = (1.0, 1.0, 1.0)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    assert f"cut short at byte {int(share * len(content))}" in refusal(path)
