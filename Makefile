@@ -43,6 +43,9 @@ VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/scripts/
 ifndef CHROMIUM
 export CHROMIUM := $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
 endif
+# Bytecode is kept, wherever Python is told not to: each process would compile what it imports, and
+# to compile all of .venv once, most of which nobody imports, takes 30 s
+export PYTHONDONTWRITEBYTECODE :=
 # real volumes, where they are at hand; tests that want them skip without
 ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
@@ -66,8 +69,6 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock || \
 	  $(PIP) --require-hashes -r requirements.lock
 	$(PIP) --no-deps --no-build-isolation -e .
-	@# once, also where Python is told to keep no bytecode; by all cores, of which pip takes one
-	@$(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib pipeline || true
 	@# loops over voxels and triangles: 25 s, so that no build waits for it
 	@$(BIN)/python -m stereocell.kernels
 	@touch $@

@@ -69,6 +69,8 @@ class Figures:
     found: dict[str, Found] = field(default_factory=dict)
     tiles: list[tuple[float, float]] = field(default_factory=list)
     confidence: float = 0.0
+    rung: int = 0  # of the truth
+    rungs: int = 0  # clear ones that were found
 
     @property
     def has_truth(self) -> bool:
@@ -110,7 +112,8 @@ def measure(number: int) -> Figures:
     """Return the figures of all methods on one case."""
     case = list(all_cases())[number]
     sight = look_at(case)
-    result = Figures(case.name, case.group, case.held_out)
+    result = Figures(case.name, case.group, case.held_out, rung=case.rung)
+    result.rungs = len(sight.found.clear)
     truth = None if sight.truth is None else Truth(sight.truth, case.spacing_um)
     for name, inside, levels in _solids(sight):
         found = Found(float(inside.mean()), levels=levels)
@@ -184,10 +187,12 @@ def main() -> None:
         for case in pool.map(measure, chosen):
             cases.append(case)
             print(f"{len(cases)} of {len(chosen)}: {case.name}", file=sys.stderr, flush=True)
-    if any(case.group != "looked at" for case in cases):
-        print_methods([case for case in cases if case.group != "looked at"])
+    whole = [case for case in cases if case.group not in ("nested", "looked at")]
+    if whole:
+        print_methods(whole)
     print_looks([case for case in cases if case.group == "looked at"])
-    print_confidence(cases)
+    print_confidence("a tile", [tile for case in whole for tile in case.tiles])
+    print_inner(cases)
     if options.each:
         print_cases(cases)
 
@@ -227,17 +232,29 @@ def _ratio(levels: tuple[float, ...]) -> float:
     return max(levels) / least if least > 0 else float("inf")
 
 
-def print_confidence(cases: list[Figures]) -> None:
-    print(f"\n| confidence of a tile | tiles | share with Dice > {RIGHT} | mean Dice |")
+def print_confidence(what: str, judged: list[tuple[float, float]]) -> None:
+    """Print what confidences are worth, of pairs of one and a Dice."""
+    print(f"\n| confidence of {what} | count | share with Dice > {RIGHT} | mean Dice |")
     print("|---|---|---|---|")
-    tiles = [tile for case in cases for tile in case.tiles]
     for low, high in pairwise(BINS):
-        inside = [d for c, d in tiles if low <= c < high or c == high == 1.0]
+        inside = [d for c, d in judged if low <= c < high or c == high == 1.0]
         if inside:
             right = np.mean([d > RIGHT for d in inside])
             print(
                 f"| {low:.1f} to {high:.1f} | {len(inside)} | {right:.2f} | {np.mean(inside):.2f} |"
             )
+
+
+def print_inner(cases: list[Figures]) -> None:
+    """Print what rungs within the first are worth, and how many are found where there are none."""
+    within = [case for case in cases if case.rung]
+    missed = [case.name for case in within if case.rungs <= case.rung]
+    judged = [(c.confidence, c.found[OURS].dice) for c in within if c.name not in missed]
+    print_confidence("an inner rung", judged)
+    print(f"\ninner rungs that are missed: {len(missed)} of {len(within)} {missed}")
+    alike = [case for case in cases if ", x 1," in case.name]  # the family's bodies of one height
+    further = sum(max(0, case.rungs - 1) for case in alike)
+    print(f"further rungs on {len(alike)} volumes whose bodies are all alike: {further}")
 
 
 def print_looks(cases: list[Figures]) -> None:

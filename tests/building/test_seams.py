@@ -17,8 +17,9 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import load_lods, load_record, load_volume
 from stereocell.cli.__main__ import main
-from stereocell.isosurface.channel_level import ChannelLevels, Level
+from stereocell.isosurface.channel_level import ChannelLevels
 from stereocell.isosurface.extract import extract_surface
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice

@@ -181,6 +181,47 @@ def test_a_value_above_the_background_is_that_of_the_build(
     assert found == ours  # the same keys: the very same surfaces
 
 
+@pytest.mark.parametrize(("given", "side"), [("5000", "below"), ("-3", "above")])
+def test_a_given_level_that_parts_nothing_has_no_surface_and_says_why(
+    source: Path, tmp_path: Path, given: str, side: str
+) -> None:
+    flags = ["--grid", "2x1", "--channels", "even", f"--iso-value=even={given}"]
+    assert main(["build", str(source), "-o", str(tmp_path / "out"), *flags, "--workers", "0"]) == 0
+    (channel,) = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text())["channels"]
+    assert channel["surface"] == "none"
+    assert channel["surface_reason"] == f"no surface: all voxels lie {side} the level {given}"
+    assert channel["tileset"] is None
+
+
+@pytest.mark.parametrize("values", [(0, 1), (0, 255), (3, 900)])
+@pytest.mark.parametrize("scope", ["channel", "tile"])
+def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], values: tuple[int, int], scope: str
+) -> None:
+    away = np.linalg.norm(
+        np.indices(SHAPE, np.float64).T * SPACING - np.array((20.0, 32.0, 40.0)), axis=-1
+    ).T
+    mask = np.where(away < 17.0, values[1], values[0]).astype(np.uint16)
+    path = phantoms.write_ome_zarr(
+        tmp_path / "mask.ome.zarr", [mask[None]], "czyx",
+        scales=[{"c": 1.0, **dict(zip("zyx", SPACING, strict=True))}],
+    )  # fmt: skip
+    out = tmp_path / "out"
+    assert main(["plan", str(path), "-o", str(out), "--grid", "2x1", "--iso-scope", scope]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    told = f"a mask of {values[0]} and {values[1]}, whose surface lies half-way"
+    assert told in capsys.readouterr().err
+    (channel,) = OutFolder(out).survey().values()
+    assert {tile["value"] for tile in channel["iso"].values()} == {sum(values) / 2}
+    assert channel["appearance"]["surface"] == "clear"
+    volume = 0.0
+    for unit, key in OutFolder(out).index().items():
+        mesh = load_lods(OutFolder(out).unit_dir(*unit.split("/"), key))[0].mesh
+        a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+        volume += float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
+    assert volume == pytest.approx(4 / 3 * np.pi * 17.0**3, rel=0.03)
+
+
 def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]
@@ -207,9 +248,9 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
     ("surfaces", "message"),
     [
         ("even=outer,outer", "--surfaces even: found outer,outer, expected each once"),
-        ("even=skin", "--surfaces even: found 'skin', expected outer, inner, third or voxel"),
+        ("even=skin", "--surfaces even: found 'skin', expected outer, inner, third, voxel"),
         ("odd=outer", "--surfaces names channel 'odd', expected one of uneven"),
-        ("even=outer,,inner", "--surfaces even: found '', expected outer, inner, third or voxel"),
+        ("even=outer,,inner", "--surfaces even: found '', expected outer, inner, third, voxel"),
         ("even=", "--surfaces is 'even=', expected CHANNEL=SURFACE,..."),
     ],
 )

@@ -7,7 +7,7 @@ constant is chosen.
 from collections.abc import Iterator
 
 from corpus.case import Case
-from corpus.made import empty_cases, family_cases, made_cases
+from corpus.made import empty_cases, family_cases, made_cases, nested_cases
 from corpus.real import real_cases
 
 
@@ -16,4 +16,5 @@ def all_cases() -> Iterator[Case]:
     yield from real_cases()
     yield from made_cases()
     yield from family_cases()
+    yield from nested_cases()
     yield from empty_cases()

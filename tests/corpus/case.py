@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
-Group = Literal["labelled", "outlined", "made", "empty", "looked at"]
+Group = Literal["labelled", "outlined", "made", "nested", "empty", "looked at"]
 Kind = Literal["microscopy", "CT", "MR"]
 
 
@@ -17,8 +17,9 @@ class Case:
     """A volume of one channel.
 
     group       labelled: a person or a model marked each voxel; outlined: physics or a plain
-                threshold says where the outside ends; made: by script; empty: nothing is there;
-                looked at: nobody says what is there, so that only methods can be compared
+                threshold says where the outside ends; made: by script; nested: by script too,
+                bodies within bodies; empty: nothing is there; looked at: nobody says what is
+                there, so that only methods can be compared
     spacing_um  (z, y, x)
     load        returns the voxels (z, y, x) and the truth, bool (z, y, x); None: nothing
                 is there, or nobody says what

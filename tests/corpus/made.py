@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,7 @@ FAULTS = ("plain", "hot pixels", "vignetting", "zero padding", "black border", "
 
 
 LIGHTS = ("ramp x 2", "ramp x 3", "depth x 2", "depth x 4")
+HARD_LIGHTS = ("depth x 10", "depth x 28", "stripes", "two fields", "four fields", "tissue x 4")
 
 
 def _uneven_light(camera: str, light: str) -> NDArray[np.uint16]:
@@ -119,6 +121,39 @@ def _uneven_light(camera: str, light: str) -> NDArray[np.uint16]:
     photons = dark * (1 + (times - 1) * along if kind == "ramp" else times ** (1 - along))
     whole = np.broadcast_to(photons, SHAPE).astype(np.float64)
     return sees.shoot(whole, _rng(f"light {camera} {light}"))
+
+
+def _hard_light(camera: str, light: str) -> NDArray[np.uint16]:
+    """Return a tile of nothing under light that makes levels look clear."""
+    z, y, x = (axis / axis.max() for axis in _axes())
+    sees, rng = CAMERAS[camera], _rng(f"hard light {camera} {light}")
+    most = min(100.0, 0.25 * sees.largest / sees.gain)  # photons
+    photons = {
+        "depth x 10": most * 10.0**-z,
+        "depth x 28": 2 * most * 28.0**-z,
+        "stripes": most * (1 + 0.1 * np.sin(46 * y)),
+        "two fields": most / 2 * np.where(x < 0.5, 1.0, 1.6),
+        "four fields": most / 2 * np.where(x < 0.5, 1.0, 1.3) * np.where(y < 0.4, 1.0, 1.25),
+        "tissue x 4": most * 4.0**-z * np.exp(0.12 * _texture(rng, 6.0)),
+    }[light]
+    return sees.shoot(np.broadcast_to(photons, SHAPE).astype(np.float64), rng)
+
+
+def _bodies_in_depth() -> tuple[NDArray[np.uint16], Mask]:
+    """Bodies on a weak ground, in light that falls off to a sixth with depth."""
+    rng = _rng("bodies in depth")
+    mask = _balls(rng, 45, (1.0, 1.8))
+    z, _, _ = _axes()
+    return CAMERAS["scmos"].shoot(_seen(mask, 200.0, 25.0) * 6.0 ** (-z / z.max()), rng), mask
+
+
+def _slab() -> tuple[NDArray[np.uint16], Mask]:
+    """A section of tissue that fills the field, between empty planes."""
+    rng = _rng("slab")
+    z, y, x = _axes()
+    mask = np.abs(z - 6.7 - 0.4 * np.sin(x / 4) - 0.4 * np.cos(y / 5)) < 3.5
+    height = 60 * np.exp(0.2 * _texture(rng, 6.0))
+    return CAMERAS["scmos"].shoot(_seen(mask, height, 4.0), rng), mask
 
 
 def _inside_tissue(camera: str, sigma: float) -> NDArray[np.uint16]:
@@ -202,6 +237,34 @@ def _shells() -> tuple[NDArray[np.uint16], Mask]:
     return CAMERAS["scmos"].shoot(_seen(mask, 90.0, 8.0), rng), mask
 
 
+def _nested(photons: float, times: float) -> tuple[NDArray[np.uint16], Mask]:
+    """Cells with nuclei `times` as bright as they are; the truth is the nuclei."""
+    rng = _rng(f"nested {photons} {times}")
+    z, y, x = _axes()
+    cells, nuclei = np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)
+    for _ in range(14):
+        r = rng.uniform(2.2, 3.2)
+        c = [rng.uniform(1.5, n * h - 1.5) for n, h in zip(SHAPE, SPACING, strict=True)]
+        away = np.sqrt((z - c[0]) ** 2 + (y - c[1]) ** 2 + (x - c[2]) ** 2)
+        cells |= away < r
+        nuclei |= away < r * rng.uniform(0.45, 0.6)
+    height = photons * np.where(nuclei, times, 1.0)
+    return CAMERAS["scmos"].shoot(_seen(cells, height, 0.1 * photons), rng), nuclei
+
+
+def nested_cases() -> Iterator[Case]:
+    """Yield cells with nuclei, whose level is the second; every other one is held out."""
+    for count, (photons, times) in enumerate(product((10.0, 40.0, 160.0), (1.5, 2.5, 5.0))):
+        yield Case(
+            f"nested, {photons:g} photons, x {times:g}",
+            "nested",
+            SPACING,
+            partial(_nested, photons, times),
+            held_out=count % 2 == 1,
+            rung=1,
+        )
+
+
 def _case_of(name: str, make: Callable[[], tuple[NDArray[Any], Mask]], held_out: bool) -> Case:
     return Case(name, "made", SPACING, make, held_out=held_out)
 
@@ -218,6 +281,8 @@ def made_cases() -> Iterator[Case]:
         ("tissue", lambda: _tissue(1.0), False),
         ("dim tissue", lambda: _tissue(0.4), True),
         ("shells", _shells, False),
+        ("bodies in depth", _bodies_in_depth, True),
+        ("slab", _slab, True),
     ):
         yield _case_of(name, make, held_out)
 
@@ -245,6 +310,9 @@ def empty_cases() -> Iterator[Case]:
     for camera in CAMERAS:
         makers |= {f"empty, {camera}, {one}": partial(_empty, camera, one) for one in FAULTS}
         makers |= {f"empty, {camera}, {one}": partial(_uneven_light, camera, one) for one in LIGHTS}
+        makers |= {
+            f"empty, {camera}, {one}": partial(_hard_light, camera, one) for one in HARD_LIGHTS
+        }
         makers |= {
             f"inside tissue, {camera}, {sigma:g}": partial(_inside_tissue, camera, sigma)
             for sigma in (2.0, 6.0)

@@ -76,6 +76,7 @@ def look_at(case: Case) -> Sight:
                 own,
                 spacing_um=case.spacing_um,
                 counting=counting,
+                start=tuple(side.start for side in place),
                 background=None if under is None else under[window],
             ),
         )

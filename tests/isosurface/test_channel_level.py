@@ -8,13 +8,14 @@ from scipy import ndimage
 
 from corpus import all_cases
 from corpus.case import Case
-from corpus.made import CAMERAS, FAULTS, empty_cases, made_cases
+from corpus.made import CAMERAS, FAULTS, empty_cases, made_cases, nested_cases
 from corpus.sight import Sight, look_at
 from stereocell.isosurface.channel_level import find_levels
 from stereocell.isosurface.level_evidence import Counting, find_padding
 from support.exhaustive import sweep
 
 MADE = {case.name: case for case in made_cases()}
+NESTED = {case.name: case for case in nested_cases()}
 EMPTY = {case.name: case for case in empty_cases()}
 # the least Dice that a person would call a fit; those that are not here are hard
 EASY = {
@@ -43,18 +44,30 @@ def test_finds_the_bodies(name: str) -> None:
         list(EMPTY),
         kept=[f"empty, {c}, {f}" for c, f in zip(CAMERAS, FAULTS[1::2], strict=True)]
         + ["empty, emccd, ramp x 3", "empty, scmos, depth x 4", "empty, scmos, zero padding"]
-        + ["inside tissue, detector, 6", "inside tissue, scmos, 2"],
+        + ["inside tissue, detector, 6", "inside tissue, scmos, 2"]
+        + ["empty, scmos, depth x 10", "empty, emccd, two fields", "empty, detector, tissue x 4"],
     ),
 )
 def test_finds_nothing_where_nothing_is(name: str) -> None:
     assert look_at(EMPTY[name]).found.clear == ()
 
 
+def test_of_uneven_light_is_said_that_it_is_light() -> None:
+    found = look_at(EMPTY["empty, emccd, two fields"]).found
+    assert found.light > 0.95
+    assert "of what varies lies along the axes alone, as light does and no body" in found.doubt
+
+
+@pytest.mark.parametrize("name", ["slab", "bodies in depth"])
+def test_bodies_are_found_in_light_that_falls_off_and_so_is_a_section(name: str) -> None:
+    assert dice(look_at(MADE[name])) > 0.85
+
+
 def test_the_cut_into_tiles_changes_no_level() -> None:
-    case = MADE["shells"]
+    case = MADE["two classes"]
     cuts = [look_at(replace(case, grid=grid)).found for grid in ((1, 1), (3, 2), (1, 5))]
     whole = [level.value for level in cuts[0].ladder]
-    assert len(whole) >= 3
+    assert len(whole) >= 2
     for found in cuts[1:]:
         assert [level.value for level in found.ladder] == whole
         assert found.noise == cuts[0].noise
@@ -107,6 +120,24 @@ def test_of_mr_the_outer_level_keeps_skin_that_is_dim_beside_a_bright_brain(ghos
     sight = look_at(case)
     inside = ndimage.binary_fill_holes(sight.values > sight.found.clear[0].value)
     assert 2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()) > 0.95
+
+
+@pytest.mark.parametrize("name", ["nested, 40 photons, x 1.5", "nested, 160 photons, x 5"])
+def test_nuclei_in_cells_have_a_level_of_their_own(name: str) -> None:
+    sight = look_at(NESTED[name])
+    assert len(sight.found.clear) == 2
+    assert dice(sight, 1) > 0.9
+
+
+def test_bodies_that_are_all_alike_have_no_second_level() -> None:
+    """What lies further in is the flank of the same blurred edge."""
+    rng = np.random.default_rng(6)
+    z, y, x = np.ogrid[:48, :96, :96]
+    ball = (z - 24) ** 2 + (y - 48) ** 2 + (x - 40) ** 2 < 18**2
+    voxels = rng.poisson(10 + 90 * ball).astype(np.uint16)
+    sight = look_at(Case("ball", "made", (1.0, 1.0, 1.0), lambda: (voxels, ball)))
+    assert len(sight.found.ladder) == 1
+    assert dice(sight) > 0.97
 
 
 def test_equal_voxels_have_no_level() -> None:

@@ -56,21 +56,50 @@ def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     assert float(confidence) > 0.8
     flags = [word for row in rows[2:-2] for word in row if word.startswith("--")]
     assert len(flags) == 3
-    assert set(flags) <= {"--surfaces", "--iso-value", "--iso-criterion"}
+    assert set(flags) <= {"--surfaces", "--iso-value"}
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        (),
+        ("--iso-scope", "tile"),
+        ("--iso-criterion", "edges"),
+        ("--surfaces", "0=outer"),
+        ("--surfaces", "0=300+b"),
+        ("--iso-value", "0=300+b"),
+    ],
+)
 def test_a_setting_of_the_table_takes_its_level(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], given: tuple[str, ...]
 ) -> None:
+    """Beside the settings that were given, but for the one that it is instead of."""
     where = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ball.png"))
-    assert _iso(source, *where) == 0
+    assert _iso(source, *where, *given) == 0
     rows = capsys.readouterr().out.splitlines()[2:-2]
+    assert len(rows) >= 2
     for row in rows:
         _, _, setting = row.partition("--")
-        level = next(float(word) for word in row.split() if word.replace(".", "").isdigit())
-        assert _iso(source, *where, *shlex.split(f"--{setting}")) == 0
+        flag, value = shlex.split(f"--{setting}")
+        words = [word.removesuffix("+b") for word in row.split()]
+        level = next(float(word) for word in words if word.replace(".", "").isdigit())
+        kept = () if given[:1] in ((flag,), ("--iso-value",)) else given
+        assert _iso(source, *where, *kept, flag, value) == 0
         taken = next(line for line in capsys.readouterr().out.splitlines() if " * " in line)
-        assert float(taken.split("*")[1].split()[0]) == pytest.approx(level, rel=1e-3), row
+        found = taken.split("*")[1].split()[0]
+        assert float(found.removesuffix("+b")) == pytest.approx(level, rel=1e-3), row
+        assert found.endswith("+b") == any(word.endswith("+b") for word in row.split()[:4]), row
+
+
+def test_a_setting_leaves_the_channel_s_other_surfaces_as_they_are(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flags = ("--surfaces", "0=outer,700", "--tile", "r0_c0", "-o", str(tmp_path / "ball.png"))
+    assert _iso(source, "--channel", "Channel0 700", *flags) == 0
+    rows = capsys.readouterr().out.splitlines()[2:-2]
+    settings = [shlex.split(row[row.index("--") :])[1] for row in rows]
+    assert all(setting.partition("=")[2].startswith("outer,") for setting in settings)
+    assert not any(setting.endswith("outer,outer") for setting in settings)
 
 
 def test_the_legend_has_every_candidate_s_colour_and_nothing_else_is_written(

@@ -19,6 +19,7 @@ from stereocell.building.level_choice import (
     choose_rung,
     find_level,
     given_level,
+    hold_to_solids,
     level_of_tile,
 )
 from stereocell.building.open_source import source_of
@@ -54,7 +55,7 @@ from stereocell.building.tasks.window import (
     write_window,
 )
 from stereocell.engine.run import Engine, console
-from stereocell.isosurface.channel_level import Level
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import CRITERIA, LADDER
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
@@ -108,6 +109,8 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             for rung in solids[: len(one.rungs)]
         ]
         chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
+        if one.is_fixed and of_rungs:
+            one = hold_to_solids(plan, one, of_rungs[chosen])
         iso = {
             tile.id: level_of_tile(
                 plan,
@@ -118,7 +121,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
                     what: result[tile.id, channel.id].file
                     for what, result in (
                         ("evidence", evidence),
-                        ("solids", solids[chosen] if one.rungs else {}),
+                        ("solids", solids[chosen] if of_rungs else {}),
                     )
                     if (tile.id, channel.id) in result
                 },
@@ -129,7 +132,11 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             plan, channel, one, chosen, iso, of_rungs[chosen] if of_rungs else {}, files[channel.id]
         )
     save_survey(out_folder, survey)
-    for look in (of_channel.appearance for of_channel in survey.values()):
+    for channel in plan.channels:
+        look, mask = survey[channel.id].appearance, windows[channel.id].counting.mask
+        if mask is not None and found[channel.id].is_fixed and given_level(plan, channel) is None:
+            told = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
+            console.print(f"units: {look.name}: {told}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey

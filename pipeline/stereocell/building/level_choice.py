@@ -1,5 +1,6 @@
 """Which level of a channel has its surface: the given one, a rung of the ladder, its threshold."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,7 +10,8 @@ import numpy as np
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
-from stereocell.isosurface.channel_level import ChannelLevels, Level, find_levels
+from stereocell.isosurface.channel_level import ChannelLevels, find_levels
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUNGS, parse_level
 from stereocell.model.lattice_field import LatticeField
@@ -28,10 +30,10 @@ class Found:
     window    of the channel
     levels    what its tiles add up to; None where there is no evidence
     evidence  each tile's; empty for shares of tissue, whose level is known
-    is_given  whether the user, or a preset, gave the level
     rungs     the levels that may have the surface: the given one, or clear ones; the first is
               taken, unless its solids speak against it
     doubt     why there is none
+    is_fixed  whether all tiles have the same level, whatever they hold: a given one, or a mask's
     """
 
     window: Window
@@ -40,7 +42,7 @@ class Found:
     rungs: tuple[Level | float, ...]
     subtracts: bool
     doubt: str
-    is_given: bool = False
+    is_fixed: bool = False
 
     @property
     def background(self) -> LatticeField | None:
@@ -55,7 +57,7 @@ def find_level(
     given = given_level(plan, channel)
     if not evidence:
         assert given is not None
-        return Found(window, None, {}, (given[0],), given[1], "", is_given=True)
+        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True)
     options = plan.settings.isovalue
     criterion = LADDER if channel.rung else options.criterion
     levels = find_levels(
@@ -64,12 +66,20 @@ def find_level(
         finest_um=min(plan.spacing_um),
         modality=plan.modality,
         options=options if criterion in CRITERIA else None,
+        subtracts=None if given is None else given[1],
     )
     if given is not None:
         value, subtracts = given
-        # above another ground than the ladder's nothing can be said of a level
+        # where there is no background to be above, nothing can be said of such a level
         rated = levels.judge(value) if subtracts == levels.subtracts else value
-        return Found(window, levels, evidence, (rated,), subtracts, "", is_given=True)
+        return Found(window, levels, evidence, (rated,), subtracts, "", is_fixed=True)
+    mask = window.counting.mask
+    if mask is not None and criterion == LADDER:
+        # blurred by half a voxel, a mask has its own edge half-way; peaks of its blur are no levels
+        half = levels.judge(sum(mask) / 2)
+        levels = replace(levels, ladder=(half,))
+        if options.rung == APART or RUNGS[channel.rung or options.rung] == 0:
+            return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     clear = levels.clear
     doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
     if criterion == ADAPTIVE and clear:
@@ -79,7 +89,7 @@ def find_level(
             return Found(window, levels, evidence, (), False, nothing)
         plain = replace(levels, subtracts=False)
         rated = threshold.value if levels.subtracts else levels.judge(threshold.value)
-        return Found(window, plain, evidence, (rated,), False, "", is_given=True)
+        return Found(window, plain, evidence, (rated,), False, "", is_fixed=True)
     rung = channel.rung or options.rung
     if clear and rung != APART:
         place = RUNGS[rung]
@@ -92,7 +102,9 @@ def find_level(
 def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
     """Return the iso-value that the user gives for a channel, and whether above the background."""
     if channel.rung:
-        return None if channel.rung in RUNGS else (float(channel.rung), False)
+        if channel.rung in RUNGS:
+            return None
+        return parse_level(f"--surfaces {channel.base or channel.name}", channel.rung)
     given = plan.settings.iso_values.get(channel.name)
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
 
@@ -118,6 +130,25 @@ def choose_rung(of_rungs: Sequence[Solids]) -> int:
     return best if shares and shares[best] < JOINED_SHARE else 0
 
 
+def hold_to_solids(plan: Plan, found: Found, solids: Solids) -> Found:
+    """Return what is known of a level with its solids: one that parts nothing has no surface.
+
+    solids  the ComponentSums of each tile at the level that is taken
+    """
+    if not found.rungs or not solids:
+        return found
+    inside = sum(one["voxels"] for one in solids.values())
+    if 0 < inside < sum(math.prod(tile.box.shape) for tile in plan.tiles):
+        return found
+    level = found.rungs[0]
+    value = level.value if isinstance(level, Level) else level
+    side = "above" if inside else "below"
+    above = " above the background" if found.subtracts else ""
+    return replace(
+        found, rungs=(), doubt=f"no surface: all voxels lie {side} the level {value:.5g}{above}"
+    )
+
+
 def level_of_tile(
     plan: Plan, tile: Tile, found: Found, chosen: int, files: dict[str, str]
 ) -> TileIso:
@@ -132,6 +163,6 @@ def level_of_tile(
         return TileIso(value, below, None, files)
     tile_evidence, value = found.evidence[tile.id], level.value
     judged = found.levels.judge_tile(level, tile_evidence)
-    if plan.settings.isovalue.scope == "tile" and not found.is_given:
+    if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)
     return TileIso(value, below, None if judged is None else judged.confidence, files)

@@ -4,13 +4,15 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from stereocell.building.level_choice import given_level
 from stereocell.building.plan import Channel, Plan
-from stereocell.isosurface.channel_level import Level, clear_of
+from stereocell.isosurface.level import Level, clear_of
 from stereocell.isosurface.options import ADAPTIVE, RUNGS
 
 MOST = 3
 LIKELY = 0.2  # confidence from which a doubtful rung goes before a level that was only moved
-_ASIDE = 0.25  # share of the contrast by which a level is moved where the ladder has no other
+# Shares of the contrast by which a level is moved where the ladder has no other
+_ASIDE = {"a little lower": -0.25, "a little higher": 0.25, "lower": -0.4, "higher": 0.4}
 _ALIKE = 0.03  # share of the contrast: levels nearer to one another are one
 
 
@@ -52,13 +54,16 @@ def find_other_levels(
     """
     if not ladder:
         return []
-    named, doubtful = _rungs(channel, ladder, subtracts)
+    # a channel that has no surface has no rung that could be named
+    clear = () if taken is None else clear_of(ladder)
+    named, doubtful = _rungs(plan, channel, ladder, clear, subtracts)
     likely = [level for level in doubtful if (level.confidence or 0.0) >= LIKELY]
     levels = [*named, *likely]
     if threshold is not None and plan.settings.isovalue.criterion != ADAPTIVE:
-        flag = f"--iso-criterion {ADAPTIVE}"
+        # by its value, since the criterion is that of all channels
+        flag = take(plan, channel, threshold, above=False)
         levels.append(OtherLevel(ADAPTIVE, threshold, False, flag, None))
-    levels += _aside(channel, ladder, taken, subtracts)
+    levels += _aside(plan, channel, ladder, taken, subtracts)
     levels += [level for level in doubtful if level not in likely]
     contrast = max(level.contrast for level in ladder)
     chosen: list[OtherLevel] = []
@@ -71,29 +76,52 @@ def find_other_levels(
     return chosen[:MOST]
 
 
-def take(channel: Channel, value: float, above: bool) -> str:
+def take(plan: Plan, channel: Channel, value: float, *, above: bool) -> str:
     """Return the flag that takes a level; `--surfaces` goes before `--iso-value` where both are."""
-    if channel.rung and not above:
-        return "--surfaces " + shlex.quote(f"{channel.base or channel.name}={value:.5g}")
-    return "--iso-value " + shlex.quote(f"{channel.name}={value:.5g}{'+b' if above else ''}")
+    level = f"{value:.5g}{'+b' if above else ''}"
+    if channel.rung:
+        return _surfaces(plan, channel, level)
+    return "--iso-value " + shlex.quote(f"{channel.name}={level}")
+
+
+def _surfaces(plan: Plan, channel: Channel, rung: str) -> str:
+    """Return the flag that builds another surface in place of the channel's, beside its others."""
+    base = channel.base or channel.name
+    rungs = [
+        rung if one == channel else one.rung
+        for one in plan.channels
+        if one == channel or (channel.base and one.base == base)
+    ]
+    return "--surfaces " + shlex.quote(f"{base}={','.join(rungs)}")
 
 
 def _rungs(
-    channel: Channel, ladder: Sequence[Level], subtracts: bool
+    plan: Plan,
+    channel: Channel,
+    ladder: Sequence[Level],
+    clear: Sequence[Level],
+    subtracts: bool,
 ) -> tuple[list[OtherLevel], list[OtherLevel]]:
-    """Return the clear rungs by their names, and the doubtful ones, best first."""
-    clear = clear_of(ladder)
+    """Return the clear rungs by their names, and the doubtful ones, best first.
+
+    Surfaces that are built already are no others. Where the level is given, or each tile's own, a
+    rung's name would take another level than the one here: it is taken by its value.
+    """
+    by_name = given_level(plan, channel) is None and plan.settings.isovalue.scope == "channel"
+    built = {one.rung for one in plan.channels if channel.base and one.base == channel.base}
     doubtful = [level for level in ladder if level not in clear]
     named = [
         OtherLevel(
             name,
             clear[place].value,
             subtracts,
-            "--surfaces " + shlex.quote(f"{channel.base or channel.name}={name}"),
+            _surfaces(plan, channel, name)
+            if by_name
+            else take(plan, channel, clear[place].value, above=subtracts),
             clear[place].confidence,
         )
         for name, place in RUNGS.items()
-        if place < len(clear)
+        if place < len(clear) and name not in built
     ]
     doubtful.sort(key=lambda level: -level.confidence)
     return named, [
@@ -101,7 +129,7 @@ def _rungs(
             "doubtful",
             level.value,
             subtracts,
-            take(channel, level.value, subtracts),
+            take(plan, channel, level.value, above=subtracts),
             level.confidence,
         )
         for level in doubtful
@@ -109,12 +137,15 @@ def _rungs(
 
 
 def _aside(
-    channel: Channel, ladder: Sequence[Level], taken: float | None, subtracts: bool
+    plan: Plan, channel: Channel, ladder: Sequence[Level], taken: float | None, subtracts: bool
 ) -> list[OtherLevel]:
-    best = max(ladder, key=lambda level: level.confidence)
-    start = best.value if taken is None else taken
+    if taken is None:
+        rung = max(ladder, key=lambda level: level.confidence)
+    else:  # the one that it is, or that is nearest to it
+        rung = min(ladder, key=lambda level: abs(level.value - taken))
+    start = rung.value if taken is None else taken
     return [
-        OtherLevel(name, value, subtracts, take(channel, value, subtracts), None)
-        for name, share in (("a little lower", -_ASIDE), ("a little higher", _ASIDE))
-        for value in [start + share * best.contrast]
+        OtherLevel(name, value, subtracts, take(plan, channel, value, above=subtracts), None)
+        for name, share in _ASIDE.items()
+        for value in [start + share * rung.contrast]
     ]

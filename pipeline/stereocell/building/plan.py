@@ -72,7 +72,7 @@ def with_surfaces(channels: Sequence["Channel"], wanted: Mapping[str, str]) -> l
         rungs = [part.strip() for part in by_name[channel.name].split(",")]
         for rung in rungs:
             if rung not in RUNGS:
-                parse_surface(channel.name, rung)
+                _require_level(channel.name, rung)
         if len(set(rungs)) < len(rungs):
             found_twice = ",".join(rungs)
             raise UsageError(f"--surfaces {channel.name}: found {found_twice}, expected each once")
@@ -95,18 +95,15 @@ def with_surfaces(channels: Sequence["Channel"], wanted: Mapping[str, str]) -> l
     return found
 
 
-def parse_surface(name: str, rung: str) -> float:
-    """Return the voxel value that a surface is asked for at. Raises UsageError."""
+def _require_level(name: str, rung: str) -> None:
+    """Raise UsageError where a surface is asked for neither by a rung nor by a voxel value."""
     try:
-        value = float(rung)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+        parse_level("", rung)
+    except UsageError:
         raise UsageError(
-            f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)} or voxel values, "
-            "between commas"
-        )
-    return value
+            f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)}, voxel values or "
+            "values above the background as 162+b, between commas"
+        ) from None
 
 
 class LevelLike(Protocol):
@@ -125,7 +122,8 @@ class Channel:
     source       a source for this channel alone, which a command added to the plan: one level, the
                  planned one, and voxels uint8 with the window 0..255; empty: the plan's source
     fingerprint  of that source
-    rung         which level of the ladder has the surface, or a voxel value; empty: the settings'
+    rung         which level of the ladder has the surface, or a voxel value, as 162 or 162+b;
+                 empty: the settings'
     base         the name of the channel whose voxels these are, where it has several surfaces;
                  empty: its own
     """
@@ -295,12 +293,7 @@ def make_plan(
         paint=_painted(settings.paint, channels),
     )
     _require_planes(settings, chosen.spacing_um)
-    for key, value in settings.iso_values.items():
-        if modality in ("CT", "MR") and parse_level(f"--iso-value {key}", value)[1]:
-            raise UsageError(
-                f"--iso-value {key}={value}: a level above the background, which is never "
-                f"subtracted of {modality}, expected a voxel value"
-            )
+    _require_no_background(settings, channels, modality)
     return Plan(
         source=source,
         name=name,
@@ -425,6 +418,24 @@ def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> 
         # a surface that is chosen by its rung or value has its level from there
         found = {one.name: given[ALL] for one in channels if not one.rung} | found
     return found
+
+
+def _require_no_background(settings: Settings, channels: Sequence[Channel], modality: str) -> None:
+    """Raise UsageError where a level is given above the background of what has none."""
+    if modality not in BODY_MODALITIES:
+        return
+    given = [(f"--iso-value {key}", value) for key, value in settings.iso_values.items()]
+    given += [
+        (f"--surfaces {channel.base or channel.name}", channel.rung)
+        for channel in channels
+        if channel.rung and channel.rung not in RUNGS
+    ]
+    for flag, value in given:
+        if parse_level(flag, value)[1]:
+            raise UsageError(
+                f"{flag}={value}: a level above the background, which is never "
+                f"subtracted of {modality}, expected a voxel value"
+            )
 
 
 def _of_all(

@@ -176,7 +176,8 @@ class Settings:
     )
     surfaces: Mapping[str, str] = setting(
         {},
-        "channel = the surfaces built of it: outer, inner, third, or voxel values, between commas",
+        "channel = the surfaces built of it: outer, inner, third, or voxel values, between "
+        "commas; a value above the background as 162+b",
         Flag(
             "--surfaces",
             "which surfaces are built of a channel: outer, inner, third, or voxel values, between "

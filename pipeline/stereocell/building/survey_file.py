@@ -11,8 +11,8 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.isosurface.channel_level import Level
 from stereocell.isosurface.holder import Holder
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics

@@ -36,7 +36,7 @@ References
 N. Otsu, IEEE Trans. Systems, Man, and Cybernetics 9, 1979. doi:10.1109/TSMC.1979.4310076
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 
@@ -44,23 +44,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.isosurface.axis_profiles import MOST_LIGHT, share_of_light
 from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges
+from stereocell.isosurface.level import MOST_RISE, Level, clear_of
 from stereocell.isosurface.level_evidence import Counting, Sums, TileEvidence, noise_edges
 from stereocell.isosurface.level_histogram import DIP, INSIDE, OUTSIDE, LevelHistogram, Scale
 from stereocell.isosurface.options import IsoValueOptions
 
-LEAST_SNR = 3.0  # contrast over noise of a clear level
-LEAST_SHARPNESS = 0.04  # share of the contrast that the finest spacing crosses at a clear level
-LEAST_SEPARATION = 0.70  # share of the variance between the groups at a level in no valley
-LEAST_STEEPNESS = 0.95  # ... unless the level lies on steeper slopes than there are in texture
-# ... and less again within a clear level, where something is for sure: bone in a head's skin, in
-# planes 5 mm apart, has .67, .11 and 157
-WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
 LEAST_CONTRAST = 0.1  # share of the values' range: what a valley's level parts is more than this
-# Of a level that is an edge beyond doubt, as that of bodies much dimmer than others. An edge of its
-# own is no sharper than a step after a Gaussian of one voxel, 1 / sqrt(2 pi): a sharper level lies
-# on the flank of something brighter.
-EDGE_SNR, EDGE_STEEPNESS, EDGE_SHARPNESS = 6.0, 1.5, 0.4
 # A valley's level as sharp as this is none between two materials: by central differences a step
 # rises by half of itself a voxel. It lies in the blurred edge of something much brighter.
 FLANK = 0.6
@@ -70,9 +61,6 @@ VALLEY_GAIN = 2.0  # ... and where the field has a valley
 # Of MR's outermost valley that has a level: how deep it is where it parts air from tissue, and the
 # quantile of the tissue that stands for it
 AIR_DIP, DIM = 0.3, 0.25
-# Slope at a level over the least of the slopes at its inside and outside: where values rise evenly
-# through the volume, as light falls off, all three are the noise's
-LEAST_RISE, MOST_RISE = 1.35, 1000.0
 PADDING_SHARE = 0.5  # share of the outside's distance from padding within which padding is outside
 HALF_HEIGHTS = 3  # levels looked for above the last valley
 # voxels above a level: this share of all, within these bounds
@@ -90,96 +78,6 @@ LEAST_NOISE = 1e-3  # share of the values' range: noise-free data is given so mu
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
-    """A level with what speaks for it. Values in voxel values.
-
-    value       of the field, or of the field above the background
-    inside      what stands for the voxels above it
-    outside     what stands for the voxels below it
-    snr         contrast (inside - outside) over noise
-    sharpness   mean slope at the level times the finest spacing, over the contrast
-    separation  share of the variance that lies between the voxels above and below, 0..1
-    dip         the valley's height over the lower of its two peaks, 0..1; 1: it lies in no valley
-    stability   Dice, 0..1, between what lies above the level moved down and up by a tenth of the
-                contrast
-    share       of all voxels that lie above it, 0..1
-    rise        slope at the level over the lesser one of those at its inside and outside
-    """
-
-    value: float
-    inside: float
-    outside: float
-    snr: float
-    sharpness: float
-    separation: float
-    dip: float
-    stability: float
-    share: float
-    rise: float
-
-    @property
-    def contrast(self) -> float:
-        """The difference between inside and outside, voxel values."""
-        return self.inside - self.outside
-
-    @property
-    def confidence(self) -> float:
-        """How sure a surface at this level is, 0..1."""
-        return max(0.0, 1.0 - 2.0 / self.snr) * self.stability if self.snr > 0 else 0.0
-
-    @property
-    def steepness(self) -> float:
-        """The slope at the level, over what voxels a few apart usually differ by."""
-        return self.snr * self.sharpness
-
-    @property
-    def is_edge(self) -> bool:
-        """Whether the level is that of edges beyond doubt, however low they are."""
-        is_steep = self.snr >= EDGE_SNR and self.steepness >= EDGE_STEEPNESS
-        return is_steep and self.sharpness <= EDGE_SHARPNESS
-
-    @property
-    def is_clear(self) -> bool:
-        return not self.doubt
-
-    @property
-    def doubt(self) -> str:
-        """The reason why no surface can be relied on here; empty: one can."""
-        if self.snr < LEAST_SNR:
-            return (
-                f"at {self.value:.5g} inside and outside differ by {self.snr:.1f} times the noise, "
-                f"expected at least {LEAST_SNR:g}"
-            )
-        if self.sharpness < LEAST_SHARPNESS:
-            return (
-                f"at {self.value:.5g} the edges rise by {self.sharpness:.1%} of their height a "
-                f"voxel, expected at least {LEAST_SHARPNESS:.0%}"
-            )
-        if self.rise < LEAST_RISE:
-            return (
-                f"values rise evenly there: at {self.value:.5g} the slope is {self.rise:.2f} times "
-                f"that beside it, expected at least {LEAST_RISE:g}"
-            )
-        if self.dip <= DIP or self.separation >= LEAST_SEPARATION:
-            return ""
-        if self.steepness >= LEAST_STEEPNESS:
-            return ""
-        return (
-            f"no level parts two groups of voxels better than in noise: at {self.value:.5g} "
-            f"{self.separation:.0%} of the variance lies between them, expected at least "
-            f"{LEAST_SEPARATION:.0%}"
-        )
-
-    @property
-    def is_clear_within(self) -> bool:
-        """Whether the level is clear, given that it lies within one that is."""
-        return self.is_clear or self._reaches(WITHIN)
-
-    def _reaches(self, bounds: Mapping[str, float]) -> bool:
-        return all(getattr(self, name) >= least for name, least in bounds.items())
-
-
-@dataclass(frozen=True, slots=True)
 class ChannelLevels:
     """A channel's levels.
 
@@ -190,6 +88,7 @@ class ChannelLevels:
     finest_um    the finest voxel spacing
     sums         of the field, or of the field above the background
     histogram    of the same
+    light        share of its variance, 0..1, that lies along the axes alone; see axis_profiles.py
     """
 
     ladder: tuple[Level, ...]
@@ -199,11 +98,12 @@ class ChannelLevels:
     finest_um: float
     sums: Sums
     histogram: LevelHistogram
+    light: float
 
     @property
     def clear(self) -> tuple[Level, ...]:
         """The clear ones, outermost first: the rungs of the ladder that have surfaces."""
-        return clear_of(self.ladder)
+        return clear_of(self.ladder) if self.light <= MOST_LIGHT else ()
 
     @property
     def doubt(self) -> str:
@@ -212,6 +112,11 @@ class ChannelLevels:
             return ""
         if not self.ladder:
             return "nothing stands out: no level has more than a few voxels above it"
+        if clear_of(self.ladder):
+            return (
+                f"{self.light:.0%} of what varies lies along the axes alone, as light does and "
+                f"no body, expected at most {MOST_LIGHT:.0%}"
+            )
         return max(self.ladder, key=lambda level: level.confidence).doubt
 
     def judge(self, value: float) -> Level:
@@ -259,15 +164,6 @@ class ChannelLevels:
         return _Sight(sums, self.histogram.edges, self.noise, self.finest_um)
 
 
-def clear_of(ladder: Sequence[Level]) -> tuple[Level, ...]:
-    """Return the clear levels of a ladder: one within a clear one needs less to be clear."""
-    found: list[Level] = []
-    for level in ladder:
-        if level.is_clear or (found and level.is_clear_within):
-            found.append(level)
-    return tuple(found)
-
-
 def find_levels(
     tiles: Sequence[TileEvidence],
     *,
@@ -275,6 +171,7 @@ def find_levels(
     finest_um: float,
     modality: str = "",
     options: IsoValueOptions | None = None,
+    subtracts: bool | None = None,
 ) -> ChannelLevels:
     """Return a channel's levels.
 
@@ -283,6 +180,7 @@ def find_levels(
     finest_um  the finest voxel spacing
     modality   DICOM's code; of CT and MR no background is subtracted
     options    of a criterion that scores edges, whose level is then the only rung; None: the ladder
+    subtracts  whether the levels are to be above the background; None: where that gains
     """
     scale = counting.scale
     plain = reduce(Sums.__add__, (tile.plain for tile in tiles))
@@ -296,16 +194,25 @@ def find_levels(
         has_padding = False
         sight = _Sight(plain + padding, scale.edges(), noise, finest_um)
         ladder = sight.ladder(modality)
-    above, subtracts = [tile.above for tile in tiles if tile.above is not None], False
-    if above and counting.scale_above is not None and not is_body:
+    above, is_raised = [tile.above for tile in tiles if tile.above is not None], False
+    if above and counting.scale_above is not None and not is_body and subtracts is not False:
         edges = counting.scale_above.edges()
         raised = _Sight(reduce(Sums.__add__, above), edges, noise, finest_um)
         other = raised.ladder()
-        subtracts = _gains(_first(ladder), _first(other))
-        if subtracts:
+        is_raised = bool(subtracts) or _gains(_first(ladder), _first(other))
+        if is_raised:
             sight, ladder = raised, other
+    light = 0.0
+    # where padding is the ground, the profiles, which leave it out, are of bodies alone
+    if not is_body and has_padding == bool(padding.counts.any()):
+        both = [tile.profiles for tile in tiles if tile.profiles is not None]
+        light = share_of_light(
+            [one for one in (pair[is_raised] for pair in both) if one is not None],
+            [pair[0] for pair in both],
+            variance=sight.histogram.variance - noise**2,
+        )
     found = ChannelLevels(
-        ladder, subtracts, has_padding, noise, finest_um, sight.sums, sight.histogram
+        ladder, is_raised, has_padding, noise, finest_um, sight.sums, sight.histogram, light
     )
     return found if options is None else _by_edges(found, tiles, options)
 
@@ -386,7 +293,10 @@ class _Sight:
             if is_high and is_large and level.sharpness <= FLANK:
                 found.append(level)
         last = max([ends[-2], *(level.value for level in found)])
-        return (*found, *self._half_heights(whole.above(last)))
+        for level in self._half_heights(whole.above(last)):
+            if not (level.is_flank and clear_of(found)):
+                found.append(level)
+        return tuple(found)
 
     @property
     def _least_voxels(self) -> float:
@@ -447,7 +357,8 @@ class _Sight:
         contrast = max(inside - outside, 1e-12)
         width = max(WIDTH_SHARE * contrast, 2 * part.width_at(value))
         slope = self._slope(value, width)
-        beside = min(self._slope(inside, width), self._slope(outside, width))
+        slope_outside = self._slope(outside, width)
+        beside = min(self._slope(inside, width), slope_outside)
         low, high = (part.above(value + d * contrast).total for d in (-TENTH, TENTH))
         return Level(
             value=value,
@@ -461,6 +372,7 @@ class _Sight:
             share=self.histogram.above(value).total / self.histogram.total,
             # noise-free values have no slope beside
             rise=min(slope / beside, MOST_RISE) if beside > 0 else MOST_RISE,
+            stands_out=min(slope / slope_outside, MOST_RISE) if slope_outside > 0 else MOST_RISE,
         )
 
     def _slope(self, value: float, width: float) -> float:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.filters.denoise import MEDIAN_REACH, SMOOTHING_REACH
+from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import EdgeSums, gather_edges
 from stereocell.isosurface.level_histogram import BINS, Scale
@@ -53,6 +54,7 @@ class TileEvidence:
     padding      of its padding, in the same field
     above        of the field above the background; None: the channel has none
     differences  int64 (NOISE_BINS,), how often the field differs by so much LAG voxels further
+    profiles     of the field along the axes, and of that above the background
     edges        of the field, and of that above the background, where a criterion scores edges
     """
 
@@ -60,6 +62,7 @@ class TileEvidence:
     padding: Sums
     above: Sums | None
     differences: NDArray[np.int64]
+    profiles: tuple[Profiles, Profiles | None] | None = None
     edges: tuple[EdgeSums, EdgeSums | None] | None = None
 
     def __add__(self, other: "TileEvidence") -> "TileEvidence":
@@ -79,11 +82,13 @@ class Counting:
     scale        of the values
     scale_above  of the values above the background; None: none is tried
     darkest      the channel's least value, that of its padding; None: it has none
+    mask         the only two values that its voxels have; None: they have more
     """
 
     scale: Scale
     scale_above: Scale | None
     darkest: float | None
+    mask: tuple[float, float] | None = None
 
 
 def denoising_reach(
@@ -125,6 +130,7 @@ def gather_evidence(
     *,
     spacing_um: tuple[float, float, float],
     counting: Counting,
+    start: tuple[int, int, int] = (0, 0, 0),
     background: NDArray[np.float32] | None = None,
     criterion: Criterion | None = None,
 ) -> TileEvidence:
@@ -135,6 +141,7 @@ def gather_evidence(
     padding      bool, the same window, as `find_padding` returns it
     own          the tile in the window
     spacing_um   (z, y, x)
+    start        voxels (z, y, x) of the dataset at which the tile begins
     background   float32, broadcasts over the window, voxel values; None: none is tried
     criterion    the one that scores edges; None: none does
 
@@ -150,7 +157,12 @@ def gather_evidence(
         inner = (slice(z - low, min(z + _PLANES, stop) - low), *own[1:])
         under = None if background is None else background[part]
         parts.append(_gather(field[part], padding[part], inner, spacing_um, counting, under))
-    found = reduce(TileEvidence.__add__, parts)
+    kept = ~padding[own]
+    raised = None
+    if background is not None and counting.scale_above is not None:
+        raised = Profiles.of(field[own] - background[own], kept, start)
+    profiles = Profiles.of(field[own], kept, start), raised
+    found = replace(reduce(TileEvidence.__add__, parts), profiles=profiles)
     if criterion is None:
         return found
     edges = _edges(field, padding, own, spacing_um, counting.scale, criterion)

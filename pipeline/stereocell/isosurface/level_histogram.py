@@ -117,6 +117,14 @@ class LevelHistogram:
         """The number of voxels."""
         return float(self.counts.sum())
 
+    @cached_property
+    def variance(self) -> float:
+        """The variance of the voxels; 0 without a voxel."""
+        if not self.total:
+            return 0.0
+        mean = np.average(self.centres, weights=self.counts)
+        return float(np.average((self.centres - mean) ** 2, weights=self.counts))
+
     def between(self, low: float, high: float) -> "LevelHistogram":
         """Return the histogram of the voxels above `low` and up to `high` alone."""
         kept = (self.centres > low) & (self.centres <= high)

@@ -22,7 +22,8 @@ from stereocell.building.settings import Settings
 from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
-from stereocell.isosurface.channel_level import ChannelLevels, Level
+from stereocell.isosurface.channel_level import ChannelLevels
+from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import LADDER
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError, UsageError
@@ -112,7 +113,8 @@ def preview(
         )
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
     where = f"{len(tiles)} of {len(plan.tiles)}" if len(tiles) < len(plan.tiles) else "all"
-    basis = f"{'given, and judged' if found.is_given else 'found'} on {where} tiles"
+    is_given = given_level(plan, channel) is not None
+    basis = f"{'given, and judged' if is_given else 'found'} on {where} tiles"
     if where != "all":
         basis += "; a build takes all"
     if window.holder is not None:
@@ -186,7 +188,7 @@ def _choose(
 ) -> Level | float | None:
     """Return the level that a build would take of this tile."""
     rung = _choose_rung(plan, found, field, under)
-    if found.levels is None or not isinstance(rung, Level) or found.is_given:
+    if found.levels is None or not isinstance(rung, Level) or found.is_fixed:
         return rung
     if plan.settings.isovalue.scope != "tile":
         return rung
@@ -236,7 +238,7 @@ def _candidates(
         elif channel.rung or name == LADDER:
             name = channel.rung or plan.settings.isovalue.rung
         confidence = chosen.confidence if isinstance(chosen, Level) else None
-        setting = take(channel, value, found.subtracts) if is_given else ""
+        setting = take(plan, channel, value, above=found.subtracts) if is_given else ""
         candidates.append(candidate(name, value, found.subtracts, confidence, setting, True))
     threshold = found.window.statistics.threshold
     for other in find_other_levels(

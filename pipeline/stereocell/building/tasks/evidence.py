@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.filters.denoise import denoise
+from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.edge_criteria import EdgeSums
 from stereocell.isosurface.level_evidence import (
     HALO,
@@ -66,6 +67,7 @@ def measure_evidence(task: EvidenceTask) -> TileEvidence:
         (inner_z, inner_y, inner_x),
         spacing_um=spacing,
         counting=task.counting,
+        start=task.box.start,
         background=None if task.background is None else task.background.at(window),
         criterion=CRITERIA.get(task.criterion),
     )
@@ -85,6 +87,16 @@ def evidence_to_json(evidence: TileEvidence) -> dict[str, Any]:
         "padding": _sums_to_json(evidence.padding),
         "above": None if evidence.above is None else _sums_to_json(evidence.above),
         "differences": _pack(evidence.differences),
+        "profiles": [
+            None
+            if one is None
+            else {
+                "start": list(one.start),
+                "sums": [_pack(part) for part in one.sums],
+                "counts": [_pack(part) for part in one.counts],
+            }
+            for one in evidence.profiles or (None, None)
+        ],
         "edges": None
         if edges is None
         else [
@@ -101,13 +113,24 @@ def evidence_from_json(content: Mapping[str, Any]) -> TileEvidence:
         None if one is None else EdgeSums(_unpack(one["areas"]), _unpack(one["totals"]))
         for one in edges or (None, None)
     )
+    along, along_above = (_profiles_from_json(one) for one in content["profiles"])
     return TileEvidence(
         _sums_from_json(content["plain"]),
         _sums_from_json(content["padding"]),
         None if content["above"] is None else _sums_from_json(content["above"]),
         _unpack(content["differences"]).astype(np.int64),
+        None if along is None else (along, along_above),
         None if plain is None else (plain, above),
     )
+
+
+def _profiles_from_json(content: Mapping[str, Any] | None) -> Profiles | None:
+    if content is None:
+        return None
+    z, y, x = content["start"]
+    sz, sy, sx = (_unpack(part) for part in content["sums"])
+    nz, ny, nx = (_unpack(part).astype(np.int64) for part in content["counts"])
+    return Profiles((z, y, x), (sz, sy, sx), (nz, ny, nx))
 
 
 def _sums_to_json(sums: Sums) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Find a channel's window, histogram and suggested 2D function, on a worker. Picklable."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -114,13 +114,15 @@ def measure_window(task: StatisticsTask) -> Window:
         else [dataset.read(task.channel, box, level).voxels]
     )
     surface = task.settings.surface
-    darkest: float | None = float(voxels.min())
+    mask = _mask_of([voxels] if level == task.level else _blocks(task, dataset))
+    # a mask's ground is even, and no padding
+    darkest = float(voxels.min()) if mask is None else None
     reach = denoising_reach(float(surface.smoothing_um), dataset.levels[level].spacing_um)
     padding = find_padding(voxels, darkest, reach if step == 1 else (0, *reach[1:]))
     if padding.mean() > MOST_PADDING:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
-    if task.subtracts:
+    if task.subtracts and mask is None:
         # sharp hot voxels and noise don't reach a percentile of whole blocks, so planes are not
         # denoised: a median before it changed the mean Dice over 48 tiles of known solids by .0006
         background = find_background(
@@ -134,7 +136,8 @@ def measure_window(task: StatisticsTask) -> Window:
     if task.finds_holder:
         z, y, x = dataset.levels[level].spacing_um
         holder = find_holder(voxels, (step * z, y, x), task.region)
-    counting = Counting(scale, None if background is None else scale.above(background), darkest)
+    scale_above = None if background is None else scale.above(background)
+    counting = Counting(scale, scale_above, darkest, mask)
     del padding
     statistics = find_statistics(
         voxels, task.settings.window, background=background, window=task.window
@@ -167,13 +170,32 @@ def _suggest(
     """Return a 2D function from blocks of the level that is built: coarse levels have no edges."""
     spacing = dataset.levels[task.level].spacing_um
     fine = np.zeros((FINE_ROWS, COLUMNS), np.int64)
-    for box in sample_boxes(task.region, JOINT_VOXELS):
-        around = box.grown((1, 1, 1), task.region)
-        voxels = dataset.read(task.channel, around, task.level).voxels
+    for voxels in _blocks(task, dataset):
         fine += count_joint(
             to_eight_bits(voxels, window), spacing, gradient_max=STEEPEST, rows=FINE_ROWS
         )
     return suggest(fine, spacing)
+
+
+def _blocks(task: StatisticsTask, dataset: Dataset) -> Iterator[NDArray[Any]]:
+    """Yield blocks (z, y, x) spread over the region, of the level that is built."""
+    for box in sample_boxes(task.region, JOINT_VOXELS):
+        around = box.grown((1, 1, 1), task.region)
+        yield dataset.read(task.channel, around, task.level).voxels
+
+
+def _mask_of(blocks: Iterable[NDArray[Any]]) -> tuple[float, float] | None:
+    """Return the two values that all voxels have; None: they have more, or one alone."""
+    low, high = np.inf, -np.inf
+    for voxels in blocks:
+        least, most = float(voxels.min()), float(voxels.max())
+        if not ((voxels == least) | (voxels == most)).all():
+            return None
+        found = {value for value in (low, high, least, most) if np.isfinite(value)}
+        if len(found) > 2:
+            return None
+        low, high = min(found), max(found)
+    return (low, high) if low < high else None
 
 
 def _voxels(task: StatisticsTask, dataset: Dataset, level: int) -> int:

@@ -1,0 +1,130 @@
+"""A level with what speaks for it, and whether a surface can be relied on there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from stereocell.isosurface.level_histogram import DIP
+
+LEAST_SNR = 3.0  # contrast over noise of a clear level
+LEAST_SHARPNESS = 0.04  # share of the contrast that the finest spacing crosses at a clear level
+LEAST_SEPARATION = 0.70  # share of the variance between the groups at a level in no valley
+LEAST_STEEPNESS = 0.95  # ... unless the level lies on steeper slopes than there are in texture
+# ... and less again within a clear level, where something is for sure: bone in a head's skin, in
+# planes 5 mm apart, has .67, .11 and 157
+WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
+# Of a level that is an edge beyond doubt, as that of bodies much dimmer than others. An edge of its
+# own is no sharper than a step after a Gaussian of one voxel, 1 / sqrt(2 pi): a sharper level lies
+# on the flank of something brighter.
+EDGE_SNR, EDGE_STEEPNESS, EDGE_SHARPNESS = 6.0, 1.5, 0.4
+# Slope at a level over the least of the slopes at its inside and outside: where values rise evenly
+# through the volume, as light falls off, all three are the noise's
+LEAST_RISE, MOST_RISE = 1.35, 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A level with what speaks for it. Values in voxel values.
+
+    value       of the field, or of the field above the background
+    inside      what stands for the voxels above it
+    outside     what stands for the voxels below it
+    snr         contrast (inside - outside) over noise
+    sharpness   mean slope at the level times the finest spacing, over the contrast
+    separation  share of the variance that lies between the voxels above and below, 0..1
+    dip         the valley's height over the lower of its two peaks, 0..1; 1: it lies in no valley
+    stability   Dice, 0..1, between what lies above the level moved down and up by a tenth of the
+                contrast
+    share       of all voxels that lie above it, 0..1
+    rise        slope at the level over the lesser one of those at its inside and outside
+    stands_out  slope at the level over that at its outside
+    """
+
+    value: float
+    inside: float
+    outside: float
+    snr: float
+    sharpness: float
+    separation: float
+    dip: float
+    stability: float
+    share: float
+    rise: float
+    stands_out: float
+
+    @property
+    def contrast(self) -> float:
+        """The difference between inside and outside, voxel values."""
+        return self.inside - self.outside
+
+    @property
+    def confidence(self) -> float:
+        """How sure a surface at this level is, 0..1."""
+        return max(0.0, 1.0 - 2.0 / self.snr) * self.stability if self.snr > 0 else 0.0
+
+    @property
+    def steepness(self) -> float:
+        """The slope at the level, over what voxels a few apart usually differ by."""
+        return self.snr * self.sharpness
+
+    @property
+    def is_edge(self) -> bool:
+        """Whether the level is that of edges beyond doubt, however low they are."""
+        is_steep = self.snr >= EDGE_SNR and self.steepness >= EDGE_STEEPNESS
+        return is_steep and self.sharpness <= EDGE_SHARPNESS
+
+    @property
+    def is_clear(self) -> bool:
+        return not self.doubt
+
+    @property
+    def doubt(self) -> str:
+        """The reason why no surface can be relied on here; empty: one can."""
+        if self.snr < LEAST_SNR:
+            return (
+                f"at {self.value:.5g} inside and outside differ by {self.snr:.1f} times the noise, "
+                f"expected at least {LEAST_SNR:g}"
+            )
+        if self.sharpness < LEAST_SHARPNESS:
+            return (
+                f"at {self.value:.5g} the edges rise by {self.sharpness:.1%} of their height a "
+                f"voxel, expected at least {LEAST_SHARPNESS:.0%}"
+            )
+        if self.rise < LEAST_RISE:
+            return (
+                f"values rise evenly there: at {self.value:.5g} the slope is {self.rise:.2f} times "
+                f"that beside it, expected at least {LEAST_RISE:g}"
+            )
+        if self.dip <= DIP or self.separation >= LEAST_SEPARATION:
+            return ""
+        if self.steepness >= LEAST_STEEPNESS:
+            return ""
+        return (
+            f"no level parts two groups of voxels better than in noise: at {self.value:.5g} "
+            f"{self.separation:.0%} of the variance lies between them, expected at least "
+            f"{LEAST_SEPARATION:.0%}"
+        )
+
+    @property
+    def is_clear_within(self) -> bool:
+        """Whether the level is clear, given that it lies within one that is."""
+        return self.is_clear or self._reaches(WITHIN)
+
+    @property
+    def is_flank(self) -> bool:
+        """Whether, within a clear level, it lies on the inner flank of that level's own edge.
+
+        There the slope falls inwards. What has an edge of its own is steeper there than outside.
+        """
+        return self.dip > DIP and self.stands_out < 1.0
+
+    def _reaches(self, bounds: Mapping[str, float]) -> bool:
+        return all(getattr(self, name) >= least for name, least in bounds.items())
+
+
+def clear_of(ladder: Sequence[Level]) -> tuple[Level, ...]:
+    """Return the clear levels of a ladder: one within a clear one needs less to be clear."""
+    found: list[Level] = []
+    for level in ladder:
+        if level.is_clear or (found and level.is_clear_within):
+            found.append(level)
+    return tuple(found)
