@@ -63,6 +63,22 @@ def test_they_are_read_as_the_least_value_of_the_channel(
         np.testing.assert_array_equal(dataset.read(channel, box).voxels, expected[box.slices])
 
 
+def test_levels_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The window is found on a coarse level, and knows the padding of the fine one by its value."""
+    fine = with_gaps()[0]
+    coarse = fine.reshape(6, 2, 20, 2, 18, 2).mean((1, 3, 5))
+    least = coarse[np.isfinite(coarse)].min()
+    scales = [dict.fromkeys("zyx", 1.0), dict.fromkeys("zyx", 2.0)]
+    path = write_ome_zarr(tmp_path / "a.zarr", [fine, coarse], scales=scales)
+    gap = Box((0, 0, 0), (1, 2, 2))
+    dataset = read.open(path)
+    assert least > LEAST[0]
+    for level in (1, 0):
+        assert (dataset.read(0, gap, level).voxels == np.float32(LEAST[0])).all()
+    monkeypatch.setattr("stereocell.read.dataset.MOST_SEARCHED", fine.size - 1)
+    assert read.open(path).darkest(0) == least
+
+
 def test_all_slabs_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dataset = read.open(_zarr(tmp_path, with_gaps()))
     for slab_bytes in (1, 3000, 30_000):

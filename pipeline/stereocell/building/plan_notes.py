@@ -22,7 +22,7 @@ def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
     for index in indices:
         share = dataset.share_of_gaps(index, boxes, plan.level)
         if share == 1.0:
-            dataset.darkest(index, plan.level)
+            dataset.darkest(index)
         if share > 0.0:
             found.append(
                 f"{dataset.channels[index].name}: {max(share, 1e-4):.2%} of the voxels are NaN or "

@@ -5,6 +5,7 @@ import weakref
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import prod
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,6 +26,7 @@ from stereocell.storage.library_errors import one_line
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 
 
+MOST_SEARCHED = 2_000_000_000  # voxels of a level that are searched for the smallest: as a plan has
 MAX_VALUE = 1e30  # largest voxel value: squares and differences of larger ones overflow float32
 
 
@@ -133,7 +135,7 @@ class Dataset:
     remarks: tuple[str, ...] = ()
     labels: str = ""
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
-    _darkest: dict[tuple[int, int], float] = field(init=False, repr=False, default_factory=dict)
+    _darkest: dict[int, float] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.on_close is not None:
@@ -184,7 +186,7 @@ class Dataset:
             stored = self.arrays[level].stored_window(self.time, channel, box)
             voxels = cast(stored, built_dtype(stored.dtype) or stored.dtype)
         if stored.dtype.kind == "f" and not (is_measured := np.isfinite(stored)).all():
-            least = self.darkest(channel, level)
+            least = self.darkest(channel)
             voxels = np.where(is_measured, voxels, voxels.dtype.type(least))
         if voxels.dtype.kind == "f" and not np.abs(voxels).max(initial=0) <= MAX_VALUE:
             raise SourceError(
@@ -203,12 +205,16 @@ class Dataset:
         """The dtype in the file, in this machine's byte order."""
         return np.dtype(self.arrays[0].array.dtype).newbyteorder("=")
 
-    def darkest(self, channel: int, level: int) -> float:
-        """Return the smallest finite voxel of a level. All of it is read, at the first call.
+    def darkest(self, channel: int) -> float:
+        """Return the smallest finite voxel of a channel, which stands for gaps at all its levels.
 
-        Raises SourceError where a chunk can't be decoded or no voxel is finite.
+        It is that of the finest level of MOST_SEARCHED voxels at most, whose averages the coarser
+        ones are. All of it is read, at the first call. Raises SourceError where a chunk can't be
+        decoded or no voxel is finite.
         """
-        if (channel, level) not in self._darkest:
+        if channel not in self._darkest:
+            small = (i for i, one in enumerate(self.levels) if prod(one.shape) <= MOST_SEARCHED)
+            level = next(small, len(self.levels) - 1)
             where = f"{self.shown}: channel {self.channels[channel].name!r}, level {level}"
             with one_line(where, "chunks that are whole"):
                 found = least_finite(self.arrays[level], self.time, channel)
@@ -216,8 +222,8 @@ class Dataset:
                 raise SourceError(
                     f"{where}: found no finite voxel: all are NaN or infinite, expected an image"
                 )
-            self._darkest[channel, level] = found
-        return self._darkest[channel, level]
+            self._darkest[channel] = found
+        return self._darkest[channel]
 
     def share_of_gaps(self, channel: int, boxes: Iterable[Box], level: int) -> float:
         """Return the share (0..1) of the voxels in boxes of a level that are NaN or infinite.
