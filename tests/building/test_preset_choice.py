@@ -72,6 +72,19 @@ def test_what_the_input_says_goes_first(tmp_path: Path) -> None:
     assert choose_preset(dataset, "PT")[0] is None
 
 
+def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> None:
+    """As an embryo in a small scanner: the presets would drop all of it."""
+    image = nibabel.Nifti1Image(_body(20, 400), np.diag([0.2, 0.2, 0.2, 1.0]))
+    image.header.set_xyzt_units("mm")
+    nibabel.save(image, tmp_path / "a.nii")
+    dataset = open_dataset(tmp_path / "a.nii")
+    for modality in ("", "MR"):
+        chosen, reason = choose_preset(dataset, modality)
+        assert chosen is None
+        assert "6.4 mm across, too small for a patient" in reason
+    assert main(["plan", str(tmp_path / "a.nii"), "-o", str(tmp_path / "o")]) == 0
+
+
 def test_micrometres_follow_the_spacing(tmp_path: Path) -> None:
     source = tmp_path / "a.ome.tif"
     phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))

@@ -16,6 +16,7 @@ from stereocell.storage.location import Location
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
+_PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
 # of the voxels looked at so many lie this near to air, and 99 % below metal
 _AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MOST_HU = -1000.0, 150.0, 0.02, 4000.0
 _PLANES = 8  # in the middle, that are looked at for Hounsfield units
@@ -60,12 +61,16 @@ def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str
     modality  the settings', where the input says none
     """
     known = dataset.modality or modality
+    level = dataset.levels[0]
+    finest = min(level.spacing_um)
+    if not known and finest < _BODY_UM:
+        return None, _told(None, f"voxels of {finest:.3g} um, as of a microscope")
+    across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
+    if across < _PART_UM:
+        return None, _told(None, f"{across / 1000:.3g} mm across, too small for a patient")
     if known:
         chosen = _BY_MODALITY.get(known)
         return chosen, _told(chosen, f"the input is {known}")
-    finest = min(dataset.levels[0].spacing_um)
-    if finest < _BODY_UM:
-        return None, _told(None, f"voxels of {finest:.3g} um, as of a microscope")
     chosen = "ct" if _has_hounsfield_units(dataset) else "mri"
     looks = "values like Hounsfield units" if chosen == "ct" else "no Hounsfield units"
     return chosen, _told(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
