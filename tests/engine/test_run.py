@@ -8,6 +8,7 @@ from pathlib import Path
 import dask
 import pytest
 
+from stereocell.engine import run
 from stereocell.engine.cluster import ClusterError
 from stereocell.engine.run import _AHEAD, Engine, TasksFailedError, _outcome_of
 from support.server.timeouts import PATIENCE_S
@@ -206,3 +207,18 @@ def test_a_command_that_is_stopped_while_it_ends_its_workers_comes_to_an_end(
     command = [sys.executable, str(tmp_path / "stopped.py")]
     ended = subprocess.run(command, timeout=PATIENCE_S, check=False, capture_output=True, text=True)
     assert ended.returncode == 143, ended.stderr
+
+
+def test_a_log_says_how_long_the_others_take_at_the_pace_so_far(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = iter([100.0, 104.0, 120.0, 190.0, 200.0])  # the start, and the end of each of four tasks
+    monkeypatch.setattr(run.time, "monotonic", lambda: next(now))
+    Engine(0).run("units", str, [(name, 0) for name in "abcd"])
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.removeprefix("units: ") for line in lines] == [
+        "1/4 a",
+        "2/4 b; 20 s left",
+        "3/4 c; 30 s left",
+        "4/4 d",
+    ]

@@ -1,6 +1,7 @@
 """The report: its cross-sections against geometry, its choices, and the page as a whole."""
 
 import io
+import re
 import shutil
 import sys
 from dataclasses import replace
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from markupsafe import escape
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -311,7 +313,7 @@ def test_page_tells_of_each_unit(built: Path) -> None:
     assert "1 channel without a surface" in parsed.texts
     nothing = "empty: no clear surface: nothing stands out: no level has more than a few voxels"
     assert any(text.startswith(nothing) for text in parsed.texts)
-    assert any(text.startswith("--surfaces twin=") for text in parsed.texts)  # if it is wrong
+    assert any(text.startswith("--iso-value twin=") for text in parsed.texts)  # if it is wrong
     assert any(alt.startswith("Contour of twin at ") for alt in parsed.alts)
     assert "as the test has it" not in html  # it starts a sentence
     assert "As the test has it." in html
@@ -455,6 +457,19 @@ def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
     assert remark.title.startswith("1 channel with thin triangles in lod0")
     assert remark.lines == ("CD31: 9.5° in r0_c2, 2 tiles below",)
     assert not find_remarks(replace(facts, units=units[:1]))
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_each_unit_s_slowest_step_is_named(built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(built, out)
+    _write(out)
+    text = (out / "report" / "index.html").read_text()
+    units = gather(OutFolder(out)).units
+    assert units
+    for unit in units:
+        step = max(unit.seconds, key=lambda name: unit.seconds[name])
+        assert re.search(rf"{re.escape(escape(unit.name))}.*{escape(step)}</td>", text), unit.name
 
 
 @pytest.mark.usefixtures("no_drawing")

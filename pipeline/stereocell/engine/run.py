@@ -28,6 +28,7 @@ from stereocell.engine.interrupts import children_ignore_interrupts, interrupts_
 from stereocell.engine.object_store_tasks import carried, forget_scratch
 from stereocell.engine.workers import choose_start
 from stereocell.kernels.cache_place import are_compiled, compile_in_process
+from stereocell.model.duration import in_words
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.processes import shortage
 
@@ -38,6 +39,7 @@ _START_S = 300  # s for workers of this machine to start: it may be busy
 _END_S = 30  # s for workers to end
 _LOOK_S, _LOOKS = 15, 12  # s between looks for workers, and looks until they count as gone
 _POLL_S = 0.05  # s between looks at finished tasks
+_PACE_S = 10  # s that tasks have run before their pace is told
 _AHEAD = 64  # tasks that wait for a worker
 _GONE = "its workers are gone and did not come back: the same command goes on from here"
 
@@ -275,15 +277,19 @@ def _in_words(error: BaseException) -> str:
 def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
     """Yield a function to call at the end of each task, with its name and whether it failed.
 
-    On a terminal it draws a bar; elsewhere, as in a log, it prints a line for each task.
+    On a terminal it draws a bar; elsewhere, as in a log, it prints a line for each task. Both say
+    how long the others will take, at the pace so far.
     """
     if not console.is_terminal:
-        done = 0
+        done, start = 0, time.monotonic()
 
         def tell(name: str, failure: bool) -> None:
             nonlocal done
             done += 1
             end = ": failed" if failure else ""
+            spent = time.monotonic() - start
+            if done < total and spent > _PACE_S:
+                end += f"; {in_words(spent / done * (total - done))} left"
             console.print(f"{label}: {done}/{total} {name}{end}", markup=False)
 
         yield tell

@@ -73,6 +73,11 @@ class UnitFacts:
         """The tile's ID and the channel's name, `<tile>/<channel>`."""
         return f"{self.tile.id}/{self.channel.name}"
 
+    @property
+    def slowest_step(self) -> str:
+        """The step that took longest; empty where times were lost."""
+        return max(self.seconds, key=lambda step: self.seconds[step], default="")
+
 
 @dataclass(frozen=True, slots=True)
 class StepFacts:
