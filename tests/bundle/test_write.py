@@ -112,13 +112,23 @@ def test_tileset_has_the_hash_of_every_surface(bundle):
     assert len(found) == 6
 
 
-def test_coarsest_surface_counts_what_its_lattice_moves(bundle):
+def test_errors_are_the_largest_distances_and_all_levels_share_a_lattice(bundle):
     tile = load(bundle / "channels/CD31/tileset.json")["root"]["children"][0]
-    document, _ = read((bundle / f"channels/CD31/{tile['content']['uri']}").read_bytes())
-    step = document["nodes"][0]["scale"][0]
+    steps = {
+        read(glb.read_bytes())[0]["nodes"][0]["scale"][0]
+        for glb in (bundle / "channels/CD31/r0_c0").glob("*.glb")
+    }
+    assert len(steps) == 1
     (_, middle), (_, coarsest) = spheres.LEVELS[1:]
-    assert tile["geometricError"] == pytest.approx(coarsest * 1e-6 + 0.75**0.5 * step, rel=1e-3)
+    assert tile["geometricError"] == pytest.approx(coarsest * 1e-6, rel=1e-3)
     assert tile["children"][0]["geometricError"] == pytest.approx(middle * 1e-6, rel=1e-3)
+
+
+def test_manifest_states_how_far_levels_are_from_the_surface(bundle):
+    stated = channel(bundle)["distances"]
+    assert [level["p99_um"] for level in stated] == pytest.approx([um for _, um in spheres.LEVELS])
+    assert all(level["largest_um"] >= level["p99_um"] for level in stated)
+    assert len(stated) == len(channel(bundle)["triangles"])
 
 
 def test_lut_rows_are_the_transfer_functions(bundle):
@@ -138,9 +148,7 @@ def test_meshes_lie_where_the_stage_has_them_and_meet_without_a_crack(bundle):
             data = (bundle / f"channels/CD31/{tile}/lod{level}.glb").read_bytes()
             points = decoded_positions_m(data)
             away = np.linalg.norm(points * 1e6 - spheres.CENTER, axis=1)
-            step_um = read(data)[0]["nodes"][0]["scale"][0] * 1e6
-            moved_um = 0.75**0.5 * step_um if level == 2 else 0  # the coarsest has longer steps
-            assert np.abs(away - spheres.RADIUS).max() < 0.003 + moved_um
+            assert np.abs(away - spheres.RADIUS).max() < 0.003
             edge = points[points[:, 0] == last(points[:, 0])]
             assert len(edge) > 10
             edges.append(np.unique(edge, axis=0).tobytes())

@@ -82,6 +82,7 @@ def manifest(rng, tiles, files):
         entry = describe_channel(
             appearance,
             [(137_218, 38_314, 26_304, 17_454)] * len(tiles),
+            [((0.0131, 0.0342), (0.0562, 0.134), (0.231, 0.517), (0.77, 1.36))] * len(tiles),
             transfer2d=ref(f"channels/{name}/transfer2d.json"),
             lut=ref(f"luts/{name}.ktx2"),
             tileset=ref(f"channels/{name}/{TILESET}", len(files[TILESET])),

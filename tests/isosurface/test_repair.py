@@ -1,7 +1,9 @@
 """Fragments, gaps and cavities, at sizes on either side of the limits."""
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from stereocell.isosurface.repair import RepairOptions, repair
 
@@ -59,8 +61,32 @@ def test_closing_leaves_a_smooth_ball_where_it_is() -> None:
     np.testing.assert_allclose(closed[near], ball[near], atol=1e-6)
 
 
-def test_argument_stays_as_it_is() -> None:
-    distance = _boxes(np.s_[3:5, 3:5, 3:5])
-    before = distance.copy()
-    repair(distance, SPACING, RepairOptions(2.0, 4.0, 4.0))
-    np.testing.assert_array_equal(distance, before)
+@pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (0.28, 0.14, 0.14), (2.0, 0.7, 1.3)])
+@pytest.mark.parametrize("balls", [0.9, 1.0, 2.3])  # radius in coarsest spacings
+def test_closing_is_that_of_exact_distances(
+    spacing: tuple[float, float, float], balls: float
+) -> None:
+    """The whole window's distances by another program, in place of a band's."""
+    noise = np.random.default_rng(1).normal(size=(20, 30, 41))
+    h = max(spacing)
+    distance = np.clip(ndimage.gaussian_filter(noise, 1.5) * 20 * h, -2 * h, 2 * h)
+    distance = distance.astype(np.float32)
+    alpha = balls * h
+    margin = [int(np.ceil(alpha / step)) + 1 for step in spacing]
+    free = np.pad(distance <= 0, [(m, m) for m in margin], constant_values=True)
+    nowhere = ndimage.distance_transform_edt(free, spacing) < alpha * (1 - 1e-6)
+    away = ndimage.distance_transform_edt(nowhere, spacing)
+    away = away[tuple(slice(m, -m) for m in margin)]
+    wanted = np.maximum(distance, np.clip(away - (alpha + h), -2 * h, h))
+    found = repair(distance.copy(), spacing, RepairOptions(alpha, 0.0, 0.0)).distance
+    np.testing.assert_allclose(found, wanted, atol=1e-5 * h)
+    assert 0 < (distance > 0).sum() <= (found > 0).sum()
+    assert balls < 2 or (found > 0).sum() > (distance > 0).sum()
+
+
+def test_windows_of_nothing_and_of_a_whole_solid_stay() -> None:
+    for value in (-2.0, 2.0):
+        whole = np.full((7, 8, 9), value, np.float32)
+        result = repair(whole.copy(), SPACING, RepairOptions(1.5, 3.0, 3.0))
+        np.testing.assert_array_equal(result.distance, whole)
+        assert (result.fragments_dropped, result.cavities_filled) == (0, 0)

@@ -106,7 +106,7 @@ def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
 def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
     distance = _distance()
     options = RepairOptions(0.0, 5.0, 0.0, offset_um=0.3)
-    moved = repair(distance, SPACING, options)
+    moved = repair(distance.copy(), SPACING, options)
     assert moved.fragments_dropped == 1
     whole = Box((0, 0, 0), SHAPE)
     mesh = extract_surface(moved.distance, Lattice.of_whole(whole, SPACING))

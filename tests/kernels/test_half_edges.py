@@ -9,7 +9,8 @@ from stereocell.kernels.half_edges import (
     count_fans,
     label_bodies,
     match_twins,
-    measure_sizes,
+    measure_areas,
+    measure_boxes,
     measure_volumes,
     sum_gains,
     sum_normals,
@@ -62,10 +63,11 @@ def test_bodies_are_numbered_by_their_first_vertices_and_measured() -> None:
     volumes = measure_volumes(at, triangles, label, bodies)
     np.testing.assert_allclose(volumes, [enclosed_volume(one), enclosed_volume(other)], rtol=1e-5)
     opened = triangles[:-1]
-    areas, diagonals, is_open = measure_sizes(at, opened, match_twins(opened, count), label, bodies)
+    areas, is_open = measure_areas(at, opened, match_twins(opened, count), label, bodies)
+    sides = measure_boxes(at, label, bodies)
     assert is_open.tolist() == [False, True]
     np.testing.assert_allclose(areas, 4 * np.pi * np.array([4, 1]), rtol=0.03)
-    np.testing.assert_allclose(diagonals, np.sqrt(3) * np.array([4, 2]), rtol=0.02)
+    np.testing.assert_allclose(sides, np.repeat([[4.0], [2.0]], 3, axis=1), rtol=0.02)
 
 
 def test_gain_is_the_area_where_all_move_outwards() -> None:

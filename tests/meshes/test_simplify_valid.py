@@ -24,7 +24,7 @@ def sponge(seed: int) -> Mesh:
     return extract_surface(distance, Lattice.of_whole(whole, (1.0,) * 3))
 
 
-@pytest.mark.parametrize(("seed", "max_error_um"), [(0, 0.5), (1, 2.0), (2, 4.0)])
+@pytest.mark.parametrize(("seed", "max_error_um"), [(0, 0.8), (1, 2.0), (2, 4.0)])
 def test_crossings_that_simplification_makes_are_mended(seed: int, max_error_um: float) -> None:
     fine = sponge(seed)
     assert "crossings" in kinds(find_defects(simplify(fine, max_error_um)))

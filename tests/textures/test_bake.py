@@ -226,7 +226,7 @@ def test_neighbours_shade_alike_along_the_cut(
 ) -> None:
     ours, theirs = (on_the_cut(lods[level]) for lods in neighbours)
     common = sorted(ours.keys() & theirs.keys())
-    assert len(common) > 300
+    assert len(common) > 150
     assert len(common) > 0.9 * len(ours)
     a, b = (np.array([side[place][0] for place in common]) for side in (ours, theirs))
     angle = degrees(a, b)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from stereocell.building.closed_copy import close_tile
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import denoise
-from stereocell.isosurface.distance_field import signed_distance
+from stereocell.isosurface.distance_field import to_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
 from stereocell.meshes.alpha_wrap import alpha_wrap
+from stereocell.meshes.rims import thin_rims
 from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
@@ -28,6 +29,7 @@ from stereocell.textures.sample_channel import sample_channel
 from stereocell.textures.texture_lod import Texturer, VertexValues
 from stereocell.transfer.joint_histogram import to_eight_bits
 
+RIM_ERROR = 0.3  # finest spacings; largest error of a surface's curve where tiles meet
 PAST = 3  # voxels beyond a cut that maps are baked from; the halo is larger, texels smaller
 
 
@@ -128,16 +130,13 @@ def _repaired(
             np.minimum(field, outside, out=field, where=given.holder.at(given.lattice.window))
         if given.step != (1, 1, 1):
             field = np.ascontiguousarray(field[given.lattice.slices_of_thinned(given.step)])
-        distance = signed_distance(
-            field, np.zeros(1, np.float32), spacing_um=spacing, value_range=value_range
-        )
-        del field
+        to_distance(field, spacing_um=spacing, value_range=value_range)
     with clock("repair"):
         by_triangles = surface.wrap == "alpha-wrap" and given.repair.alpha_um > 0
         options = (
             replace(given.repair, alpha_um=0.0, offset_um=0.0) if by_triangles else given.repair
         )
-        return repair(distance, spacing, options), by_triangles
+        return repair(field, spacing, options), by_triangles
 
 
 def _extract(
@@ -145,6 +144,8 @@ def _extract(
 ) -> Mesh:
     with clock("extract"):
         fine = extract_surface(repaired.distance, lattice)
+        error_um = RIM_ERROR * min(lattice.spacing_um)
+        fine = thin_rims(fine, repaired.distance, lattice, error_um=error_um)
     if by_triangles and len(fine.triangles):
         with clock("wrap"):
             fine = alpha_wrap(fine, given.repair.alpha_um, given.repair.offset_um)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 from pydantic import TypeAdapter, ValidationError
 
-from stereocell.meshes.distance import Nearest, measure_distance
+from stereocell.meshes.distance import Nearest, measure_spread
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.validity import Defects, border, find_defects
@@ -115,8 +115,12 @@ def _follow(
     planes = _cut_planes(tile, channel_id, fine)
     to_fine = Nearest(fine.mesh, options.lod.samples)
 
-    def away(lod: ComposedLod) -> float:
-        return measure_distance(to_fine, Nearest(lod.mesh, options.lod.samples))
+    def measured(lod: ComposedLod, past_um: float = 0.0) -> ComposedLod:
+        """Return the level with its distances from the finest, and as much as that is away."""
+        to_mesh = Nearest(lod.mesh, options.lod.samples)
+        ways = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
+        most = max(way.p99 for way in ways), max(way.max for way in ways)
+        return replace(lod, distance_um=past_um + most[0], largest_um=past_um + most[1])
 
     def verdict(lod: ComposedLod) -> str:
         _, defects = _certified(read_local(tile, channel_id, lod.level), planes)
@@ -124,21 +128,25 @@ def _follow(
         return f"lod{lod.level} ({_describe(defects)}{lost})"
 
     if fine.level not in edited:
-        told = [f"{verdict(lod)} {away(lod):.3g} um from lod{fine.level}, which is as it was built"
-                for lod in lods if lod.level in edited]  # fmt: skip
-        return [
-            replace(lod, distance_um=fine.distance_um + away(lod)) if lod.level in edited else lod
-            for lod in lods
-        ], told
+        told, result = [], []
+        for lod in lods:
+            if lod.level in edited:
+                um = measured(lod).distance_um
+                told.append(
+                    f"{verdict(lod)} {um:.3g} um from lod{fine.level}, which is as it was built"
+                )
+                lod = measured(lod, fine.largest_um)
+            result.append(lod)
+        return result, told
     told = [verdict(fine)]
     # an opinion outside the variants lies over all levels: it is the finest's edit, not their own
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
     made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
-    result = [replace(fine, distance_um=0.0)]
+    result = [replace(fine, distance_um=0.0, largest_um=0.0)]
     anew = []
     for lod in lods[1:]:
         if lod.level in own:
-            lod = replace(lod, distance_um=away(lod))
+            lod = measured(lod)
             told.append(f"{verdict(lod)} stays, {lod.distance_um:.3g} um from lod{fine.level}")
         else:
             lod, defects = made[lod.level]
@@ -192,9 +200,12 @@ def _make(
             found = replace(before[0], level=lod.level), before[1]
         else:
             dressed = _compose(made[place], lod, fine, mesh, others)
-            um = made[place].distance_um * stretch
+            um, most_um = made[place].distance_um * stretch, made[place].largest_um * stretch
             quality = made[place].quality
-            found = replace(dressed, distance_um=um), quality.faults if quality else 0
+            found = (
+                replace(dressed, distance_um=um, largest_um=most_um),
+                quality.faults if quality else 0,
+            )
         result[lod.level] = before = found
     return result
 

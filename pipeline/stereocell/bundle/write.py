@@ -214,6 +214,7 @@ def _write_channel(
     entry = describe_channel(
         appearance,
         [channel.triangles for _, channel in tiles],
+        [channel.distances for _, channel in tiles],
         transfer2d=transfer2d,
         lut=lut,
         tileset=tilesets[0] if tilesets else None,
@@ -225,13 +226,14 @@ def _write_channel(
 def describe_channel(
     appearance: ComposedAppearance,
     triangles: Iterable[Sequence[int]],
+    distances: Iterable[Sequence[tuple[float, float]]],
     *,
     transfer2d: FileRef,
     lut: FileRef,
     tileset: FileRef | None,
     volumes: FileRef,
 ) -> dict[str, Any]:
-    """Return a channel's entry in the manifest; `triangles` of each tile by level."""
+    """Return a channel's entry in the manifest; `triangles`, `distances` of each tile by level."""
     return {
         "id": appearance.id,
         "name": appearance.name,
@@ -252,6 +254,7 @@ def describe_channel(
         "lut": asdict(lut),
         "tileset": None if tileset is None else asdict(tileset),
         "triangles": _totals(triangles),
+        "distances": _farthest(distances),
         "volumes": asdict(volumes),
     }
 
@@ -269,6 +272,17 @@ def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
     given = [triangles for triangles in tiles if triangles]
     count = max((len(triangles) for triangles in given), default=0)
     return [sum(t[min(level, len(t) - 1)] for t in given) for level in range(count)]
+
+
+def _farthest(tiles: Iterable[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
+    """Return the largest distances of all tiles by level; as of triangles, the last repeats."""
+    given = [distances for distances in tiles if distances]
+    count = max((len(distances) for distances in given), default=0)
+    levels = ([d[min(level, len(d) - 1)] for d in given] for level in range(count))
+    return [
+        {"p99_um": max(p99 for p99, _ in level), "largest_um": max(most for _, most in level)}
+        for level in levels
+    ]
 
 
 def _bounds(tiles: Sequence[BundleTile]) -> dict[str, list[float]]:

@@ -5,7 +5,6 @@ says what the bundle's own files need to know of it.
 """
 
 import hashlib
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -48,8 +47,6 @@ from stereocell.usd.read_textures import read_image
 from stereocell.usd.read_variants import Representation
 from stereocell.usd.written_files import AsWritten
 
-_COARSE_STEPS = 16  # of the lattice, to one of the coarsest LODs': some 3/4 of a large tile's voxel
-_UM_PER_METRE = 1e6
 _RECORD = "tile.json"
 
 
@@ -68,6 +65,7 @@ class TileChannel:
 
     lods       for the tileset, finest first; addresses relative to it
     triangles  by level of detail; levels finer than the finest have as many as that
+    distances  by level, too: the stated and the largest distance from the iso-surface, um
     volume     its entry in volumes.json, or None
     files      all that was written
     joint      the volume's histogram of value and gradient, packed; see bundle/write_transfer2d.py
@@ -79,6 +77,7 @@ class TileChannel:
     channel_id: str
     lods: tuple[TileLod, ...]
     triangles: tuple[int, ...]
+    distances: tuple[tuple[float, float], ...]
     volume: dict[str, Any] | None
     files: tuple[FileRef, ...]
     joint: bytes | None
@@ -181,6 +180,7 @@ def _export_channel(
     files: list[FileRef] = []
     lods: list[TileLod] = []
     triangles: list[int] = []
+    distances: list[tuple[float, float]] = []
     finer = b""
     shown = shown_lods(tile, channel_id, finest_lod)
     levels = shown.lods
@@ -189,37 +189,44 @@ def _export_channel(
             as_written.require(image)
         glb = _encode(tile, channel_id, lod, step_m)
         triangles += [len(lod.mesh.triangles)] * (lod.level + 1 - len(triangles))
+        distances += [(lod.distance_um, lod.largest_um)] * (lod.level + 1 - len(distances))
         if glb.data == finer:
             continue  # a channel with fewer levels than others repeats its last
         finer = glb.data
         if lod is levels[-1] and lods:
-            lod = _bare(lod, step_m)
-            glb = _encode(tile, channel_id, lod, _COARSE_STEPS * step_m)
+            lod = _bare(lod)
+            glb = _encode(tile, channel_id, lod, step_m)
         uri = f"{tile.GetName()}/lod{lod.level}.glb"
         file = write_file(root, f"channels/{channel_id}/{uri}", glb.data)
         files.append(file)
-        lods.append(TileLod(uri, file.sha256, lod.distance_um, glb.min_m, glb.max_m))
+        lods.append(TileLod(uri, file.sha256, lod.largest_um, glb.min_m, glb.max_m))
     entry = joint = None
     if volume is not None:
         as_written.require(volume.atlas)
         entry, written, joint = _export_volume(root, tile.GetName(), appearance, volume)
         files += written
     return TileChannel(
-        channel_id, tuple(lods), tuple(triangles), entry, tuple(files), joint, shown.edit
+        channel_id,
+        tuple(lods),
+        tuple(triangles),
+        tuple(distances),
+        entry,
+        tuple(files),
+        joint,
+        shown.edit,
     )
 
 
-def _bare(lod: ComposedLod, step_m: float) -> ComposedLod:
+def _bare(lod: ComposedLod) -> ComposedLod:
     """Return the coarsest level without what only shows from near: it is what all wait for first.
 
     Of the sample's coarsest levels, maps, their UVs and the vertices that charts had split were
-    five sixths of the bytes. The lattice's longer step adds to the distance; with it, positions
-    take a third less.
+    five sixths of the bytes. Its lattice is that of all levels: on a longer step positions would
+    take a third less, and stand apart from a finer neighbour's by up to three quarters of a voxel.
     """
-    moved_um = math.sqrt(3) / 2 * _COARSE_STEPS * step_m * _UM_PER_METRE
     maps = replace(lod.maps, normal=None, occlusion=None)
     images = lod.images and replace(lod.images, normal=None, occlusion=None)
-    lod = replace(lod, distance_um=lod.distance_um + moved_um, maps=maps, images=images)
+    lod = replace(lod, maps=maps, images=images)
     if maps.color is not None or (images is not None and images.color is not None):
         return lod
     mesh = replace(lod.mesh, uvs=None, tangents=None)

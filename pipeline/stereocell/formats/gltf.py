@@ -9,8 +9,8 @@ vertex becomes round(position / step), with the same `step` everywhere, a power 
 A file stores the 16-bit offset from its own origin, which is a lattice point as well, and its
 node has scale = step and translation = origin * step. Every factor is then a dyadic number, and
 a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps (for
-tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin). The coarsest
-LODs, which a viewer loads first, have a lattice of their own with longer steps.
+tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin). All levels of
+detail share it: a tile fits its neighbour at any pair of levels.
 """
 
 import json

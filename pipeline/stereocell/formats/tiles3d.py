@@ -47,13 +47,13 @@ class TileLod:
 
     uri           `<tile>/<name>.glb`
     sha256        of the file, hexadecimal
-    distance_um   the LOD's measured distance from the finest surface
+    largest_um    the largest distance that was found between the LOD and the iso-surface
     min_m, max_m  corners of the box (x, y, z), metres, y up
     """
 
     uri: str
     sha256: str
-    distance_um: float
+    largest_um: float
     min_m: Point
     max_m: Point
 
@@ -75,7 +75,7 @@ def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
     """
     boxes = [_Box.around(lods) for lods in tiles]
     whole = _Box.holding(boxes)
-    farthest_um = max(lod.distance_um for lods in tiles for lod in lods)
+    farthest_um = max(lod.largest_um for lods in tiles for lod in lods)
     error = _round_up(max(_ROOT_ERROR * whole.diagonal_m, farthest_um * _METRES_PER_UM))
     files: dict[str, bytes] = {}
     children = []
@@ -111,7 +111,7 @@ def _tileset(root: dict[str, Any], error: float) -> dict[str, Any]:
 
 def _levels(lods: Sequence[TileLod], box: "_Box") -> list[dict[str, Any]]:
     """Return a tile of the tileset for each LOD, finest first, without children."""
-    errors = accumulate((_round_up(lod.distance_um * _METRES_PER_UM) for lod in lods[1:]), max)
+    errors = accumulate((_round_up(lod.largest_um * _METRES_PER_UM) for lod in lods[1:]), max)
     return [
         _tile(box, error, lod.uri, lod.sha256)
         for lod, error in zip(lods, (0.0, *errors), strict=True)

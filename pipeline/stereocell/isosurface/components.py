@@ -1,25 +1,31 @@
 """The connected components of a mask: their sizes, and their triangle counts."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-import cc3d
 import numpy as np
 from numpy.typing import NDArray
+
+from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
+
+_Ints = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Connected components, numbered from 1; arrays (n,) hold component k at index k - 1.
+    """Connected components, numbered from 0; arrays (n,) hold component k at index k.
 
-    labels       unsigned integers (z, y, x), 0 outside
     diagonal_um  diagonal of the box of its voxel centres, in um
     whole        whether the component stays clear of the mask's ends
+    voxels       number of its voxels
     """
 
-    labels: NDArray[Any]
     diagonal_um: NDArray[np.float64]
     whole: NDArray[np.bool_]
+    voxels: NDArray[np.int64]
+    _faces: NDArray[np.int64]
+    _shape: tuple[int, int, int]
+    _runs: tuple[NDArray[np.int64], _Ints, _Ints, _Ints]  # of rows, starts, stops, components
 
     def faces(self) -> NDArray[np.int64]:
         """Return how many triangles an iso-surface around each component has, int64 (n,).
@@ -28,14 +34,13 @@ class Components:
         component, and a closed surface has twice as many triangles as vertices, less 4 for a sphere
         and plus 4 for each handle (Euler).
         """
-        vertices = np.zeros(len(self.diagonal_um) + 1, np.int64)
-        for axis in range(self.labels.ndim):
-            ahead = np.moveaxis(self.labels, axis, 0)
-            low, high = ahead[:-1], ahead[1:]
-            leaves = (low == 0) != (high == 0)
-            # one of the two labels is 0
-            vertices += np.bincount((low[leaves] | high[leaves]).ravel(), minlength=len(vertices))
-        return 2 * vertices[1:]
+        return 2 * self._faces
+
+    def mask_of(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the voxels of the chosen components (n,), bool (z, y, x)."""
+        mask = np.zeros(self._shape, bool)
+        mark_runs(*self._runs, chosen, mask)
+        return mask
 
 
 def find_components(
@@ -47,10 +52,20 @@ def find_components(
     spacing_um    (z, y, x)
     connectivity  6: voxels that share a face; 26: also an edge or a corner
     """
-    labels = cc3d.connected_components(mask, connectivity=connectivity)
-    found = cc3d.statistics(labels, no_slice_conversion=True)["bounding_boxes"]
-    boxes = np.asarray(found, np.int64).reshape(-1, 3, 2)[1:]  # (label, axis, first and last)
-    diagonal = np.linalg.norm((boxes[:, :, 1] - boxes[:, :, 0]) * np.asarray(spacing_um), axis=1)
-    end = np.asarray(mask.shape) - 1
-    whole = np.all((boxes[:, :, 0] > 0) & (boxes[:, :, 1] < end), axis=1)
-    return Components(labels, diagonal, np.asarray(whole))
+    depth, height, width = mask.shape
+    first, start, stop = find_runs(np.ascontiguousarray(mask))
+    labels, touching, count = join_runs(first, start, stop, height, connectivity == 26)
+    boxes, voxels, faces = measure_components(
+        first, start, stop, labels, touching, count, (depth, height, width)
+    )
+    low, high = boxes[:, :3].astype(np.int64), boxes[:, 3:].astype(np.int64)
+    diagonal = np.linalg.norm((high - low) * np.asarray(spacing_um), axis=1)
+    whole = np.all((low > 0) & (high < np.asarray(mask.shape) - 1), axis=1)
+    return Components(
+        diagonal,
+        np.asarray(whole),
+        voxels,
+        faces,
+        (depth, height, width),
+        (first, start, stop, labels),
+    )

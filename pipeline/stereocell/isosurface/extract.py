@@ -70,15 +70,12 @@ def extract_surface(
         (part.start, part.stop + low + high)
         for part, (low, high) in zip(own.slices_in(window), cap, strict=True)
     ]
-    values = distance[tuple(slice(*ends) for ends in box)].copy()
+    cuts = [
+        (axis, place - window.start[axis] + cap[axis][0])
+        for axis, place in (cut_as or lattice).cuts()
+    ]
     snap = np.float32(SNAP) * limit
-    _move_off_zero(values, snap)
-    for axis, place in (cut_as or lattice).cuts():
-        at = place - window.start[axis] + cap[axis][0]
-        plane = np.moveaxis(values, axis, 0)[at - box[axis][0]]
-        least = _least_on_plane(distance, box, axis, at, snap)
-        np.copyto(plane, np.where(plane > 0, least, -least), where=np.abs(plane) < least)
-    points, triangles = _flying_edges(values)
+    points, triangles = _flying_edges(_snapped(distance, box, cuts, snap))
     if not len(triangles):
         empty = np.zeros((0, 3), np.float32)
         return Mesh(empty, np.zeros((0, 3), np.uint32), empty)
@@ -92,9 +89,30 @@ def extract_surface(
     return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
 
 
+def _snapped(
+    distance: NDArray[np.float32],
+    box: list[tuple[int, int]],
+    cuts: list[tuple[int, int]],
+    snap: np.float32,
+) -> NDArray[np.float32]:
+    """Return the values of a box, a copy, with those that are near zero moved off it.
+
+    cuts  axis and place of the planes where tiles meet; those beside the box are left out
+    """
+    values = distance[tuple(slice(*ends) for ends in box)].copy()
+    _move_off_zero(values, snap)
+    for axis, at in cuts:
+        low, high = box[axis]
+        if low <= at < high:
+            plane = np.moveaxis(values, axis, 0)[at - low]
+            least = _least_on_plane(distance, box, axis, at, snap)
+            np.copyto(plane, np.where(plane > 0, least, -least), where=np.abs(plane) < least)
+    return values
+
+
 def _move_off_zero(values: NDArray[np.float32], least: np.float32) -> None:
-    near = np.abs(values) < least
-    values[near] = np.where(values[near] > 0, least, -least)
+    near = (values < least) & (values > -least)
+    np.copyto(values, np.where(values > 0, least, -least), where=near)
 
 
 def _least_on_plane(

@@ -61,8 +61,7 @@ def sum_components(
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
-    sizes = np.bincount(components.labels.ravel())[1:]
-    voxels, largest = int(sizes.sum()), int(sizes.max(initial=0))
+    voxels, largest = int(components.voxels.sum()), int(components.voxels.max(initial=0))
     if not len(faces):
         return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())

@@ -1,8 +1,9 @@
 """Half-edge collapses: a vertex moves onto a neighbour, which stays, and two triangles go.
 
 A collapse costs the quadric error of its target (Garland & Heckbert), a mean squared distance from
-the planes of all triangles that have gone into the vertex. Cheap collapses come first, in a few
-classes of cost rather than by a queue. A collapse is made only where the result is sound by itself:
+the planes of all triangles that have gone into the vertex, as a share of what its body may have.
+Cheap collapses come first, in a few classes of cost rather than by a queue. A collapse is made only
+where the result is sound by itself:
 
 - the two ends have two common neighbours (the link condition): topology stays
 - each triangle turns by less than 60 degrees, or was a sliver and faces as its surroundings do
@@ -42,7 +43,7 @@ VALENCE = 24  # most neighbours of two ends together
 
 @part
 def _price(quadrics: Points, u: int, at: Points, v: int) -> float:
-    """Return the mean squared distance of v from u's planes."""
+    """Return the mean squared distance of v from u's planes, in squared errors."""
     x, y, z = at[v]
     q = quadrics[u]
     square = q[0] * x * x + q[1] * y * y + q[2] * z * z + q[9]
@@ -51,7 +52,7 @@ def _price(quadrics: Points, u: int, at: Points, v: int) -> float:
 
 
 @part
-def _sum_planes(at: Points, corner: Ints, quadrics: Points) -> None:
+def _sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
     for t in range(len(corner) // 3):
         a, b, c = corner[3 * t], corner[3 * t + 1], corner[3 * t + 2]
         x, y, z = doubled_area(at, a, b, c)
@@ -72,7 +73,7 @@ def _sum_planes(at: Points, corner: Ints, quadrics: Points) -> None:
             q[7] += w * y * d
             q[8] += w * z * d
             q[9] += w * d * d
-            q[10] += w
+            q[10] += w * errors[v] * errors[v]
 
 
 @part
@@ -89,12 +90,12 @@ def _cheapest(
 
 
 @part
-def _class_of(price: float, limit: float) -> int:
-    return int(np.sqrt(price / limit) * CLASSES) if price <= limit else NEVER
+def _class_of(price: float) -> int:
+    return int(np.sqrt(price) * CLASSES) if price <= 1 else NEVER
 
 
 @part
-def _count_common(h: int, twins: Ints, corner: Ints, stamp: Ints, tick: int) -> tuple[int, int]:
+def count_common(h: int, twins: Ints, corner: Ints, stamp: Ints, tick: int) -> tuple[int, int]:
     """Return how many neighbours of the target carry the stamp, and how many it has.
 
     h  the half-edge to the target
@@ -124,7 +125,7 @@ def _count_common(h: int, twins: Ints, corner: Ints, stamp: Ints, tick: int) -> 
 
 
 @part
-def _keeps_form(
+def keeps_form(
     at: Points,
     corner: Ints,
     u: int,
@@ -175,7 +176,7 @@ def _distance_after(
 
 
 @part
-def _join(h: int, v: int, out: Ints, size: int, twins: Ints, corner: Ints, leaving: Ints) -> None:
+def join(h: int, v: int, out: Ints, size: int, twins: Ints, corner: Ints, leaving: Ints) -> None:
     """Move the start of half-edge h onto its end, v, and take its two triangles out."""
     g = twins[h]
     a, b = corner[preceding(h)], corner[preceding(g)]
@@ -198,7 +199,7 @@ def collapse(
     triangles: Ints,
     locked: NDArray[np.bool_],
     planes: NDArray[np.uint8],
-    error: float,
+    errors: Points,
     stray: float,
     sharpest: float,
 ) -> Ints:
@@ -209,8 +210,9 @@ def collapse(
     locked     bool (n,), vertices that stay; those of borders stay anyway, and those whose
                triangles make no single fan
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in
-    error      largest root of the mean squared distance from the planes
-    stray      largest distance of a vertex from the result, added up over its collapses
+    errors     float64 (n,), largest root of the mean squared distance from the planes; it is the
+               same for all vertices of a body
+    stray      errors; largest distance of a vertex from the result, added up over its collapses
     sharpest   cosine of the smallest angle that a triangle may get
     """
     n, m = len(at), len(triangles)
@@ -223,13 +225,12 @@ def collapse(
         if twins[h] < 0:
             stays[corner[h]] = stays[corner[following(h)]] = True
     quadrics = np.zeros((n, 11))
-    _sum_planes(at, corner, quadrics)
-    limit = error * error
+    _sum_planes(at, corner, errors, quadrics)
     cost, gone = np.full(n, NEVER, np.int16), np.zeros(m, np.bool_)
     for u in range(n):
         stays[u] |= valence[u] <= 0
         if not stays[u]:
-            cost[u] = _class_of(_cheapest(quadrics, u, at, leaving, twins, corner), limit)
+            cost[u] = _class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
     away, stamp, tick = np.zeros(n), np.zeros(n, np.int32), 0
     touched, turn = np.zeros(n, np.int32), 0
     ring, out = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
@@ -278,37 +279,35 @@ def collapse(
                 later = NEVER
                 for j in range(size):
                     o = order[j]
-                    c = _class_of(price[o], limit)
+                    c = _class_of(price[o])
                     if c > k:
                         later = c
                         break
                     v, h = ring[o], out[o]
-                    common, others = _count_common(h, twins, corner, stamp, tick)
+                    common, others = count_common(h, twins, corner, stamp, tick)
                     if common != 2 or not 7 <= others + size <= VALENCE:
                         continue
-                    if not _keeps_form(
+                    if not keeps_form(
                         at, corner, u, v, ring, out, size, (bx, by, bz), allowed, planes
                     ):
                         continue
                     strayed = away[u] + _distance_after(at, corner, u, v, ring, out, size)
-                    if strayed > stray:
+                    if strayed > stray * errors[u]:
                         continue
                     away[v] = max(away[v], strayed)
                     gone[h // 3] = gone[twins[h] // 3] = True
-                    _join(h, v, out, size, twins, corner, leaving)
+                    join(h, v, out, size, twins, corner, leaving)
                     quadrics[v] += quadrics[u]
                     later = NEVER
                     leaving[u] = -1
                     if not stays[v]:
-                        cost[v] = _class_of(
-                            _cheapest(quadrics, v, at, leaving, twins, corner), limit
-                        )
+                        cost[v] = _class_of(_cheapest(quadrics, v, at, leaving, twins, corner))
                     for p in range(size):
                         w = ring[p]
                         touched[w] = turn
                         if w == v or stays[w]:
                             continue
-                        c = max(_class_of(_price(quadrics, w, at, v), limit), k)
+                        c = max(_class_of(_price(quadrics, w, at, v)), k)
                         cost[w] = min(cost[w], c)
                         if cost[w] == NEVER:  # what was refused may be allowed now
                             cost[w] = min(k + 1, CLASSES)

@@ -3,21 +3,28 @@
 import numpy as np
 
 from stereocell.kernels.cache_place import mark_compiled
+from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
 from stereocell.kernels.flips import flip_edges
+from stereocell.kernels.gradients import divide_by_slopes, measure_slopes
 from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
 from stereocell.kernels.half_edges import (
     count_fans,
     label_bodies,
     match_twins,
-    measure_sizes,
+    measure_areas,
+    measure_boxes,
+    measure_triangles,
     measure_volumes,
     sum_gains,
     sum_normals,
 )
 from stereocell.kernels.nearest import find_nearest, find_sides
+from stereocell.kernels.rims import thin_rim
+from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
 from stereocell.kernels.slopes import find_downhill
+from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.visibility import cast_rays
 
 
@@ -30,10 +37,13 @@ def compile_all() -> None:
     count_fans(triangles, twins, 4)
     labels, bodies = label_bodies(triangles, 4)
     measure_volumes(at, triangles, labels, bodies)
-    measure_sizes(at, triangles, twins, labels, bodies)
+    measure_areas(at, triangles, twins, labels, bodies)
+    measure_boxes(at, labels, bodies)
+    measure_triangles(at, triangles)
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
-    bits = np.zeros(4, np.uint8)
-    flip_edges(at, collapse(at, triangles, flags, bits, 0.1, 0.3, 0.9), bits, 0.1, 0.9)
+    bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
+    flip_edges(at, collapse(at, triangles, flags, bits, errors, 3.0, 0.9), bits, errors, 0.9)
+    thin_rim(at, triangles, np.zeros(4, np.int8), flags, 0.1, 0.9)
 
     low, high = bound_boxes(at, triangles)
     origin, edge, shape = low.min(axis=0), 0.5, np.array([3, 3, 3])
@@ -48,4 +58,15 @@ def compile_all() -> None:
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
+
+    weights, steps = np.ones(1), np.ones(3)
+    smooth_in_place(voxels, weights, weights, weights, True)
+    measure_slopes(voxels, steps)
+    divide_by_slopes(voxels, steps, 1e-6, 2.0)
+    close_gaps(voxels, steps, 1.0, 1.0)
+    mask = voxels > 0
+    first_run, start, stop = find_runs(mask)
+    components, touching, count = join_runs(first_run, start, stop, 3, True)
+    measure_components(first_run, start, stop, components, touching, count, (3, 3, 3))
+    mark_runs(first_run, start, stop, components, np.ones(count, bool), mask)
     mark_compiled()

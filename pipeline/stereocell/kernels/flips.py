@@ -74,14 +74,14 @@ def _pair(twins: Ints, is_due: NDArray[np.bool_], h: int, g: int) -> None:
 
 @kernel
 def flip_edges(
-    at: Points, triangles: Ints, planes: NDArray[np.uint8], most: float, sharp: float
+    at: Points, triangles: Ints, planes: NDArray[np.uint8], errors: Points, sharp: float
 ) -> int:
     """Flip edges of sharp triangles, in place; return how many.
 
     at         float64 (n, 3)
     triangles  int32 (m, 3); boundary edges stay
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in
-    most       largest distance by which the surface moves
+    errors     float64 (n,), largest distance by which the surface moves at a vertex
     sharp      cosine of the angle below which a triangle is sharp
     """
     corner = triangles.ravel()
@@ -115,7 +115,7 @@ def flip_edges(
                     continue
                 before = max(smallest_angle_cosine(at, u, v, a), smallest_angle_cosine(at, v, u, b))
                 after = max(smallest_angle_cosine(at, a, u, b), smallest_angle_cosine(at, b, v, a))
-                if after >= min(least, before - GAIN) or _moves_far(at, u, v, a, b, most):
+                if after >= min(least, before - GAIN) or _moves_far(at, u, v, a, b, errors[u]):
                     continue
                 if _folds(at, u, v, a, b) or _are_joined(a, b, preceding(h), twins, corner):
                     continue

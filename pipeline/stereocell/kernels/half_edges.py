@@ -141,27 +141,40 @@ def measure_volumes(at: Points, triangles: Ints, labels: Ints, bodies: int) -> P
 
 
 @kernel
-def measure_sizes(
+def measure_triangles(at: Points, triangles: Ints) -> Points:
+    """Return the area of each triangle (m,)."""
+    areas = np.empty(len(triangles))
+    for t in range(len(triangles)):
+        x, y, z = doubled_area(at, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        areas[t] = np.sqrt(x * x + y * y + z * z) / 2
+    return areas
+
+
+@kernel
+def measure_areas(
     at: Points, triangles: Ints, twins: Ints, labels: Ints, bodies: int
-) -> tuple[Points, Points, NDArray[np.bool_]]:
-    """Return the area of each body, the diagonal of its box, and whether it is open; (bodies,)."""
-    areas, diagonals = np.zeros(bodies), np.zeros(bodies)
-    is_open = np.zeros(bodies, np.bool_)
-    low, high = np.full((bodies, 3), np.inf), np.full((bodies, 3), -np.inf)
+) -> tuple[Points, NDArray[np.bool_]]:
+    """Return the area of each body, and whether it is open; (bodies,)."""
+    areas, is_open = np.zeros(bodies), np.zeros(bodies, np.bool_)
     for t in range(len(triangles)):
         a, b, c = triangles[t]
-        body = labels[a]
         x, y, z = doubled_area(at, a, b, c)
-        areas[body] += np.sqrt(x * x + y * y + z * z) / 2
+        areas[labels[a]] += np.sqrt(x * x + y * y + z * z) / 2
         for k in range(3):
-            is_open[body] |= twins[3 * t + k] < 0
-            low[body, k] = min(low[body, k], min(at[a, k], min(at[b, k], at[c, k])))
-            high[body, k] = max(high[body, k], max(at[a, k], max(at[b, k], at[c, k])))
-    for body in range(bodies):
-        if areas[body] > 0:
-            x, y, z = high[body] - low[body]
-            diagonals[body] = np.sqrt(x * x + y * y + z * z)
-    return areas, diagonals, is_open
+            is_open[labels[a]] |= twins[3 * t + k] < 0
+    return areas, is_open
+
+
+@kernel
+def measure_boxes(at: Points, labels: Ints, bodies: int) -> Points:
+    """Return the sides of the box of each body's vertices (bodies, 3)."""
+    low, high = np.full((bodies, 3), np.inf), np.full((bodies, 3), -np.inf)
+    for v in range(len(at)):
+        body = labels[v]
+        for k in range(3):
+            low[body, k] = min(low[body, k], at[v, k])
+            high[body, k] = max(high[body, k], at[v, k])
+    return high - low
 
 
 @kernel

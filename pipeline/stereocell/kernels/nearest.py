@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.compiled import kernel
+from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
-from stereocell.kernels.triangles import Points, closest
+from stereocell.kernels.triangles import Points, Triple, closest, doubled_area
 
 
 @kernel
@@ -72,6 +72,23 @@ def find_nearest(
     return distance, nearest, parts
 
 
+@part
+def _unit_normal(at: Points, triangles: Ints, t: int) -> Triple:
+    """Return the unit normal of a triangle; 0 where it has no area."""
+    x, y, z = doubled_area(at, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+    length = max(np.sqrt(x * x + y * y + z * z), 1e-300)
+    return x / length, y / length, z / length
+
+
+@part
+def _angle_at(at: Points, here: int, one: int, other: int) -> float:
+    x, y, z = doubled_area(at, here, one, other)
+    along = 0.0
+    for k in range(3):
+        along += (at[one, k] - at[here, k]) * (at[other, k] - at[here, k])
+    return np.arctan2(np.sqrt(x * x + y * y + z * z), along)
+
+
 @kernel
 def find_sides(
     points: Points,
@@ -87,30 +104,31 @@ def find_sides(
     J. A. Baerentzen & H. Aanaes, "Signed distance computation using the angle weighted
     pseudonormal", IEEE TVCG 11(3), 2005. doi:10.1109/TVCG.2005.49
     """
-    units, around = np.zeros((len(triangles), 3)), np.zeros((len(at), 3))
+    is_asked = np.zeros(len(at), np.bool_)
+    for i in range(len(points)):
+        if parts[i] < 3:
+            is_asked[triangles[nearest[i], parts[i]]] = True
+    around = np.zeros((len(at), 3))
     for t in range(len(triangles)):
-        p, q, r = at[triangles[t, 0]], at[triangles[t, 1]], at[triangles[t, 2]]
-        normal = np.cross(q - p, r - p)
-        length = np.sqrt((normal * normal).sum())
-        if length <= 0:
-            continue
-        units[t] = normal / length
         for k in range(3):
-            here = at[triangles[t, k]]
-            u, v = at[triangles[t, (k + 1) % 3]] - here, at[triangles[t, (k + 2) % 3]] - here
-            across = np.cross(u, v)
-            angle = np.arctan2(np.sqrt((across * across).sum()), (u * v).sum())
-            around[triangles[t, k]] += angle * units[t]
+            v = triangles[t, k]
+            if is_asked[v]:
+                x, y, z = _unit_normal(at, triangles, t)
+                angle = _angle_at(at, v, triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3])
+                around[v, 0] += angle * x
+                around[v, 1] += angle * y
+                around[v, 2] += angle * z
     inside = np.empty(len(points), np.bool_)
     for i in range(len(points)):
         t, side = nearest[i], parts[i]
-        corner = at[triangles[t, side % 3]]
-        normal = units[t].copy()
+        x, y, z = _unit_normal(at, triangles, t)
         if side < 3:
-            normal = around[triangles[t, side]].copy()
+            x, y, z = around[triangles[t, side]]
         elif side < 6:
             twin = twins[3 * t + side - 3]
             if twin >= 0:
-                normal += units[twin // 3]
-        inside[i] = ((points[i] - corner) * normal).sum() < 0
+                dx, dy, dz = _unit_normal(at, triangles, twin // 3)
+                x, y, z = x + dx, y + dy, z + dz
+        ahead = points[i] - at[triangles[t, side % 3]]
+        inside[i] = ahead[0] * x + ahead[1] * y + ahead[2] * z < 0
     return inside

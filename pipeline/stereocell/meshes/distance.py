@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.half_edges import match_twins
+from stereocell.kernels.half_edges import match_twins, measure_triangles
 from stereocell.kernels.nearest import find_nearest, find_sides
 from stereocell.meshes.triangle_grid import make_grid
 from stereocell.model.mesh import Mesh, Spread
 
 PERCENTILE = 99.0  # percent; a sliver that vanishes, less than 1 % of the area, does not count
-VERTICES = 100_000  # asked for the largest distance, at least, where there are so many
+VERTICES = 50_000  # of a mesh, at most, that are asked for the largest distance
 ON_UM = 1e-6  # um; points this close count as on the surface: float32 rounds
 
 
@@ -25,7 +25,9 @@ class Nearest:
         self.points = spread_points(mesh, samples)
         self.vertices = mesh.positions.astype(np.float64)
         self.triangles = np.ascontiguousarray(mesh.triangles, np.int32)
-        self._grid = make_grid(self.vertices, self.triangles)
+        grid = make_grid(self.vertices, self.triangles)
+        # the triangles' boxes would take a third of a large unit's memory
+        self._cells = grid.first, grid.listed, grid.origin, grid.edge, grid.shape
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance in um from each of the points, float64 (n,); points (n, 3) in um."""
@@ -45,17 +47,8 @@ class Nearest:
     def _find(
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
-        grid = self._grid
-        return find_nearest(
-            np.ascontiguousarray(points, np.float64),
-            self.vertices,
-            self.triangles,
-            grid.first,
-            grid.listed,
-            grid.origin,
-            grid.edge,
-            grid.shape,
-        )
+        at = np.ascontiguousarray(points, np.float64)
+        return find_nearest(at, self.vertices, self.triangles, *self._cells)
 
 
 def measure_enclosure(source: Nearest, target: Nearest) -> float:
@@ -68,21 +61,20 @@ def measure_distance(a: Nearest, b: Nearest) -> float:
 
     Points spread evenly over the area of each mesh go to the nearest point of the other.
     """
-    there, back = b.distances(a.points), a.distances(b.points)
-    return float(max(np.percentile(there, PERCENTILE), np.percentile(back, PERCENTILE)))
+    return max(measure_spread(a, b).p99, measure_spread(b, a).p99)
 
 
 def measure_spread(source: Nearest, target: Nearest) -> Spread:
     """Return the distances in um from one mesh to the other.
 
-    Mean and 95th percentile are over the source's area; the maximum is over its vertices too, of
-    which VERTICES are asked, evenly over their order.
+    Mean and percentiles are over the source's area; the maximum is over its vertices too, of which
+    VERTICES are asked, evenly over their order.
     """
     sampled = target.distances(source.points)
-    few = source.vertices[:: max(1, len(source.vertices) // VERTICES)]
-    at_vertices = target.distances(few)
-    largest = max(float(sampled.max()), float(at_vertices.max()))
-    return Spread(float(sampled.mean()), float(np.percentile(sampled, 95)), largest)
+    few = source.vertices[:: -(-len(source.vertices) // VERTICES)]
+    largest = max(float(sampled.max()), float(target.distances(few).max()))
+    p95, p99 = (float(np.percentile(sampled, percent)) for percent in (95, PERCENTILE))
+    return Spread(float(sampled.mean()), p95, p99, largest)
 
 
 def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
@@ -90,7 +82,9 @@ def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
 
     The same mesh gives the same points.
     """
-    along = np.cumsum(_doubled_areas(mesh))
+    at = mesh.positions.astype(np.float64)
+    areas = measure_triangles(at, np.ascontiguousarray(mesh.triangles, np.int32))
+    along = np.cumsum(areas)
     place = np.arange(count)
     chosen = np.searchsorted(along, (place + 0.5) / count * along[-1], side="right")
     # inside the triangles: the R2 sequence (M. Roberts, "The unreasonable effectiveness of
@@ -98,18 +92,5 @@ def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
     u, v = (0.5 + place * 0.7548776662466927) % 1, (0.5 + place * 0.5698402909980532) % 1
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     corners = mesh.triangles[np.minimum(chosen, len(mesh.triangles) - 1)]
-    a, b, c = mesh.positions[corners].astype(np.float64).transpose(1, 0, 2)
+    a, b, c = at[corners].transpose(1, 0, 2)
     return a + u[:, None] * (b - a) + v[:, None] * (c - a)
-
-
-_BLOCK = 100_000  # triangles at once
-
-
-def _doubled_areas(mesh: Mesh) -> NDArray[np.float64]:
-    """Return twice each triangle's area (m,), in blocks: corners in float64 take a GB."""
-    areas = np.empty(len(mesh.triangles))
-    for start in range(0, len(areas), _BLOCK):
-        part = slice(start, start + _BLOCK)
-        a, b, c = mesh.positions[mesh.triangles[part]].astype(np.float64).transpose(1, 0, 2)
-        areas[part] = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return areas

@@ -5,8 +5,9 @@ of a round body lie inside of it: at coarse levels bodies would lose a third of 
 all vertices of a body move outward by one distance, until its volume is the fine one's, or the
 distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
 bit and no other reaches it. No vertex leaves the tile's box, or the fine mesh's where the caps of
-the data's end lie outside of that. A body that comes to cross another, or itself, moves half as
-far, and at last not at all.
+the data's end lie outside of that. Where bodies come to cross each other or themselves, the
+vertices there stay, and the others move farther for it; if that doesn't help, the whole body moves
+half as far, and at last not at all.
 """
 
 from dataclasses import replace
@@ -21,7 +22,8 @@ from stereocell.model.mesh import Mesh
 
 STEPS = 4  # Newton's; volume is a cubic function of the distance
 FADE = 1.25  # moves are whole from this many largest moves from a cut on
-HALVINGS = 3  # tries with half the move, before a body with defects stays
+CALMED = 3  # tries in which the vertices of defects stay, and more around them with each
+HALVINGS = 3  # tries with half the move after that, before a body with defects stays
 
 Points = NDArray[np.float64]
 Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
@@ -74,6 +76,44 @@ class FineVolumes:
         wanted = self._volume[self._label[vertices[first]]]
         start = mesh.positions.astype(np.float64)
         share = _fade(mesh, planes, FADE * max_move_um)
+        part = np.ones(count)
+        fresh = np.ones(len(triangles), bool)
+        for number in range(CALMED + HALVINGS + 2):
+            at = self._move(start, triangles, (label, count), wanted, share, max_move_um)
+            moves = (at - start) * part[label][:, None]
+            positions = (start + moves).astype(np.float32)
+            # bit by bit: a sum would lose the sign of a zero
+            positions = np.where(moves == 0, mesh.positions, positions)
+            placed = replace(mesh, positions=positions)
+            defects = find_defects(placed, planes, fresh)
+            faulty = defects.vertices(mesh.triangles)
+            worst = np.unique(label[faulty])
+            worst = worst[part[worst] > 0]
+            if not len(worst):
+                break
+            if number < CALMED:
+                share[_grow(faulty, mesh.triangles, len(start), number)] = 0.0
+            else:
+                part[worst] *= 0.5 if number < CALMED + HALVINGS else 0.0
+            fresh = np.isin(label[mesh.triangles[:, 0]], worst)
+        return placed, defects
+
+    def _move(
+        self,
+        start: Points,
+        triangles: NDArray[np.int32],
+        bodies: tuple[NDArray[np.int32], int],
+        wanted: Points,
+        share: Points,
+        max_move_um: float,
+    ) -> Points:
+        """Return where vertices go, (n, 3), so that each body gets its volume.
+
+        bodies  of each vertex, and their number
+        wanted  volumes
+        share   of the move that each vertex makes
+        """
+        label, count = bodies
         at, moved = start.copy(), np.zeros(count)
         for _ in range(STEPS):
             missing = wanted - self._measure(at, triangles, label, count)
@@ -83,22 +123,18 @@ class FineVolumes:
             step = np.clip(moved + step, -max_move_um, max_move_um) - moved
             moved += step
             at = np.clip(at + ways * step[label][:, None], self._low, self._high)
-        part = np.ones(count)
-        fresh = np.ones(len(triangles), bool)
-        for number in range(HALVINGS + 2):
-            moves = (at - start) * part[label][:, None]
-            positions = (start + moves).astype(np.float32)
-            # bit by bit: a sum would lose the sign of a zero
-            positions = np.where(moves == 0, mesh.positions, positions)
-            placed = replace(mesh, positions=positions)
-            defects = find_defects(placed, planes, fresh)
-            worst = np.unique(label[defects.vertices(mesh.triangles)])
-            worst = worst[part[worst] > 0]
-            if not len(worst):
-                break
-            part[worst] *= 0.5 if number < HALVINGS else 0.0
-            fresh = np.isin(label[mesh.triangles[:, 0]], worst)
-        return placed, defects
+        return at
+
+
+def _grow(
+    chosen: NDArray[np.int64], triangles: NDArray[np.uint32], count: int, rings: int
+) -> NDArray[np.bool_]:
+    """Return the chosen vertices and `rings` rings of neighbours, bool (count,)."""
+    found = np.zeros(count, bool)
+    found[chosen] = True
+    for _ in range(rings):
+        found[triangles[found[triangles].any(axis=1)]] = True
+    return found
 
 
 def _fade(mesh: Mesh, planes: tuple[Plane, ...], reach_um: float) -> Points:

@@ -14,7 +14,7 @@ class LodOptions:
     """
 
     errors: tuple[float, ...] = setting(
-        (0.1, 0.5, 0.8, 4.0),
+        (0.1, 0.35, 1.1, 4.0),
         "aim of simplifying to lod0, lod1, ..., in finest spacings; what comes out is measured",
     )
     samples: int = setting(1000, "points at which distances are measured, each way")

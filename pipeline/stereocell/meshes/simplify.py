@@ -5,6 +5,8 @@ keep their normals and values. Vertices of boundary edges stay: the edges on a c
 same at every level, and neighbours at different levels still meet. A body stays one, with its
 handles, and never gets thinner than the errors allow, but bodies may come to cross each other:
 meshes/simplify_valid.py.
+
+A small body may have less of an error than a large one: at half its radius a ball is a few spikes.
 """
 
 import numpy as np
@@ -12,12 +14,15 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.collapse import collapse
 from stereocell.kernels.flips import flip_edges
+from stereocell.kernels.half_edges import label_bodies, measure_boxes
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
+# largest error that a body may have, as a share of its box's diagonal, and of its shortest side
+OF_DIAGONAL, OF_SIDE = 0.1, 0.2
 STRAY = 3.0  # errors; largest distance of a vertex from the result
-SHARPEST_DEG = 15.0  # degrees; smallest angle of a triangle, unless those around are sharper
-FLIP_DEG = 20.0  # degrees; edges of sharper triangles flip
+SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle, unless those around are sharper
+FLIP_DEG = 25.0  # degrees; edges of sharper triangles flip
 
 
 def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) -> Mesh:
@@ -25,7 +30,7 @@ def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) ->
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
     max_error_um  largest root of the mean squared distance of a vertex from the planes of the
-                  triangles that it stands for
+                  triangles that it stands for; on small bodies less: see `find_errors`
     planes        the cut planes, where the mesh may be open: no triangle comes to lie in one
 
     >>> v = np.array([[i % 5, i // 5, 0] for i in range(25)], np.float32)
@@ -36,23 +41,32 @@ def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) ->
     (32, 16)
     """
     locked = np.zeros(len(mesh.positions), bool)
-    left = simplify_part(
-        mesh, mesh.triangles, max_error_um=max_error_um, locked=locked, planes=planes
-    )
+    errors = find_errors(mesh, max_error_um)
+    left = simplify_part(mesh, mesh.triangles, errors, locked=locked, planes=planes)
     return compact(mesh, left)
+
+
+def find_errors(mesh: Mesh, max_error_um: float) -> NDArray[np.float64]:
+    """Return the error that each vertex may have (n,), um: less on bodies that are small for it."""
+    triangles = np.ascontiguousarray(mesh.triangles, np.int32)
+    labels, bodies = label_bodies(triangles, len(mesh.positions))
+    sides = measure_boxes(mesh.positions.astype(np.float64), labels, bodies)
+    own = np.minimum(OF_DIAGONAL * np.linalg.norm(sides, axis=1), OF_SIDE * sides.min(axis=1))
+    return np.minimum(max_error_um, own)[labels]
 
 
 def simplify_part(
     mesh: Mesh,
     triangles: NDArray[np.uint32],
+    errors: NDArray[np.float64],
     *,
-    max_error_um: float,
     locked: NDArray[np.bool_],
     planes: tuple[Plane, ...],
 ) -> NDArray[np.uint32]:
     """Return fewer triangles in place of those of some whole bodies, uint32 (k, 3).
 
     triangles  uint32 (m, 3), by the mesh's vertices
+    errors     float64 (n,), see `find_errors`
     locked     bool (n,), vertices that stay
     """
     used, own = renumber(triangles, len(mesh.positions))
@@ -67,11 +81,11 @@ def simplify_part(
         own.astype(np.int32),
         locked[used],
         bits,
-        max_error_um,
-        STRAY * max_error_um,
+        errors[used],
+        STRAY,
         sharpest,
     )
-    flip_edges(at, left, bits, max_error_um, sharp)
+    flip_edges(at, left, bits, errors[used], sharp)
     return used[left].astype(np.uint32)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from stereocell.meshes.simplify import compact, renumber, simplify_part
+from stereocell.meshes.simplify import compact, find_errors, renumber, simplify_part
 from stereocell.meshes.validity import Defects, find_defects, label_components
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
@@ -56,10 +56,10 @@ def simplify_without_defects(
     tries = np.zeros(len(mesh.positions), np.int64)  # a vertex that was locked once stays
     tree: cKDTree | None = None
 
+    errors = find_errors(mesh, max_error_um)
+
     def again(triangles: Triangles) -> Triangles:
-        return simplify_part(
-            mesh, triangles, max_error_um=max_error_um, locked=tries > 0, planes=planes
-        )
+        return simplify_part(mesh, triangles, errors, locked=tries > 0, planes=planes)
 
     triangles = again(mesh.triangles)
     fresh = np.ones(len(triangles), bool)

@@ -9,7 +9,12 @@ would have to decide alike.
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.half_edges import label_bodies, match_twins, measure_sizes
+from stereocell.kernels.half_edges import (
+    label_bodies,
+    match_twins,
+    measure_areas,
+    measure_boxes,
+)
 from stereocell.model.mesh import Mesh
 
 SMALL = 4.0  # errors; at the default errors only lod3's is larger than fragments that stay
@@ -24,9 +29,8 @@ class SmallBodies:
         triangles = np.ascontiguousarray(mesh.triangles, np.int32)
         self._label, bodies = label_bodies(triangles, count)
         twins, at = match_twins(triangles, count), mesh.positions.astype(np.float64)
-        self._areas, self._diagonals, self._is_open = measure_sizes(
-            at, triangles, twins, self._label, bodies
-        )
+        self._areas, self._is_open = measure_areas(at, triangles, twins, self._label, bodies)
+        self._diagonals = np.linalg.norm(measure_boxes(at, self._label, bodies), axis=1)
 
     def find(self, error_um: float) -> NDArray[np.bool_]:
         """Return which vertices of the surface belong to bodies that go, bool (n,).

@@ -34,6 +34,7 @@ class Spread:
 
     mean: float
     p95: float
+    p99: float
     max: float
 
 
@@ -42,6 +43,7 @@ class Quality:
     """How a level of detail was made, and how true it is.
 
     away, back  distances from the iso-surface to this mesh, and from this mesh to the iso-surface
+    samples     points spread over each of the two, at which these were measured
     mended      bodies that were simplified again, because the first attempt had defects
     fallbacks   bodies that kept the previous level's surface, because every attempt had defects
     faults      defects that are left, by the exact check: see `find_defects`
@@ -51,6 +53,7 @@ class Quality:
 
     away: Spread
     back: Spread
+    samples: int
     mended: int
     fallbacks: int
     faults: int
@@ -80,7 +83,8 @@ class Baked:
 class Lod:
     """One level of detail. `lod0` is the finest.
 
-    distance_um  measured distance between this mesh and the iso-surface: see `measure_distance`
+    distance_um  99th percentile of the distances between this mesh and the iso-surface, of points
+                 spread over both: see `measure_distance`
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
     quality      None where the writer doesn't know it
     baked        ambient occlusion and sampled channel; None: neither
@@ -91,3 +95,10 @@ class Lod:
     normal_map: NDArray[np.uint8] | None = None
     quality: Quality | None = None
     baked: Baked | None = None
+
+    @property
+    def largest_um(self) -> float:
+        """The largest distance that was found between this mesh and the iso-surface, um."""
+        if self.quality is None:
+            return self.distance_um
+        return max(self.distance_um, self.quality.away.max, self.quality.back.max)

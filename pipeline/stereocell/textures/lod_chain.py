@@ -1,8 +1,8 @@
 """Make all levels of detail of one unit from its fine surface; each is validated and measured.
 
 Each level is simplified from the one before, so that its vertices are some of that one's, and then
-gets back the volume that this took (meshes/keep_volume.py). Small bodies go as a whole where they
-would be thinner than the error (meshes/small_bodies.py).
+gets back the volume that this took (meshes/keep_volume.py). Rims stay as they are.
+Small bodies go as a whole where they would be thinner than the error (meshes/small_bodies.py).
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.meshes.distance import Nearest, measure_distance, measure_enclosure, measure_spread
+from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.keep_volume import Box, FineVolumes
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
@@ -75,12 +75,13 @@ def make_levels(
                 left = fine.triangles[~gone[fine.triangles[:, 0]]]
                 to_fine = Nearest(compact(fine, left), lod.samples)
             to_mesh = Nearest(shown, lod.samples)
-            distance = measure_distance(to_fine, to_mesh)
+            away, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
             # a coarser level is no more accurate: sampling errors must not break the viewers' order
-            distance = max(distance, lods[-1].distance_um if lods else 0.0)
+            distance = max(away.p99, back.p99, lods[-1].distance_um if lods else 0.0)
             quality = Quality(
-                away=measure_spread(to_fine, to_mesh),
-                back=measure_spread(to_mesh, to_fine),
+                away=away,
+                back=back,
+                samples=lod.samples,
                 mended=simplified.simplified_again,
                 fallbacks=simplified.fallbacks,
                 faults=defects.total,

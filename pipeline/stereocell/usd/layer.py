@@ -25,9 +25,14 @@ TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
 CHANNEL_API = "StereoCellChannelAPI"
 SPECIMEN_API = "StereoCellSpecimenAPI"
+SURFACE_API = "StereoCellSurfaceAPI"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 
-SHAPE_HASH = "stereocell:shapeHash"  # attribute: hash of a mesh's shape as built
+# attributes of a surface's mesh
+SHAPE_HASH = "stereocell:shapeHash"
+DISTANCE = "stereocell:distance"
+LARGEST_DISTANCE = "stereocell:largestDistance"
+DISTANCE_SAMPLES = "stereocell:distanceSamples"
 
 Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
 

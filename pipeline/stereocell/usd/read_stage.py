@@ -21,6 +21,8 @@ from stereocell.storage.location import Location, require_own
 from stereocell.storage.workspace import cached
 from stereocell.usd.layer import (
     CHANNELS,
+    DISTANCE,
+    LARGEST_DISTANCE,
     METERS_PER_UNIT,
     ROOT,
     SHAPE_HASH,
@@ -62,6 +64,8 @@ class ComposedLod:
     """One level of detail, in world um. `level` counts from the finest, 0.
 
     matrix  (4, 4) for row vectors, from the mesh's own space to world um
+    distance_um  99th percentile of the distances from the iso-surface, and back
+    largest_um   the largest of them; the former, where a stage of an earlier version has none
     shape   hash of the composed points and faces
     built   the same hash as the pipeline wrote it; empty: the stage has none
     own     the mesh prim's own transform
@@ -72,6 +76,7 @@ class ComposedLod:
     level: int
     mesh: Mesh
     distance_um: float
+    largest_um: float
     material: Material
     maps: ComposedMaps
     matrix: NDArray[np.float64]
@@ -262,12 +267,15 @@ def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[Comp
         if mesh is None:
             continue
         stretch = float(np.linalg.norm(matrix[:3, :3], 2))
-        distance = shortest(*numbers_of(prim, "stereocell:distance", 1)) * stretch
+        distance = largest = shortest(*numbers_of(prim, DISTANCE, 1)) * stretch
+        if prim.HasAttribute(LARGEST_DISTANCE):
+            largest = shortest(*numbers_of(prim, LARGEST_DISTANCE, 1)) * stretch
         own = UsdGeom.Xformable(prim).GetLocalTransformation()
         lod = ComposedLod(
             level,
             mesh,
             distance,
+            largest,
             material_of(surface),
             maps_of(surface),
             matrix,

@@ -33,7 +33,11 @@ from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import FileList, measure
 from stereocell.usd.layer import (
     CHANNELS,
+    DISTANCE,
+    DISTANCE_SAMPLES,
+    LARGEST_DISTANCE,
     SHAPE_HASH,
+    SURFACE_API,
     export,
     hash_shape,
     new_stage,
@@ -168,6 +172,7 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     """Define the properties that all levels of detail share."""
     stage = branch.GetPrim().GetStage()
     mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
+    mesh.GetPrim().AddAppliedSchema(SURFACE_API)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
@@ -234,8 +239,11 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     if len(points):
         mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
-    set_attribute(mesh.GetPrim(), "stereocell:distance", _Types.Float, lod.distance_um, custom=True)
-    set_attribute(mesh.GetPrim(), SHAPE_HASH, _Types.String, hash_shape(mesh), custom=True)
+    set_attribute(mesh.GetPrim(), DISTANCE, _Types.Float, lod.distance_um)
+    set_attribute(mesh.GetPrim(), LARGEST_DISTANCE, _Types.Float, lod.largest_um)
+    if lod.quality is not None:
+        set_attribute(mesh.GetPrim(), DISTANCE_SAMPLES, _Types.Int, lod.quality.samples)
+    set_attribute(mesh.GetPrim(), SHAPE_HASH, _Types.String, hash_shape(mesh))
     primvars = UsdGeom.PrimvarsAPI(mesh)
     vertex = UsdGeom.Tokens.vertex
     if lod.mesh.uvs is not None:

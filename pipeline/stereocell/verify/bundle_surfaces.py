@@ -90,8 +90,7 @@ def compare_surfaces(
         problems += [f"lod{level}: {fault}" for fault in faults]
         # errors don't fall from fine to coarse; the finest level, the reference, states none
         if level > min(contents):
-            moved_m = math.sqrt(3) / 2 * drawn.step_m if is_last else 0.0
-            error_m = max(error_m, lod.distance_um / _UM_PER_METRE + moved_m)
+            error_m = max(error_m, lod.largest_um / _UM_PER_METRE)
         if not error_m * (1 - 1e-6) <= content.error_m <= error_m * _ROUNDED:
             problems.append(
                 f"lod{level}: the tileset states {content.error_m * _UM_PER_METRE:.4g} um, "

@@ -1,0 +1,118 @@
+"""A median in plane and a Gaussian, in one pass over the planes and in place."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.compiled import kernel, part
+
+Field = NDArray[np.float32]
+Weights = NDArray[np.float64]
+
+
+@part
+def _find_median(plane: Field, out: Field, low: Field, mid: Field, high: Field) -> None:
+    """Write the median of the 3 x 3 pixels around each pixel; edges repeat.
+
+    Columns of three are put in order. The median of nine is the median of three: of the largest of
+    the low ones, the median of those in the middle, and the least of the high ones.
+
+    References
+    A. W. Paeth, "Median finding on a 3 x 3 grid", Graphics Gems, 1990, 171-175
+    """
+    height, width = plane.shape
+    for y in range(height):
+        above, here, below = plane[max(y - 1, 0)], plane[y], plane[min(y + 1, height - 1)]
+        for x in range(width):
+            p, q, r = above[x], here[x], below[x]
+            p, q = min(p, q), max(p, q)
+            q, r = min(q, r), max(q, r)
+            p, q = min(p, q), max(p, q)
+            low[x + 1], mid[x + 1], high[x + 1] = p, q, r
+        low[0], mid[0], high[0] = low[1], mid[1], high[1]
+        end = width + 1
+        low[end], mid[end], high[end] = low[width], mid[width], high[width]
+        row = out[y]
+        for x in range(width):
+            least = max(low[x], max(low[x + 1], low[x + 2]))
+            most = min(high[x], min(high[x + 1], high[x + 2]))
+            p, q, r = mid[x], mid[x + 1], mid[x + 2]
+            q = max(min(p, q), min(max(p, q), r))
+            row[x] = max(min(least, q), min(max(least, q), most))
+
+
+@part
+def _smooth_plane(
+    plane: Field, out: Field, along_y: Weights, along_x: Weights, total: Weights, wide: Field
+) -> None:
+    """Write a plane smoothed along y and x; edges repeat.
+
+    total  (width,) and wide (width + len(along_x) - 1,): memory to work in
+    """
+    height, width = plane.shape
+    ry, rx = len(along_y) // 2, len(along_x) // 2
+    for y in range(height):
+        for x in range(width):
+            total[x] = along_y[ry] * plane[y, x]
+        for j in range(1, ry + 1):
+            weight = along_y[ry + j]
+            above, below = plane[max(y - j, 0)], plane[min(y + j, height - 1)]
+            for x in range(width):
+                total[x] += weight * (np.float64(above[x]) + np.float64(below[x]))
+        for x in range(rx):
+            wide[x] = total[0]
+            wide[rx + width + x] = total[width - 1]
+        for x in range(width):
+            wide[rx + x] = total[x]
+        for x in range(width):
+            total[x] = along_x[rx] * wide[rx + x]
+        for j in range(1, rx + 1):
+            weight = along_x[rx + j]
+            for x in range(width):
+                total[x] += weight * (np.float64(wide[rx + x - j]) + np.float64(wide[rx + x + j]))
+        row = out[y]
+        for x in range(width):
+            row[x] = total[x]
+
+
+@kernel
+def smooth_in_place(
+    field: Field, along_z: Weights, along_y: Weights, along_x: Weights, has_median: bool
+) -> None:
+    """Replace a field float32 (z, y, x) by itself smoothed.
+
+    along_z, along_y, along_x  weights, symmetric, of odd length; they add up to 1
+    has_median                 whether a 3 x 3 median in plane goes before
+
+    Edges repeat. Sums are float64, in an order that the voxel's neighbours alone decide; what is
+    kept between the axes is float32.
+    """
+    depth, height, width = field.shape
+    rz, rx = len(along_z) // 2, len(along_x) // 2
+    ring = np.empty((2 * rz + 1, height, width), np.float32)
+    plane = np.empty((height, width), np.float32)
+    low, mid = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
+    high = np.empty(width + 2, np.float32)
+    total, wide = np.empty(width), np.empty(width + 2 * rx, np.float32)
+    for z in range(depth + rz):
+        if z < depth:
+            if has_median:
+                _find_median(field[z], plane, low, mid, high)
+            else:
+                plane[:] = field[z]
+            _smooth_plane(plane, ring[z % len(ring)], along_y, along_x, total, wide)
+        done = z - rz
+        if done < 0:
+            continue
+        for y in range(height):
+            middle = ring[done % len(ring), y]
+            for x in range(width):
+                total[x] = along_z[rz] * middle[x]
+            for j in range(1, rz + 1):
+                weight = along_z[rz + j]
+                above = ring[max(done - j, 0) % len(ring), y]
+                below = ring[min(done + j, depth - 1) % len(ring), y]
+                for x in range(width):
+                    total[x] += weight * (np.float64(above[x]) + np.float64(below[x]))
+            row = field[done, y]
+            for x in range(width):
+                row[x] = total[x]

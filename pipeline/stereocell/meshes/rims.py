@@ -1,0 +1,93 @@
+"""Thin out the vertices of a surface in the planes where tiles meet: alike on both sides.
+
+Simplification may not touch these vertices, since the neighbour has them too, bit by bit; so all
+levels have the same, and a tile fits its neighbour at any pair of levels. On small tiles they were
+three of five vertices of the coarsest level. Here both tiles take the same ones out, before levels
+are made: each extracts the two layers of cells beside the plane, its own and the neighbour's, and
+decides on these alone. They are the same voxels by the same arithmetic, so the answer is the same.
+What moves stays inside the two layers, so surfaces that come to cross are found there, too.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.isosurface.extract import extract_surface
+from stereocell.kernels.rims import thin_rim
+from stereocell.meshes.self_intersections import find_crossings
+from stereocell.meshes.simplify import compact
+from stereocell.model.lattice import Lattice
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+
+SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle at the plane, or a third of those there
+TRIES = 4  # with vertices near crossings kept, before all of the plane stay
+
+Numbers = NDArray[np.int64]
+
+
+def thin_rims(
+    mesh: Mesh, distance: NDArray[np.float32], lattice: Lattice, *, error_um: float
+) -> Mesh:
+    """Return a tile's iso-surface with fewer vertices on its cut planes.
+
+    mesh      as `extract_surface` gives it
+    distance  float32 (z, y, x), um; covers `lattice.window`, which reaches past the planes
+    error_um  largest distance of a vertex from the curve that is left
+    """
+    target = np.arange(len(mesh.positions))
+    for axis, place in lattice.cuts():
+        start, stop = list(lattice.own.start), list(lattice.own.stop)
+        start[axis], stop[axis] = place - 1, place + 2
+        beside = Box((start[0], start[1], start[2]), (stop[0], stop[1], stop[2]))
+        layers = extract_surface(distance, replace(lattice, own=beside), cut_as=lattice)
+        if not len(layers.triangles):
+            continue
+        value = np.float32(_plane_um(lattice, axis, place))
+        moved, onto = _decide(layers, 2 - axis, value, error_um)
+        own = np.flatnonzero(mesh.positions[:, 2 - axis] == value)
+        known = _keys(mesh.positions[own])
+        order = np.argsort(known)
+        target[own[order[np.searchsorted(known, moved, sorter=order)]]] = own[
+            order[np.searchsorted(known, onto, sorter=order)]
+        ]
+    triangles = target[mesh.triangles]
+    is_left = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return compact(mesh, triangles[is_left].astype(np.uint32))
+
+
+def _plane_um(lattice: Lattice, axis: int, place: int) -> float:
+    """Return where a plane lies along its axis of the world."""
+    planes = zip(lattice.cuts(), lattice.cut_planes(), strict=True)
+    return next(value for cut, (_, value) in planes if cut == (axis, place))
+
+
+def _decide(
+    layers: Mesh, axis: int, value: np.float32, error_um: float
+) -> tuple[NDArray[np.void], NDArray[np.void]]:
+    """Return the keys of vertices that move, and of those onto which, (k,) each."""
+    at = layers.positions.astype(np.float64)
+    triangles = np.ascontiguousarray(layers.triangles, np.int32)
+    sides = np.sign(layers.positions[:, axis] - value).astype(np.int8)
+    sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
+    stays = np.zeros(len(at), bool)
+    for number in range(TRIES + 1):
+        target = thin_rim(at, triangles, sides, stays, error_um, sharpest)
+        changed = target[triangles]
+        is_left = (changed != np.roll(changed, 1, axis=1)).all(axis=1)
+        crossings = find_crossings(at, changed[is_left].astype(np.int64))
+        if not len(crossings):
+            break
+        # all that was one triangle with a corner of theirs before
+        at_fault = np.isin(target, changed[is_left][crossings.ravel()])
+        stays[triangles[at_fault[triangles].any(axis=1)]] = True
+        if number + 1 == TRIES:
+            stays[:] = True
+    moved = np.flatnonzero(target != np.arange(len(target)))
+    return _keys(layers.positions[moved]), _keys(layers.positions[target[moved]])
+
+
+def _keys(positions: NDArray[np.float32]) -> NDArray[np.void]:
+    """Return the bytes of each position (n, 3), which can be sorted and compared."""
+    return np.ascontiguousarray(positions).view("V12").ravel()

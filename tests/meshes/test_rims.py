@@ -1,0 +1,86 @@
+"""Rims of neighbouring tiles: thinned out alike, and sound on each side."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.isosurface.extract import extract_surface
+from stereocell.meshes.distance import Nearest
+from stereocell.meshes.rims import thin_rims
+from stereocell.meshes.validity import border, find_defects
+from stereocell.model.lattice import Lattice
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+from support.meshes import kinds
+
+SPACING = (0.28, 0.14, 0.14)
+SHAPE = (30, 80, 100)
+HALO = (6, 6, 6)
+ERROR = 0.04
+Field = NDArray[np.float32]
+Edges = set[tuple[bytes, ...]]
+
+
+@pytest.fixture(scope="module", params=[2.2, 1.4])
+def sponge(request: pytest.FixtureRequest) -> Field:
+    """Smoothed noise: curves of all kinds in every plane."""
+    noise = np.random.default_rng(3).normal(size=SHAPE)
+    field = ndimage.gaussian_filter(noise, request.param)
+    return np.clip(field / field.std() * 0.4, -0.56, 0.56).astype(np.float32)
+
+
+def _tiles(field: Field, error_um: float) -> list[tuple[Mesh, Lattice]]:
+    """Return four tiles, two by two, of unlike sizes."""
+    region, tiles = Box((0, 0, 0), SHAPE), []
+    for y0, y1 in ((0, 41), (40, 80)):
+        for x0, x1 in ((0, 61), (60, 100)):
+            own = Box((0, y0, x0), (SHAPE[0], y1, x1))
+            window = own.grown(HALO, region)
+            lattice = Lattice(window, own, region, SPACING, (0.0, 0.0, 0.0))
+            mesh = extract_surface(field[window.slices], lattice)
+            if error_um > 0:
+                mesh = thin_rims(mesh, field[window.slices], lattice, error_um=error_um)
+            tiles.append((mesh, lattice))
+    return tiles
+
+
+def _rims(tiles: list[tuple[Mesh, Lattice]]) -> dict[tuple[int, float, int], list[Edges]]:
+    """Return the border edges of both tiles at each common plane."""
+    found: dict[tuple[int, float, int], list[Edges]] = {}
+    for number, (mesh, lattice) in enumerate(tiles):
+        ends = mesh.positions[border(mesh.triangles)]
+        for axis, value in lattice.cut_planes():
+            on = (ends[:, :, axis] == np.float32(value)).all(axis=1)
+            edges = {tuple(sorted(point.tobytes() for point in edge)) for edge in ends[on]}
+            beside = number // 2 if axis == 0 else number % 2
+            found.setdefault((axis, value, beside), []).append(edges)
+    return found
+
+
+def test_both_tiles_keep_the_same_edges_and_less_than_half(sponge: Field) -> None:
+    whole, thinned = (_rims(_tiles(sponge, error)) for error in (0.0, ERROR))
+    assert len(thinned) == 4
+    for plane, (one, other) in thinned.items():
+        assert one == other
+        assert 20 < len(one) < 0.6 * len(whole[plane][0])
+
+
+def test_each_tile_is_sound(sponge: Field) -> None:
+    for mesh, lattice in _tiles(sponge, ERROR):
+        assert kinds(find_defects(mesh, lattice.cut_planes())) == set()
+
+
+def test_no_vertex_of_the_fine_rim_is_farther_than_the_error(sponge: Field) -> None:
+    for (fine, _), (thin, _) in zip(_tiles(sponge, 0.0), _tiles(sponge, ERROR), strict=True):
+        away = Nearest(thin, 10).distances(fine.positions.astype(np.float64))
+        assert 0 < away.max() <= ERROR * (1 + 1e-6)
+
+
+def test_vertices_beside_the_planes_stay(sponge: Field) -> None:
+    for (fine, lattice), (thin, _) in zip(_tiles(sponge, 0.0), _tiles(sponge, ERROR), strict=True):
+        inside = np.ones(len(fine.positions), bool)
+        for axis, value in lattice.cut_planes():
+            inside &= fine.positions[:, axis] != np.float32(value)
+        kept = {point.tobytes() for point in thin.positions}
+        assert all(point.tobytes() in kept for point in fine.positions[inside])
