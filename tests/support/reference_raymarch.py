@@ -123,19 +123,34 @@ def render(
     return picture.reshape(height, width, 4)
 
 
-def encode(picture: Values, background: Triple = (0.0, 0.0, 0.0)) -> NDArray[np.uint8]:
+def encode(
+    picture: Values, background: Triple = (0.0, 0.0, 0.0), *, adds_light: bool = True
+) -> NDArray[np.uint8]:
     """Return 8-bit sRGB (height, width, 3) of a picture from `render` over an sRGB background 0..1.
 
-    The colour is encoded (IEC 61966-2-1) before it is blended, as a page's canvas does it.
+    adds_light: whether light is blended, and encoded (IEC 61966-2-1) at the end, as the viewer
+    does it; else colours are encoded before they are blended, as a page's canvas does it.
     """
     alpha = picture[..., 3:]
-    color = np.divide(picture[..., :3], alpha, out=np.zeros_like(picture[..., :3]), where=alpha > 0)
-    color = np.clip(color, 0.0, 1.0)
-    low = color <= 0.0031308
-    color = np.where(low, 12.92 * color, 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055)
-    blended = color * alpha + (1 - alpha) * np.asarray(background)
+    if adds_light:
+        light = picture[..., :3] + (1 - alpha) * _decoded(np.asarray(background))
+        blended = _encoded(light)
+    else:
+        clear = np.zeros_like(picture[..., :3])
+        color = np.divide(picture[..., :3], alpha, out=clear, where=alpha > 0)
+        blended = _encoded(color) * alpha + (1 - alpha) * np.asarray(background)
     pixels: NDArray[np.uint8] = np.rint(255 * blended).astype(np.uint8)
     return pixels
+
+
+def _encoded(light: Values) -> Values:
+    light = np.clip(light, 0.0, 1.0)
+    high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, high)
+
+
+def _decoded(color: Values) -> Values:
+    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
 
 
 def psnr(

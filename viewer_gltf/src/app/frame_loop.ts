@@ -12,6 +12,7 @@ import type { Room } from "../render/scene";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
+import { MAX_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
 import type { Contents } from "./scene_contents";
 
@@ -149,7 +150,9 @@ export class FrameLoop {
       this.hasCome = isFading;
       contents.surfaces.dressAll();
       const { passes } = this.gathering;
-      this.draw(camera, { resolution: settings.resolution, isMoving, passes });
+      // late frames give up smooth edges first
+      const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
+      this.draw(camera, { resolution: settings.resolution, isMoving, passes, isSmooth });
       if (isGathering) this.gathering.submit(time_ms);
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;

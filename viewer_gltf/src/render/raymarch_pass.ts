@@ -3,25 +3,27 @@
  * allows, and laid over the scene: what lies behind translucent surfaces before these are drawn,
  * the rest last of all.
  */
-import { type Mesh, NearestFilter, type Scene, type WebGLRenderer, WebGLRenderTarget } from "three";
-import { FIRST, LAST, Overlay } from "../gpu/composite_pass";
+import type { Mesh, Scene, WebGLRenderer, WebGLRenderTarget } from "three";
+import { type Disc, FIRST, LAST, type MarchedUniforms, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
+import { linearTarget } from "../gpu/linear_target";
 import { drawEyes } from "../gpu/offscreen_target";
 import type { MarchFrame } from "../volumes/tile_raymarch";
 
 export class MarchPass {
-  private readonly target = new WebGLRenderTarget(1, 1, {
-    count: 2,
-    depthBuffer: false,
-    minFilter: NearestFilter,
-    magFilter: NearestFilter,
-  });
+  private readonly target: WebGLRenderTarget;
   private readonly front: Overlay;
   private readonly behind: Overlay;
 
-  constructor(private readonly frame: MarchFrame) {
-    this.front = new Overlay(this.target.textures[0], frame.uSceneDepth, LAST);
-    this.behind = new Overlay(this.target.textures[1], frame.uSceneDepth, FIRST);
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly frame: MarchFrame,
+    disc?: Disc,
+  ) {
+    this.target = linearTarget(renderer, { count: 2 });
+    const [front, behind] = this.target.textures;
+    this.front = new Overlay(front, frame.uSceneDepth, { order: LAST, disc });
+    this.behind = new Overlay(behind, frame.uSceneDepth, { order: FIRST, disc });
   }
 
   /** They lay the marched pictures over what was drawn before. */
@@ -29,9 +31,14 @@ export class MarchPass {
     return [this.front.mesh, this.behind.mesh];
   }
 
+  /** For surfaces, which the picture takes the place of. */
+  get picture(): MarchedUniforms {
+    return this.front.uniforms;
+  }
+
   /** March what is in `scene`, at `scale` pixels to one of the picture, 0..1. */
-  render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, scale: number): void {
-    drawEyes(renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
+  render(scene: Scene, eyes: Eyes, scale: number): void {
+    drawEyes(this.renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
       this.frame.uEye.value.copy(viewport);
       this.frame.uPart.value.copy(part);
     });

@@ -54,6 +54,10 @@ export type MarchFrame = Readonly<{
   uPart: { value: Vector4 };
   /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
   uDisc: { value: Vector2 };
+  /** Cosine of the radius within which the disc is marched. */
+  uReach: { value: number };
+  /** Whether all that is marched shows in the disc alone: then its picture is mixed with the surfaces'. */
+  uIsCrossing: { value: boolean };
   uSteps: { value: number };
 }>;
 
@@ -71,6 +75,8 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uEye: { value: new Vector4(0, 0, 1, 1) },
     uPart: { value: new Vector4(0, 0, 1, 1) },
     uDisc: { value: new Vector2(-2, -3) },
+    uReach: { value: -1 },
+    uIsCrossing: { value: false },
     uSteps: { value: MAX_STEPS },
   };
 }
@@ -245,6 +251,11 @@ export class TileMarch {
     const isExact = coarsest === 0 || shown.index !== null;
     uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
+  }
+
+  /** Whether all of its channels show in the disc alone. */
+  get isInDisc(): boolean {
+    return this.mesh.material.uniforms.uAllInDisc.value;
   }
 
   /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */

@@ -17,7 +17,7 @@ describeInChromium("surface or volume", () => {
   const stand = prepareStand({ viewport: VIEWPORT });
 
   async function pictureOf(query: string): Promise<Picture> {
-    await stand.open(`${query}&quality=high`);
+    await stand.open(query);
     await stand.viewer.settled();
     return takePicture(stand.viewer.page);
   }
@@ -25,7 +25,8 @@ describeInChromium("surface or volume", () => {
   const drawn = new Map<Mode, Picture>();
   /** Drawn once for all tests that look at it. */
   async function as(mode: Mode): Promise<Picture> {
-    const picture = drawn.get(mode) ?? (await pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}`));
+    const picture =
+      drawn.get(mode) ?? (await pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}&quality=high`));
     drawn.set(mode, picture);
     return picture;
   }
@@ -63,6 +64,27 @@ describeInChromium("surface or volume", () => {
     expect(apart(disc, off, 1.04 * DISC_DEG, 40)).toBeLessThan(20);
     expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the feather
   });
+
+  for (const quality of ["high", "low"]) {
+    it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
+      const at = (mode: Mode) =>
+        quality === "high"
+          ? as(mode)
+          : pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}&quality=low`);
+      const [disc, all, off] = [await at("disc"), await at("all"), await at("off")];
+      let [outside, between] = [0, 0];
+      for (let y = 0; y < disc.height; y++) {
+        for (let x = 0; x < disc.width; x++) {
+          const [a, b, found] = [all.at(x, y), off.at(x, y), disc.at(x, y)];
+          if (found.some((v, i) => v < Math.min(a[i], b[i]) - 5 || v > Math.max(a[i], b[i]) + 5))
+            outside++;
+          if (found.some((v, i) => Math.abs(v - a[i]) > 5 && Math.abs(v - b[i]) > 5)) between++;
+        }
+      }
+      expect(outside).toBe(0);
+      expect(between).toBeGreaterThan(50); // there is a rim
+    });
+  }
 
   it("takes another colour in the same frame, surface and volume", async () => {
     const { page } = stand.viewer;

@@ -88,6 +88,16 @@ describeInChromium("the ray-march", () => {
     }
   });
 
+  it("mixes light over the border of two tiles as within one", async () => {
+    const columns = await bare.call("columnsOverBorder");
+    for (const k of [0, 1, 2]) {
+      const values = columns.map((column) => column[k]);
+      expect(Math.max(...values) - Math.min(...values)).toBeLessThan(3);
+    }
+    expect(columns[0][0]).toBeGreaterThan(60); // both are there
+    expect(columns[0][1]).toBeGreaterThan(60);
+  });
+
   it("finds where a ray enters and leaves a box", async () => {
     const chunks = await readChunks("intersect_box");
     const intersect = async (eye: string, dir: string) => {

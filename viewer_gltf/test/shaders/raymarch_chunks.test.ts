@@ -37,7 +37,7 @@ describeInChromium("the shader's chunks", () => {
     const cone = async (eye: number[], dir: number[]) => {
       const length = Math.hypot(...dir);
       const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
-        const vec2 uDisc = vec2(0.9, ${Math.SQRT1_2});`; // 45 degrees
+        const float uReach = ${Math.SQRT1_2};`; // 45 degrees
       const unit = vec(...dir.map((v) => v / length));
       const call = `oColor = coneSpan(vec2(0.0, 10.0), ${vec(...eye)}, ${unit}).xyxy;`;
       return (await run(["cone_span"], head, call)).slice(0, 2);
@@ -77,7 +77,7 @@ describeInChromium("the shader's chunks", () => {
 
   it("let channels without a disc count everywhere, the others by the cube of their weight", async () => {
     const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
-      const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5;
+      const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5; const bool uIsCrossing = false;
       const bvec4 uInDisc = bvec4(true, false, true, false);`;
     const far = await run(
       ["focus_disc", "disc_weights"],
@@ -95,6 +95,60 @@ describeInChromium("the shader's chunks", () => {
     const at = `vec3(${Math.sqrt(1 - 0.945 ** 2)}, 0.0, -0.945)`;
     const half = await run(["focus_disc", "disc_weights"], head, `oColor = weights(${at});`);
     expect(half[0]).toBeCloseTo(0.5 / 8, 4);
+    const crossing = head.replace("uIsCrossing = false", "uIsCrossing = true");
+    const far2 = "oColor = weights(vec3(5.0, 0.0, -1.0));";
+    // the pictures are mixed then: each is whole
+    expect(await run(["focus_disc", "disc_weights"], crossing, far2)).toEqual([1, 1, 1, 1]);
+  });
+
+  it("decode what was encoded", async () => {
+    const light = [0.001, 0.2, 0.75] as const;
+    const body = `oColor = vec4(decoded(encoded(${vec(...light)})), 1.0);`;
+    const found = await run(["encode_srgb", "decode_srgb"], "", body);
+    light.forEach((v, i) => {
+      expect(found[i]).toBeCloseTo(v, 3);
+    });
+  });
+
+  it("mix the marched pixels around by nearness, but for those of another depth", async () => {
+    // two pixels of the march side by side, to four of the picture
+    const chunks = await readChunks("marched_light");
+    const text = chunks["chunks/marched_light"]
+      .replace("uniform int uEyeCount;", "const int uEyeCount = 1;")
+      .replace("uniform vec4 uEyes[2];", "vec4 uEyes[2];")
+      .replace("uniform vec4 uParts[2];", "vec4 uParts[2];");
+    const uMarched = {
+      size: [2, 1],
+      channels: 4,
+      texels: [...[255, 0, 0, 255], 0, 0, 0, 0],
+    } as const;
+    const at = async (x: number, scene: readonly number[]) => {
+      const body = `uEyes[0] = vec4(0.0, 0.0, 4.0, 1.0); uParts[0] = vec4(0.0, 0.0, 2.0, 1.0);
+        oColor = marchedLight(vec2(${x.toFixed(1)}, 0.5));`;
+      const uSceneDepth: Texture = { size: [4, 1], channels: 1, texels: [...scene] };
+      const given = { uMarched: { ...uMarched, texels: [...uMarched.texels] }, uSceneDepth };
+      const head = "#include <chunks/marched_light>";
+      return runProgram(bare.page, { "chunks/marched_light": text }, head, body, given);
+    };
+    const even = [100, 100, 100, 100];
+    expect((await at(0.5, even))[0]).toBeCloseTo(1, 2);
+    expect((await at(1.5, even))[0]).toBeCloseTo(0.75, 2);
+    expect((await at(2.5, even))[3]).toBeCloseTo(0.25, 2);
+    expect((await at(2.5, [100, 100, 200, 200]))[0]).toBeLessThan(0.01); // beyond an edge
+  });
+
+  it("keep the hue of light that no screen shows, and leave all other light", async () => {
+    const within = (...light: number[]) =>
+      run(["within_gamut"], "", `oColor = vec4(withinGamut(${vec(...light)}), 1.0);`);
+    const [r, g, b] = await within(0.2, 1, 0.5);
+    [0.2, 1, 0.5].forEach((v, i) => {
+      expect([r, g, b][i]).toBeCloseTo(v, 5);
+    });
+    const bright = await within(3, 1.5, 0.3);
+    expect(bright[0]).toBeCloseTo(1, 5);
+    // the middle part lies as far between the others as it did
+    expect((bright[1] - bright[2]) / (bright[0] - bright[2])).toBeCloseTo(1.2 / 2.7, 4);
+    expect(bright[2]).toBeGreaterThan(0.1); // nearer to white than 0.3 / 3
   });
 
   it("encode colours as sRGB", async () => {

@@ -27,6 +27,8 @@ uniform bool uAllInDisc;
 uniform vec3 uApex;  // um: the disc is a cone from here ...
 uniform vec3 uAxis;  // ... along this unit vector
 uniform vec2 uDisc;  // cosines of its inner and outer radius
+uniform float uReach;  // cosine of what is marched of it: a little more, for pixels that mix others
+uniform bool uIsCrossing;  // all that is marched shows in the disc alone
 #endif
 uniform float uPresence;  // 0..1: volumes fade in once they have come
 uniform vec3 uClipLow;  // um: nothing outside is drawn
@@ -55,7 +57,7 @@ flat in vec3 vLight;
 flat in vec2 vDepth;
 centroid in float vViewZ;
 
-layout(location = 0) out vec4 oColor;  // premultiplied: up to the pane, or all
+layout(location = 0) out vec4 oColor;  // linear, premultiplied: up to the pane, or all
 layout(location = 1) out vec4 oBehind;  // beyond the pane
 
 #include <chunks/intersect_box>
@@ -76,15 +78,12 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/gradient>
 #include <chunks/shade>
 #include <chunks/jitter>
-#include <chunks/encode_srgb>
 
 const float NOWHERE = 1e30;
 
-// Blending happens on encoded colours, as for every other surface of the page.
+// A ray that ended early is opaque: what was left out behind looks as what is in front.
 vec4 shown(vec4 sum) {
-  if (sum.a <= 0.0) return vec4(0.0);
-  float whole = sum.a >= OPAQUE ? sum.a : 1.0;  // what was left out behind looks as what is in front
-  return vec4(encoded(sum.rgb / sum.a) * sum.a, sum.a) / whole;
+  return sum.a >= OPAQUE ? sum / sum.a : sum;
 }
 
 void main() {
