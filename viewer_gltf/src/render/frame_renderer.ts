@@ -18,7 +18,7 @@ import { linearTarget } from "../gpu/linear_target";
 import type { Clip } from "../math/clip";
 import type { TracedVolume } from "../pathtrace/traced_volume";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
-import { makeFrame } from "../volumes/tile_raymarch";
+import { makeFrame, REST_STEPS } from "../volumes/tile_raymarch";
 import type { VolumeSet } from "../volumes/volume_set";
 import { DepthPass } from "./depth_pass";
 import type { Hybrid } from "./gaze_focus";
@@ -46,8 +46,14 @@ export type FramePace = Readonly<{
   passes: number;
   /** Whether edges are smoothed: it costs a third of a frame of surfaces where software draws. */
   isSmooth: boolean;
+  /** Whether nothing has changed since the last frame: the march is averaged with those before. */
+  gathers: boolean;
 }>;
 
+/** Most frames of a view at rest that are averaged. */
+const MOST_GATHERED = 64;
+/** Multiples of it fill 0..1 evenly, however many there are. */
+const GOLDEN = (Math.sqrt(5) - 1) / 2;
 /** Pixels of the march beyond the disc that those within it mix. */
 const MIXED_PX = 2;
 
@@ -72,6 +78,8 @@ export class Picture {
   /** The same where edges aren't smoothed. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
+  /** Frames of moving views. */
+  private moved = 0;
   private readonly point = new Vector3();
   private readonly corner = new Vector3();
   private readonly toSpecimen = new Matrix4();
@@ -100,7 +108,7 @@ export class Picture {
     head: Matrix4,
     { volumes, traced, panes, overlays, bounds, solids }: Drawn,
     clip: Clip,
-    { resolution, isMoving, passes, isSmooth }: FramePace,
+    { resolution, isMoving, passes, isSmooth, gathers }: FramePace,
   ): void {
     const { renderer, room, hybrid } = this;
     const specimen = room.specimen.group.matrixWorld;
@@ -134,9 +142,24 @@ export class Picture {
       const hasPane = panes.some(({ isPane }) => isPane);
       this.marchFrame.uHasPane.value = hasPane;
       if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
-      this.march.render(volumes.scene, this.eyes, resolution);
+      this.shiftNoise(isMoving, gathers);
+      this.march.render(volumes.scene, this.eyes, resolution, gathers);
     }
     this.show(camera, isSmooth ? this.light : this.draft);
+  }
+
+  /** Whether another frame of the view at rest would make the march's picture better. */
+  get canGather(): boolean {
+    return this.march.isShown && this.march.gathered < MOST_GATHERED;
+  }
+
+  /** The grain of the march differs from frame to frame; at rest frames begin with the same. */
+  private shiftNoise(isMoving: boolean, gathers: boolean): void {
+    const { uPhase, uSteps } = this.marchFrame;
+    if (gathers) uSteps.value = REST_STEPS;
+    if (isMoving) this.moved++;
+    const turns = isMoving ? this.moved : gathers ? this.march.gathered : 0;
+    uPhase.value = (turns * GOLDEN) % 1;
   }
 
   /** Bring the disc's cone to the gaze. */

@@ -35,8 +35,10 @@ import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
-/** Most steps of a ray, for any size of the volume and any number of tiles. */
+/** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
 export const MAX_STEPS = 100;
+/** Most steps of a ray at rest: one a voxel through 512 of them. */
+export const REST_STEPS = 512;
 /** Opacity, 0..1, at which a ray ends. */
 const OPAQUE = 0.99;
 /** Shortest step, in voxels. */
@@ -49,6 +51,8 @@ export type MarchFrame = Readonly<{
   uPaneDepth: { value: DepthTexture };
   uHasPane: { value: boolean };
   uNoise: { value: Texture };
+  /** By how much the noise is shifted in this frame, 0..1. */
+  uPhase: { value: number };
   /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
   uEye: { value: Vector4 };
   uPart: { value: Vector4 };
@@ -72,6 +76,7 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uPaneDepth: { value: pane },
     uHasPane: { value: false },
     uNoise: { value: noise },
+    uPhase: { value: 0 },
     uEye: { value: new Vector4(0, 0, 1, 1) },
     uPart: { value: new Vector4(0, 0, 1, 1) },
     uDisc: { value: new Vector2(-2, -3) },
@@ -153,7 +158,7 @@ export class TileMarch {
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
       fragmentShader: RAYMARCH_FRAGMENT,
-      defines: { CHANNELS: channelCount, MAX_STEPS, OPAQUE, SKIP_BRICK },
+      defines: { CHANNELS: channelCount, MAX_STEPS: REST_STEPS, OPAQUE, SKIP_BRICK },
       side: BackSide,
       transparent: true,
       premultipliedAlpha: true,

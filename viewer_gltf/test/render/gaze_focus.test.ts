@@ -130,6 +130,14 @@ describeInChromium("surface or volume", () => {
     await expect.poll(isLoading).toBe(false);
     await tick(page, 150, 8);
     expect(await settings()).toEqual(best);
+    // and clears up, frame by frame, while nothing changes
+    const frames = () => page.evaluate(() => window.stereocell?.frames ?? 0);
+    const rested = await frames();
+    const later = async () => {
+      await tick(page, 2000);
+      return frames();
+    };
+    await expect.poll(later).toBeGreaterThan(rested + 2);
   });
 
   it("stays a surface beyond the switch distance", async () => {

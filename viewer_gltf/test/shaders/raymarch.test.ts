@@ -88,6 +88,15 @@ describeInChromium("the ray-march", () => {
     }
   });
 
+  it("averages pictures of a view at rest", async () => {
+    const reds = Array.from({ length: 64 }, (_, i) => 0.5 + 0.25 * Math.sin(2.4 * i));
+    const means = await bare.call("meansOf", reds);
+    for (const count of [1, 2, 9, 64]) {
+      const expected = reds.slice(0, count).reduce((sum, red) => sum + red, 0) / count;
+      expect(Math.abs(means[count - 1] - expected)).toBeLessThan(0.5 / 255);
+    }
+  });
+
   it("mixes light over the border of two tiles as within one", async () => {
     const columns = await bare.call("columnsOverBorder");
     for (const k of [0, 1, 2]) {

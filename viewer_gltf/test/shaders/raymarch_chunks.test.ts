@@ -433,15 +433,29 @@ describeInChromium("the shader's chunks", () => {
     const noise: Texture = { size, channels: 1, texels: [...blueNoise()] };
 
     /** What the march itself asks for, at a place of the picture of which an eye has a part. */
-    async function shiftAt(at: readonly number[], corner: readonly number[], texture = noise) {
+    async function shiftAt(
+      at: readonly number[],
+      corner: readonly number[],
+      texture = noise,
+      phase = 0,
+    ) {
       const march = new URL("../../src/volumes/shaders/raymarch.frag.glsl", import.meta.url);
       const call = /float shift = (jitter\(.*\));/.exec(await readFile(march, "utf8"))?.[1];
       if (call === undefined) throw new Error("the march has no shift");
-      const head = `uniform sampler2D uNoise; const vec4 place = ${vec(...at, 0, 1)};
+      const head = `uniform sampler2D uNoise; const float uPhase = ${phase.toFixed(4)};
+        const vec4 place = ${vec(...at, 0, 1)};
         const vec4 uPart = ${vec(...corner, 9, 9)};`;
       const body = `oColor = vec4(${call.replaceAll("gl_FragCoord", "place")});`;
       return (await run(["jitter"], head, body, { uNoise: texture }))[0];
     }
+
+    it("by another value in another frame, within the same step", async () => {
+      const [first, next] = [
+        await shiftAt([3, 1], [0, 0]),
+        await shiftAt([3, 1], [0, 0], noise, 0.9),
+      ];
+      expect(next).toBeCloseTo((first + 0.9) % 1, 4);
+    });
 
     it("by the table's value at the place, which repeats", async () => {
       for (const [x, y] of [

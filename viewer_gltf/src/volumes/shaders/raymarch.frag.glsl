@@ -47,6 +47,7 @@ uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
 uniform bool uHasPane;  // whether any surface is translucent
 uniform sampler2D uNoise;  // blue noise
+uniform float uPhase;  // 0..1: by how much it is shifted in this frame
 uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
 uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
 

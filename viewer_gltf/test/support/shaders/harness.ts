@@ -23,6 +23,7 @@ import type { TransferTable2d } from "../../../src/volumes/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
 import { cube, PIXELS } from "./cube";
+import { meansOf } from "./mean";
 import { columnsOverBorder } from "./seam";
 
 export type Run = Readonly<{
@@ -243,7 +244,7 @@ function meanOpacity(filling: Filling, side: number, opacity: number): number {
   return inner.reduce((a, b) => a + b, 0) / inner.length;
 }
 
-const harness = { countSteps, countThrough, compareSkips, meanOpacity, columnsOverBorder };
+const harness = { countSteps, countThrough, compareSkips, meanOpacity, columnsOverBorder, meansOf };
 export type Harness = typeof harness;
 
 Object.assign(window, { harness });
