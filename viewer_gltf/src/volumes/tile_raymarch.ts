@@ -26,6 +26,7 @@ import type { TileVolume } from "../bundle/generated/volumes";
 import { COLUMNS, ROWS } from "../bundle/transfer_2d";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import { distanceInGrid } from "./blend_order";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
@@ -174,7 +175,13 @@ export class TileMarch {
         uMinStep: { value: voxel },
         uFloor: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
-        uLight: { value: new Vector3(-0.35, 0.5, 0.8).normalize() },
+        uLight: { value: new Vector3(...towards(KEY_AT)).normalize() },
+        uFill: { value: new Vector3(...towards(FILL_AT)).normalize() },
+        uKeyLight: { value: new Vector3(...KEY) },
+        uFillLight: { value: new Vector3(...FILL) },
+        uSkyLight: { value: new Vector3(...SKY) },
+        uGroundLight: { value: new Vector3(...GROUND) },
+        uGloss: { value: GLOSS },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
         uInDisc: { value: [false, false, false, false] },
         uAllInDisc: { value: false },

@@ -342,20 +342,35 @@ describeInChromium("the shader's chunks", () => {
   });
 
   describe("light a sample", () => {
+    /** A lamp and a sky of even light, in grey. */
+    const lights = (key: number, even: number, gloss = 0) => `
+      const vec3 uKeyLight = vec3(${key.toFixed(4)}); const vec3 uFillLight = vec3(0.0);
+      const vec3 uSkyLight = vec3(${even.toFixed(4)}); const vec3 uGroundLight = uSkyLight;
+      const vec3 vFill = vec3(1.0, 0.0, 0.0); const vec3 vUp = vec3(0.0, 1.0, 0.0);
+      const float uGloss = ${gloss.toFixed(4)};`;
+
     /**
      * Of an intensity that rises by `slope` a um, in two channels, on voxels of 0.5 x 0.75 x 2 um;
      * their rows run against y, as a tile's do.
      */
-    function lit(slope: readonly number[], dir: readonly number[], light: readonly number[]) {
+    function lit(
+      slope: readonly number[],
+      dir: readonly number[],
+      light: readonly number[],
+      gloss = 0,
+    ) {
       const size = [40, 60, 24]; // um
       const perUm = [1 / size[0], -1 / size[1], 1 / size[2]];
       const head = `const float uVoxel = 0.5; const vec3 vLight = ${vec(...unit(light))};
+        ${lights(DIFFUSE, AMBIENT, gloss)}
         vec4 sampleIntensities(vec3 p) {
           vec3 um = (p - vec3(0.0, 1.0, 0.0)) * ${vec(...perUm.map((v) => 1 / v))};
           float v = dot(um - vec3(20.0, 30.0, 12.0), ${vec(...slope)});
-          return vec4(0.5 + 0.25 * v, 0.0, 0.5 + 0.75 * v, 0.0);
+          return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
-      const body = `oColor = vec4(shade(vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}));`;
+      const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no say
+      const call = `shade(vec3(1.0), vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}, ${shares})`;
+      const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
 
@@ -394,12 +409,23 @@ describeInChromium("the shader's chunks", () => {
     });
 
     it("not at all where there is no direction or only noise, and fades in between", async () => {
-      const away = [0, 0, -1]; // of the light: a boundary would be dark
-      const steep = (step: number) => lit([0, 0, -step], [0, 0, -1], away); // over two voxels, 1 um
-      expect(await steep(0)).toBe(1);
-      expect(await steep(0.03)).toBeCloseTo(1, 4);
-      expect(await steep(0.105)).toBeCloseTo((1 + AMBIENT) / 2, 3); // half of the way
+      // the lamp stands beside the eye, and behind the boundary, which would be dark
+      const steep = (step: number) => lit([-step, 0, 0], [0, 0, -1], [-1, 0, 1]); // over 1 um
+      const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as on what faces the eye
+      expect(await steep(0)).toBeCloseTo(even, 4);
+      expect(await steep(0.03)).toBeCloseTo(even, 4);
+      expect(await steep(0.105)).toBeCloseTo((even + AMBIENT) / 2, 3); // half of the way
       expect(await steep(0.18)).toBeCloseTo(AMBIENT, 4);
+    });
+
+    it("with gloss where the boundary mirrors the lamp", async () => {
+      const facing = (degrees: number) => {
+        const at = (degrees * Math.PI) / 180;
+        return lit([0, 0, -0.5], [0, 0, -1], [Math.sin(at), 0, Math.cos(at)], 0.5);
+      };
+      expect(await facing(0)).toBeCloseTo(AMBIENT + 1.5 * DIFFUSE, 4);
+      const half = Math.cos(Math.PI / 6) ** 16; // between lamp and eye
+      expect(await facing(60)).toBeCloseTo(AMBIENT + DIFFUSE * (0.5 + 0.5 * half), 4);
     });
 
     it("by the volume's own texels too", async () => {
@@ -409,21 +435,26 @@ describeInChromium("the shader's chunks", () => {
       const light = unit([-1, 1, 1]);
       const head = `uniform sampler3D uVolume;
         const float uFresh = 1.0; const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
+        ${lights(DIFFUSE, AMBIENT)}
         #define uOldVolume uVolume`;
       // voxels of 1 um each; rows run against y
-      const call = `shade(vec3(0.5), ${vec(1 / 8, -1 / 8, 1 / 4)}, vec3(0.6, -0.8, 0.0))`;
+      const perUm = vec(1 / 8, -1 / 8, 1 / 4);
+      const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
+      const call = `shade(vec3(1.0), vec3(0.5), ${perUm}, vec3(0.6, -0.8, 0.0), ${shares})`;
       const textures = { uVolume };
       const [found] = await run(
         ["sample_intensities", "gradient", "shade"],
         head,
-        `oColor = vec4(${call});`,
+        `oColor = vec4(${call}, 1.0);`,
         textures,
       );
       const normal = unit([-2, 1, 0]);
       const steepness = (Math.hypot(16, 8) * 2) / 255;
       const t = (steepness - 0.03) / 0.15;
       const share = t * t * (3 - 2 * t);
-      const expected = 1 - share + share * (AMBIENT + DIFFUSE * dot(normal, light));
+      const even = 1.2 * (AMBIENT + DIFFUSE * Math.max(0, dot([-0.6, 0.8, 0], light)));
+      const boundary = AMBIENT + DIFFUSE * Math.max(0, dot(normal, light));
+      const expected = even + share * (boundary - even);
       expect(found).toBeCloseTo(expected, 2);
     });
   });
@@ -507,7 +538,8 @@ describeInChromium("the shader's chunks", () => {
       run(
         ["classify"],
         head,
-        `oColor = classify(${vec(intensity / 255, 0, 0, 0)}, ${vec(voxels, 0, 0, 0)});`,
+        `vec4 shares;
+         oColor = classify(${vec(intensity / 255, 0, 0, 0)}, ${vec(voxels, 0, 0, 0)}, shares);`,
         { uLut },
       );
     expect((await at(100, 1))[3]).toBeCloseTo(0, 2);

@@ -140,7 +140,7 @@ function volumeOf(about: About): TileVolume {
 
 /** The march without light: for the peers, which are timed without theirs. */
 function unlit(text: string): string {
-  const line = "s.rgb *= shade(p, texPerUm, dir);";
+  const line = "s.rgb = shade(s.rgb, p, texPerUm, dir, shares);";
   if (!text.includes(line)) throw new Error("the march shades in another line than it did");
   return text.replace(line, "");
 }

@@ -46,6 +46,11 @@ uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by value and
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
 uniform bool uHasPane;  // whether any surface is translucent
+uniform vec3 uKeyLight;  // what a white surface sends on that faces the lamp ...
+uniform vec3 uFillLight;  // ... the weaker one ...
+uniform vec3 uSkyLight;  // ... the sky, and the ground
+uniform vec3 uGroundLight;
+uniform float uGloss;  // of the lamp's light, at most
 uniform sampler2D uNoise;  // blue noise
 uniform float uPhase;  // 0..1: by how much it is shifted in this frame
 uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
@@ -55,6 +60,8 @@ uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
 centroid in vec3 vPosition;
 flat in vec3 vEye;
 flat in vec3 vLight;
+flat in vec3 vFill;
+flat in vec3 vUp;
 flat in vec2 vDepth;
 centroid in float vViewZ;
 
@@ -160,17 +167,18 @@ void main() {
 #else
       vec4 voxels = vec4(here / uVoxel * uPresence);
 #endif
+      vec4 shares;
 #ifdef TWO_D
       Steps around = stepsAt(p, uVoxel * abs(texPerUm));
-      vec4 s = classify2d(v, steepnessOf(around), voxels);
+      vec4 s = classify2d(v, steepnessOf(around), voxels, shares);
 #else
-      vec4 s = classify(v, voxels);
+      vec4 s = classify(v, voxels, shares);
 #endif
       if (s.a > 0.0) {
 #ifdef TWO_D
-        s.rgb *= shadeBy(gradientOf(around) * sign(texPerUm), dir);
+        s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir);
 #else
-        s.rgb *= shade(p, texPerUm, dir);
+        s.rgb = shade(s.rgb, p, texPerUm, dir, shares);
 #endif
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
