@@ -19,8 +19,15 @@ RAYS = 1 << 18  # at a time
 CLEAR = 1e-7  # a ray that lets less through ends: a thousandth of what 8 bits show
 ENTRIES = 256
 
-LIGHT: Triple = (-0.35, 0.5, 0.8)  # towards the lamp, from the eye: right, up, back
-AMBIENT, DIFFUSE = 0.4, 0.7
+# towards the lamps, from the eye: right, up, back; what a white surface sends on that faces each
+LIGHT: Triple = (-1.2, 1.6, 2.5)
+FILL: Triple = (1.8, -0.4, 1.8)
+LIGHT_COLOR: Triple = (0.66, 0.62, 0.56)
+FILL_COLOR: Triple = (0.08, 0.1, 0.14)
+SKY: Triple = (0.33, 0.34, 0.37)
+GROUND: Triple = (0.13, 0.125, 0.12)
+GLOSS, EXPONENT = 0.1, 16
+SCATTERED = 1.2  # factor of light where there is no boundary
 NOISE_STEP, BOUNDARY_STEP = 0.03, 0.18  # of intensity over two voxels: light fades in between
 FLAT_STEP = 1e-4  # no direction at all
 
@@ -116,26 +123,42 @@ def render(
     width, height = camera.size_px
     picture = np.zeros((height * width, 4))
     start, direction = camera.rays()
-    light = np.asarray(LIGHT) / np.linalg.norm(LIGHT) @ np.stack(camera.axes())
+    lamps = np.array([np.divide(lamp, np.linalg.norm(lamp)) for lamp in (LIGHT, FILL)])
+    light = lamps @ np.stack(camera.axes())
     for some in _chunks(len(picture)):
         lit = light if shading else None
         picture[some] = _march(block, start[some], direction[some], step_voxels, lit)
     return picture.reshape(height, width, 4)
 
 
-def encode(picture: Values, background: Triple = (0.0, 0.0, 0.0)) -> NDArray[np.uint8]:
+def encode(
+    picture: Values, background: Triple = (0.0, 0.0, 0.0), *, adds_light: bool = True
+) -> NDArray[np.uint8]:
     """Return 8-bit sRGB (height, width, 3) of a picture from `render` over an sRGB background 0..1.
 
-    The colour is encoded (IEC 61966-2-1) before it is blended, as a page's canvas does it.
+    adds_light: whether light is blended, and encoded (IEC 61966-2-1) at the end, as the viewer
+    does it; else colours are encoded before they are blended, as a page's canvas does it.
     """
     alpha = picture[..., 3:]
-    color = np.divide(picture[..., :3], alpha, out=np.zeros_like(picture[..., :3]), where=alpha > 0)
-    color = np.clip(color, 0.0, 1.0)
-    low = color <= 0.0031308
-    color = np.where(low, 12.92 * color, 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055)
-    blended = color * alpha + (1 - alpha) * np.asarray(background)
+    if adds_light:
+        light = picture[..., :3] + (1 - alpha) * _decoded(np.asarray(background))
+        blended = _encoded(light)
+    else:
+        clear = np.zeros_like(picture[..., :3])
+        color = np.divide(picture[..., :3], alpha, out=clear, where=alpha > 0)
+        blended = _encoded(color) * alpha + (1 - alpha) * np.asarray(background)
     pixels: NDArray[np.uint8] = np.rint(255 * blended).astype(np.uint8)
     return pixels
+
+
+def _encoded(light: Values) -> Values:
+    light = np.clip(light, 0.0, 1.0)
+    high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, high)
+
+
+def _decoded(color: Values) -> Values:
+    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
 
 
 def psnr(
@@ -189,44 +212,58 @@ def _march(
     for k in range(int(steps.max(initial=0))):
         rays = rays[(k < steps[rays]) & (sums[rays, 3] < 1 - CLEAR)]
         points = start[rays] + (near[rays] + (k + 0.5) * step[rays])[:, None] * direction[rays]
-        color, opacity = _classify(block, block.intensities(points), step[rays] / voxel)
+        color, opacity, shares = _classify(block, block.intensities(points), step[rays] / voxel)
         seen = opacity > 0
         rays_seen, opacity = rays[seen], opacity[seen]
         color = color[seen]
         if light is not None:
-            color *= _shade(block, points[seen], direction[rays_seen], light)[:, None]
+            color = _shade(block, points[seen], direction[rays_seen], light, color, shares[:, seen])
         weight = (1 - sums[rays_seen, 3]) * opacity
         sums[rays_seen, :3] += weight[:, None] * color
         sums[rays_seen, 3] += weight
     return sums
 
 
-def _classify(block: Block, intensities: Values, voxels: Values) -> tuple[Values, Values]:
+def _classify(block: Block, intensities: Values, voxels: Values) -> tuple[Values, Values, Values]:
     """Return colour (n, 3), not premultiplied, and opacity (n,) of steps that are `voxels` long.
+
+    Besides, the share (channels, n) of each channel in what is seen.
 
     Channels absorb together, and share the colour by their opacities.
     """
     count = intensities.shape[1]
+    shares = np.zeros_like(intensities)
     color, weight, clear = np.zeros((count, 3)), np.zeros(count), np.ones(count)
     entries = np.arange(ENTRIES) / (ENTRIES - 1)
-    for v, table, tint in zip(intensities, block.tables, block.colors, strict=True):
+    for c, (v, table, tint) in enumerate(zip(intensities, block.tables, block.colors, strict=True)):
         a = 1 - (1 - np.minimum(np.interp(v, entries, table[:, 3]), 0.999)) ** voxels
         look = np.stack([np.interp(v, entries, table[:, i]) for i in range(3)], axis=1)
         color += look * tint * a[:, None]
         weight += a
+        shares[c] = a
         clear *= 1 - a
-    return color / np.maximum(weight, 1e-300)[:, None], 1 - clear
+    whole = np.maximum(weight, 1e-300)
+    return color / whole[:, None], 1 - clear, shares / whole
 
 
-def _shade(block: Block, points: Values, direction: Values, light: Values) -> Values:
-    """Return the light (n,) at points (n, 3): central differences of the summed intensities.
+def _shade(
+    block: Block,
+    points: Values,
+    direction: Values,
+    lamps: Values,
+    color: Values,
+    shares: Values,
+) -> Values:
+    """Return the light (n, 3) that is seen at points (n, 3) of a colour (n, 3).
 
-    Lit from both sides (Levoy, Display of Surfaces from Volume Data, 1988).
+    lamps: (2, 3), towards the lamp and the weaker one. Central differences of the intensities, each
+    channel by its share. Lit from both sides (Levoy, Display of Surfaces from Volume Data, 1988);
+    what has no direction is lit as if it faced the eye.
     """
     h = float(block.spacing_um().min())
     gradient = np.stack(
         [
-            (block.intensities(points + e) - block.intensities(points - e)).sum(axis=0)
+            ((block.intensities(points + e) - block.intensities(points - e)) * shares).sum(axis=0)
             for e in h * np.eye(3)
         ],
         axis=1,
@@ -235,7 +272,18 @@ def _shade(block: Block, points: Values, direction: Values, light: Values) -> Va
     flat = steepness < FLAT_STEP
     normal = -gradient / np.where(flat, 1.0, steepness)[:, None]
     normal *= np.where((normal * direction).sum(axis=1) > 0, -1.0, 1.0)[:, None]
-    lit = AMBIENT + DIFFUSE * np.maximum(normal @ light, 0.0)
+    half = lamps[0] - direction
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    gloss = GLOSS * np.maximum((normal * half).sum(axis=1), 0.0) ** EXPONENT
+    lit = color * _light_on(normal, lamps) + gloss[:, None] * np.asarray(LIGHT_COLOR)
+    unlit = SCATTERED * color * _light_on(-direction, lamps)
     fade = np.clip((steepness - NOISE_STEP) / (BOUNDARY_STEP - NOISE_STEP), 0.0, 1.0)
-    fade = fade**2 * (3 - 2 * fade)
-    return np.where(flat, 1.0, 1 + fade * (lit - 1))
+    fade = np.where(flat, 0.0, fade**2 * (3 - 2 * fade))
+    return unlit + fade[:, None] * (lit - unlit)
+
+
+def _light_on(normal: Values, lamps: Values) -> Values:
+    key, fill = (np.maximum(normal @ lamp, 0.0)[:, None] for lamp in lamps)
+    up = 0.5 + 0.5 * normal[:, 1:2]
+    sky = up * np.asarray(SKY) + (1 - up) * np.asarray(GROUND)
+    return key * np.asarray(LIGHT_COLOR) + fill * np.asarray(FILL_COLOR) + sky

@@ -137,16 +137,30 @@ def test_a_wall_is_lit_by_its_angle_to_the_lamp() -> None:
     block.tables[0, :255, 3] = 0  # opaque only at full intensity, where the wall begins
     plain = render(block, facing(block), shading=False)[0, 0]
     lit = render(block, facing(block), 0.01)[0, 0]
-    facing_lamp = 0.8 / np.linalg.norm((0.35, 0.5, 0.8))
+    lamp = 2.5 / np.linalg.norm((1.2, 1.6, 2.5))  # cosines of the angles to both lamps
+    weaker = 1.8 / np.linalg.norm((1.8, 0.4, 1.8))
+    gloss = 0.1 * np.cos(np.arccos(lamp) / 2) ** 16
+    expected = 0.66 * (lamp + gloss) + 0.08 * weaker + (0.33 + 0.13) / 2
     # the difference over 1 um either side of the first full voxel, whose spacing is 2: 0.5
     assert plain[0] == pytest.approx(plain[3])
-    assert lit[0] / lit[3] == pytest.approx(0.4 + 0.7 * facing_lamp, abs=0.02)
+    assert lit[0] / lit[3] == pytest.approx(expected, abs=0.02)
 
 
-def test_colours_are_encoded_before_they_are_blended() -> None:
+def test_light_is_blended_before_it_is_encoded() -> None:
+    picture: Values = np.array([[[0.5 * 0.25, 0, 0, 0.25], [0, 0, 0, 0], [2, 2, 2, 1]]])
+    pixels = encode(picture, (0.0, 1.0, 0.0))
+    red, green = (1.055 * light ** (1 / 2.4) - 0.055 for light in (0.5 * 0.25, 0.75))
+    assert pixels[0].tolist() == [
+        [round(255 * red), round(255 * green), 0],
+        [0, 255, 0],
+        [255, 255, 255],
+    ]
+
+
+def test_a_page_that_adds_no_light_encodes_before_it_blends() -> None:
     picture: Values = np.array([[[0.5 * 0.25, 0, 0, 0.25], [0, 0, 0, 0], [2, 2, 2, 1]]])
     encoded = 1.055 * 0.5 ** (1 / 2.4) - 0.055
-    pixels = encode(picture, (0.0, 1.0, 0.0))
+    pixels = encode(picture, (0.0, 1.0, 0.0), adds_light=False)
     assert pixels[0].tolist() == [
         [round(255 * encoded * 0.25), round(255 * 0.75), 0],
         [0, 255, 0],

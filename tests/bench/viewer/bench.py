@@ -140,7 +140,8 @@ def row(run: Run, scene: Scene, timings: dict[str, Timing], folder: Path) -> str
     ideal = reference(scene, run.camera, run.shading, folder)
     there = ideal[..., 3] > 0
     Image.fromarray(picture_of(run, folder)).save(folder / f"{run.name}.png")
-    expected, found = encode(ideal), picture_of(run, folder)
+    is_ours = run.renderer == "ours"  # the others' pages blend what is encoded
+    expected, found = encode(ideal, adds_light=is_ours), picture_of(run, folder)
     ms, steps = statistics.median(timing["ms"]), timing["steps"]
     path = path_voxels(scene.block, scene.cameras[run.camera])
     most = float(path[path > 0].mean())

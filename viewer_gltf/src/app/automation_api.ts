@@ -46,7 +46,7 @@ export interface StereoCellApi {
   readonly apiVersion: 1;
   /** Resolves when the overview is on screen; rejects with the words of a fatal error. */
   readonly ready: Promise<void>;
-  /** Frames drawn so far. A still picture draws none. */
+  /** Frames drawn so far. A still picture draws none, but for those by which volumes clear up (`quality` auto). */
   readonly frames: number;
   /** Resolves when nothing is loading any more and the picture shows all of it. */
   settled(): Promise<void>;

@@ -12,6 +12,7 @@ import type { Room } from "../render/scene";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
+import { MAX_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
 import type { Contents } from "./scene_contents";
 
@@ -133,9 +134,15 @@ export class FrameLoop {
     const isMoving = isStereo || this.isStale;
     // a picture that came to rest is drawn once more, as well as can be
     const isWanted = isMoving || this.wasMoving || isGathering || isDue;
+    // "High" and "low" are alike in all frames
+    const gathers =
+      !isWanted &&
+      this.options.shown().state.quality === "auto" &&
+      this.picture.canGather &&
+      this.resting.isDue(time_ms);
     // someone waits: what is missing is looked for, and a picture that shows all is not drawn again
     const isAwaited = this.waiting.length > 0;
-    if (!isWanted && !wasLoading && !this.hasCome && !isAwaited) return;
+    if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) return;
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;
@@ -144,12 +151,14 @@ export class FrameLoop {
       const { z, w } = eye.viewport;
       contents.stream(stereo.seenBy(camera), z, w, ERROR_TARGET_PX * settings.errorFactor);
     }
-    if (isWanted) {
+    if (isWanted || gathers) {
       this.isStale = isChanging;
       this.hasCome = isFading;
       contents.surfaces.dressAll();
       const { passes } = this.gathering;
-      this.draw(camera, { resolution: settings.resolution, isMoving, passes });
+      // late frames give up smooth edges first
+      const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
+      this.draw(camera, { resolution: settings.resolution, isMoving, passes, isSmooth, gathers });
       if (isGathering) this.gathering.submit(time_ms);
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;

@@ -73,6 +73,7 @@ export class Contents {
       picture.surfaceFrame,
       budget.surfaces,
       (tile, channel) => this.volumes.presence(tile, channel),
+      () => this.volumes.isInDisc,
       onChange,
       onError,
     );

@@ -67,7 +67,11 @@ export class Viewer {
     onFrame: () => void,
   ) {
     const { manifest } = bundle;
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.renderer = new WebGLRenderer({
+      antialias: false, // the picture's own target is multisampled
+      depth: false,
+      powerPreference: "high-performance",
+    });
     this.renderer.info.autoReset = false;
     stage.append(this.renderer.domElement);
     const gl = this.renderer.getContext() as WebGL2RenderingContext;

@@ -4,11 +4,15 @@ import {
   BufferGeometry,
   CustomBlending,
   GLSL3,
+  Matrix4,
   Mesh,
+  NotEqualStencilFunc,
   OneFactor,
   OneMinusSrcAlphaFactor,
   ShaderMaterial,
   type Texture,
+  type Vector2,
+  Vector3,
   Vector4,
 } from "three";
 import type { Eyes } from "./eyes";
@@ -18,17 +22,54 @@ import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "./shaders/sources";
 /** Render order of the pass: first among all that is blended. */
 export const FIRST = -1000;
 export const LAST = 1000;
+/** The stencil where a surface has laid the volume of its place over the scene already. */
+export const LAID = 1;
 
-export class Overlay {
-  readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
-  private readonly eyes = {
+/** What `chunks/marched_light` reads, by reference. */
+export function marchedUniforms(picture: Texture, uSceneDepth: { value: Texture }) {
+  return {
+    uMarched: { value: picture },
+    uSceneDepth,
     uEyes: { value: [new Vector4(), new Vector4()] },
     uParts: { value: [new Vector4(), new Vector4()] },
     uEyeCount: { value: 1 },
   };
+}
+export type MarchedUniforms = ReturnType<typeof marchedUniforms>;
 
-  /** @param picture encoded, premultiplied */
-  constructor(picture: Texture, uSceneDepth: { value: Texture }, order: number) {
+/** The disc in the room, by reference: within it the picture takes the place of surfaces. */
+export type Disc = Readonly<{
+  uIsCrossing: { value: boolean };
+  uApex: { value: Vector3 };
+  uAxis: { value: Vector3 };
+  uDisc: { value: Vector2 };
+  /** m */
+  uRim: { value: number };
+}>;
+
+export type OverlayOptions = Readonly<{
+  /** Render order. */
+  order: number;
+  /** The picture's colours are encoded, each before its opacity; else it is linear. */
+  isEncoded?: boolean;
+  disc?: Disc;
+}>;
+
+export class Overlay {
+  readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
+  readonly uniforms: MarchedUniforms;
+  private readonly rays = {
+    uToRoom: { value: [new Matrix4(), new Matrix4()] },
+    uEyeAt: { value: [new Vector3(), new Vector3()] },
+  };
+
+  /** @param picture premultiplied */
+  constructor(
+    picture: Texture,
+    uSceneDepth: { value: Texture },
+    { order, isEncoded = false, disc }: OverlayOptions,
+  ) {
+    this.uniforms = marchedUniforms(picture, uSceneDepth);
     const triangle = new BufferGeometry();
     const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
     triangle.setAttribute("position", new BufferAttribute(corners, 3));
@@ -36,13 +77,18 @@ export class Overlay {
       glslVersion: GLSL3,
       vertexShader: COMPOSITE_VERTEX,
       fragmentShader: COMPOSITE_FRAGMENT,
+      defines: { ...(isEncoded ? { ENCODED: 1 } : {}), ...(disc ? { CROSSING: 1 } : {}) },
       depthTest: false,
       depthWrite: false,
       transparent: true,
       blending: CustomBlending,
       blendSrc: OneFactor,
       blendDst: OneMinusSrcAlphaFactor,
-      uniforms: { ...this.eyes, uMarched: { value: picture }, uSceneDepth },
+      stencilWrite: disc !== undefined, // it is three's switch of the test
+      stencilWriteMask: 0,
+      stencilRef: LAID,
+      stencilFunc: NotEqualStencilFunc,
+      uniforms: { ...this.uniforms, ...this.rays, ...disc },
     });
     this.mesh = new Mesh(triangle, material);
     this.mesh.name = "volumes";
@@ -53,11 +99,15 @@ export class Overlay {
 
   /** Show what was drawn for these eyes, at `scale` pixels to one of theirs. */
   show(eyes: Eyes, scale: number): void {
-    const { uEyes, uParts, uEyeCount } = this.eyes;
+    const { uEyes, uParts, uEyeCount } = this.uniforms;
+    const { uToRoom, uEyeAt } = this.rays;
     uEyeCount.value = eyes.all.length;
     eyes.all.slice(0, 2).forEach((eye, i) => {
+      const { matrixWorld, projectionMatrixInverse } = eye.camera;
       uEyes.value[i].copy(eye.viewport);
       partOf(eye, scale, uParts.value[i]);
+      uToRoom.value[i].multiplyMatrices(matrixWorld, projectionMatrixInverse);
+      uEyeAt.value[i].setFromMatrixPosition(matrixWorld);
     });
     this.mesh.visible = true;
   }

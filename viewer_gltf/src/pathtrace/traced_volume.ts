@@ -208,7 +208,10 @@ export class TracedVolume {
           return tracer;
         }
         this.tracer = tracer;
-        this.overlay = new Overlay(tracer.picture.texture, this.sceneDepth, LAST);
+        this.overlay = new Overlay(tracer.picture.texture, this.sceneDepth, {
+          order: LAST,
+          isEncoded: true,
+        });
         this.group.add(this.overlay.mesh);
         if (this.state !== null) this.follow(this.state);
         this.onChange();

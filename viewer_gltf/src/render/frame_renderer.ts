@@ -1,12 +1,24 @@
-/** One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. */
-import { type Camera, Matrix4, type Object3D, Vector3, type WebGLRenderer } from "three";
+/**
+ * One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. All of
+ * it is linear light until the end, when it is encoded once.
+ */
+import {
+  type Camera,
+  Matrix4,
+  type Object3D,
+  Vector3,
+  type WebGLRenderer,
+  type WebGLRenderTarget,
+} from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { Cuts } from "../gpu/clip_planes";
+import { EncodePass } from "../gpu/encode_pass";
 import { Eyes } from "../gpu/eyes";
+import { linearTarget } from "../gpu/linear_target";
 import type { Clip } from "../math/clip";
 import type { TracedVolume } from "../pathtrace/traced_volume";
-import { makeSurfaceFrame } from "../surfaces/blend_material";
-import { makeFrame } from "../volumes/tile_raymarch";
+import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
+import { makeFrame, REST_STEPS } from "../volumes/tile_raymarch";
 import type { VolumeSet } from "../volumes/volume_set";
 import { DepthPass } from "./depth_pass";
 import type { Hybrid } from "./gaze_focus";
@@ -18,7 +30,7 @@ export type Drawn = Readonly<{
   volumes: VolumeSet;
   traced: TracedVolume;
   /** Surfaces that are not opaque now. */
-  panes: readonly Object3D[];
+  panes: readonly BlendedScene[];
   /** What else is not, besides the room's own. */
   overlays: readonly Object3D[];
   /** Of the specimen, um. */
@@ -28,7 +40,22 @@ export type Drawn = Readonly<{
 }>;
 
 /** Pixels of the volumes to one of the picture, 0..1; samples of each that are traced. */
-export type FramePace = Readonly<{ resolution: number; isMoving: boolean; passes: number }>;
+export type FramePace = Readonly<{
+  resolution: number;
+  isMoving: boolean;
+  passes: number;
+  /** Whether edges are smoothed: it costs a third of a frame of surfaces where software draws. */
+  isSmooth: boolean;
+  /** Whether nothing has changed since the last frame: the march is averaged with those before. */
+  gathers: boolean;
+}>;
+
+/** Most frames of a view at rest that are averaged. */
+const MOST_GATHERED = 64;
+/** Multiples of it fill 0..1 evenly, however many there are. */
+const GOLDEN = (Math.sqrt(5) - 1) / 2;
+/** Pixels of the march beyond the disc that those within it mix. */
+const MIXED_PX = 2;
 
 export class Picture {
   /** Where they are in this frame. */
@@ -38,9 +65,23 @@ export class Picture {
   /** The part of a frame that all volumes share. */
   readonly marchFrame = makeFrame(this.depth.texture, this.depth.paneTexture);
   /** The part of a frame that all surfaces share. */
-  readonly surfaceFrame = makeSurfaceFrame(this.marchFrame.uDisc, this.cuts);
-  private readonly march = new MarchPass(this.marchFrame);
+  readonly surfaceFrame: SurfaceFrame;
+  private readonly march: MarchPass;
+  /** The disc's cone in the room, m. */
+  private readonly cone = {
+    uApex: { value: new Vector3() },
+    uAxis: { value: new Vector3(0, 0, -1) },
+    uRim: { value: 1 },
+  };
+  /** All that is drawn, before it is encoded. */
+  private readonly light: WebGLRenderTarget;
+  /** The same where edges aren't smoothed. */
+  private readonly draft: WebGLRenderTarget;
+  private readonly encode = new EncodePass();
+  /** Frames of moving views. */
+  private moved = 0;
   private readonly point = new Vector3();
+  private readonly corner = new Vector3();
   private readonly toSpecimen = new Matrix4();
 
   constructor(
@@ -48,6 +89,12 @@ export class Picture {
     private readonly room: Room,
     private readonly hybrid: Hybrid,
   ) {
+    const { uDisc, uIsCrossing } = this.marchFrame;
+    const disc = { ...this.cone, uDisc, uIsCrossing };
+    this.march = new MarchPass(renderer, this.marchFrame, disc);
+    this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts);
+    this.light = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
+    this.draft = linearTarget(renderer, { hasDepth: true });
     room.scene.add(...this.march.overlays);
   }
 
@@ -61,20 +108,24 @@ export class Picture {
     head: Matrix4,
     { volumes, traced, panes, overlays, bounds, solids }: Drawn,
     clip: Clip,
-    { resolution, isMoving, passes }: FramePace,
+    { resolution, isMoving, passes, isSmooth, gathers }: FramePace,
   ): void {
     const { renderer, room, hybrid } = this;
     const specimen = room.specimen.group.matrixWorld;
+    const blended = panes.map(({ scene }) => scene);
     renderer.info.reset();
     room.light(head);
     this.cuts.follow(clip, specimen);
-    this.surfaceFrame.uApex.value.copy(hybrid.apex);
-    this.surfaceFrame.uAxis.value.copy(hybrid.axis);
-    this.surfaceFrame.uDisc.value.set(...hybrid.cosines);
+    this.aim(bounds, resolution);
+    this.marchFrame.uIsCrossing.value = volumes.isInDisc;
     this.march.hide();
     traced.hide();
     if (traced.isShown) {
-      this.depth.render(renderer, room.scene, this.eyes, [...room.overlays, ...overlays, ...panes]);
+      this.depth.render(renderer, room.scene, this.eyes, [
+        ...room.overlays,
+        ...overlays,
+        ...blended,
+      ]);
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
       traced.render(renderer, this.eyes, scene, resolution, isMoving, passes);
     }
@@ -83,12 +134,59 @@ export class Picture {
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       volumes.placeAs(specimen);
       volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
-      this.depth.render(renderer, room.scene, this.eyes, [...room.overlays, ...overlays, ...panes]);
-      this.marchFrame.uHasPane.value = panes.length > 0;
-      if (panes.length > 0) this.depth.renderPanes(renderer, room.scene, this.eyes);
-      this.march.render(renderer, volumes.scene, this.eyes, resolution);
+      this.depth.render(renderer, room.scene, this.eyes, [
+        ...room.overlays,
+        ...overlays,
+        ...blended,
+      ]);
+      const hasPane = panes.some(({ isPane }) => isPane);
+      this.marchFrame.uHasPane.value = hasPane;
+      if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
+      this.shiftNoise(isMoving, gathers);
+      this.march.render(volumes.scene, this.eyes, resolution, gathers);
     }
-    renderer.render(room.scene, camera);
+    this.show(camera, isSmooth ? this.light : this.draft);
+  }
+
+  /** Whether another frame of the view at rest would make the march's picture better. */
+  get canGather(): boolean {
+    return this.march.isShown && this.march.gathered < MOST_GATHERED;
+  }
+
+  /** The grain of the march differs from frame to frame; at rest frames begin with the same. */
+  private shiftNoise(isMoving: boolean, gathers: boolean): void {
+    const { uPhase, uSteps } = this.marchFrame;
+    if (gathers) uSteps.value = REST_STEPS;
+    if (isMoving) this.moved++;
+    const turns = isMoving ? this.moved : gathers ? this.march.gathered : 0;
+    uPhase.value = (turns * GOLDEN) % 1;
+  }
+
+  /** Bring the disc's cone to the gaze. */
+  private aim({ min, max }: Bounds, resolution: number): void {
+    const { hybrid, cone, marchFrame, room } = this;
+    cone.uApex.value.copy(hybrid.apex);
+    cone.uAxis.value.copy(hybrid.axis);
+    const middle = this.point
+      .set(...max)
+      .add(this.corner.set(...min))
+      .multiplyScalar(0.5);
+    cone.uRim.value = middle.applyMatrix4(room.specimen.group.matrixWorld).distanceTo(hybrid.apex);
+    marchFrame.uDisc.value.set(...hybrid.cosines);
+    const [eye] = this.eyes.all;
+    const pixel_rad =
+      eye === undefined ? 0 : 2 / (eye.camera.projectionMatrix.elements[5] * eye.viewport.w);
+    marchFrame.uReach.value = hybrid.reach((MIXED_PX * pixel_rad) / resolution);
+  }
+
+  /** Draw the room's light, and encode it for the present target. */
+  private show(camera: Camera, light: WebGLRenderTarget): void {
+    const { renderer, eyes } = this;
+    const before = renderer.getRenderTarget();
+    light.setSize(eyes.width_px, eyes.height_px);
+    renderer.setRenderTarget(light);
+    renderer.render(this.room.scene, camera);
+    this.encode.render(renderer, light, before);
   }
 
   /** What is laid over the scene. */
@@ -99,6 +197,9 @@ export class Picture {
   dispose(): void {
     this.depth.dispose();
     this.march.dispose();
+    this.light.dispose();
+    this.draft.dispose();
+    this.encode.dispose();
     this.marchFrame.uNoise.value.dispose();
   }
 }

@@ -18,6 +18,9 @@ const INNER = 0.6;
 /** Time that the gaze stays on the same tiles before finer levels are fetched, s. */
 const REFINE_S = 0.25;
 
+/** Of a cone that is marched. */
+const WIDEST_RAD = 1.5;
+
 const RADIANS = Math.PI / 180;
 
 export class Hybrid {
@@ -45,6 +48,11 @@ export class Hybrid {
   /** Cosines of the inner and outer radius. */
   get cosines(): readonly [number, number] {
     return [Math.cos(INNER * this.outer_rad), Math.cos(this.outer_rad)];
+  }
+
+  /** Cosine of the outer radius and `more_rad`; 1: the disc is closed. */
+  reach(more_rad: number): number {
+    return this.outer_rad === 0 ? 1 : Math.cos(Math.min(WIDEST_RAD, this.outer_rad + more_rad));
   }
 
   /**

@@ -3,25 +3,30 @@
  * allows, and laid over the scene: what lies behind translucent surfaces before these are drawn,
  * the rest last of all.
  */
-import { type Mesh, NearestFilter, type Scene, type WebGLRenderer, WebGLRenderTarget } from "three";
-import { FIRST, LAST, Overlay } from "../gpu/composite_pass";
+import type { Mesh, Scene, WebGLRenderer, WebGLRenderTarget } from "three";
+import { type Disc, FIRST, LAST, type MarchedUniforms, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
+import { linearTarget } from "../gpu/linear_target";
 import { drawEyes } from "../gpu/offscreen_target";
+import { RunningMean } from "../gpu/running_mean";
 import type { MarchFrame } from "../volumes/tile_raymarch";
 
 export class MarchPass {
-  private readonly target = new WebGLRenderTarget(1, 1, {
-    count: 2,
-    depthBuffer: false,
-    minFilter: NearestFilter,
-    magFilter: NearestFilter,
-  });
+  private readonly target: WebGLRenderTarget;
+  private readonly mean: RunningMean;
   private readonly front: Overlay;
   private readonly behind: Overlay;
 
-  constructor(private readonly frame: MarchFrame) {
-    this.front = new Overlay(this.target.textures[0], frame.uSceneDepth, LAST);
-    this.behind = new Overlay(this.target.textures[1], frame.uSceneDepth, FIRST);
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly frame: MarchFrame,
+    disc?: Disc,
+  ) {
+    this.target = linearTarget(renderer, { count: 2 });
+    this.mean = new RunningMean(renderer);
+    const [front, behind] = this.target.textures;
+    this.front = new Overlay(front, frame.uSceneDepth, { order: LAST, disc });
+    this.behind = new Overlay(behind, frame.uSceneDepth, { order: FIRST, disc });
   }
 
   /** They lay the marched pictures over what was drawn before. */
@@ -29,12 +34,35 @@ export class MarchPass {
     return [this.front.mesh, this.behind.mesh];
   }
 
-  /** March what is in `scene`, at `scale` pixels to one of the picture, 0..1. */
-  render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, scale: number): void {
-    drawEyes(renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
+  get isShown(): boolean {
+    return this.front.mesh.visible;
+  }
+
+  /** For surfaces, which the picture takes the place of. */
+  get picture(): MarchedUniforms {
+    return this.front.uniforms;
+  }
+
+  /** Pictures of a view at rest that have been gathered; 0: the last one stands alone. */
+  get gathered(): number {
+    return this.mean.count;
+  }
+
+  /**
+   * March what is in `scene`, at `scale` pixels to one of the picture, 0..1.
+   *
+   * @param gathers whether the picture is of the same view as the last one, and is averaged with it
+   */
+  render(scene: Scene, eyes: Eyes, scale: number, gathers = false): void {
+    drawEyes(this.renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
       this.frame.uEye.value.copy(viewport);
       this.frame.uPart.value.copy(part);
     });
+    if (gathers) this.mean.add(this.target);
+    else this.mean.count = 0;
+    const [front, behind] = gathers ? this.mean.textures : this.target.textures;
+    this.front.uniforms.uMarched.value = front;
+    this.behind.uniforms.uMarched.value = behind;
     this.front.show(eyes, scale);
     if (this.frame.uHasPane.value) this.behind.show(eyes, scale);
   }
@@ -47,6 +75,7 @@ export class MarchPass {
 
   dispose(): void {
     this.target.dispose();
+    this.mean.dispose();
     this.front.dispose();
     this.behind.dispose();
   }

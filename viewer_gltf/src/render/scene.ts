@@ -11,6 +11,9 @@ import {
   Scene,
 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
+import { FILL, FILL_AT, GROUND, KEY, KEY_AT, SHINES_AT, SKY } from "../gpu/room_light";
+import type { Rgb } from "../math/color";
+import type { Vec3 } from "../math/vec3";
 import { Specimen } from "./specimen_pose";
 
 const BACKGROUND = 0x0b0d12;
@@ -19,15 +22,15 @@ const OUTLINE = 0x5b6678;
 export class Room {
   readonly scene = new Scene();
   readonly specimen: Specimen;
-  private readonly key = new DirectionalLight(0xfff4e6, 2.2);
-  private readonly fill = new DirectionalLight(0xbfd4ff, 0.5);
+  private readonly key = new DirectionalLight(colorOf(KEY), Math.PI);
+  private readonly fill = new DirectionalLight(colorOf(FILL), Math.PI);
   private readonly outline: Box3Helper;
 
   constructor(private readonly manifest: Manifest) {
     this.specimen = new Specimen(manifest.specimen.bounds_um);
     const { group } = this.specimen;
     this.scene.background = new Color(BACKGROUND);
-    this.scene.add(new HemisphereLight(0xe8eefc, 0x2a2c33, 0.9));
+    this.scene.add(new HemisphereLight(colorOf(SKY), colorOf(GROUND), Math.PI));
     this.scene.add(this.key, this.key.target, this.fill, this.fill.target, group);
     this.outline = new Box3Helper(new Box3(), OUTLINE);
     const material = this.outline.material as LineBasicMaterial;
@@ -39,8 +42,8 @@ export class Room {
 
   /** The lamp hangs over the viewer's left shoulder, wherever the viewer goes. */
   light(eye: Matrix4): void {
-    aim(this.key, eye, -1.2, 1.6, 1.5);
-    aim(this.fill, eye, 1.8, -0.4, 0.8);
+    aim(this.key, eye, KEY_AT);
+    aim(this.fill, eye, FILL_AT);
   }
 
   /** Outline a tile, or none. */
@@ -58,7 +61,12 @@ export class Room {
   }
 }
 
-function aim(light: DirectionalLight, eye: Matrix4, x: number, y: number, z: number): void {
-  light.position.set(x, y, z).applyMatrix4(eye);
-  light.target.position.set(0, 0, -1).applyMatrix4(eye);
+/** A lamp's colour for three, whose white surface sends on a light's intensity over pi. */
+function colorOf([r, g, b]: Rgb): Color {
+  return new Color().setRGB(r, g, b);
+}
+
+function aim(light: DirectionalLight, eye: Matrix4, at: Vec3): void {
+  light.position.set(...at).applyMatrix4(eye);
+  light.target.position.set(...SHINES_AT).applyMatrix4(eye);
 }

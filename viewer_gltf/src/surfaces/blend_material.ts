@@ -5,34 +5,43 @@
  * flat, and lit as that.
  */
 import {
+  AlwaysStencilFunc,
+  CustomBlending,
   DoubleSide,
   GLSL3,
   Mesh,
   type MeshStandardMaterial,
+  NormalBlending,
   type Object3D,
+  OneFactor,
+  ReplaceStencilOp,
   ShaderMaterial,
-  type Vector2,
-  Vector3,
-  type Vector4,
+  SrcAlphaFactor,
+  ZeroFactor,
 } from "three";
 import type { Cuts } from "../gpu/clip_planes";
+import { type Disc, LAID, type MarchedUniforms } from "../gpu/composite_pass";
 import { CHUNKS } from "../gpu/glsl_chunks";
 import { includeChunks } from "../gpu/glsl_include";
 
-/** What all surfaces share, by reference: the disc's cone and the cuts in the room, metres. */
-export type SurfaceFrame = Readonly<{
-  uDisc: { value: Vector2 };
-  uApex: { value: Vector3 };
-  uAxis: { value: Vector3 };
-  uCuts: { value: Vector4[] };
-  uCutCount: { value: number };
-}>;
+/**
+ * What all surfaces share, by reference: the disc's cone and the cuts in the room, metres, and the
+ * volumes' picture, which takes their place in the disc.
+ */
+export type SurfaceFrame = Pick<Disc, "uDisc" | "uApex" | "uAxis"> &
+  Pick<Cuts, "uCuts" | "uCutCount"> &
+  MarchedUniforms;
 
-export function makeSurfaceFrame(uDisc: { value: Vector2 }, cuts: Cuts): SurfaceFrame {
-  const { uCuts, uCutCount } = cuts;
-  const uAxis = { value: new Vector3(0, 0, -1) };
-  return { uDisc, uApex: { value: new Vector3() }, uAxis, uCuts, uCutCount };
+export function makeSurfaceFrame(
+  { uDisc, uApex, uAxis }: Disc,
+  picture: MarchedUniforms,
+  { uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">,
+): SurfaceFrame {
+  return { uDisc, uApex, uAxis, uCuts, uCutCount, ...picture };
 }
+
+/** A surface that is not opaque now; a pane: the march has to know what lies behind it. */
+export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean }>;
 
 /** How much of a surface is left. */
 export type Share = Readonly<{
@@ -40,6 +49,8 @@ export type Share = Readonly<{
   /** What its volume takes, 0..1: in the disc, or everywhere. */
   taken: number;
   isInDisc: boolean;
+  /** Whether the volumes' picture is mixed with the surfaces' in the disc. */
+  isCrossing: boolean;
 }>;
 
 const VARYING = "varying vec3 vRoom;\n";
@@ -52,10 +63,15 @@ uniform vec3 uAxis;
 uniform float uOpacity;
 uniform float uTaken;
 uniform bool uInDisc;
+uniform bool uCrosses;
 #include <chunks/focus_disc>
-float shareLeft() {
-  float w = uInDisc ? discWeight(vRoom, uApex, uAxis, uDisc) : 1.0;
-  return uOpacity * (1.0 - uTaken * w);
+// What the volume takes of the surface here, 0..1.
+float shareTaken() {
+  return uTaken * (uInDisc ? discWeight(vRoom, uApex, uAxis, uDisc) : 1.0);
+}
+// One that is mixed with its volume's picture is drawn also where that has taken all of it.
+bool isGone() {
+  return uOpacity <= 0.0 || (!uCrosses && shareTaken() >= 1.0);
 }
 `,
   CHUNKS,
@@ -92,17 +108,48 @@ void main() {
   });
 }
 
+/** The picture of the volumes. */
+const MARCHED = `${includeChunks("#include <chunks/marched_light>", CHUNKS)}\n`;
+/**
+ * Light, and in place of opacity the share that is left of what lies behind. In the disc both
+ * pictures, of surface and of volume, are mixed: one laid over the other would be dark between.
+ */
+const BLENDED = `
+#ifndef OPAQUE
+  float taken = shareTaken();
+  float own = uOpacity * diffuseColor.a;
+  gl_FragColor = vec4(own * (1.0 - taken) * gl_FragColor.rgb, 1.0 - own * (1.0 - taken));
+  if (uCrosses && taken > 0.0) {
+    vec4 volume = marchedLight(gl_FragCoord.xy);
+    gl_FragColor.rgb += taken * volume.rgb;
+    gl_FragColor.a = (1.0 - taken) * (1.0 - own) + taken * (1.0 - volume.a);
+  }
+#endif
+`;
+
 /** Before the depth of surfaces without a share, after all opaque ones. */
 const AFTER_OPAQUE = 1;
 
 /** The layer in which only what writes the depth of translucent surfaces is; WebXR has 1 and 2. */
 export const PANES = 3;
 
+/** Blending of light with the share that is left of what lies behind, and the mark of it. */
+const LEAVES_A_SHARE = {
+  blendSrc: OneFactor,
+  blendDst: SrcAlphaFactor,
+  blendSrcAlpha: ZeroFactor,
+  blendDstAlpha: OneFactor,
+  stencilRef: LAID,
+  stencilFunc: AlwaysStencilFunc,
+  stencilZPass: ReplaceStencilOp,
+} as const;
+
 export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
   private readonly twins: Mesh[] = [];
   isBlended = false;
+  isPane = false;
 
   constructor(
     private readonly scene: Object3D,
@@ -114,12 +161,14 @@ export class BlendedSurface {
       uOpacity: { value: 1 },
       uTaken: { value: 0 },
       uInDisc: { value: false },
+      uCrosses: { value: false },
     };
     for (const material of materials) {
       this.patch(material);
       material.forceSinglePass = true; // the depth that is written first sorts both sides
+      Object.assign(material, LEAVES_A_SHARE);
     }
-    this.depth = depthMaterial(this.uniforms, "if (shareLeft() <= 0.0) discard;");
+    this.depth = depthMaterial(this.uniforms, "if (isGone()) discard;");
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
     this.depth.polygonOffset = true;
@@ -133,7 +182,6 @@ export class BlendedSurface {
       const twin = new Mesh(mesh.geometry, this.depth);
       twin.renderOrder = AFTER_OPAQUE;
       twin.visible = false;
-      twin.layers.enable(PANES);
       mesh.add(twin);
       this.twins.push(twin);
     }
@@ -146,11 +194,11 @@ export class BlendedSurface {
         "#include <project_vertex>",
         "#include <project_vertex>\n\tvRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;",
       );
-      shader.fragmentShader = (DECLARED + shader.fragmentShader)
+      shader.fragmentShader = (DECLARED + MARCHED + shader.fragmentShader)
+        .replace("#include <dithering_fragment>", `${BLENDED}\n#include <dithering_fragment>`)
         .replace(
           "#include <color_fragment>",
-          "#include <color_fragment>\n\tdiffuseColor.a *= shareLeft();\n" +
-            "\tif (diffuseColor.a <= 0.0 || isCut(vRoom)) discard;",
+          "#include <color_fragment>\n\tif (isGone() || isCut(vRoom)) discard;",
         )
         .replace(
           "#include <normal_fragment_maps>",
@@ -163,18 +211,27 @@ export class BlendedSurface {
     material.customProgramCacheKey = () => "blended";
   }
 
-  set({ opacity, taken, isInDisc }: Share): void {
+  set({ opacity, taken, isInDisc, isCrossing }: Share): void {
+    const crosses = isInDisc && isCrossing;
     this.uniforms.uOpacity.value = opacity;
     this.uniforms.uTaken.value = taken;
     this.uniforms.uInDisc.value = isInDisc;
+    this.uniforms.uCrosses.value = crosses;
     this.isBlended = opacity < 1 || taken > 0;
+    this.isPane = this.isBlended && !crosses;
     this.scene.visible = opacity > 0 && (taken < 1 || isInDisc);
     for (const material of this.materials) {
+      material.stencilWrite = crosses && this.isBlended;
       if (material.transparent === this.isBlended) continue;
       material.transparent = this.isBlended;
+      material.blending = this.isBlended ? CustomBlending : NormalBlending;
       material.needsUpdate = true; // an opaque surface's shader leaves its alpha out
     }
-    for (const twin of this.twins) twin.visible = this.isBlended;
+    for (const twin of this.twins) {
+      twin.visible = this.isBlended;
+      if (this.isPane) twin.layers.enable(PANES);
+      else twin.layers.disable(PANES);
+    }
   }
 
   dispose(): void {

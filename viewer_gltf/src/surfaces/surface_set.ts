@@ -1,5 +1,5 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
-import { type Camera, Group, Mesh, type Object3D, ShaderMaterial } from "three";
+import { type Camera, Group, Mesh, ShaderMaterial } from "three";
 import type { Bundle } from "../bundle/load";
 import { surfaceColor } from "../math/color";
 import type { ShownSurface } from "../state/on_screen";
@@ -11,7 +11,7 @@ import {
   wantsSurface,
 } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
-import type { SurfaceFrame } from "./blend_material";
+import type { BlendedScene, SurfaceFrame } from "./blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
 import { overview, type Progress } from "./overview_progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
@@ -37,6 +37,8 @@ export class SurfaceSet {
     private readonly bytes: number,
     /** How far the volume of a tile and channel has faded in, 0..1. */
     private readonly presence: (tile: string, channel: string) => number,
+    /** Whether all that is marched shows in the disc alone. */
+    private readonly isCrossing: () => boolean,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {}
@@ -68,9 +70,11 @@ export class SurfaceSet {
   }
 
   /** Those that are not opaque now. */
-  get blended(): readonly Object3D[] {
+  get blended(): readonly BlendedScene[] {
     return this.shown().flatMap(([, { surfaces }]) =>
-      [...surfaces.values()].flatMap(({ scene, blend }) => (blend.isBlended ? [scene] : [])),
+      [...surfaces.values()].flatMap(({ scene, blend: { isBlended, isPane } }) =>
+        isBlended ? [{ scene, isPane }] : [],
+      ),
     );
   }
 
@@ -152,6 +156,7 @@ export class SurfaceSet {
       opacity: taken === null ? 0 : channel.opacity,
       taken: taken ?? 0,
       isInDisc: isInDisc(state, channel),
+      isCrossing: this.isCrossing(),
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
   }

@@ -26,6 +26,7 @@ import type { TileVolume } from "../bundle/generated/volumes";
 import { COLUMNS, ROWS } from "../bundle/transfer_2d";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import { distanceInGrid } from "./blend_order";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
@@ -35,8 +36,10 @@ import type { Packed } from "./tile_texture";
 import { ENTRIES } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
-/** Most steps of a ray, for any size of the volume and any number of tiles. */
+/** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
 export const MAX_STEPS = 100;
+/** Most steps of a ray at rest: one a voxel through 512 of them. */
+export const REST_STEPS = 512;
 /** Opacity, 0..1, at which a ray ends. */
 const OPAQUE = 0.99;
 /** Shortest step, in voxels. */
@@ -49,11 +52,17 @@ export type MarchFrame = Readonly<{
   uPaneDepth: { value: DepthTexture };
   uHasPane: { value: boolean };
   uNoise: { value: Texture };
+  /** By how much the noise is shifted in this frame, 0..1. */
+  uPhase: { value: number };
   /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
   uEye: { value: Vector4 };
   uPart: { value: Vector4 };
   /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
   uDisc: { value: Vector2 };
+  /** Cosine of the radius within which the disc is marched. */
+  uReach: { value: number };
+  /** Whether all that is marched shows in the disc alone: then its picture is mixed with the surfaces'. */
+  uIsCrossing: { value: boolean };
   uSteps: { value: number };
 }>;
 
@@ -68,9 +77,12 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uPaneDepth: { value: pane },
     uHasPane: { value: false },
     uNoise: { value: noise },
+    uPhase: { value: 0 },
     uEye: { value: new Vector4(0, 0, 1, 1) },
     uPart: { value: new Vector4(0, 0, 1, 1) },
     uDisc: { value: new Vector2(-2, -3) },
+    uReach: { value: -1 },
+    uIsCrossing: { value: false },
     uSteps: { value: MAX_STEPS },
   };
 }
@@ -147,7 +159,7 @@ export class TileMarch {
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
       fragmentShader: RAYMARCH_FRAGMENT,
-      defines: { CHANNELS: channelCount, MAX_STEPS, OPAQUE, SKIP_BRICK },
+      defines: { CHANNELS: channelCount, MAX_STEPS: REST_STEPS, OPAQUE, SKIP_BRICK },
       side: BackSide,
       transparent: true,
       premultipliedAlpha: true,
@@ -163,7 +175,13 @@ export class TileMarch {
         uMinStep: { value: voxel },
         uFloor: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
-        uLight: { value: new Vector3(-0.35, 0.5, 0.8).normalize() },
+        uLight: { value: new Vector3(...towards(KEY_AT)).normalize() },
+        uFill: { value: new Vector3(...towards(FILL_AT)).normalize() },
+        uKeyLight: { value: new Vector3(...KEY) },
+        uFillLight: { value: new Vector3(...FILL) },
+        uSkyLight: { value: new Vector3(...SKY) },
+        uGroundLight: { value: new Vector3(...GROUND) },
+        uGloss: { value: GLOSS },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
         uInDisc: { value: [false, false, false, false] },
         uAllInDisc: { value: false },
@@ -245,6 +263,11 @@ export class TileMarch {
     const isExact = coarsest === 0 || shown.index !== null;
     uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
+  }
+
+  /** Whether all of its channels show in the disc alone. */
+  get isInDisc(): boolean {
+    return this.mesh.material.uniforms.uAllInDisc.value;
   }
 
   /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */

@@ -87,6 +87,12 @@ export class VolumeSet {
     return !this.group.children.some(({ visible }) => visible);
   }
 
+  /** Whether all that is marched shows in the disc alone. */
+  get isInDisc(): boolean {
+    const drawn = this.drawn();
+    return drawn.length > 0 && drawn.every(({ march }) => march.isInDisc);
+  }
+
   /** Bytes on the GPU. */
   get bytes(): number {
     return this.residents.bytes;

@@ -17,7 +17,7 @@ describeInChromium("surface or volume", () => {
   const stand = prepareStand({ viewport: VIEWPORT });
 
   async function pictureOf(query: string): Promise<Picture> {
-    await stand.open(`${query}&quality=high`);
+    await stand.open(query);
     await stand.viewer.settled();
     return takePicture(stand.viewer.page);
   }
@@ -25,7 +25,8 @@ describeInChromium("surface or volume", () => {
   const drawn = new Map<Mode, Picture>();
   /** Drawn once for all tests that look at it. */
   async function as(mode: Mode): Promise<Picture> {
-    const picture = drawn.get(mode) ?? (await pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}`));
+    const picture =
+      drawn.get(mode) ?? (await pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}&quality=high`));
     drawn.set(mode, picture);
     return picture;
   }
@@ -56,13 +57,34 @@ describeInChromium("surface or volume", () => {
     expect(new Set(volumes.map(({ tile }) => tile))).toEqual(new Set(["r0_c0", "r0_c1"]));
     const [all, off] = [await as("all"), await as("off")];
     const inner_deg = 0.55 * DISC_DEG;
-    expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25); // else this would show nothing
+    expect(apart(all, off, 0, inner_deg)).toBeGreaterThan(25); // else this would show nothing
     // the same picture as where everything is a volume, so that no box edge shows
     expect(apart(disc, all, 0, inner_deg)).toBe(0);
     // a few pixels of silhouettes are multisampled otherwise where surfaces are blended
     expect(apart(disc, off, 1.04 * DISC_DEG, 40)).toBeLessThan(20);
     expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the feather
   });
+
+  for (const quality of ["high", "low"]) {
+    it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
+      const at = (mode: Mode) =>
+        quality === "high"
+          ? as(mode)
+          : pictureOf(`&mode=${mode}${NEAR}&disc=${DISC_DEG}&quality=low`);
+      const [disc, all, off] = [await at("disc"), await at("all"), await at("off")];
+      let [outside, between] = [0, 0];
+      for (let y = 0; y < disc.height; y++) {
+        for (let x = 0; x < disc.width; x++) {
+          const [a, b, found] = [all.at(x, y), off.at(x, y), disc.at(x, y)];
+          if (found.some((v, i) => v < Math.min(a[i], b[i]) - 5 || v > Math.max(a[i], b[i]) + 5))
+            outside++;
+          if (found.some((v, i) => Math.abs(v - a[i]) > 2 && Math.abs(v - b[i]) > 2)) between++;
+        }
+      }
+      expect(outside).toBe(0);
+      expect(between).toBeGreaterThan(50); // there is a rim
+    });
+  }
 
   it("takes another colour in the same frame, surface and volume", async () => {
     const { page } = stand.viewer;
@@ -108,6 +130,14 @@ describeInChromium("surface or volume", () => {
     await expect.poll(isLoading).toBe(false);
     await tick(page, 150, 8);
     expect(await settings()).toEqual(best);
+    // and clears up, frame by frame, while nothing changes
+    const frames = () => page.evaluate(() => window.stereocell?.frames ?? 0);
+    const rested = await frames();
+    const later = async () => {
+      await tick(page, 2000);
+      return frames();
+    };
+    await expect.poll(later).toBeGreaterThan(rested + 2);
   });
 
   it("stays a surface beyond the switch distance", async () => {

@@ -609,7 +609,7 @@ describeInChromium("the path tracer's chunks", () => {
         float v = dot(${vec(...slope)}, (p - 0.5) / ${vec(...perUm)});
         return vec4(0.25 * v, 0.0, 0.75 * v, 0.0);
       }`;
-    const body = `oColor = vec4(gradientAt(vec3(0.5), ${vec(...perUm)}), 1.0);`;
+    const body = `oColor = vec4(gradientAt(vec3(0.5), ${vec(...perUm)}, vec4(1.0)), 1.0);`;
     const found = await run(["gradient"], head, body);
     slope.forEach((v, k) => {
       expect(found[k]).toBeCloseTo(v, 5); // two voxels are 1 um

@@ -88,6 +88,25 @@ describeInChromium("the ray-march", () => {
     }
   });
 
+  it("averages pictures of a view at rest", async () => {
+    const reds = Array.from({ length: 64 }, (_, i) => 0.5 + 0.25 * Math.sin(2.4 * i));
+    const means = await bare.call("meansOf", reds);
+    for (const count of [1, 2, 9, 64]) {
+      const expected = reds.slice(0, count).reduce((sum, red) => sum + red, 0) / count;
+      expect(Math.abs(means[count - 1] - expected)).toBeLessThan(0.5 / 255);
+    }
+  });
+
+  it("mixes light over the border of two tiles as within one", async () => {
+    const columns = await bare.call("columnsOverBorder");
+    for (const k of [0, 1, 2]) {
+      const values = columns.map((column) => column[k]);
+      expect(Math.max(...values) - Math.min(...values)).toBeLessThan(3);
+    }
+    expect(columns[0][0]).toBeGreaterThan(60); // both are there
+    expect(columns[0][1]).toBeGreaterThan(60);
+  });
+
   it("finds where a ray enters and leaves a box", async () => {
     const chunks = await readChunks("intersect_box");
     const intersect = async (eye: string, dir: string) => {
@@ -140,20 +159,21 @@ describeInChromium("the ray-march", () => {
 
   it("classifies by the table, with the opacity of the step's length", async () => {
     const chunks = await readChunks("classify");
-    const head = `uniform sampler2D uLut;
+    const head = `uniform sampler2D uLut; uniform vec4 uAsked;
       #define CHANNELS 2
       const vec3 uColor[CHANNELS] = vec3[CHANNELS](vec3(1.0, 0.0, 0.0), vec3(0.0, 0.0, 1.0));
       #include <chunks/classify>`;
     const row = (top: number) =>
       Array.from({ length: 256 }, (_, i) => [255, 255, 255, i === 200 ? top : 0]).flat();
     const uLut = { size: [256, 2], channels: 4, texels: [...row(51), ...row(102)] } as const;
-    const classify = (intensity: string, voxels: string) =>
+    const classify = (intensity: string, voxels: string, asksShares = 0) =>
       runProgram(
         bare.page,
         chunks,
         head,
-        `oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, vec4(${voxels}));`,
-        { uLut: { ...uLut, texels: [...uLut.texels] } },
+        `vec4 shares; oColor = classify(vec4(${intensity}, 0.0, 0.0) / 255.0, vec4(${voxels}), shares);
+         if (uAsked.x > 0.0) oColor = shares;`,
+        { uLut: { ...uLut, texels: [...uLut.texels] }, uAsked: [asksShares, 0, 0, 0] },
       );
     const one = await classify("200.0, 0.0", "3.0");
     [1, 0, 0, 1 - 0.8 ** 3].forEach((v, i) => {
@@ -163,6 +183,10 @@ describeInChromium("the ray-march", () => {
     const both = await classify("200.0, 200.0", "1.0");
     [1 / 3, 0, 2 / 3, 1 - 0.8 * 0.6].forEach((v, i) => {
       expect(both[i]).toBeCloseTo(v, 5);
+    });
+    const shares = await classify("200.0, 200.0", "1.0", 1);
+    [1 / 3, 2 / 3, 0, 0].forEach((v, i) => {
+      expect(shares[i]).toBeCloseTo(v, 5);
     });
     expect((await classify("10.0, 0.0", "1.0"))[3]).toBe(0);
   });

@@ -37,7 +37,7 @@ describeInChromium("the shader's chunks", () => {
     const cone = async (eye: number[], dir: number[]) => {
       const length = Math.hypot(...dir);
       const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
-        const vec2 uDisc = vec2(0.9, ${Math.SQRT1_2});`; // 45 degrees
+        const float uReach = ${Math.SQRT1_2};`; // 45 degrees
       const unit = vec(...dir.map((v) => v / length));
       const call = `oColor = coneSpan(vec2(0.0, 10.0), ${vec(...eye)}, ${unit}).xyxy;`;
       return (await run(["cone_span"], head, call)).slice(0, 2);
@@ -77,7 +77,7 @@ describeInChromium("the shader's chunks", () => {
 
   it("let channels without a disc count everywhere, the others by the cube of their weight", async () => {
     const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
-      const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5;
+      const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5; const bool uIsCrossing = false;
       const bvec4 uInDisc = bvec4(true, false, true, false);`;
     const far = await run(
       ["focus_disc", "disc_weights"],
@@ -95,6 +95,60 @@ describeInChromium("the shader's chunks", () => {
     const at = `vec3(${Math.sqrt(1 - 0.945 ** 2)}, 0.0, -0.945)`;
     const half = await run(["focus_disc", "disc_weights"], head, `oColor = weights(${at});`);
     expect(half[0]).toBeCloseTo(0.5 / 8, 4);
+    const crossing = head.replace("uIsCrossing = false", "uIsCrossing = true");
+    const far2 = "oColor = weights(vec3(5.0, 0.0, -1.0));";
+    // the pictures are mixed then: each is whole
+    expect(await run(["focus_disc", "disc_weights"], crossing, far2)).toEqual([1, 1, 1, 1]);
+  });
+
+  it("decode what was encoded", async () => {
+    const light = [0.001, 0.2, 0.75] as const;
+    const body = `oColor = vec4(decoded(encoded(${vec(...light)})), 1.0);`;
+    const found = await run(["encode_srgb", "decode_srgb"], "", body);
+    light.forEach((v, i) => {
+      expect(found[i]).toBeCloseTo(v, 3);
+    });
+  });
+
+  it("mix the marched pixels around by nearness, but for those of another depth", async () => {
+    // two pixels of the march side by side, to four of the picture
+    const chunks = await readChunks("marched_light");
+    const text = chunks["chunks/marched_light"]
+      .replace("uniform int uEyeCount;", "const int uEyeCount = 1;")
+      .replace("uniform vec4 uEyes[2];", "vec4 uEyes[2];")
+      .replace("uniform vec4 uParts[2];", "vec4 uParts[2];");
+    const uMarched = {
+      size: [2, 1],
+      channels: 4,
+      texels: [...[255, 0, 0, 255], 0, 0, 0, 0],
+    } as const;
+    const at = async (x: number, scene: readonly number[]) => {
+      const body = `uEyes[0] = vec4(0.0, 0.0, 4.0, 1.0); uParts[0] = vec4(0.0, 0.0, 2.0, 1.0);
+        oColor = marchedLight(vec2(${x.toFixed(1)}, 0.5));`;
+      const uSceneDepth: Texture = { size: [4, 1], channels: 1, texels: [...scene] };
+      const given = { uMarched: { ...uMarched, texels: [...uMarched.texels] }, uSceneDepth };
+      const head = "#include <chunks/marched_light>";
+      return runProgram(bare.page, { "chunks/marched_light": text }, head, body, given);
+    };
+    const even = [100, 100, 100, 100];
+    expect((await at(0.5, even))[0]).toBeCloseTo(1, 2);
+    expect((await at(1.5, even))[0]).toBeCloseTo(0.75, 2);
+    expect((await at(2.5, even))[3]).toBeCloseTo(0.25, 2);
+    expect((await at(2.5, [100, 100, 200, 200]))[0]).toBeLessThan(0.01); // beyond an edge
+  });
+
+  it("keep the hue of light that no screen shows, and leave all other light", async () => {
+    const within = (...light: number[]) =>
+      run(["within_gamut"], "", `oColor = vec4(withinGamut(${vec(...light)}), 1.0);`);
+    const [r, g, b] = await within(0.2, 1, 0.5);
+    [0.2, 1, 0.5].forEach((v, i) => {
+      expect([r, g, b][i]).toBeCloseTo(v, 5);
+    });
+    const bright = await within(3, 1.5, 0.3);
+    expect(bright[0]).toBeCloseTo(1, 5);
+    // the middle part lies as far between the others as it did
+    expect((bright[1] - bright[2]) / (bright[0] - bright[2])).toBeCloseTo(1.2 / 2.7, 4);
+    expect(bright[2]).toBeGreaterThan(0.1); // nearer to white than 0.3 / 3
   });
 
   it("encode colours as sRGB", async () => {
@@ -288,20 +342,35 @@ describeInChromium("the shader's chunks", () => {
   });
 
   describe("light a sample", () => {
+    /** A lamp and a sky of even light, in grey. */
+    const lights = (key: number, even: number, gloss = 0) => `
+      const vec3 uKeyLight = vec3(${key.toFixed(4)}); const vec3 uFillLight = vec3(0.0);
+      const vec3 uSkyLight = vec3(${even.toFixed(4)}); const vec3 uGroundLight = uSkyLight;
+      const vec3 vFill = vec3(1.0, 0.0, 0.0); const vec3 vUp = vec3(0.0, 1.0, 0.0);
+      const float uGloss = ${gloss.toFixed(4)};`;
+
     /**
      * Of an intensity that rises by `slope` a um, in two channels, on voxels of 0.5 x 0.75 x 2 um;
      * their rows run against y, as a tile's do.
      */
-    function lit(slope: readonly number[], dir: readonly number[], light: readonly number[]) {
+    function lit(
+      slope: readonly number[],
+      dir: readonly number[],
+      light: readonly number[],
+      gloss = 0,
+    ) {
       const size = [40, 60, 24]; // um
       const perUm = [1 / size[0], -1 / size[1], 1 / size[2]];
       const head = `const float uVoxel = 0.5; const vec3 vLight = ${vec(...unit(light))};
+        ${lights(DIFFUSE, AMBIENT, gloss)}
         vec4 sampleIntensities(vec3 p) {
           vec3 um = (p - vec3(0.0, 1.0, 0.0)) * ${vec(...perUm.map((v) => 1 / v))};
           float v = dot(um - vec3(20.0, 30.0, 12.0), ${vec(...slope)});
-          return vec4(0.5 + 0.25 * v, 0.0, 0.5 + 0.75 * v, 0.0);
+          return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
-      const body = `oColor = vec4(shade(vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}));`;
+      const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no say
+      const call = `shade(vec3(1.0), vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}, ${shares})`;
+      const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
 
@@ -340,12 +409,23 @@ describeInChromium("the shader's chunks", () => {
     });
 
     it("not at all where there is no direction or only noise, and fades in between", async () => {
-      const away = [0, 0, -1]; // of the light: a boundary would be dark
-      const steep = (step: number) => lit([0, 0, -step], [0, 0, -1], away); // over two voxels, 1 um
-      expect(await steep(0)).toBe(1);
-      expect(await steep(0.03)).toBeCloseTo(1, 4);
-      expect(await steep(0.105)).toBeCloseTo((1 + AMBIENT) / 2, 3); // half of the way
+      // the lamp stands beside the eye, and behind the boundary, which would be dark
+      const steep = (step: number) => lit([-step, 0, 0], [0, 0, -1], [-1, 0, 1]); // over 1 um
+      const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as on what faces the eye
+      expect(await steep(0)).toBeCloseTo(even, 4);
+      expect(await steep(0.03)).toBeCloseTo(even, 4);
+      expect(await steep(0.105)).toBeCloseTo((even + AMBIENT) / 2, 3); // half of the way
       expect(await steep(0.18)).toBeCloseTo(AMBIENT, 4);
+    });
+
+    it("with gloss where the boundary mirrors the lamp", async () => {
+      const facing = (degrees: number) => {
+        const at = (degrees * Math.PI) / 180;
+        return lit([0, 0, -0.5], [0, 0, -1], [Math.sin(at), 0, Math.cos(at)], 0.5);
+      };
+      expect(await facing(0)).toBeCloseTo(AMBIENT + 1.5 * DIFFUSE, 4);
+      const half = Math.cos(Math.PI / 6) ** 16; // between lamp and eye
+      expect(await facing(60)).toBeCloseTo(AMBIENT + DIFFUSE * (0.5 + 0.5 * half), 4);
     });
 
     it("by the volume's own texels too", async () => {
@@ -355,21 +435,26 @@ describeInChromium("the shader's chunks", () => {
       const light = unit([-1, 1, 1]);
       const head = `uniform sampler3D uVolume;
         const float uFresh = 1.0; const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
+        ${lights(DIFFUSE, AMBIENT)}
         #define uOldVolume uVolume`;
       // voxels of 1 um each; rows run against y
-      const call = `shade(vec3(0.5), ${vec(1 / 8, -1 / 8, 1 / 4)}, vec3(0.6, -0.8, 0.0))`;
+      const perUm = vec(1 / 8, -1 / 8, 1 / 4);
+      const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
+      const call = `shade(vec3(1.0), vec3(0.5), ${perUm}, vec3(0.6, -0.8, 0.0), ${shares})`;
       const textures = { uVolume };
       const [found] = await run(
         ["sample_intensities", "gradient", "shade"],
         head,
-        `oColor = vec4(${call});`,
+        `oColor = vec4(${call}, 1.0);`,
         textures,
       );
       const normal = unit([-2, 1, 0]);
       const steepness = (Math.hypot(16, 8) * 2) / 255;
       const t = (steepness - 0.03) / 0.15;
       const share = t * t * (3 - 2 * t);
-      const expected = 1 - share + share * (AMBIENT + DIFFUSE * dot(normal, light));
+      const even = 1.2 * (AMBIENT + DIFFUSE * Math.max(0, dot([-0.6, 0.8, 0], light)));
+      const boundary = AMBIENT + DIFFUSE * Math.max(0, dot(normal, light));
+      const expected = even + share * (boundary - even);
       expect(found).toBeCloseTo(expected, 2);
     });
   });
@@ -379,15 +464,29 @@ describeInChromium("the shader's chunks", () => {
     const noise: Texture = { size, channels: 1, texels: [...blueNoise()] };
 
     /** What the march itself asks for, at a place of the picture of which an eye has a part. */
-    async function shiftAt(at: readonly number[], corner: readonly number[], texture = noise) {
+    async function shiftAt(
+      at: readonly number[],
+      corner: readonly number[],
+      texture = noise,
+      phase = 0,
+    ) {
       const march = new URL("../../src/volumes/shaders/raymarch.frag.glsl", import.meta.url);
       const call = /float shift = (jitter\(.*\));/.exec(await readFile(march, "utf8"))?.[1];
       if (call === undefined) throw new Error("the march has no shift");
-      const head = `uniform sampler2D uNoise; const vec4 place = ${vec(...at, 0, 1)};
+      const head = `uniform sampler2D uNoise; const float uPhase = ${phase.toFixed(4)};
+        const vec4 place = ${vec(...at, 0, 1)};
         const vec4 uPart = ${vec(...corner, 9, 9)};`;
       const body = `oColor = vec4(${call.replaceAll("gl_FragCoord", "place")});`;
       return (await run(["jitter"], head, body, { uNoise: texture }))[0];
     }
+
+    it("by another value in another frame, within the same step", async () => {
+      const [first, next] = [
+        await shiftAt([3, 1], [0, 0]),
+        await shiftAt([3, 1], [0, 0], noise, 0.9),
+      ];
+      expect(next).toBeCloseTo((first + 0.9) % 1, 4);
+    });
 
     it("by the table's value at the place, which repeats", async () => {
       for (const [x, y] of [
@@ -439,7 +538,8 @@ describeInChromium("the shader's chunks", () => {
       run(
         ["classify"],
         head,
-        `oColor = classify(${vec(intensity / 255, 0, 0, 0)}, ${vec(voxels, 0, 0, 0)});`,
+        `vec4 shares;
+         oColor = classify(${vec(intensity / 255, 0, 0, 0)}, ${vec(voxels, 0, 0, 0)}, shares);`,
         { uLut },
       );
     expect((await at(100, 1))[3]).toBeCloseTo(0, 2);

@@ -12,7 +12,9 @@ import {
 import type { TileVolume } from "viewer/bundle/generated/volumes";
 import { Cuts } from "viewer/gpu/clip_planes";
 import { DepthPass } from "viewer/render/depth_pass";
+import { EncodePass } from "viewer/gpu/encode_pass";
 import { Eyes } from "viewer/gpu/eyes";
+import { linearTarget } from "viewer/gpu/linear_target";
 import { MarchPass } from "viewer/render/raymarch_pass";
 import { brickCounts } from "viewer/volumes/skip_bricks";
 import { opacities } from "viewer/volumes/transfer_luts";
@@ -25,7 +27,9 @@ class Ours implements Renderer {
   private readonly renderer = new WebGLRenderer({ antialias: false });
   private readonly depth = new DepthPass(new Cuts());
   private readonly frame = makeFrame(this.depth.texture);
-  private readonly pass = new MarchPass(this.frame);
+  private readonly pass = new MarchPass(this.renderer, this.frame);
+  private readonly light = linearTarget(this.renderer, { hasDepth: true, isMultisampled: true });
+  private readonly encode = new EncodePass();
   private readonly eyes = new Eyes();
   private readonly camera = new PerspectiveCamera();
   /** What is marched, and what it is laid over: a room that is empty but for that. */
@@ -67,8 +71,11 @@ class Ours implements Renderer {
   draw(): void {
     this.eyes.followScreen(this.renderer, this.camera);
     this.depth.render(this.renderer, this.room, this.eyes, this.pass.overlays);
-    this.pass.render(this.renderer, this.marched, this.eyes, 1);
+    this.pass.render(this.marched, this.eyes, 1);
+    this.light.setSize(this.eyes.width_px, this.eyes.height_px);
+    this.renderer.setRenderTarget(this.light);
     this.renderer.render(this.room, this.camera);
+    this.encode.render(this.renderer, this.light, null);
   }
 
   countSteps(): number {
@@ -133,7 +140,7 @@ function volumeOf(about: About): TileVolume {
 
 /** The march without light: for the peers, which are timed without theirs. */
 function unlit(text: string): string {
-  const line = "s.rgb *= shade(p, texPerUm, dir);";
+  const line = "s.rgb = shade(s.rgb, p, texPerUm, dir, shares);";
   if (!text.includes(line)) throw new Error("the march shades in another line than it did");
   return text.replace(line, "");
 }

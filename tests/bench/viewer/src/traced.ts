@@ -16,7 +16,9 @@ import { START_TRACE } from "viewer/state/path_trace_settings";
 import { Tracer } from "viewer/pathtrace/path_tracer";
 import { Cuts } from "viewer/gpu/clip_planes";
 import { DepthPass } from "viewer/render/depth_pass";
+import { EncodePass } from "viewer/gpu/encode_pass";
 import { Eyes } from "viewer/gpu/eyes";
+import { linearTarget } from "viewer/gpu/linear_target";
 import { LAST, Overlay } from "viewer/gpu/composite_pass";
 import { serve } from "./page";
 import type { Camera, Renderer, Scene } from "./scene";
@@ -33,7 +35,12 @@ class Traced implements Renderer {
   private readonly depth = new DepthPass(new Cuts());
   private readonly sceneDepth = { value: this.depth.texture };
   private readonly tracer = new Tracer(this.sceneDepth);
-  private readonly overlay = new Overlay(this.tracer.picture.texture, this.sceneDepth, LAST);
+  private readonly overlay = new Overlay(this.tracer.picture.texture, this.sceneDepth, {
+    order: LAST,
+    isEncoded: true,
+  });
+  private readonly light = linearTarget(this.renderer, { hasDepth: true, isMultisampled: true });
+  private readonly encode = new EncodePass();
   private readonly eyes = new Eyes();
   private readonly camera = new PerspectiveCamera();
   private readonly room = new Room();
@@ -108,7 +115,10 @@ class Traced implements Renderer {
       isDraft: false,
     });
     this.overlay.show(this.eyes, 1);
+    this.light.setSize(this.eyes.width_px, this.eyes.height_px);
+    this.renderer.setRenderTarget(this.light);
     this.renderer.render(this.room, this.camera);
+    this.encode.render(this.renderer, this.light, null);
   }
 }
 

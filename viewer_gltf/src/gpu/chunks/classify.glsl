@@ -1,12 +1,14 @@
 // Colour (not premultiplied) and opacity of a step that is so many voxels long for each channel.
-// Channels that overlap absorb together and share the colour by their opacities.
+// Channels that overlap absorb together and share the colour by their opacities, which are `shares`.
 #if CHANNELS == 1
-vec4 classify(vec4 intensity, vec4 voxels) {
+vec4 classify(vec4 intensity, vec4 voxels, out vec4 shares) {
+  shares = vec4(1.0, 0.0, 0.0, 0.0);
   vec4 look = texture(uLut, vec2(intensity.x * (255.0 / 256.0) + 0.5 / 256.0, 0.5));
   return vec4(look.rgb * uColor[0], 1.0 - pow(1.0 - min(look.a, 0.999), voxels.x));
 }
 #else
-vec4 classify(vec4 intensity, vec4 voxels) {
+vec4 classify(vec4 intensity, vec4 voxels, out vec4 shares) {
+  shares = vec4(0.0);
   vec3 color = vec3(0.0);
   float weight = 0.0;
   float clear = 1.0;
@@ -16,8 +18,10 @@ vec4 classify(vec4 intensity, vec4 voxels) {
     float a = 1.0 - pow(1.0 - min(look.a, 0.999), voxels[c]);
     color += look.rgb * uColor[c] * a;
     weight += a;
+    shares[c] = a;
     clear *= 1.0 - a;
   }
+  shares /= max(weight, 1e-6);
   return weight > 0.0 ? vec4(color / weight, 1.0 - clear) : vec4(0.0);
 }
 #endif

@@ -9,7 +9,8 @@ bool mayShow(vec4 intensity) {
 }
 
 // As `classify`, by tables of value and steepness, a layer each channel.
-vec4 classify2d(vec4 intensity, vec4 steepness, vec4 voxels) {
+vec4 classify2d(vec4 intensity, vec4 steepness, vec4 voxels, out vec4 shares) {
+  shares = vec4(0.0);
   vec3 color = vec3(0.0);
   float weight = 0.0;
   float clear = 1.0;
@@ -19,7 +20,9 @@ vec4 classify2d(vec4 intensity, vec4 steepness, vec4 voxels) {
     float a = 1.0 - pow(1.0 - min(look.a, 0.999), voxels[c]);
     color += look.rgb * uColor[c] * a;
     weight += a;
+    shares[c] = a;
     clear *= 1.0 - a;
   }
+  shares /= max(weight, 1e-6);
   return weight > 0.0 ? vec4(color / weight, 1.0 - clear) : vec4(0.0);
 }

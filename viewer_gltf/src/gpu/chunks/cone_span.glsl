@@ -1,9 +1,9 @@
-// The part of a ray's span inside the cone of the disc's outer radius, which is less than 90
+// The part of a ray's span inside the cone that reaches uReach, the cosine of an angle below 90
 // degrees: there f(t) = (axis . q)^2 - cos^2 |q|^2 >= 0 for q = eye + t dir - apex, on the side
 // that the axis points to.
 vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
   vec3 m = eye - uApex;
-  float square = uDisc.y * uDisc.y;
+  float square = uReach * uReach;
   float dg = dot(dir, uAxis);
   float mg = dot(m, uAxis);
   float a = dg * dg - square;

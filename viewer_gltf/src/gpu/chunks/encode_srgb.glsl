@@ -1,5 +1,7 @@
-// sRGB (IEC 61966-2-1) of a linear colour.
+// sRGB (IEC 61966-2-1) of a linear colour, 0..1. Its power is fitted by roots, which cost a fifth of
+// it where software draws: off by 0.1 of 255 at most.
 vec3 encoded(vec3 linear) {
-  vec3 high = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
+  vec3 root = sqrt(linear);
+  vec3 high = 0.83371875 * root + 0.29813954 * sqrt(root) - 0.05530768 * linear - 0.07691076;
   return mix(high, 12.92 * linear, lessThanEqual(linear, vec3(0.0031308)));
 }

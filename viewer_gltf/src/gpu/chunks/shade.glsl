@@ -1,22 +1,38 @@
-const float AMBIENT = 0.4;  // for sides that face away: they keep the channel's colour
-const float DIFFUSE = 0.7;  // a little above 1 in all, as the surfaces' lamp is
+// The room's light, as the surfaces have it; the includer declares it: uKeyLight, uFillLight, uSkyLight
+// and uGroundLight are what a white surface sends on that faces each, vLight, vFill and vUp lead there.
+
 // Steps of intensity over two voxels: below the first they are the noise of 8 bits and of the
 // detector, above the second a boundary of its own; between, light fades in.
 const float NOISE_STEP = 0.03;
 const float BOUNDARY_STEP = 0.18;
 const float FLAT_STEP = 1e-4;  // less than one of 8 bits: no direction at all
 
-// Diffuse light by the gradient (Levoy 1988). 1 where there is none to give a direction, or only
-// noise.
-float shadeBy(vec3 gradient, vec3 dir) {
-  float steepness = length(gradient);
-  if (steepness < FLAT_STEP) return 1.0;
-  vec3 normal = -gradient / steepness;
-  if (dot(normal, dir) > 0.0) normal = -normal;
-  float lit = AMBIENT + DIFFUSE * max(dot(normal, vLight), 0.0);
-  return mix(1.0, lit, smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness));
+// What has no boundary is lit through by its surroundings: as bright in the mean as the surfaces.
+const float SCATTERED = 1.2;
+
+vec3 lightOn(vec3 normal) {
+  vec3 lamps = uKeyLight * max(dot(normal, vLight), 0.0) + uFillLight * max(dot(normal, vFill), 0.0);
+  return lamps + mix(uGroundLight, uSkyLight, 0.5 + 0.5 * dot(normal, vUp));
 }
 
-float shade(vec3 p, vec3 texPerUm, vec3 dir) {
-  return shadeBy(gradientAt(p, texPerUm), dir);
+// Diffuse light by the gradient (Levoy 1988), and the lamp's own gloss (Blinn 1977, exponent 16). Where
+// there is none to give a direction, or only noise, light falls as on what faces the eye.
+vec3 shadeBy(vec3 color, vec3 gradient, vec3 dir) {
+  float steepness = length(gradient);
+  vec3 unlit = SCATTERED * color * lightOn(-dir);
+  if (steepness < FLAT_STEP) return unlit;
+  vec3 normal = -gradient / steepness;
+  if (dot(normal, dir) > 0.0) normal = -normal;
+  float gloss = max(dot(normal, normalize(vLight - dir)), 0.0);
+  gloss *= gloss;
+  gloss *= gloss;
+  gloss *= gloss;
+  gloss *= gloss;
+  vec3 lit = color * lightOn(normal) + uGloss * gloss * uKeyLight;
+  return mix(unlit, lit, smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness));
+}
+
+// `shares`: of each channel in what is seen here.
+vec3 shade(vec3 color, vec3 p, vec3 texPerUm, vec3 dir, vec4 shares) {
+  return shadeBy(color, gradientAt(p, texPerUm, shares), dir);
 }

@@ -23,7 +23,7 @@ vec4 steepnessOf(Steps s) {
   return min(sqrt(s.x * s.x + s.y * s.y + s.z * s.z) / uGradientMax, 1.0);
 }
 
-// Of the summed intensities, along the axes of the texture.
-vec3 gradientOf(Steps s) {
-  return vec3(dot(s.x, vec4(1.0)), dot(s.y, vec4(1.0)), dot(s.z, vec4(1.0)));
+// Of the intensities, each channel by its share, along the axes of the texture.
+vec3 gradientOf(Steps s, vec4 shares) {
+  return vec3(dot(s.x, shares), dot(s.y, shares), dot(s.z, shares));
 }

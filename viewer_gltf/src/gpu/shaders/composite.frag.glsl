@@ -1,43 +1,33 @@
-// Lay the marched picture over the scene. Where it was marched at fewer pixels, each pixel mixes
-// the four around it by nearness, and by how alike the depth of the scene is there, so that colour
-// does not bleed over a surface's edge (joint bilateral upsampling, Kopf et al., SIGGRAPH 2007).
+// Lay the marched picture over the scene. Within the disc, where it takes the place of surfaces
+// (CROSSING), by as much as the disc shows there: the surfaces themselves do the same.
 precision highp float;
 
-uniform sampler2D uMarched;  // premultiplied, encoded
-uniform sampler2D uSceneDepth;
-uniform int uEyeCount;
-uniform vec4 uEyes[2];  // each eye's part of the picture: x, y, width, height, pixels ...
-uniform vec4 uParts[2];  // ... and of uMarched
+#ifdef CROSSING
+uniform bool uIsCrossing;
+uniform mat4 uToRoom[2];  // each eye's, from clip space
+uniform vec3 uEyeAt[2];  // m
+uniform float uRim;  // m: what no surface covers is weighed as if it lay so far
+uniform vec3 uApex;
+uniform vec3 uAxis;
+uniform vec2 uDisc;
+#include <chunks/focus_disc>
+#endif
 
 out vec4 oColor;
 
-const float ALIKE = 0.02;  // of the depth's distance to the far plane
+#ifdef ENCODED
+#include <chunks/decode_srgb>
+#endif
+#include <chunks/marched_light>
 
 void main() {
-  int i = uEyeCount > 1 && gl_FragCoord.x >= uEyes[1].x ? 1 : 0;
-  vec4 eye = uEyes[i];
-  vec4 part = uParts[i];
-  vec2 scale = part.zw / eye.zw;
-  if (scale == vec2(1.0)) {
-    oColor = texelFetch(uMarched, ivec2(gl_FragCoord.xy - eye.xy + part.xy), 0);
-    return;
-  }
-  float here = 1.0 - texelFetch(uSceneDepth, ivec2(gl_FragCoord.xy), 0).r;
-  vec2 at = (gl_FragCoord.xy - eye.xy) * scale - 0.5;
-  vec2 corner = floor(at);
-  vec2 share = at - corner;
-  vec4 sum = vec4(0.0);
-  float total = 0.0;
-  for (int k = 0; k < 4; k++) {
-    vec2 side = vec2(k & 1, k >> 1);
-    vec2 tap = clamp(corner + side, vec2(0.0), part.zw - 1.0);  // never the other eye's
-    vec2 source = (tap + 0.5) / scale + eye.xy;
-    float there = 1.0 - texelFetch(uSceneDepth, ivec2(source), 0).r;
-    vec2 near = mix(1.0 - share, share, side);
-    float alike = abs(there - here) <= ALIKE * max(there, here) ? 1.0 : 1e-3;
-    float weight = (near.x * near.y + 1e-4) * alike;
-    sum += weight * texelFetch(uMarched, ivec2(tap + part.xy), 0);
-    total += weight;
-  }
-  oColor = sum / total;
+  oColor = marchedLight(gl_FragCoord.xy);
+#ifdef CROSSING
+  if (!uIsCrossing) return;
+  int i = eyeAt(gl_FragCoord.xy);
+  vec2 at = 2.0 * (gl_FragCoord.xy - uEyes[i].xy) / uEyes[i].zw - 1.0;
+  vec4 far = uToRoom[i] * vec4(at, 1.0, 1.0);
+  vec3 dir = normalize(far.xyz / far.w - uEyeAt[i]);
+  oColor *= discWeight(uEyeAt[i] + uRim * dir, uApex, uAxis, uDisc);
+#endif
 }

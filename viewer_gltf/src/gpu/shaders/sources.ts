@@ -1,6 +1,12 @@
-/** The text of the shaders that lay one picture over another. */
+/** The text of the shaders that lay one picture over another, and bring it to the screen. */
+import { CHUNKS } from "../glsl_chunks";
+import { includeChunks } from "../glsl_include";
 import composite from "./composite.frag.glsl?raw";
+import copy from "./copy.frag.glsl?raw";
+import encode from "./encode.frag.glsl?raw";
 import triangle from "./fullscreen_triangle.vert.glsl?raw";
 
 export const COMPOSITE_VERTEX = triangle;
-export const COMPOSITE_FRAGMENT = composite;
+export const COMPOSITE_FRAGMENT = includeChunks(composite, CHUNKS);
+export const COPY_FRAGMENT = copy;
+export const ENCODE_FRAGMENT = includeChunks(encode, CHUNKS);

@@ -90,7 +90,7 @@ vec3 withoutZeros(vec3 dir) {
 Scatter chooseScatter(vec3 p, vec3 dir, vec3 albedo, out vec3 weight) {
   Scatter s = Scatter(PHASE, vec3(0.0), vec3(0.0));
   weight = albedo;
-  vec3 gradient = gradientAt(uTexLow + p * uTexPerUm, uTexPerUm);
+  vec3 gradient = gradientAt(uTexLow + p * uTexPerUm, uTexPerUm, vec4(1.0));
   float steepness = length(gradient);
   // Kroes et al., equation 9, with the gradient's share of the whole range
   float isSurface = 1.0 - exp(-25.0 * uSurface * uSurface * uSurface * steepness);

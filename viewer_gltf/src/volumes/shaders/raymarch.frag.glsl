@@ -27,6 +27,8 @@ uniform bool uAllInDisc;
 uniform vec3 uApex;  // um: the disc is a cone from here ...
 uniform vec3 uAxis;  // ... along this unit vector
 uniform vec2 uDisc;  // cosines of its inner and outer radius
+uniform float uReach;  // cosine of what is marched of it: a little more, for pixels that mix others
+uniform bool uIsCrossing;  // all that is marched shows in the disc alone
 #endif
 uniform float uPresence;  // 0..1: volumes fade in once they have come
 uniform vec3 uClipLow;  // um: nothing outside is drawn
@@ -44,7 +46,13 @@ uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by value and
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
 uniform bool uHasPane;  // whether any surface is translucent
+uniform vec3 uKeyLight;  // what a white surface sends on that faces the lamp ...
+uniform vec3 uFillLight;  // ... the weaker one ...
+uniform vec3 uSkyLight;  // ... the sky, and the ground
+uniform vec3 uGroundLight;
+uniform float uGloss;  // of the lamp's light, at most
 uniform sampler2D uNoise;  // blue noise
+uniform float uPhase;  // 0..1: by how much it is shifted in this frame
 uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
 uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
 
@@ -52,10 +60,12 @@ uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
 centroid in vec3 vPosition;
 flat in vec3 vEye;
 flat in vec3 vLight;
+flat in vec3 vFill;
+flat in vec3 vUp;
 flat in vec2 vDepth;
 centroid in float vViewZ;
 
-layout(location = 0) out vec4 oColor;  // premultiplied: up to the pane, or all
+layout(location = 0) out vec4 oColor;  // linear, premultiplied: up to the pane, or all
 layout(location = 1) out vec4 oBehind;  // beyond the pane
 
 #include <chunks/intersect_box>
@@ -76,15 +86,12 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/gradient>
 #include <chunks/shade>
 #include <chunks/jitter>
-#include <chunks/encode_srgb>
 
 const float NOWHERE = 1e30;
 
-// Blending happens on encoded colours, as for every other surface of the page.
+// A ray that ended early is opaque: what was left out behind looks as what is in front.
 vec4 shown(vec4 sum) {
-  if (sum.a <= 0.0) return vec4(0.0);
-  float whole = sum.a >= OPAQUE ? sum.a : 1.0;  // what was left out behind looks as what is in front
-  return vec4(encoded(sum.rgb / sum.a) * sum.a, sum.a) / whole;
+  return sum.a >= OPAQUE ? sum / sum.a : sum;
 }
 
 void main() {
@@ -160,17 +167,18 @@ void main() {
 #else
       vec4 voxels = vec4(here / uVoxel * uPresence);
 #endif
+      vec4 shares;
 #ifdef TWO_D
       Steps around = stepsAt(p, uVoxel * abs(texPerUm));
-      vec4 s = classify2d(v, steepnessOf(around), voxels);
+      vec4 s = classify2d(v, steepnessOf(around), voxels, shares);
 #else
-      vec4 s = classify(v, voxels);
+      vec4 s = classify(v, voxels, shares);
 #endif
       if (s.a > 0.0) {
 #ifdef TWO_D
-        s.rgb *= shadeBy(gradientOf(around) * sign(texPerUm), dir);
+        s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir);
 #else
-        s.rgb *= shade(p, texPerUm, dir);
+        s.rgb = shade(s.rgb, p, texPerUm, dir, shares);
 #endif
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }

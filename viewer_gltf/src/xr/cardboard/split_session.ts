@@ -18,14 +18,7 @@
  *   another host, which our Content-Security-Policy forbids, and that table ends in 2020.
  * - 51 kB gzip; this folder, which draws through three alone, is 7.
  */
-import {
-  type ArrayCamera,
-  Matrix4,
-  SRGBColorSpace,
-  Vector2,
-  type WebGLRenderer,
-  WebGLRenderTarget,
-} from "three";
+import { type ArrayCamera, Matrix4, Vector2, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { BundleError } from "../../bundle/errors";
 import { DistortionPass } from "./distortion_pass";
 import { type Eye, EyeCameras } from "./eye_cameras";
@@ -35,8 +28,6 @@ import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientati
 import type { ScreenHold } from "./screen";
 import type { Asked } from "./user_gesture";
 import { CARDBOARD_V2, type Profile } from "./viewer_profile";
-
-const SAMPLES = 4;
 
 export type SplitOptions = Readonly<{
   /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
@@ -62,16 +53,8 @@ export class SplitSession {
     private readonly onGesture: (gesture: Gesture) => void,
     private readonly options: SplitOptions = { cssPixelsPerInch: null },
   ) {
-    const { stencil = false } = renderer.getContext().getContextAttributes() ?? {};
-    this.target = new WebGLRenderTarget(1, 1, {
-      samples: SAMPLES,
-      stencilBuffer: stencil,
-      colorSpace: SRGBColorSpace,
-      internalFormat: "RGBA8",
-    });
-    // three's mark of a headset's frame buffer: colours are encoded before they are blended, as on
-    // the canvas, so that a volume looks the same in both. RGBA8 keeps the GPU from doing so again.
-    Object.assign(this.target, { isXRRenderTarget: true });
+    // It takes a finished picture, encoded as on the canvas.
+    this.target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
   }
 
   /** Both eyes in one, as in WebXR: render with it into `target`. */

@@ -22,6 +22,9 @@ import { opacities } from "../../../src/volumes/transfer_luts";
 import type { TransferTable2d } from "../../../src/volumes/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
+import { cube, PIXELS } from "./cube";
+import { meansOf } from "./mean";
+import { columnsOverBorder } from "./seam";
 
 export type Run = Readonly<{
   /** Texels along each edge of the cube. */
@@ -34,24 +37,6 @@ export type Run = Readonly<{
 
 /** Over the pixels that the volume covers. */
 export type Counts = Readonly<{ pixels: number; most: number; least: number; covered: number }>;
-
-export const PIXELS = 64;
-
-/** A cube of `side` texels along each edge; its low corner lies `left_um` along x. */
-export function cube(side: number, left_um = 0): TileVolume {
-  const file = { path: "x", bytes: 0, sha256: "" };
-  const edge = side - 3; // lattice intervals without the apron, one um each
-  return {
-    tile: "r0_c0",
-    file,
-    bricks: file,
-    size: [side, side, side],
-    apron: 1,
-    bounds_um: { min: [left_um, -edge, 0], max: [left_um + edge, 0, edge] },
-    matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
-    levels: [{ size: [side, side, side], offset: 0, length: 1, sha256: "" }],
-  };
-}
 
 function texture3D(texels: Uint8Array<ArrayBuffer>, side: number): Data3DTexture {
   const texture = new Data3DTexture(texels, side, side, side);
@@ -259,7 +244,7 @@ function meanOpacity(filling: Filling, side: number, opacity: number): number {
   return inner.reduce((a, b) => a + b, 0) / inner.length;
 }
 
-const harness = { countSteps, countThrough, compareSkips, meanOpacity };
+const harness = { countSteps, countThrough, compareSkips, meanOpacity, columnsOverBorder, meansOf };
 export type Harness = typeof harness;
 
 Object.assign(window, { harness });

@@ -11,7 +11,8 @@ import {
 } from "../../../src/volumes/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
-import { cube, diagonalCamera, draw, marchOf, PIXELS, randomScene } from "./harness";
+import { cube, PIXELS } from "./cube";
+import { diagonalCamera, draw, marchOf, randomScene } from "./harness";
 
 const SIDE = 51;
 const EDGE = SIDE - 3;

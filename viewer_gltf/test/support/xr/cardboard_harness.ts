@@ -11,7 +11,10 @@ import {
   SphereGeometry,
   SRGBColorSpace,
   WebGLRenderer,
+  type WebGLRenderTarget,
 } from "three";
+import { EncodePass } from "../../../src/gpu/encode_pass";
+import { linearTarget } from "../../../src/gpu/linear_target";
 import { SplitSession } from "../../../src/xr/cardboard/split_session";
 import { askInTap } from "../../../src/xr/cardboard/user_gesture";
 import { BUILT_IN, parseProfile } from "../../../src/xr/cardboard/viewer_profile";
@@ -37,12 +40,15 @@ class Stand {
     new MeshBasicMaterial({ map: checkerboard(), side: BackSide }),
   );
   private readonly split: SplitSession;
+  private readonly light: WebGLRenderTarget;
+  private readonly encode = new EncodePass();
 
   constructor(stage: HTMLElement) {
     stage.append(this.renderer.domElement);
     const fit = () => this.renderer.setSize(stage.clientWidth, stage.clientHeight);
     new ResizeObserver(fit).observe(stage);
     fit();
+    this.light = linearTarget(this.renderer, { hasDepth: true, isMultisampled: true });
     this.scene.background = new Color("#123456");
     this.scene.add(this.mark, this.room);
     this.split = new SplitSession(
@@ -117,8 +123,11 @@ class Stand {
     this.mark.position.set(...at);
     this.mark.scale.setScalar(radius_m);
     this.split.update();
-    this.renderer.setRenderTarget(this.split.target);
+    const { width, height } = this.split.target;
+    this.light.setSize(width, height);
+    this.renderer.setRenderTarget(this.light);
     this.renderer.render(this.scene, this.split.camera);
+    this.encode.render(this.renderer, this.light, this.split.target);
     this.renderer.setRenderTarget(null);
   }
 }

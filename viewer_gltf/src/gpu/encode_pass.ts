@@ -1,0 +1,36 @@
+/** Brings linear light to the screen: colours are encoded here, once, after all that is blended. */
+import { Camera, Vector4, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import { nothing } from "./float_targets";
+import { ScreenPass } from "./screen_pass";
+import { ENCODE_FRAGMENT } from "./shaders/sources";
+
+const NOBODY = new Camera();
+
+export class EncodePass {
+  private readonly pass = new ScreenPass(ENCODE_FRAGMENT, { uLight: nothing() });
+  private readonly kept = new Vector4();
+
+  /** Over the whole of a target that is as large as the light's; null: the canvas. */
+  render(
+    renderer: WebGLRenderer,
+    light: WebGLRenderTarget,
+    target: WebGLRenderTarget | null,
+  ): void {
+    const { enabled } = renderer.xr; // else three would draw for each of the headset's eyes
+    renderer.xr.enabled = false;
+    this.pass.uniforms.uLight.value = light.texture;
+    if (target !== null) {
+      // a headset's frame buffer may be larger than three knows
+      this.kept.copy(target.viewport);
+      target.viewport.set(0, 0, light.width, light.height);
+    }
+    renderer.setRenderTarget(target);
+    renderer.render(this.pass.scene, NOBODY);
+    target?.viewport.copy(this.kept);
+    renderer.xr.enabled = enabled;
+  }
+
+  dispose(): void {
+    this.pass.dispose();
+  }
+}

@@ -1,0 +1,54 @@
+/** The mean of pictures that come one by one: what differs from one to the next, as noise does, goes. */
+import {
+  AddEquation,
+  ConstantAlphaFactor,
+  CustomBlending,
+  OneMinusConstantAlphaFactor,
+  type Texture,
+  type WebGLRenderer,
+  type WebGLRenderTarget,
+} from "three";
+import { drawWhole, nothing } from "./float_targets";
+import { linearTarget } from "./linear_target";
+import { ScreenPass } from "./screen_pass";
+import { COPY_FRAGMENT } from "./shaders/sources";
+
+export class RunningMean {
+  /** Of so many pictures. */
+  count = 0;
+  readonly target: WebGLRenderTarget;
+  private readonly pass = new ScreenPass(COPY_FRAGMENT, { uFirst: nothing(), uSecond: nothing() });
+
+  constructor(private readonly renderer: WebGLRenderer) {
+    this.target = linearTarget(renderer, { count: 2 });
+    Object.assign(this.pass.material, {
+      blending: CustomBlending,
+      blendEquation: AddEquation,
+      blendSrc: ConstantAlphaFactor,
+      blendDst: OneMinusConstantAlphaFactor,
+      transparent: true,
+    });
+  }
+
+  get textures(): readonly Texture[] {
+    return this.target.textures;
+  }
+
+  /** Take in both textures of a target. */
+  add({ textures, width, height }: WebGLRenderTarget): void {
+    const { uFirst, uSecond } = this.pass.uniforms;
+    [uFirst.value, uSecond.value] = textures;
+    if (this.target.width !== width || this.target.height !== height) this.count = 0;
+    this.count++;
+    this.pass.material.blendAlpha = 1 / this.count;
+    const { autoClear } = this.renderer;
+    this.renderer.autoClear = false;
+    drawWhole(this.renderer, this.pass.scene, this.target, width, height);
+    this.renderer.autoClear = autoClear;
+  }
+
+  dispose(): void {
+    this.target.dispose();
+    this.pass.dispose();
+  }
+}

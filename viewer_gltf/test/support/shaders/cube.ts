@@ -1,0 +1,21 @@
+/** A tile's volume for small programs: a cube of voxels that are one um apart. */
+import type { TileVolume } from "../../../src/bundle/generated/volumes";
+
+/** Of the picture, along each edge. */
+export const PIXELS = 64;
+
+/** A cube of `side` texels along each edge; its low corner lies `left_um` along x. */
+export function cube(side: number, left_um = 0): TileVolume {
+  const file = { path: "x", bytes: 0, sha256: "" };
+  const edge = side - 3; // lattice intervals without the apron, one um each
+  return {
+    tile: "r0_c0",
+    file,
+    bricks: file,
+    size: [side, side, side],
+    apron: 1,
+    bounds_um: { min: [left_um, -edge, 0], max: [left_um + edge, 0, edge] },
+    matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    levels: [{ size: [side, side, side], offset: 0, length: 1, sha256: "" }],
+  };
+}
