@@ -222,6 +222,22 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
     assert volume == pytest.approx(4 / 3 * np.pi * 17.0**3, rel=0.03)
 
 
+def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mask = np.zeros(SHAPE, np.uint8)
+    mask[5:15:4, 8:60:9, 8:90:9] = 255
+    path = tmp_path / "specks.ome.tif"
+    phantoms.write_ome_tiff(path, mask, spacing=SPACING)
+    out = tmp_path / "out"
+    assert main(["build", str(path), "-o", str(out), "--workers", "0"]) == 0
+    told = capsys.readouterr().err
+    assert "half-way; 0% of it is left by a median of 3 x 3 voxels and a Gaussian of 1 um" in told
+    assert "no surface: all voxels lie below the level 127.5" in told
+    (channel,) = json.loads((out / "bundle" / "manifest.json").read_text())["channels"]
+    assert channel["surface"] == "none"
+
+
 def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]

@@ -108,7 +108,7 @@ FAULTS = ("plain", "hot pixels", "vignetting", "zero padding", "black border", "
 
 
 LIGHTS = ("ramp x 2", "ramp x 3", "depth x 2", "depth x 4")
-HARD_LIGHTS = ("depth x 10", "depth x 28", "stripes", "two fields", "four fields", "tissue x 4")
+HARD_LIGHTS = ("depth x 10", "depth x 28", "stripes", "tissue x 4")
 
 
 def _uneven_light(camera: str, light: str) -> NDArray[np.uint16]:
@@ -125,15 +125,13 @@ def _uneven_light(camera: str, light: str) -> NDArray[np.uint16]:
 
 def _hard_light(camera: str, light: str) -> NDArray[np.uint16]:
     """Return a tile of nothing under light that makes levels look clear."""
-    z, y, x = (axis / axis.max() for axis in _axes())
+    z, y, _ = (axis / axis.max() for axis in _axes())
     sees, rng = CAMERAS[camera], _rng(f"hard light {camera} {light}")
     most = min(100.0, 0.25 * sees.largest / sees.gain)  # photons
     photons = {
         "depth x 10": most * 10.0**-z,
         "depth x 28": 2 * most * 28.0**-z,
         "stripes": most * (1 + 0.1 * np.sin(46 * y)),
-        "two fields": most / 2 * np.where(x < 0.5, 1.0, 1.6),
-        "four fields": most / 2 * np.where(x < 0.5, 1.0, 1.3) * np.where(y < 0.4, 1.0, 1.25),
         "tissue x 4": most * 4.0**-z * np.exp(0.12 * _texture(rng, 6.0)),
     }[light]
     return sees.shoot(np.broadcast_to(photons, SHAPE).astype(np.float64), rng)
@@ -154,6 +152,26 @@ def _slab() -> tuple[NDArray[np.uint16], Mask]:
     mask = np.abs(z - 6.7 - 0.4 * np.sin(x / 4) - 0.4 * np.cos(y / 5)) < 3.5
     height = 60 * np.exp(0.2 * _texture(rng, 6.0))
     return CAMERAS["scmos"].shoot(_seen(mask, height, 4.0), rng), mask
+
+
+def _counted(photons: float) -> NDArray[np.uint8]:
+    """Return an empty tile of a detector that counts photons, most voxels without one."""
+    return _rng(f"counted {photons}").poisson(photons, SHAPE).astype(np.uint8)
+
+
+def _clipped(offset: float) -> NDArray[np.uint8]:
+    """Return an empty tile of a detector whose offset is set so low that most of it reads 0."""
+    noise = _rng(f"clipped {offset}").normal(offset, 12.0, SHAPE)
+    return np.clip(np.rint(noise), 0, 255).astype(np.uint8)
+
+
+def _straight_edge(degrees: float) -> tuple[NDArray[np.uint16], Mask]:
+    """A piece of tissue whose edge was cut straight, nearly along an axis."""
+    rng = _rng(f"edge {degrees}")
+    z, y, x = _axes()
+    mask = np.broadcast_to(x < 11 + np.tan(np.radians(degrees)) * (y - 11) + 0 * z, SHAPE).copy()
+    height = 60 * np.exp(0.2 * _texture(rng, 6.0))
+    return CAMERAS["scmos"].shoot(_seen(mask, height, 6.0), rng), mask
 
 
 def _inside_tissue(camera: str, sigma: float) -> NDArray[np.uint16]:
@@ -283,6 +301,8 @@ def made_cases() -> Iterator[Case]:
         ("shells", _shells, False),
         ("bodies in depth", _bodies_in_depth, True),
         ("slab", _slab, True),
+        ("straight edge", lambda: _straight_edge(0.0), True),
+        ("edge at 5 degrees", lambda: _straight_edge(5.0), True),
     ):
         yield _case_of(name, make, held_out)
 
@@ -306,7 +326,11 @@ def family_cases() -> Iterator[Case]:
 
 def empty_cases() -> Iterator[Case]:
     """Yield the volumes of nothing; every other one is held out."""
-    makers: dict[str, Callable[[], NDArray[np.uint16]]] = {}
+    makers: dict[str, Callable[[], NDArray[Any]]] = {
+        f"empty, counted photons, {photons:g}": partial(_counted, photons)
+        for photons in (0.05, 0.3, 3.0)
+    }
+    makers |= {f"empty, clipped at {-offset:g}": partial(_clipped, offset) for offset in (-10, -15)}
     for camera in CAMERAS:
         makers |= {f"empty, {camera}, {one}": partial(_empty, camera, one) for one in FAULTS}
         makers |= {f"empty, {camera}, {one}": partial(_uneven_light, camera, one) for one in LIGHTS}

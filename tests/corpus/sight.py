@@ -74,6 +74,7 @@ def look_at(case: Case) -> Sight:
                 np.ascontiguousarray(field[window]),
                 padding[window],
                 own,
+                voxels=voxels[window],
                 spacing_um=case.spacing_um,
                 counting=counting,
                 start=tuple(side.start for side in place),

@@ -5,6 +5,7 @@ each tile's sums, which add up to the channel's levels. Solids: what lies above 
 which decides how the surface is cleaned. The result, survey.json, steers the units.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -66,6 +67,8 @@ from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import make_appearance
 from stereocell.transfer.windows import parse_window
 
+KEPT_OF_MASK = 0.9  # share of a mask's voxels: what loses more to smoothing is said
+
 
 @dataclass(frozen=True, slots=True)
 class _Result:
@@ -84,7 +87,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             pieces = ", ".join(holder.pieces)
             console.print(f"units: {name}: a table or holder is left out: {pieces}", markup=False)
     evidence = _evidence(out_folder, plan, engine, windows)
-    survey = {}
+    survey, inside = {}, {}
     found = {
         channel.id: find_level(
             plan,
@@ -109,6 +112,8 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             for rung in solids[: len(one.rungs)]
         ]
         chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
+        if of_rungs:
+            inside[channel.id] = sum(one["voxels"] for one in of_rungs[chosen].values())
         if one.is_fixed and of_rungs:
             one = hold_to_solids(plan, one, of_rungs[chosen])
         iso = {
@@ -136,10 +141,25 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
         look, mask = survey[channel.id].appearance, windows[channel.id].counting.mask
         if mask is not None and found[channel.id].is_fixed and given_level(plan, channel) is None:
             told = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
+            told += _loss(plan, survey[channel.id], inside[channel.id])
             console.print(f"units: {look.name}: {told}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey
+
+
+def _loss(plan: Plan, survey: ChannelSurvey, inside: int) -> str:
+    """Return what is said of a mask that smoothing takes much of; empty: it does not."""
+    counts = np.asarray(survey.statistics.histogram)
+    share = counts[-1] / max(1, counts.sum())
+    left = inside / math.prod(plan.region.shape) / share if share > 0 else 1.0
+    if left >= KEPT_OF_MASK:
+        return ""
+    smoothing = float(plan.settings.surface.smoothing_um)
+    return (
+        f"; {left:.0%} of it is left by a median of 3 x 3 voxels and a Gaussian of {smoothing:g} "
+        "um (surface.smoothing_um)"
+    )
 
 
 def _of_channel(

@@ -68,18 +68,19 @@ def find_level(
         options=options if criterion in CRITERIA else None,
         subtracts=None if given is None else given[1],
     )
+    mask, half = window.counting.mask, None
+    if mask is not None and criterion not in CRITERIA:
+        # blurred, a mask has its own edge half-way; peaks of its blur are no levels
+        half = levels.judge(sum(mask) / 2)
+        levels = replace(levels, ladder=(half,) if levels.has_both_sides(half.value) else ())
     if given is not None:
         value, subtracts = given
         # where there is no background to be above, nothing can be said of such a level
         rated = levels.judge(value) if subtracts == levels.subtracts else value
         return Found(window, levels, evidence, (rated,), subtracts, "", is_fixed=True)
-    mask = window.counting.mask
-    if mask is not None and criterion == LADDER:
-        # blurred by half a voxel, a mask has its own edge half-way; peaks of its blur are no levels
-        half = levels.judge(sum(mask) / 2)
-        levels = replace(levels, ladder=(half,))
-        if options.rung == APART or RUNGS[channel.rung or options.rung] == 0:
-            return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
+    is_outer = options.rung == APART or RUNGS[channel.rung or options.rung] == 0
+    if half is not None and criterion == LADDER and is_outer:
+        return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     clear = levels.clear
     doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
     if criterion == ADAPTIVE and clear:
@@ -140,13 +141,29 @@ def hold_to_solids(plan: Plan, found: Found, solids: Solids) -> Found:
     inside = sum(one["voxels"] for one in solids.values())
     if 0 < inside < sum(math.prod(tile.box.shape) for tile in plan.tiles):
         return found
-    level = found.rungs[0]
-    value = level.value if isinstance(level, Level) else level
-    side = "above" if inside else "below"
-    above = " above the background" if found.subtracts else ""
-    return replace(
-        found, rungs=(), doubt=f"no surface: all voxels lie {side} the level {value:.5g}{above}"
+    return _without_surface(found, "above" if inside else "below")
+
+
+def hold_to_histogram(found: Found) -> Found:
+    """Return the same before there are solids: exact but for a few hot voxels."""
+    if not found.is_fixed or not found.rungs or found.levels is None:
+        return found
+    value = _value_of(found.rungs[0])
+    if found.subtracts != found.levels.subtracts or found.levels.has_both_sides(value):
+        return found
+    return _without_surface(
+        found, "above" if found.levels.histogram.above(value).total else "below"
     )
+
+
+def _without_surface(found: Found, side: str) -> Found:
+    above = " above the background" if found.subtracts else ""
+    told = f"no surface: all voxels lie {side} the level {_value_of(found.rungs[0]):.5g}{above}"
+    return replace(found, rungs=(), doubt=told)
+
+
+def _value_of(level: Level | float) -> float:
+    return level.value if isinstance(level, Level) else level
 
 
 def level_of_tile(
@@ -159,8 +176,7 @@ def level_of_tile(
         under = np.broadcast_to(found.background.at(tile.box), tile.box.shape)
         below = float(np.mean(under, dtype=np.float64))
     if found.levels is None or not isinstance(level, Level):
-        value = level.value if isinstance(level, Level) else level
-        return TileIso(value, below, None, files)
+        return TileIso(_value_of(level), below, None, files)
     tile_evidence, value = found.evidence[tile.id], level.value
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:

@@ -42,12 +42,14 @@ def find_other_levels(
     subtracts: bool,
     taken: float | None,
     threshold: float | None,
+    ends: tuple[float, float] | None,
 ) -> list[OtherLevel]:
     """Return the next-best levels, at most MOST, best first; none for a channel without a ladder.
 
     ladder     all levels that were found; `subtracts`: above the background
     taken      the surface's level; None: there is no surface
     threshold  the adaptive one, voxel value; None: there is none
+    ends       of the values that the ladder was found in: beyond them a level parts nothing
 
     First the ladder's other rungs, clear ones before doubtful ones, then the adaptive threshold,
     then levels a little lower and higher; last the rungs that hardly anything speaks for.
@@ -68,12 +70,19 @@ def find_other_levels(
     contrast = max(level.contrast for level in ladder)
     chosen: list[OtherLevel] = []
     for level in levels:
+        if ends and level.above == subtracts and not ends[0] < level.value < ends[1]:
+            continue
         near = [one.value for one in chosen if one.above == level.above]
         if taken is not None and level.above == subtracts:
             near.append(taken)
         if all(abs(level.value - value) > _ALIKE * contrast for value in near):
             chosen.append(level)
     return chosen[:MOST]
+
+
+def ends_of(values: Sequence[float]) -> tuple[float, float] | None:
+    """Return the least and the largest of a channel's values, rising; None without any."""
+    return (values[0], values[-1]) if len(values) > 1 else None
 
 
 def take(plan: Plan, channel: Channel, value: float, *, above: bool) -> str:

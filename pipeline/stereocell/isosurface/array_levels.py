@@ -71,7 +71,13 @@ def find_array_levels(
     counting = Counting(scale, scale_above, darkest)
     z, y, x = (slice(0, n) for n in voxels.shape)
     evidence = gather_evidence(
-        field, padding, (z, y, x), spacing_um=spacing, counting=counting, background=under
+        field,
+        padding,
+        (z, y, x),
+        voxels=voxels,
+        spacing_um=spacing,
+        counting=counting,
+        background=under,
     )
     levels = find_levels([evidence], counting=counting, finest_um=min(spacing), modality=modality)
     if not levels.subtracts or under is None:

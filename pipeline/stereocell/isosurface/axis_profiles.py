@@ -1,11 +1,12 @@
 """How much of what varies in a channel varies along the axes alone, as light does and no body.
 
-Light that falls off with depth, a ramp, vignetting and fields of view of different brightness side
-by side are sums of a function of z, one of y and one of x, nearly. Bodies are not: in the volumes
-of `make bench-iso` their means along the axes explain at most .71 of the variance (a straight edge
-of tissue; of all others at most .45), and .86 to 1.0 in fields of nothing, and of nothing but
+Light that falls off with depth, a ramp, stripes and vignetting are nearly sums of a function of z,
+one of y and one of x. Bodies are not: in the volumes of `make bench-iso` their means along the axes
+explain at most .45 of the variance, and .86 to 1.0 in fields of nothing, and of nothing but
 texture, under such light. A slab of tissue between two dark ends does vary along z alone, but up
-and down.
+and down; an edge of tissue along an axis does as well, but lies between two peaks (a valley of .6
+and deeper in 20 such volumes; light makes none). Fields of different brightness side by side look
+just as such an edge does: they are not told from one.
 """
 
 from collections.abc import Sequence

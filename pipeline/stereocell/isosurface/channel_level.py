@@ -49,6 +49,7 @@ from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges
 from stereocell.isosurface.level import MOST_RISE, Level, clear_of
 from stereocell.isosurface.level_evidence import Counting, Sums, TileEvidence, noise_edges
 from stereocell.isosurface.level_histogram import DIP, INSIDE, OUTSIDE, LevelHistogram, Scale
+from stereocell.isosurface.neighbours import LEAST_KINSHIP, kinship
 from stereocell.isosurface.options import IsoValueOptions
 
 LEAST_CONTRAST = 0.1  # share of the values' range: what a valley's level parts is more than this
@@ -89,6 +90,7 @@ class ChannelLevels:
     sums         of the field, or of the field above the background
     histogram    of the same
     light        share of its variance, 0..1, that lies along the axes alone; see axis_profiles.py
+    kinship      correlation of neighbouring voxels as read; see neighbours.py
     """
 
     ladder: tuple[Level, ...]
@@ -99,11 +101,29 @@ class ChannelLevels:
     sums: Sums
     histogram: LevelHistogram
     light: float
+    kinship: float
 
     @property
     def clear(self) -> tuple[Level, ...]:
         """The clear ones, outermost first: the rungs of the ladder that have surfaces."""
-        return clear_of(self.ladder) if self.light <= MOST_LIGHT else ()
+        return () if self._nothing else clear_of(self.ladder)
+
+    @property
+    def _nothing(self) -> str:
+        """The reason why nothing is there, however clear levels look; empty: something may be."""
+        if self.kinship < LEAST_KINSHIP:
+            return (
+                "neighbouring voxels have nothing to do with one another, as in noise: their "
+                f"correlation is {self.kinship:.3f}, expected at least {LEAST_KINSHIP:g}"
+            )
+        first = next(iter(clear_of(self.ladder)), None)
+        # a straight edge of tissue is a step along an axis too, but between two peaks
+        if self.light > MOST_LIGHT and first is not None and first.dip > DIP:
+            return (
+                f"{self.light:.0%} of what varies lies along the axes alone, and in no valley, as "
+                f"light does and no body, expected at most {MOST_LIGHT:.0%}"
+            )
+        return ""
 
     @property
     def doubt(self) -> str:
@@ -112,11 +132,8 @@ class ChannelLevels:
             return ""
         if not self.ladder:
             return "nothing stands out: no level has more than a few voxels above it"
-        if clear_of(self.ladder):
-            return (
-                f"{self.light:.0%} of what varies lies along the axes alone, as light does and "
-                f"no body, expected at most {MOST_LIGHT:.0%}"
-            )
+        if self._nothing:
+            return self._nothing
         return max(self.ladder, key=lambda level: level.confidence).doubt
 
     def judge(self, value: float) -> Level:
@@ -124,6 +141,10 @@ class ChannelLevels:
         valleys = self._sight.histogram.find_valleys(self.noise)
         dips = [valley.dip for valley in valleys if valley.low <= value <= valley.high]
         return self._sight.judge(value, self._sight.histogram, min(dips, default=1.0))
+
+    def has_both_sides(self, value: float) -> bool:
+        """Whether voxels lie above a level and below it, but for a few hot ones."""
+        return 0 < self.histogram.above(value).total < self.histogram.total
 
     def judge_tile(self, level: Level, tile: TileEvidence) -> Level | None:
         """Return a level with what speaks for it in one tile; None: it parts nothing there."""
@@ -211,8 +232,17 @@ def find_levels(
             [pair[0] for pair in both],
             variance=sight.histogram.variance - noise**2,
         )
+    beside = [tile.neighbours for tile in tiles if tile.neighbours is not None]
     found = ChannelLevels(
-        ladder, is_raised, has_padding, noise, finest_um, sight.sums, sight.histogram, light
+        ladder,
+        is_raised,
+        has_padding,
+        noise,
+        finest_um,
+        sight.sums,
+        sight.histogram,
+        light,
+        kinship(beside),
     )
     return found if options is None else _by_edges(found, tiles, options)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import floor
 
 from stereocell.isosurface.level_histogram import DIP
 
@@ -91,8 +92,9 @@ class Level:
             )
         if self.rise < LEAST_RISE:
             return (
-                f"values rise evenly there: at {self.value:.5g} the slope is {self.rise:.2f} times "
-                f"that beside it, expected at least {LEAST_RISE:g}"
+                f"values rise evenly there: at {self.value:.5g} the slope is "
+                f"{floor(100 * self.rise) / 100:.2f} times that beside it, expected at least "
+                f"{LEAST_RISE:g}"
             )
         if self.dip <= DIP or self.separation >= LEAST_SEPARATION:
             return ""

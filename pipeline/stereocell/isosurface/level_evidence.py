@@ -16,6 +16,7 @@ from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import EdgeSums, gather_edges
 from stereocell.isosurface.level_histogram import BINS, Scale
+from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import Criterion
 
 MOST_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
@@ -55,6 +56,7 @@ class TileEvidence:
     above        of the field above the background; None: the channel has none
     differences  int64 (NOISE_BINS,), how often the field differs by so much LAG voxels further
     profiles     of the field along the axes, and of that above the background
+    neighbours   of the voxels as read
     edges        of the field, and of that above the background, where a criterion scores edges
     """
 
@@ -63,6 +65,7 @@ class TileEvidence:
     above: Sums | None
     differences: NDArray[np.int64]
     profiles: tuple[Profiles, Profiles | None] | None = None
+    neighbours: Neighbours | None = None
     edges: tuple[EdgeSums, EdgeSums | None] | None = None
 
     def __add__(self, other: "TileEvidence") -> "TileEvidence":
@@ -128,6 +131,7 @@ def gather_evidence(
     padding: NDArray[np.bool_],
     own: Slices,
     *,
+    voxels: NDArray[Any],
     spacing_um: tuple[float, float, float],
     counting: Counting,
     start: tuple[int, int, int] = (0, 0, 0),
@@ -140,6 +144,7 @@ def gather_evidence(
                  more each way, where the data has them
     padding      bool, the same window, as `find_padding` returns it
     own          the tile in the window
+    voxels       (z, y, x), as read, the same window
     spacing_um   (z, y, x)
     start        voxels (z, y, x) of the dataset at which the tile begins
     background   float32, broadcasts over the window, voxel values; None: none is tried
@@ -162,7 +167,12 @@ def gather_evidence(
     if background is not None and counting.scale_above is not None:
         raised = Profiles.of(field[own] - background[own], kept, start)
     profiles = Profiles.of(field[own], kept, start), raised
-    found = replace(reduce(TileEvidence.__add__, parts), profiles=profiles)
+    scale = counting.scale.low, counting.scale.middle, counting.scale.high
+    found = replace(
+        reduce(TileEvidence.__add__, parts),
+        profiles=profiles,
+        neighbours=Neighbours.of(voxels, padding, own, scale),
+    )
     if criterion is None:
         return found
     edges = _edges(field, padding, own, spacing_um, counting.scale, criterion)

@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from stereocell.building.channel_survey import evidence_task, statistics_task
-from stereocell.building.level_choice import Found, Solids, choose_rung, find_level, given_level
+from stereocell.building.level_choice import (
+    Found,
+    Solids,
+    choose_rung,
+    find_level,
+    given_level,
+    hold_to_histogram,
+)
 from stereocell.building.open_source import open_source, source_of
-from stereocell.building.other_levels import find_other_levels, take
+from stereocell.building.other_levels import ends_of, find_other_levels, take
 from stereocell.building.phases import settle
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.settings import Settings
@@ -99,7 +106,7 @@ def preview(
         one.id: measure_evidence(evidence_task(plan, one, channel=channel, window=window))
         for one in tiles
     }
-    found = find_level(plan, channel, window, evidence)
+    found = hold_to_histogram(find_level(plan, channel, window, evidence))
     volume = open_source(source_of(plan, channel)).read(channel.index, tile.box, plan.level)
     field = denoise(volume, float(plan.settings.surface.smoothing_um))
     under = np.zeros((1, 1, 1), np.float32)
@@ -248,6 +255,7 @@ def _candidates(
         subtracts=False if found.levels is None else found.levels.subtracts,
         taken=value,
         threshold=None if threshold is None or found.doubt else threshold.value,
+        ends=None if found.levels is None else ends_of(found.levels.curve()[0]),
     ):
         candidates.append(
             candidate(other.name, other.value, other.above, other.confidence, other.setting, False)

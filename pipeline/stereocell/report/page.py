@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from stereocell.building.level_choice import given_level
-from stereocell.building.other_levels import OtherLevel, find_other_levels
+from stereocell.building.other_levels import OtherLevel, ends_of, find_other_levels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Channel, Plan
 from stereocell.building.survey_file import ChannelSurvey
@@ -257,6 +257,7 @@ def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[s
             subtracts=found.statistics.background is not None,
             taken=None if found.appearance.level is None else found.appearance.level.iso,
             threshold=found.appearance.threshold,
+            ends=None if found.curve is None else ends_of(found.curve.values),
         )
     ]
 

@@ -23,6 +23,7 @@ from stereocell.isosurface.level_evidence import (
     find_padding,
     gather_evidence,
 )
+from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import CRITERIA
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
@@ -65,6 +66,7 @@ def measure_evidence(task: EvidenceTask) -> TileEvidence:
         denoise(volume, task.smoothing_um),
         find_padding(volume.voxels, task.counting.darkest, reach),
         (inner_z, inner_y, inner_x),
+        voxels=volume.voxels,
         spacing_um=spacing,
         counting=task.counting,
         start=task.box.start,
@@ -97,6 +99,12 @@ def evidence_to_json(evidence: TileEvidence) -> dict[str, Any]:
             }
             for one in evidence.profiles or (None, None)
         ],
+        "neighbours": None
+        if evidence.neighbours is None
+        else {
+            "voxels": _pack(evidence.neighbours.voxels),
+            "pairs": _pack(evidence.neighbours.pairs),
+        },
         "edges": None
         if edges is None
         else [
@@ -120,6 +128,7 @@ def evidence_from_json(content: Mapping[str, Any]) -> TileEvidence:
         None if content["above"] is None else _sums_from_json(content["above"]),
         _unpack(content["differences"]).astype(np.int64),
         None if along is None else (along, along_above),
+        _neighbours_from_json(content["neighbours"]),
         None if plain is None else (plain, above),
     )
 
@@ -131,6 +140,12 @@ def _profiles_from_json(content: Mapping[str, Any] | None) -> Profiles | None:
     sz, sy, sx = (_unpack(part) for part in content["sums"])
     nz, ny, nx = (_unpack(part).astype(np.int64) for part in content["counts"])
     return Profiles((z, y, x), (sz, sy, sx), (nz, ny, nx))
+
+
+def _neighbours_from_json(content: Mapping[str, str] | None) -> Neighbours | None:
+    if content is None:
+        return None
+    return Neighbours(_unpack(content["voxels"]), _unpack(content["pairs"]).reshape(2, 2))
 
 
 def _sums_to_json(sums: Sums) -> dict[str, str]:

@@ -1,0 +1,61 @@
+"""Correlation of neighbours, against numpy's own, whatever the tiles; padding takes no part."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from stereocell.isosurface.neighbours import LEAST_KINSHIP, Neighbours, kinship
+
+SHAPE = (6, 40, 50)
+WIDE = (-1e9, 3.0, 1e9)
+WHOLE = tuple(slice(0, n) for n in SHAPE)
+RNG = np.random.default_rng(8)
+NOISE = RNG.normal(5, 2, SHAPE)
+BLURRED = ndimage.gaussian_filter(NOISE, (0, 1, 2))
+
+
+def _by_numpy(voxels: np.ndarray) -> float:
+    along_y = np.corrcoef(voxels[:, 1:].ravel(), voxels[:, :-1].ravel())[0, 1]
+    along_x = np.corrcoef(voxels[..., 1:].ravel(), voxels[..., :-1].ravel())[0, 1]
+    return min(along_y, along_x)
+
+
+@pytest.mark.parametrize("voxels", [NOISE, BLURRED], ids=["noise", "blurred"])
+def test_correlation_is_numpy_s_and_the_same_in_tiles(voxels: np.ndarray) -> None:
+    none = np.zeros(SHAPE, bool)
+    whole = kinship([Neighbours.of(voxels, none, WHOLE, WIDE)])
+    assert whole == pytest.approx(_by_numpy(voxels), abs=0.02)  # its means leave out an edge
+    tiles = [
+        Neighbours.of(voxels, none, (slice(0, 6), rows, columns), WIDE)
+        for rows in (slice(0, 17), slice(17, 40))
+        for columns in (slice(0, 31), slice(31, 50))
+    ]
+    assert kinship(tiles) == pytest.approx(whole, rel=1e-9)
+
+
+def test_noise_is_told_from_the_least_blur() -> None:
+    none, shape = np.zeros((20, 200, 200), bool), (20, 200, 200)
+    own = tuple(slice(0, n) for n in shape)
+    noise = np.random.default_rng(9).poisson(0.1, shape).astype(np.uint8)
+    assert abs(kinship([Neighbours.of(noise, none, own, (0.0, 0.0, 10.0))])) < LEAST_KINSHIP
+    seen = noise + ndimage.gaussian_filter(noise.astype(np.float32), 0.6)
+    assert kinship([Neighbours.of(seen, none, own, (0.0, 0.0, 10.0))]) > 10 * LEAST_KINSHIP
+
+
+def test_padding_and_hot_voxels_beyond_the_scale_take_no_part() -> None:
+    voxels, padding = BLURRED.copy(), np.zeros(SHAPE, bool)
+    padding[:, :, 20:30] = True
+    voxels[padding] = 1e6
+    halves = np.delete(BLURRED, slice(20, 30), axis=2)
+    found = kinship([Neighbours.of(voxels, padding, WHOLE, WIDE)])
+    assert found == pytest.approx(_by_numpy(halves), abs=0.05)
+    hot = BLURRED.copy()
+    hot[3, 5, 7] = 1e9
+    same = Neighbours.of(hot, np.zeros(SHAPE, bool), WHOLE, (0.0, 5.0, 10.0))
+    assert kinship([same]) == pytest.approx(_by_numpy(BLURRED), abs=0.05)
+
+
+def test_what_is_not_known_says_nothing_against() -> None:
+    flat = Neighbours.of(np.full(SHAPE, 7), np.zeros(SHAPE, bool), WHOLE, WIDE)
+    assert kinship([flat]) == kinship([]) == 1.0
+    assert kinship([Neighbours.of(NOISE, np.ones(SHAPE, bool), WHOLE, WIDE)]) == 1.0
