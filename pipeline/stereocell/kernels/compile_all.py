@@ -42,7 +42,8 @@ def compile_all() -> None:
     measure_triangles(at, triangles)
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
-    flip_edges(at, collapse(at, triangles, flags, bits, errors, 3.0, 0.9), bits, errors, 0.9)
+    left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
+    flip_edges(at, left, flags, bits, errors, 0.9)
     thin_rim(at, triangles, np.zeros(4, np.int8), flags, 0.1, 0.9)
 
     low, high = bound_boxes(at, triangles)
