@@ -51,7 +51,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-unit bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -256,6 +256,9 @@ bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head ph
 
 bench-tissue: setup ## Tissue classes and multi-Otsu on the head phantom
 	$(BIN)/python tests/bench/tissue.py
+
+bench-unit: setup ## A whole unit, and meshes of the same solids by the paper's chain, VTK and zmesh
+	$(BIN)/python tests/bench/unit.py
 
 bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
 	$(BIN)/python tests/bench/wrap.py

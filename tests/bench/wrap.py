@@ -61,7 +61,13 @@ class Input:
 
 def inputs() -> Iterator[Input]:
     """Yield what is wrapped, one after another."""
-    size = tuple(n * h for n, h in zip(SHAPE, SPACING_UM, strict=True))
+    for name, volume, grid, error in volumes(SHAPE):
+        yield prepare(name, volume, grid, error)
+
+
+def volumes(shape: tuple[int, int, int]) -> Iterator[tuple[str, Volume, float, float]]:
+    """Yield names and voxels, with grid and error as of `Input`."""
+    size = tuple(n * h for n, h in zip(shape, SPACING_UM, strict=True))
     for name, stain, seed, grid, error in (
         ("nuclei, seed 0", 0, 0, 0.42, 0.1),
         ("nuclei, seed 1", 0, 1, 0.42, 0.1),
@@ -70,8 +76,8 @@ def inputs() -> Iterator[Input]:
         ("vessels", 2, 0, 0.56, 0.1),
     ):
         tissue = grow_tissue((size[0], size[1], size[2]), seed, 1.0)
-        voxels = record(tissue, stain, box=Box((0, 0, 0), SHAPE), seed=seed)
-        yield prepare(f"{name} ({STAINS[stain].name})", Volume(voxels, SPACING_UM), grid, error)
+        voxels = record(tissue, stain, box=Box((0, 0, 0), shape), seed=seed)
+        yield f"{name} ({STAINS[stain].name})", Volume(voxels, SPACING_UM), grid, error
     folder = os.environ.get("STEREOCELL_DATA", "")
     file = Path(folder) / "brain_cells_2ch" / "brain_cells_2ch.ome.tif"
     if not folder or not file.exists():
@@ -79,7 +85,7 @@ def inputs() -> Iterator[Input]:
         return
     source = read.open(str(file))
     volume = source.read(0, Box((0, 0, 0), source.levels[0].shape), 0)
-    yield prepare("brain cells, real", volume, 0.42, 0.15)
+    yield "brain cells, real", volume, 0.42, 0.15
 
 
 def prepare(name: str, volume: Volume, grid: float, error: float) -> Input:
@@ -171,7 +177,7 @@ def build_chain(folder: Path) -> Path | None:
     """Return the compiled seedchain; None, and says why, where it can't be built."""
     compiler = shutil.which("g++")
     if compiler is None:
-        print("bench-wrap: skipped: no g++ to build seedchain.cpp with")
+        print("the paper's chain is skipped: no g++ to build seedchain.cpp with")
         return None
     binary, source = folder / "seedchain", Path(__file__).with_name("seedchain.cpp")
     flags = ["-O3", "-DNDEBUG", "-march=native", "-std=c++17"]
@@ -180,7 +186,8 @@ def build_chain(folder: Path) -> Path | None:
     )
     if made.returncode:
         reason = next((line for line in made.stderr.splitlines() if "error" in line), "g++ failed")
-        print(f"bench-wrap: skipped: {reason.strip()} (CGAL 5.5 or newer: apt install libcgal-dev)")
+        print(f"the paper's chain is skipped: {reason.strip()}")
+        print("  it needs CGAL 5.5 or newer: apt install libcgal-dev")
         return None
     return binary
 

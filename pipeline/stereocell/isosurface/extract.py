@@ -18,6 +18,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
+from stereocell.kernels.gradients import move_off_zero
 from stereocell.kernels.slopes import find_downhill
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
@@ -100,7 +101,7 @@ def _snapped(
     cuts  axis and place of the planes where tiles meet; those beside the box are left out
     """
     values = distance[tuple(slice(*ends) for ends in box)].copy()
-    _move_off_zero(values, snap)
+    move_off_zero(values, snap)
     for axis, at in cuts:
         low, high = box[axis]
         if low <= at < high:
@@ -108,11 +109,6 @@ def _snapped(
             least = _least_on_plane(distance, box, axis, at, snap)
             np.copyto(plane, np.where(plane > 0, least, -least), where=np.abs(plane) < least)
     return values
-
-
-def _move_off_zero(values: NDArray[np.float32], least: np.float32) -> None:
-    near = (values < least) & (values > -least)
-    np.copyto(values, np.where(values > 0, least, -least), where=near)
 
 
 def _least_on_plane(
@@ -129,7 +125,7 @@ def _least_on_plane(
     wide = [slice(max(low - 1, 0), high + 1) for low, high in box]
     wide[axis] = slice(at, at + 1)
     plane = distance[tuple(wide)].copy()
-    _move_off_zero(plane, snap)
+    move_off_zero(plane, snap)
     size, inside = np.abs(plane), plane > 0
     least = np.zeros_like(size)
     ratio = np.float32(RIM_SNAP / (1 - RIM_SNAP))

@@ -7,7 +7,7 @@ from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
 from stereocell.kernels.flips import flip_edges
-from stereocell.kernels.gradients import divide_by_slopes, measure_slopes
+from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
 from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
 from stereocell.kernels.half_edges import (
     count_fans,
@@ -42,7 +42,8 @@ def compile_all() -> None:
     measure_triangles(at, triangles)
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
-    flip_edges(at, collapse(at, triangles, flags, bits, errors, 3.0, 0.9), bits, errors, 0.9)
+    left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
+    flip_edges(at, left, flags, bits, errors, 0.9)
     thin_rim(at, triangles, np.zeros(4, np.int8), flags, 0.1, 0.9)
 
     low, high = bound_boxes(at, triangles)
@@ -63,6 +64,7 @@ def compile_all() -> None:
     smooth_in_place(voxels, weights, weights, weights, True)
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
+    move_off_zero(voxels, np.float32(0.01))
     close_gaps(voxels, steps, 1.0, 1.0)
     mask = voxels > 0
     first_run, start, stop = find_runs(mask)

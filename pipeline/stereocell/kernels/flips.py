@@ -74,12 +74,18 @@ def _pair(twins: Ints, is_due: NDArray[np.bool_], h: int, g: int) -> None:
 
 @kernel
 def flip_edges(
-    at: Points, triangles: Ints, planes: NDArray[np.uint8], errors: Points, sharp: float
+    at: Points,
+    triangles: Ints,
+    locked: NDArray[np.bool_],
+    planes: NDArray[np.uint8],
+    errors: Points,
+    sharp: float,
 ) -> int:
     """Flip edges of sharp triangles, in place; return how many.
 
     at         float64 (n, 3)
     triangles  int32 (m, 3); boundary edges stay
+    locked     bool (n,), vertices whose edges, and those opposite to them, stay
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in
     errors     float64 (n,), largest distance by which the surface moves at a vertex
     sharp      cosine of the angle below which a triangle is sharp
@@ -110,6 +116,8 @@ def flip_edges(
                 u, v = corner[h], corner[following(h)]
                 a, b = corner[preceding(h)], corner[preceding(g)]
                 if a == b or valence[u] <= 3 or valence[v] <= 3 or valence[a] < 0:
+                    continue
+                if locked[u] or locked[v] or locked[a] or locked[b]:
                     continue
                 if planes[a] & planes[b] & (planes[u] | planes[v]):
                     continue

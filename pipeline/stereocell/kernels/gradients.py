@@ -1,4 +1,4 @@
-"""Slopes of a field by central differences, one-sided at the ends, and what is divided by them."""
+"""Slopes of a field by central differences, one-sided at the ends, and distances made of them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,3 +73,14 @@ def divide_by_slopes(field: Field, steps: Row, least: float, limit: float) -> No
         before, plane = plane, before
         if z + 1 < depth:
             plane[:] = field[z + 1]
+
+
+@kernel
+def move_off_zero(values: Field, least: np.float32) -> None:
+    """Give values (z, y, x) nearer to zero than that its size, in place; zero becomes negative."""
+    for z in range(values.shape[0]):
+        for y in range(values.shape[1]):
+            row = values[z, y]
+            for x in range(len(row)):
+                if -least < row[x] < least:
+                    row[x] = least if row[x] > 0 else -least

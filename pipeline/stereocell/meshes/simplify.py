@@ -85,7 +85,7 @@ def simplify_part(
         STRAY,
         sharpest,
     )
-    flip_edges(at, left, bits, errors[used], sharp)
+    flip_edges(at, left, locked[used], bits, errors[used], sharp)
     return used[left].astype(np.uint32)
 
 

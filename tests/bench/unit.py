@@ -1,0 +1,205 @@
+"""What `make bench-unit` prints: a whole unit, and meshes of the same solids by other programs.
+
+Ours: the whole unit (8-bit volume, four sound levels, distances, occlusion) from voxels, and the
+first paper's part alone (iso-surface, filter, closed wrap, simplification). Peers: the paper's
+chain (seedchain.cpp, CGAL), VTK's FlyingEdges with pyvista's decimation, and zmesh (which igneous
+meshes with) on the same solids as labels; those that aren't installed are skipped by a line. All
+start from the smoothed volume but the whole unit, in one process, by turns, medians of --rounds.
+Peers are asked for as many faces as our part has; of the unit lod0 is measured, which is finer.
+Bytes are those of our .glb encoder, for all.
+"""
+
+import argparse
+import importlib.util
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import cc3d
+import numpy as np
+import pyvista as pv
+from wrap import (
+    ALPHA,
+    SAMPLES,
+    SHAPE,
+    Input,
+    build_chain,
+    chain,
+    iso_surface,
+    kept,
+    prepare,
+    volumes,
+    wrap,
+)
+
+from stereocell.building.settings import Settings
+from stereocell.building.unit import UnitInput, build_unit
+from stereocell.formats.gltf import Material, choose_step, encode_glb
+from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_rules import choose_repair, sum_components
+from stereocell.meshes.distance import Nearest, measure_spread
+from stereocell.meshes.validity import find_defects
+from stereocell.model.lattice import Lattice
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+
+Run = Callable[[], tuple[Mesh, float]]  # a mesh, and the seconds that it took
+ROUNDS = 3
+DECIMATED = 0.98  # most of the faces that decimation is asked to remove
+
+
+def whole_unit(volume: Volume, given: Input) -> Mesh:
+    """Return lod0 of a unit that is a tile by itself, with the settings that a build takes."""
+    settings = Settings()
+    surface = settings.surface.resolved(volume.spacing_um)
+    settings = replace(settings, surface=surface)
+    box = Box((0, 0, 0), volume.voxels.shape)
+    most = RepairOptions(
+        alpha_um=float(surface.max_alpha_um),
+        min_diagonal_um=float(surface.min_diagonal_um),
+        max_cavity_um=float(surface.max_cavity_um),
+        max_fragment_um=float(surface.max_fragment_um),
+    )
+    sums = sum_components(
+        given.field > np.float32(given.iso), volume.spacing_um, most.min_diagonal_um
+    )
+    unit = build_unit(
+        volume,
+        UnitInput(
+            lattice=Lattice.of_whole(box, volume.spacing_um),
+            iso=LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), given.iso)),
+            background=None,
+            repair=choose_repair(
+                [asdict(sums)], most, surface=surface, spacing_um=volume.spacing_um
+            ),
+            step=(1, 1, 1),
+            intensity_window=(float(volume.voxels.min()), float(volume.voxels.max())),
+            settings=settings,
+        ),
+    )
+    return unit.lods[0].mesh
+
+
+def decimated(given: Input, faces: int) -> Mesh:
+    """Return what FlyingEdges and pyvista's quadric decimation make."""
+    surface = iso_surface(given)
+    poly = pv.PolyData.from_regular_faces(surface.positions, surface.triangles.astype(np.int64))
+    share = min(max(1 - faces / max(len(surface.triangles), 1), 0.0), DECIMATED)
+    return to_mesh(poly.decimate(share))
+
+
+def to_mesh(poly: Any) -> Mesh:
+    """Return a pyvista surface as a mesh."""
+    positions = np.asarray(poly.points, np.float32)
+    return Mesh(positions, poly.regular_faces.astype(np.uint32), np.zeros_like(positions))
+
+
+def label_meshes(zmesh: Any, given: Input, faces: int) -> Mesh:
+    """Return zmesh's meshes of the solids as labels, joined."""
+    labels = cc3d.connected_components(given.field > np.float32(given.iso), connectivity=26)
+    mesher = zmesh.Mesher(given.spacing)
+    mesher.mesh(labels.astype(np.uint32))
+    parts = [mesher.get(number, normals=False) for number in mesher.ids()]
+    factor = max(1, round(sum(len(part.faces) for part in parts) / faces))
+    parts = [mesher.get(k, normals=False, reduction_factor=factor) for k in mesher.ids()]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    z, y, x = np.concatenate([part.vertices for part in parts]).T
+    positions = np.stack([x, -y, z], axis=1).astype(np.float32)
+    triangles = np.concatenate(
+        [part.faces.astype(np.int64) + start for part, start in zip(parts, starts, strict=False)]
+    )
+    return Mesh(positions, triangles.astype(np.uint32), np.zeros_like(positions))
+
+
+def timed(make: Callable[[], Mesh]) -> Run:
+    """Return a run that is measured from outside."""
+
+    def run() -> tuple[Mesh, float]:
+        start = time.perf_counter()
+        mesh = make()
+        return mesh, time.perf_counter() - start
+
+    return run
+
+
+def runs_of(volume: Volume, given: Input, binary: Path | None, folder: Path) -> dict[str, Run]:
+    """Return what is compared, by name."""
+    runs = {
+        "ours, whole unit": timed(lambda: whole_unit(volume, given)),
+        "ours, paper's part": timed(lambda: wrap(given)),
+    }
+    faces = len(wrap(given).triangles)
+    if binary is not None:
+        alpha, made = ALPHA * min(given.spacing), binary
+
+        def paper() -> tuple[Mesh, float]:
+            start = time.perf_counter()
+            surface = iso_surface(given)
+            extraction = time.perf_counter() - start
+            mesh, spent = chain(made, surface, alpha, folder)
+            return mesh, extraction + spent
+
+        runs["paper's chain"] = paper
+    runs["FlyingEdges, pyvista"] = timed(lambda: decimated(given, faces))
+    if importlib.util.find_spec("zmesh"):
+        zmesh = importlib.import_module("zmesh")
+        runs["zmesh"] = timed(lambda: label_meshes(zmesh, given, faces))
+    return runs
+
+
+def size_of(mesh: Mesh) -> int:
+    """Return the bytes of the mesh as .glb, on the lattice of a tile this large."""
+    extent = float(np.ptp(mesh.positions, axis=0).max())
+    material = Material((1.0, 1.0, 1.0))
+    glb = encode_glb(mesh, choose_step(extent), material=material, name="mesh", extras={})
+    return len(glb.data)
+
+
+def compare(name: str, given: Input, runs: dict[str, Run], rounds: int) -> None:
+    """Print a row for each: seconds, faces, bytes, distances both ways, faults."""
+    seconds: dict[str, list[float]] = {label: [] for label in runs}
+    meshes: dict[str, Mesh] = {}
+    for _ in range(rounds):
+        for label, run in runs.items():
+            meshes[label], took = run()
+            seconds[label].append(took)
+    surface = iso_surface(given)
+    reference, everything = Nearest(kept(surface), SAMPLES), Nearest(surface, SAMPLES)
+    print(f"{name}: {' x '.join(map(str, given.field.shape))} voxels, um: mean / p95")
+    for label, mesh in meshes.items():
+        target = Nearest(mesh, SAMPLES)
+        there, back = measure_spread(reference, target), measure_spread(target, everything)
+        print(
+            f"  {label:<21} {statistics.median(seconds[label]):7.2f} s  {len(mesh.triangles):8d} "
+            f"faces  {size_of(mesh) / 1e3:7.0f} kB  iso to mesh {there.mean:.3f} / {there.p95:.3f}"
+            f"  mesh to iso {back.mean:.3f} / {back.p95:.3f}  {find_defects(mesh).total} faults",
+            flush=True,
+        )
+
+
+def main() -> None:
+    """Run all comparisons."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    parser.add_argument("--shape", default=",".join(map(str, SHAPE)), help="z,y,x voxels")
+    parser.add_argument("--only", default="", help="volumes whose name begins so")
+    given = parser.parse_args()
+    z, y, x = (int(n) for n in given.shape.split(","))
+    if not importlib.util.find_spec("zmesh"):
+        print("bench-unit: zmesh skipped: pip install zmesh (GPL-3.0)")
+    with tempfile.TemporaryDirectory() as name:
+        binary = build_chain(Path(name))
+        for label, volume, grid, error in volumes((z, y, x)):
+            if label.startswith(given.only):
+                one = prepare(label, volume, grid, error)
+                compare(label, one, runs_of(volume, one, binary, Path(name)), given.rounds)
+
+
+if __name__ == "__main__":
+    main()
