@@ -1,10 +1,20 @@
-/** The text of every shader chunk, by the name that `#include` has. */
+/** The text of the shader chunks, by the name that `#include` has. */
 
-const files: Record<string, string> = import.meta.glob("./chunks/*.glsl", {
-  query: "?raw",
-  import: "default",
-  eager: true,
-});
-export const CHUNKS = Object.fromEntries(
-  Object.entries(files).map(([path, text]) => [path.slice(2, -".glsl".length), text]),
+/** @param files by path below this folder */
+export function byName(files: Record<string, string>): Readonly<Record<string, string>> {
+  return Object.fromEntries(
+    Object.entries(files).map(([path, text]) => [path.slice(2, -".glsl".length), text]),
+  );
+}
+
+/** Those of what is marched and laid over the scene: not the path tracer's, which come with it. */
+export const CHUNKS = byName(
+  import.meta.glob(
+    [
+      "./chunks/*.glsl",
+      "!./chunks/{delta_tracking,environment,medium,medium_2d,phase_function}.glsl",
+      "!./chunks/{random,reproject_search,temporal_history,tone_map}.glsl",
+    ],
+    { query: "?raw", import: "default", eager: true },
+  ),
 );

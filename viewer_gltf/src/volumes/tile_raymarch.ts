@@ -1,7 +1,9 @@
 /** The ray-marched box of one tile: up to four channels in one pass. */
 import {
+  AddEquation,
   BackSide,
   BoxGeometry,
+  CustomBlending,
   Data3DTexture,
   DataArrayTexture,
   DataTexture,
@@ -9,8 +11,11 @@ import {
   GLSL3,
   LinearFilter,
   Matrix4,
+  MaxEquation,
   Mesh,
   NearestFilter,
+  OneFactor,
+  OneMinusSrcAlphaFactor,
   RedFormat,
   RepeatWrapping,
   RGBAFormat,
@@ -28,6 +33,7 @@ import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
+import type { Compositing } from "../state/parameters/volumes";
 import { distanceInGrid } from "./blend_order";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { brickCounts } from "./skip_bricks";
@@ -94,9 +100,12 @@ export type Appearance = Readonly<{
   table: Uint8Array;
   /** A two-dimensional transfer function. */
   table2d?: TransferTable2d | null;
+  /** Part of the intensities, 0..1, that is shown from dark to bright; absent: all. */
+  window?: readonly [number, number];
   isInDisc: boolean;
 }>;
 
+const ALL = [0, 1] as const;
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
 
 function skipTexture(skips: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
@@ -121,6 +130,16 @@ function emptyTables2d(channels: number): DataArrayTexture {
   texture.minFilter = texture.magFilter = LinearFilter;
   return texture;
 }
+
+/** Blending of premultiplied light. */
+const OVER = {
+  blending: CustomBlending,
+  blendEquation: AddEquation,
+  blendSrc: OneFactor,
+  blendDst: OneMinusSrcAlphaFactor,
+};
+const LARGEST = { ...OVER, blendEquation: MaxEquation, blendDst: OneFactor };
+const ADDED = { ...OVER, blendDst: OneFactor };
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
@@ -162,7 +181,7 @@ export class TileMarch {
       defines: { CHANNELS: channelCount, MAX_STEPS: REST_STEPS, OPAQUE, SKIP_BRICK },
       side: BackSide,
       transparent: true,
-      premultipliedAlpha: true,
+      ...OVER,
       depthTest: false, // the march ends at the scene's depth itself
       depthWrite: false,
       uniforms: {
@@ -174,6 +193,8 @@ export class TileMarch {
         uVoxel: { value: voxel },
         uMinStep: { value: voxel },
         uFloor: { value: new Vector4(1, 1, 1, 1) },
+        uWindowLow: { value: new Vector4() },
+        uWindowHigh: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
         uLight: { value: new Vector3(...towards(KEY_AT)).normalize() },
         uFill: { value: new Vector3(...towards(FILL_AT)).normalize() },
@@ -275,10 +296,12 @@ export class TileMarch {
     const { uniforms } = this.mesh.material;
     const rows = this.lut.image.data as Uint8Array;
     let differs = false;
-    appearances.forEach(({ color, table, isInDisc }, c) => {
+    appearances.forEach(({ color, table, isInDisc, window: [low, high] = ALL }, c) => {
       (uniforms.uColor.value as Vector3[])[c].set(...color);
       uniforms.uInDisc.value[c] = isInDisc;
       uniforms.uFloor.value.setComponent(c, floorOf(table));
+      uniforms.uWindowLow.value.setComponent(c, low);
+      uniforms.uWindowHigh.value.setComponent(c, high);
       const row = rows.subarray(c * table.length, (c + 1) * table.length);
       if (table.every((value, i) => value === row[i])) return;
       row.set(table);
@@ -318,6 +341,14 @@ export class TileMarch {
       this.tables2d.addLayerUpdate(c); // the others stay as they are on the GPU
       this.tables2d.needsUpdate = true;
     });
+  }
+
+  /** What a ray makes of its samples, and how tiles are blended: as samples within one are. */
+  composite(how: Compositing): void {
+    const { material } = this.mesh;
+    this.define("MAXIMUM", how === "maximum" ? 1 : null);
+    this.define("SUM", how === "sum" ? 1 : null);
+    Object.assign(material, how === "over" ? OVER : how === "maximum" ? LARGEST : ADDED);
   }
 
   /** Where rays may skip, one byte a brick, of `brickDistances`; null: nowhere, for now. */

@@ -298,6 +298,7 @@ export class VolumeSet {
       this.group.add(march.mesh);
     }
     resident.packed = shown;
+    march.composite(state.compositing);
     const differs = march.setAppearances(appearances);
     if (differs || isNewSet || march !== before) void this.findSkips(march, shown, appearances);
   }
@@ -318,7 +319,9 @@ export class VolumeSet {
     const table2d = this.table2dOf(channel);
     if (table2d !== null) {
       const { color } = channel;
-      return { color, table: table2d.envelope, table2d, isInDisc: isInDisc(state, channel) };
+      const { window } = channel;
+      const table = table2d.envelope;
+      return { color, table, table2d, window, isInDisc: isInDisc(state, channel) };
     }
     const { transferFunction: name } = channel;
     // one's own function has no one-dimensional one that stands for it
@@ -328,6 +331,7 @@ export class VolumeSet {
     return {
       color: channel.color,
       table: lookUpTable(entries, channel.window, channel.opacity),
+      window: channel.window,
       isInDisc: isInDisc(state, channel),
     };
   }

@@ -88,6 +88,19 @@ describeInChromium("the ray-march", () => {
     }
   });
 
+  it("finds the largest value along a ray, whatever lies before it", async () => {
+    const [red, , , alpha] = await bare.call("meanAlong", "maximum", "ramp", 67, 20);
+    expect(red).toBeGreaterThan(0.97); // the last samples, just before 255
+    expect(alpha).toBeCloseTo(red, 2);
+  });
+
+  it("adds up what lies along a ray, without a veil", async () => {
+    // 64 voxels of 8 of 255 each, at an eighth; opacities would veil: 1 - (247 / 255) ** 64 = 0.87
+    const [red, , , alpha] = await bare.call("meanAlong", "sum", "uniform", 67, 8);
+    expect(red).toBeCloseTo((64 * 8) / 255 / 8, 2);
+    expect(alpha).toBe(0); // what lies behind is seen as it is
+  });
+
   it("averages pictures of a view at rest", async () => {
     const reds = Array.from({ length: 64 }, (_, i) => 0.5 + 0.25 * Math.sin(2.4 * i));
     const means = await bare.call("meansOf", reds);

@@ -2,6 +2,7 @@
 
 import { CHUNKS } from "../../gpu/glsl_chunks";
 import { includeChunks } from "../../gpu/glsl_include";
+import { PATH_TRACE_CHUNKS } from "../../gpu/path_trace_chunks";
 import denoise from "./denoise.frag.glsl?raw";
 import mean from "./mean.frag.glsl?raw";
 import trace from "./path_trace.frag.glsl?raw";
@@ -9,9 +10,11 @@ import warp from "./reproject.frag.glsl?raw";
 import show from "./tone_map.frag.glsl?raw";
 import noise from "./variance.frag.glsl?raw";
 
-export const TRACE_FRAGMENT = includeChunks(trace, CHUNKS);
+const ALL = { ...CHUNKS, ...PATH_TRACE_CHUNKS };
+
+export const TRACE_FRAGMENT = includeChunks(trace, ALL);
 export const TRACE_NOISE = noise;
 export const TRACE_MEAN = mean;
 export const TRACE_DENOISE = denoise;
-export const TRACE_WARP = includeChunks(warp, CHUNKS);
-export const TRACE_SHOW = includeChunks(show, CHUNKS);
+export const TRACE_WARP = includeChunks(warp, ALL);
+export const TRACE_SHOW = includeChunks(show, ALL);

@@ -9,6 +9,13 @@ import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } 
 export const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
 export type Mode = (typeof MODES)[number];
 
+/**
+ * What a ray makes of its samples. `over`: each veils those behind it. `maximum`: the largest value of each
+ * channel, within its window. `sum`: their light adds up, and nothing veils.
+ */
+export const COMPOSITINGS = ["over", "maximum", "sum"] as const;
+export type Compositing = (typeof COMPOSITINGS)[number];
+
 /** The volumes' parameters of a bundle that has just opened. */
 export const START_VOLUMES = {
   mode: "disc" as Mode,
@@ -16,6 +23,7 @@ export const START_VOLUMES = {
   switchDistance_m: 1.25,
   /** Angle between the gaze and the disc's rim. */
   discRadius_deg: 12,
+  compositing: "over" as Compositing,
 };
 
 export type VolumeSettings = Readonly<typeof START_VOLUMES>;
@@ -102,8 +110,27 @@ export const DISC_RADIUS: NumberParameter<Volumes> = {
   spoken: ({ discRadius_deg }) => `Disc ${degrees(discRadius_deg)}`,
 };
 
+export const COMPOSITING: ChoiceParameter<Volumes, Compositing> = {
+  kind: "choice",
+  id: "compositing",
+  label: "Along a ray",
+  link: "ray",
+  ...lens("compositing"),
+  values: COMPOSITINGS,
+  names: { over: "Opacity", maximum: "Maximum", sum: "Sum" },
+  refusal: ({ mode }) =>
+    mode === "traced" || mode === "off" ? "Only volumes that are marched have one." : "",
+  key: ["%", "Next: opacity, maximum or sum along a ray"],
+  spoken: ({ compositing }) => `Along a ray: ${compositing}`,
+};
+
 /** In the panel's order. */
-export const VOLUMES: readonly Parameter<Volumes>[] = [MODE, SWITCH_DISTANCE, DISC_RADIUS];
+export const VOLUMES: readonly Parameter<Volumes>[] = [
+  MODE,
+  SWITCH_DISTANCE,
+  DISC_RADIUS,
+  COMPOSITING,
+];
 
 /** Whether volumes are drawn by paths of light. */
 export function isTraced({ mode }: Pick<VolumeSettings, "mode">): boolean {

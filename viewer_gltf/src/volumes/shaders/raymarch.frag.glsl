@@ -15,6 +15,10 @@ uniform vec3 uTexels;  // of mip level 0
 uniform float uVoxel;  // um: the opacities of the transfer functions hold for a path this long
 uniform float uMinStep;  // um
 uniform vec4 uFloor;  // intensities of each channel up to which its table shows nothing
+#ifdef MAXIMUM
+uniform vec4 uWindowLow;  // intensities of each channel that are dark ...
+uniform vec4 uWindowHigh;  // ... and bright
+#endif
 uniform int uSteps;  // for the whole ray, at most MAX_STEPS
 uniform int uSpare;  // of these, one for each other tile
 uniform vec3 uAllLow;  // um, the same space: the box around all tiles that are marched ...
@@ -89,9 +93,29 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 
 const float NOWHERE = 1e30;
 
+#ifdef SUM
+const float SUM_LIGHT = 0.125;  // of an opaque voxel: eight of them are as bright as one alone elsewhere
+#endif
+#ifdef MAXIMUM
+// The largest value of each channel in its colour, from the first that its table shows to the window's
+// end; as opaque as it is bright.
+vec4 brightest(vec4 largest) {
+  vec4 low = max(uWindowLow, uFloor);
+  vec4 share = clamp((largest - low) / max(uWindowHigh - low, 1e-3), 0.0, 1.0);
+  vec3 color = vec3(0.0);
+  // channels as tiles are blended: else a border would show where two tiles hold one each
+  for (int c = 0; c < CHANNELS; c++) color = max(color, share[c] * uColor[c]);
+  return vec4(color, min(1.0, max(max(share.x, share.y), max(share.z, share.w))));
+}
+#endif
+
 // A ray that ended early is opaque: what was left out behind looks as what is in front.
 vec4 shown(vec4 sum) {
+#if defined(MAXIMUM) || defined(SUM)
+  return sum;
+#else
   return sum.a >= OPAQUE ? sum / sum.a : sum;
+#endif
 }
 
 void main() {
@@ -122,6 +146,9 @@ void main() {
   vec3 brickDir = texDir * uTexels / float(SKIP_BRICK);
   brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
   vec3 invBrickDir = 1.0 / brickDir;
+#ifdef MAXIMUM
+  vec4 largest = vec4(0.0);  // intensities
+#endif
   vec4 sum = vec4(0.0);
   vec4 veil = vec4(0.0);  // the sum in front of the edge
   float pane = uHasPane ? paneDistance(back) - span.x : NOWHERE;
@@ -131,7 +158,12 @@ void main() {
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
   int i = 0;
-  for (; i < steps && t < end && sum.a < OPAQUE; i++) {
+#if defined(MAXIMUM) || defined(SUM)
+  const float FULL = 2.0;  // no sample veils another
+#else
+  const float FULL = OPAQUE;
+#endif
+  for (; i < steps && t < end && sum.a < FULL; i++) {
     // What remains of the ray over what remains of the budget: it always reaches the end.
     float dt = max(uMinStep, (end - t) / float(steps - i));
     // A loop of its own: rays beside each other then sample together, whatever they skipped.
@@ -149,6 +181,9 @@ void main() {
     if (t >= pane) {
       front = mix(veil, sum, scene.z);
       sum = veil = vec4(0.0);
+#ifdef MAXIMUM
+      largest = vec4(0.0);
+#endif
       pane = NOWHERE;
       isBehind = true;
     }
@@ -174,6 +209,12 @@ void main() {
 #else
       vec4 s = classify(v, voxels, shares);
 #endif
+#if defined(MAXIMUM)
+      largest = max(largest, mix(vec4(0.0), v, greaterThan(voxels, vec4(0.0))));
+      sum = brightest(largest);
+#elif defined(SUM)
+      sum.rgb += SUM_LIGHT * s.a * s.rgb;
+#else
       if (s.a > 0.0) {
 #ifdef TWO_D
         s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir);
@@ -182,6 +223,7 @@ void main() {
 #endif
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
+#endif
     }
     if (isInFront) veil = sum;
     t += here;
@@ -191,7 +233,8 @@ void main() {
   return;
 #endif
   sum = mix(veil, sum, scene.z);
-  if (max(sum.a, front.a) <= 0.0) discard;
+  vec4 most = max(sum, front);
+  if (max(max(most.r, most.g), max(most.b, most.a)) <= 0.0) discard;
   oColor = shown(isBehind ? front : sum);
   oBehind = isBehind ? shown(sum) : vec4(0.0);
 }

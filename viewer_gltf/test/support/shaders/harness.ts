@@ -15,6 +15,7 @@ import type { TileVolume } from "../../../src/bundle/generated/volumes";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { Eyes } from "../../../src/gpu/eyes";
 import { DepthPass } from "../../../src/render/depth_pass";
+import type { Compositing } from "../../../src/state/parameters/volumes";
 import { occupancyDistances } from "../../../src/volumes/empty_space";
 import { brickCounts } from "../../../src/volumes/skip_bricks";
 import { makeFrame, TileMarch } from "../../../src/volumes/tile_raymarch";
@@ -220,6 +221,16 @@ export type Filling = "ramp" | "uniform";
 
 /** Mean opacity, 0..1, seen along x through a cube. */
 function meanOpacity(filling: Filling, side: number, opacity: number): number {
+  return meanAlong("over", filling, side, opacity)[3];
+}
+
+/** Mean colour and opacity, 0..1, of a white cube that is seen along x. */
+function meanAlong(
+  compositing: Compositing,
+  filling: Filling,
+  side: number,
+  opacity: number,
+): number[] {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
   const edge = side - 3;
@@ -232,19 +243,30 @@ function meanOpacity(filling: Filling, side: number, opacity: number): number {
   for (let i = 0; i < 256; i++) table[4 * i + 3] = Math.round((opacity * i) / 255);
   const bricks = makeBricks({ size: [side, side, side], texels }).texels;
   const march = marchOf(cube(side), texels, bricks, table, true, depth);
+  march.composite(compositing);
   const camera = new PerspectiveCamera(0.2, 1, edge, edge * 1000);
   camera.position.set(300 * edge, -edge / 2, edge / 2);
   camera.lookAt(0, -edge / 2, edge / 2);
   const rgba = draw([march], camera, depth, renderer);
   renderer.dispose();
-  const inner: number[] = [];
+  const sum = [0, 0, 0, 0];
   for (let y = 24; y < 40; y++) {
-    for (let x = 24; x < 40; x++) inner.push(rgba[4 * (y * PIXELS + x) + 3] / 255);
+    for (let x = 24; x < 40; x++) {
+      for (let k = 0; k < 4; k++) sum[k] += rgba[4 * (y * PIXELS + x) + k] / 255;
+    }
   }
-  return inner.reduce((a, b) => a + b, 0) / inner.length;
+  return sum.map((v) => v / 16 ** 2);
 }
 
-const harness = { countSteps, countThrough, compareSkips, meanOpacity, columnsOverBorder, meansOf };
+const harness = {
+  countSteps,
+  countThrough,
+  compareSkips,
+  meanOpacity,
+  meanAlong,
+  columnsOverBorder,
+  meansOf,
+};
 export type Harness = typeof harness;
 
 Object.assign(window, { harness });

@@ -1,0 +1,12 @@
+/** The text of the shader chunks that the path tracer alone needs: apart, as it is. */
+import { byName } from "./glsl_chunks";
+
+export const PATH_TRACE_CHUNKS = byName(
+  import.meta.glob(
+    [
+      "./chunks/{delta_tracking,environment,medium,medium_2d,phase_function}.glsl",
+      "./chunks/{random,reproject_search,temporal_history,tone_map}.glsl",
+    ],
+    { query: "?raw", import: "default", eager: true },
+  ),
+);
