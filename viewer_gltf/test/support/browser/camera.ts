@@ -2,7 +2,7 @@
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { framingDistance, place } from "../../../src/render/placement";
 
-const FIELD_OF_VIEW_RAD = (40 * Math.PI) / 180;
+export const FIELD_OF_VIEW_RAD = (40 * Math.PI) / 180;
 
 /** Where the eye is: at the start (towards +z), or after a quarter turn (towards -x). */
 export type Side = "front" | "left";

@@ -1,0 +1,39 @@
+/** The light of pixels, and that of the room on what faces the eye. */
+import { FILL, FILL_AT, GROUND, KEY, KEY_AT, SKY, towards } from "../../../src/gpu/room_light";
+import { fromHex } from "../../../src/math/color";
+import type { Vec3 } from "../../../src/math/vec3";
+import { FIELD_OF_VIEW_RAD } from "./camera";
+import type { Picture } from "./picture";
+
+const BACKGROUND_RED = 11;
+
+/** Linear light, 0..1, of a byte of sRGB. */
+export function lightOf(byte: number): number {
+  return fromHex(`#${byte.toString(16).padStart(2, "0")}0000`)[0];
+}
+
+/** Red light over the background's, 0..1. */
+export function lightAt(picture: Picture, { x, y }: Readonly<{ x: number; y: number }>): number {
+  return lightOf(picture.at(x, y)[0]) - lightOf(BACKGROUND_RED);
+}
+
+/** Red light that a white surface sends on that faces the eye, at a pixel of the start view. */
+export function lightFacing(
+  { width, height }: Picture,
+  { x, y }: Readonly<{ x: number; y: number }>,
+): number {
+  const slope = Math.tan(FIELD_OF_VIEW_RAD / 2) / (height / 2);
+  const normal = unit([(width / 2 - x) * slope, (y - height / 2) * slope, 1]);
+  const lamp = (light: number, at: Vec3) => light * Math.max(0, dot(normal, unit(towards(at))));
+  const sky = 0.5 + 0.5 * normal[1];
+  return lamp(KEY[0], KEY_AT) + lamp(FILL[0], FILL_AT) + GROUND[0] * (1 - sky) + SKY[0] * sky;
+}
+
+function unit(v: Vec3): Vec3 {
+  const length = Math.hypot(...v);
+  return [v[0] / length, v[1] / length, v[2] / length];
+}
+
+function dot(a: Vec3, b: Vec3): number {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
