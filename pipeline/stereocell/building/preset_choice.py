@@ -72,7 +72,9 @@ def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str
         chosen = _BY_MODALITY.get(known)
         return chosen, _told(chosen, f"the input is {known}")
     chosen = "ct" if _has_hounsfield_units(dataset) else "mri"
-    looks = "values like Hounsfield units" if chosen == "ct" else "no Hounsfield units"
+    looks = "values like Hounsfield units"
+    if chosen == "mri":
+        looks = "no Hounsfield units, which a CT that was shifted has not either"
     return chosen, _told(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
 
 
