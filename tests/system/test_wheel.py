@@ -1,5 +1,6 @@
 """The wheel: installed by itself it builds, and its bundles have the viewer, without Node."""
 
+import hashlib
 import json
 import os
 import re
@@ -60,6 +61,20 @@ def fetch(address: str) -> bytes:
     return content
 
 
+def take_compiled(kernels: Path) -> None:
+    """Give another installation the compiled kernels: to compile them takes half a minute.
+
+    numba knows them by the sources' folder and times; were it otherwise, it would compile anew.
+    """
+    ours, theirs = ROOT / "pipeline" / "stereocell" / "kernels", kernels / "__pycache__"
+    for source in kernels.glob("*.py"):
+        shutil.copystat(ours / source.name, source)
+    for folder in (ours / "__pycache__").glob("kernels-*/*"):
+        if folder.is_dir():
+            name = f"kernels_{hashlib.sha1(str(kernels).encode()).hexdigest()}"
+            shutil.copytree(folder, theirs / folder.parent.name / name)
+
+
 def make_wheel(checkout: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder]
     return run(*command, cwd=checkout)
@@ -88,6 +103,7 @@ def test_a_wheel_alone_builds_and_has_the_viewer(tmp_path: Path) -> None:
     assert package == site / "stereocell"
     assert (package / "py.typed").is_file()  # PEP 561: who imports it gets its types
 
+    take_compiled(package / "kernels")
     command, out = home / "bin" / "stereocell", tmp_path / "out"
     sample = ["sample", "cycif", "s.ome.zarr", "--grid", "1x1", "--tile-size", "16,48,48"]
     assert run(command, *sample, cwd=tmp_path).returncode == 0
