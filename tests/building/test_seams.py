@@ -140,8 +140,10 @@ def _assert_same_rims(built: Built, level: int) -> None:
     for seam in _seams(built.plan):
         ours, theirs = (built.lods[tile.id] for tile in (seam.first, seam.second))
         rim = seam.rim(ours[level], built.plan)
-        # a face is crossed by a body of 18 voxels or more
+        # a face is crossed by bodies of 18 voxels and more: from end to end of each, at least
+        places = np.array([np.frombuffer(place, np.float32) for place in rim])
         assert len(rim) > 20, seam
+        assert np.sort(np.ptp(places, axis=0))[1] > 16, seam
         assert set(rim) == set(seam.rim(theirs[level], built.plan)), seam
         # and at any other level: viewers show neighbours at different ones
         assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
@@ -223,7 +225,8 @@ def test_nothing_is_left_of_fragments_gaps_and_cavities(built: Built) -> None:
         across = np.delete(zyx, seam.axis, axis=1)
         across = np.minimum(across, 2 * TILE - 1 - across)  # as in the first quadrant
         at_bodies = across[(across < TILE - 8).all(axis=1)]  # without the ball in the middle
-        assert len(at_bodies) > 10
+        ways = np.arctan2(*(at_bodies - 13).T) / (2 * np.pi) + 0.5
+        assert len(np.unique((8 * ways).astype(int) % 8)) == 8  # all the way round
         assert np.abs(at_bodies - 13).max() < 13  # no fragment
         assert np.abs(at_bodies - 13).max(axis=1).min() > 6  # no cavity; no gap: a whole outline
 

@@ -143,6 +143,9 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             told = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
             told += _loss(plan, survey[channel.id], inside[channel.id])
             console.print(f"units: {look.name}: {told}", markup=False)
+        if found[channel.id].subtracts and found[channel.id].background is None:
+            told = "there is no background to subtract: its level counts from 0"
+            console.print(f"units: {look.name}: {told}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey

@@ -23,9 +23,7 @@ _SIDE = 128  # voxels: largest edge of a block that is looked at
 _LEAST_SIDE = 32  # of many channels, whose blocks together are to be as those of _MOST
 _WIDE = 4  # bytes
 _MOST_EXACT = 2.0**53  # whole numbers below are exact as float64
-_MOST = (
-    4  # channels that are looked at in blocks of _SIDE: a label map mostly comes with few others
-)
+_MOST = 4  # channels that are looked at in blocks of _SIDE; most label maps come with fewer others
 
 
 def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, level: int) -> None:

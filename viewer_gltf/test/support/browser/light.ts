@@ -6,6 +6,8 @@ import { FIELD_OF_VIEW_RAD } from "./camera";
 import type { Picture } from "./picture";
 
 const BACKGROUND_RED = 11;
+/** Light of what has no boundary to that of what faces the eye, as in chunks/shade. */
+export const SCATTERED = 1.2;
 
 /** Linear light, 0..1, of a byte of sRGB. */
 export function lightOf(byte: number): number {
