@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stereocell.building import settings as settings_module
-from stereocell.building.plan import Channel
+from stereocell.building.channels import Channel
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.read import Level

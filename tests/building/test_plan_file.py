@@ -3,7 +3,8 @@
 import json
 from dataclasses import fields
 
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.channels import Channel
+from stereocell.building.plan import Plan
 from stereocell.storage.assets import schema_path
 
 

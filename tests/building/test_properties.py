@@ -17,7 +17,8 @@ from hypothesis.extra import numpy as npst
 from jsonschema import Draft202012Validator
 
 from stereocell.building import settings as settings_module
-from stereocell.building.plan import Channel, Plan, choose_level, make_plan
+from stereocell.building.channels import Channel
+from stereocell.building.plan import Plan, choose_level, make_plan
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import content_hash, decode_brick, encode_tree, parse_table

@@ -238,6 +238,18 @@ def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     assert channel["surface"] == "none"
 
 
+@pytest.mark.parametrize("flag", ["--iso-value=even=500+b", "--surfaces=even=500+b"])
+def test_a_level_above_no_background_is_said_to_count_from_0(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flag: str
+) -> None:
+    (tmp_path / "s.toml").write_text(f"{SETTINGS}background_um = 0.0\n")
+    flags = ["--channels", "even", "--config", str(tmp_path / "s.toml"), flag]
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
+    assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
+    told = "units: even: there is no background to subtract: its level counts from 0"
+    assert told in capsys.readouterr().err
+
+
 def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]

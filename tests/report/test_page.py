@@ -17,8 +17,8 @@ from markupsafe import escape
 from numpy.typing import NDArray
 from PIL import Image
 
+from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel
 from stereocell.building.unit_files import is_whole
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import SurfaceLevel

@@ -10,7 +10,7 @@ import zstandard
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from stereocell.building.plan import FLESH
+from stereocell.building.channels import FLESH
 from stereocell.cli.__main__ import main
 from stereocell.verify.formats import check
 from support.bundles import load

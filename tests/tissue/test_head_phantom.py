@@ -9,7 +9,7 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.building.plan import FLESH
+from stereocell.building.channels import FLESH
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.samples import write_head

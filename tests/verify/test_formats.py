@@ -5,8 +5,9 @@ import subprocess
 import pytest
 
 from stereocell.building import settings as settings_module
+from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel, make_plan
+from stereocell.building.plan import make_plan
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine

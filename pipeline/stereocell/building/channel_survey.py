@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
     Found,
     Solids,
@@ -25,7 +26,7 @@ from stereocell.building.level_choice import (
 )
 from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.source_tasks import (
     around,
     box_to_json,

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.channels import Channel
+from stereocell.building.plan import Plan
 from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels

@@ -5,7 +5,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from stereocell import read
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.channels import Channel
+from stereocell.building.plan import Plan
 from stereocell.building.settings import PlanOptions
 from stereocell.storage.workspace import fetch
 

@@ -4,8 +4,9 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from stereocell.building.channels import Channel
 from stereocell.building.level_choice import given_level
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.isosurface.level import Level, clear_of
 from stereocell.isosurface.options import ADAPTIVE, RUNGS
 

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 from stereocell.building.channel_survey import survey_channels
+from stereocell.building.channels import Channel
 from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.source_tasks import (
     around,
     box_to_json,

@@ -12,19 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
+from stereocell.building.channels import Channel, choose_color, with_surfaces
 from stereocell.building.intensities import require_intensities
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
-from stereocell.building.plan import (
-    Channel,
-    Plan,
-    choose_color,
-    choose_level,
-    make_plan,
-    parse_region,
-    with_surfaces,
-)
+from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import told_in_vain, told_of_gaps
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import run_tile, tile_task

@@ -6,104 +6,29 @@ It holds everything that later phases need, with every `auto` resolved; plan.jso
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Protocol, TypeVar
+from typing import Protocol
 
+from stereocell.building.channels import (
+    Channel,
+    by_name,
+    painted,
+    require_no_background,
+    windows_of,
+)
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import SMOOTHING_REACH
-from stereocell.isosurface.options import RUNGS, parse_level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.errors import SourceError, UsageError
-from stereocell.model.identifiers import to_identifier
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.settings import AUTO
 from stereocell.model.tiling import Box, Tile, cut, cut_evenly
-from stereocell.transfer.windows import NAMED
-
-T = TypeVar("T")
-ALL = "*"  # the key of settings by channel that stands for all that have none
 
 # Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
 UNIT_VOXELS = 1 << 27  # voxels
 UNIT_TILES = 8  # tiles
 LEAST_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
-
-# Colours (linear RGB) for channels whose file names none, distinct on a dark ground; the first
-# three are the usual blue, magenta and green of microscopy.
-PALETTE = (
-    (0.07, 0.22, 1.0),
-    (1.0, 0.05, 0.45),
-    (0.05, 0.8, 0.15),
-    (1.0, 0.45, 0.02),
-    (0.05, 0.75, 0.85),
-    (0.9, 0.8, 0.05),
-    (0.45, 0.12, 0.95),
-    (0.8, 0.8, 0.8),
-)
-
-
-# colour (linear RGB) of MR and CT: warm and neutral, as bone and tissue are usually drawn
-_PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
-FLESH = (0.78, 0.66, 0.55)
-BODY_MODALITIES = ("MR", "CT")
-
-
-def choose_color(place: int, modality: str) -> tuple[float, float, float]:
-    """Return the colour (linear RGB) of a channel without one, the `place`-th that is built."""
-    if place == 0 and modality in BODY_MODALITIES:
-        return FLESH
-    return PALETTE[place % len(PALETTE)]
-
-
-def with_surfaces(channels: Sequence["Channel"], wanted: Mapping[str, str]) -> list["Channel"]:
-    """Return the channels, with one for each surface that the settings ask for.
-
-    wanted  `surfaces` of the settings: rungs or voxel values between commas, by name or index
-
-    Raises UsageError.
-    """
-    by_name = _by_name("--surfaces", wanted, channels)
-    found: list[Channel] = []
-    for channel in channels:
-        if channel.name not in by_name:
-            found.append(channel)
-            continue
-        rungs = [part.strip() for part in by_name[channel.name].split(",")]
-        for rung in rungs:
-            if rung not in RUNGS:
-                _require_level(channel.name, rung)
-        if len(set(rungs)) < len(rungs):
-            found_twice = ",".join(rungs)
-            raise UsageError(f"--surfaces {channel.name}: found {found_twice}, expected each once")
-        if len(rungs) == 1:
-            found.append(replace(channel, rung=rungs[0]))
-            continue
-        for place, rung in enumerate(rungs):
-            # towards white from surface to surface inwards, or towards black where it is white
-            share, end = place / len(rungs), float(min(channel.color) < _PALE)
-            red, green, blue = (part + share * (end - part) for part in channel.color)
-            found.append(
-                replace(
-                    channel,
-                    name=f"{channel.name} {rung}",
-                    color=(red, green, blue),
-                    rung=rung,
-                    base=channel.name,
-                )
-            )
-    return found
-
-
-def _require_level(name: str, rung: str) -> None:
-    """Raise UsageError where a surface is asked for neither by a rung nor by a voxel value."""
-    try:
-        parse_level("", rung)
-    except UsageError:
-        raise UsageError(
-            f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)}, voxel values or "
-            "values above the background as 162+b, between commas"
-        ) from None
 
 
 class LevelLike(Protocol):
@@ -113,38 +38,6 @@ class LevelLike(Protocol):
     def shape(self) -> tuple[int, int, int]: ...
     @property
     def spacing_um(self) -> tuple[float, float, float]: ...
-
-
-@dataclass(frozen=True, slots=True)
-class Channel:
-    """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1.
-
-    source       a source for this channel alone, which a command added to the plan: one level, the
-                 planned one, and voxels uint8 with the window 0..255; empty: the plan's source
-    fingerprint  of that source
-    rung         which level of the ladder has the surface, or a voxel value, as 162 or 162+b;
-                 empty: the settings'
-    base         the name of the channel whose voxels these are, where it has several surfaces;
-                 empty: its own
-    """
-
-    index: int
-    name: str
-    color: tuple[float, float, float]
-    source: str = ""
-    fingerprint: str = ""
-    rung: str = ""
-    base: str = ""
-
-    @property
-    def voxels_id(self) -> str:
-        """The ID under which results of the voxels alone lie, whatever surface is made of them."""
-        return to_identifier(self.base or self.name)
-
-    @property
-    def id(self) -> str:
-        """The name as an identifier, for paths and prims."""
-        return to_identifier(self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,12 +181,12 @@ def make_plan(
         surface=settings.surface.resolved(chosen.spacing_um),
         unwrap=settings.unwrap.resolved(chosen.spacing_um),
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
-        iso_values=_by_name("--iso-value", settings.iso_values, channels),
-        windows=_of_all(settings.windows, channels, modality),
-        paint=_painted(settings.paint, channels),
+        iso_values=by_name("--iso-value", settings.iso_values, channels),
+        windows=windows_of(settings.windows, channels, modality),
+        paint=painted(settings.paint, channels),
     )
     _require_planes(settings, chosen.spacing_um)
-    _require_no_background(settings, channels, modality)
+    require_no_background(settings, channels, modality)
     return Plan(
         source=source,
         name=name,
@@ -399,104 +292,6 @@ def _halo(
         for n, step, k in zip(region.shape, spacing_um, every, strict=True)
     )
     return depth, height, width
-
-
-def _by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
-    """Return values by channel name; a key is a name, or an index where no name equals it.
-
-    The key ALL is for the channels that no other names; presets use it.
-    """
-    found: dict[str, T] = {}
-    for key, value in given.items():
-        if key == ALL:
-            continue
-        name = _name(flag, key, channels)
-        if name in found:
-            raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
-        found[name] = value
-    if ALL in given:
-        # a surface that is chosen by its rung or value has its level from there
-        found = {one.name: given[ALL] for one in channels if not one.rung} | found
-    return found
-
-
-def _require_no_background(settings: Settings, channels: Sequence[Channel], modality: str) -> None:
-    """Raise UsageError where a level is given above the background of what has none."""
-    if modality not in BODY_MODALITIES:
-        return
-    given = [(f"--iso-value {key}", value) for key, value in settings.iso_values.items()]
-    given += [
-        (f"--surfaces {channel.base or channel.name}", channel.rung)
-        for channel in channels
-        if channel.rung and channel.rung not in RUNGS
-    ]
-    for flag, value in given:
-        if parse_level(flag, value)[1]:
-            raise UsageError(
-                f"{flag}={value}: a level above the background, which is never "
-                f"subtracted of {modality}, expected a voxel value"
-            )
-
-
-def _of_all(
-    windows: Mapping[str, str], channels: Sequence[Channel], modality: str
-) -> dict[str, str]:
-    """Return windows by channel name; that of voxels with several surfaces goes to each."""
-    for key, window in windows.items():
-        if window in NAMED and modality != "CT":
-            kind = f"this is {modality}" if modality else "nothing says that this is one"
-            raise UsageError(
-                f"--window {key}={window}: a window in Hounsfield units, of CT, and {kind}: "
-                "expected LOW:HIGH in voxel values, or --preset ct"
-            )
-    found: dict[str, str] = {}
-    for key, window in windows.items():
-        if key == ALL:
-            continue
-        by_name = [channel.name for channel in channels if key in (channel.name, channel.base)]
-        names = by_name or [channel.name for channel in channels if key == str(channel.index)]
-        for name in names or [_name("--window", key, channels)]:
-            if name in found:
-                raise UsageError(f"--window names channel {name!r} twice, expected once")
-            found[name] = window
-    if ALL in windows:
-        found = {channel.name: windows[ALL] for channel in channels} | found
-    return found
-
-
-def _painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
-    """Return channel name -> name of the channel that is sampled onto its surface."""
-    by_name, names = _by_name("--paint", paint, channels), [channel.name for channel in channels]
-    first = list({channel.index: channel for channel in reversed(channels)}.values())[::-1]
-    found = {
-        # of voxels with several surfaces any channel has the intensity
-        name: _name("--paint", key, channels if key in names else first)
-        for name, key in by_name.items()
-    }
-    for name, painted in found.items():
-        if name == painted:
-            raise UsageError(f"--paint {name}={painted}: expected another channel than its own")
-    return found
-
-
-def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
-    names = [channel.name for channel in channels]
-    if key in names:
-        return key
-    found = [channel.name for channel in channels if key in (channel.base, str(channel.index))]
-    found = found or [channel.name for channel in channels if key == channel.id]
-    if len(found) > 1:
-        raise UsageError(
-            f"{flag} names channel {key!r}, which has several surfaces, expected one of "
-            f"{', '.join(found)}"
-        )
-    if not found:
-        indices = dict.fromkeys(str(channel.index) for channel in channels)
-        raise UsageError(
-            f"{flag} names channel {key!r}, expected one of {', '.join(names)}, or an index of "
-            f"{', '.join(indices)}"
-        )
-    return found[0]
 
 
 def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, int]:

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from stereocell.building.plan import ALL, Channel, Plan
+from stereocell.building.channels import ALL, Channel
+from stereocell.building.plan import Plan
 from stereocell.building.settings import Settings
 from stereocell.isosurface.options import LADDER, RUNGS
 from stereocell.read import Dataset

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import require_added, require_input
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.engine.run import Engine
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box

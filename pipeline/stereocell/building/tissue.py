@@ -13,11 +13,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.building.channels import PALETTE, Channel
 from stereocell.building.input_unchanged import require_input
 from stereocell.building.open_source import SourceRef, open_source, source_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.phases import provenance
-from stereocell.building.plan import PALETTE, Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.tissue_files import (
     FOLDER,
     RECORD,

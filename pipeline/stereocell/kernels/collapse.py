@@ -24,6 +24,7 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import (
     Ints,
     count_fans,
+    find_fixed,
     following,
     match_twins,
     preceding,
@@ -220,15 +221,11 @@ def collapse(
     corner = result.ravel()
     twins = match_twins(triangles, n)
     leaving, valence = count_fans(triangles, twins, n)
-    stays = locked.copy()
-    for h in range(3 * m):
-        if twins[h] < 0:
-            stays[corner[h]] = stays[corner[following(h)]] = True
+    stays = find_fixed(locked, corner, twins, valence)
     quadrics = np.zeros((n, 11))
     _sum_planes(at, corner, errors, quadrics)
     cost, gone = np.full(n, NEVER, np.int16), np.zeros(m, np.bool_)
     for u in range(n):
-        stays[u] |= valence[u] <= 0
         if not stays[u]:
             cost[u] = _class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
     away, stamp, tick = np.zeros(n), np.zeros(n, np.int32), 0

@@ -99,6 +99,18 @@ def _find_root(parent: Ints, v: int) -> int:
     return v
 
 
+@part
+def find_fixed(
+    locked: NDArray[np.bool_], corner: Ints, twins: Ints, valence: Ints
+) -> NDArray[np.bool_]:
+    """Return which vertices no collapse moves: locked ones, borders', and those without one fan."""
+    fixed = locked | (valence <= 0)
+    for h in range(len(corner)):
+        if twins[h] < 0:
+            fixed[corner[h]] = fixed[corner[following(h)]] = True
+    return fixed
+
+
 @kernel
 def label_bodies(triangles: Ints, count: int) -> tuple[Ints, int]:
     """Return the connected body of each vertex, int32 (count,), and their number.

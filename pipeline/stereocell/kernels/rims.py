@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.collapse import MOST, VALENCE, count_common, join, keeps_form
 from stereocell.kernels.compiled import kernel, part
-from stereocell.kernels.half_edges import Ints, count_fans, following, match_twins, preceding
+from stereocell.kernels.half_edges import (
+    Ints,
+    count_fans,
+    find_fixed,
+    following,
+    match_twins,
+    preceding,
+)
 from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
 
 STEPS = 4  # in which the error grows up to its bound: flat parts go first
 PASSES = 6  # over one step
-SHARPER = 0.1
+SHARPER = 0.1  # of the sharpest angle around a third is allowed: 1 - cos goes with its square
 
 
 @part
@@ -80,14 +87,11 @@ def thin_rim(
     corner = triangles.copy().ravel()
     twins = match_twins(triangles, n)
     leaving, valence = count_fans(triangles, twins, n)
-    stays = locked.copy()
-    for h in range(len(corner)):
-        if twins[h] < 0:
-            stays[corner[h]] = stays[corner[following(h)]] = True
+    stays = find_fixed(locked, corner, twins, valence)
     planes = np.zeros(n, np.uint8)
     for v in range(n):
         planes[v] = sides[v] == 0
-        stays[v] |= sides[v] != 0 or valence[v] <= 0
+        stays[v] |= sides[v] != 0
     curves = np.full((n, 2), -1, np.int32)
     for h in range(len(corner)):
         u = corner[h]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from stereocell.building.channel_survey import evidence_task, statistics_task
+from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
     Found,
     Solids,
@@ -24,7 +25,7 @@ from stereocell.building.level_choice import (
 from stereocell.building.open_source import open_source, source_of
 from stereocell.building.other_levels import ends_of, find_other_levels, take
 from stereocell.building.phases import settle
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window

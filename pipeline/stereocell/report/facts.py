@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.survey_file import Survey, TileIso, read_survey
 from stereocell.building.unit_files import find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile

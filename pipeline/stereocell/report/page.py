@@ -16,10 +16,11 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
+from stereocell.building.channels import Channel
 from stereocell.building.level_choice import given_level
 from stereocell.building.other_levels import OtherLevel, ends_of, find_other_levels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.survey_file import ChannelSurvey
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
 from stereocell.model.channel import SurfaceLevel

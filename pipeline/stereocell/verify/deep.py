@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import require_added, require_input
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import unit_tasks
-from stereocell.building.plan import Channel, Plan
+from stereocell.building.plan import Plan
 from stereocell.building.survey_file import read_survey
 from stereocell.bundle.write import MANIFEST
 from stereocell.engine.run import Engine
