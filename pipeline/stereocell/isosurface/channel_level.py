@@ -114,7 +114,7 @@ class ChannelLevels:
         if self.kinship < LEAST_KINSHIP:
             return (
                 "neighbouring voxels have nothing to do with one another, as in noise: their "
-                f"correlation is {self.kinship:.3f}, expected at least {LEAST_KINSHIP:g}"
+                f"correlation is {self.kinship:z.3f}, expected at least {LEAST_KINSHIP:g}"
             )
         first = next(iter(clear_of(self.ladder)), None)
         # a straight edge of tissue is a step along an axis too, but between two peaks
