@@ -173,7 +173,8 @@ export class FrameLoop {
   }
 
   private poseMono(dt_s: number): Camera {
-    const { navigation } = this.options.shown();
+    const { navigation, contents, state } = this.options.shown();
+    if (!contents.hasOverview) navigation.surround(contents.occupied(state));
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;

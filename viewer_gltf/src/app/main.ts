@@ -12,7 +12,14 @@ import { loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { keepOffline } from "../offline/register";
-import { Notices, ProgressBar, Said, StereoButton, showFatal } from "../panel/html/overlays";
+import {
+  FirstHint,
+  Notices,
+  ProgressBar,
+  Said,
+  StereoButton,
+  showFatal,
+} from "../panel/html/overlays";
 import { findXrSupport, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
@@ -33,8 +40,26 @@ function describeSize({ specimen, tiles }: Manifest): string {
   return `${edges.join(" × ")} µm · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
 }
 
+/** On the page that stands until there is a picture: see boot/. */
+function sayAtStart(text: string): void {
+  const words = document.querySelector("[data-boot] p");
+  if (words !== null) words.textContent = text;
+}
+
+/** Once: someone has taken the page in hand. */
+function whenTouched(then: () => void): void {
+  const touched = new AbortController();
+  const options = { capture: true, passive: true, signal: touched.signal };
+  const touch = () => {
+    touched.abort();
+    then();
+  };
+  for (const kind of ["pointerdown", "wheel", "keydown"]) addEventListener(kind, touch, options);
+}
+
 async function open(parent: HTMLElement): Promise<Viewer> {
   checkWebGl2();
+  sayAtStart("Reading the bundle");
   const bundle = await loadBundle(bundleAddress(location.href));
   const { manifest } = bundle;
   document.title = `${manifest.specimen.name} · StereoCell`;
@@ -49,7 +74,9 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   );
   const said = new Said();
   const stereoButton = new StereoButton();
-  const over = [progress.root, said.root, notices.root, stereoButton.root];
+  const isTouch = matchMedia("(pointer: coarse)").matches;
+  const hint = new FirstHint(isTouch);
+  const over = [hint.root, progress.root, said.root, notices.root, stereoButton.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   const viewer: Viewer = new Viewer(
@@ -73,9 +100,13 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(location.search, location.hash);
+  whenTouched(() => {
+    viewer.stopTurning();
+    hint.leave();
+  });
   const support = await findXrSupport(navigator.xr, isSecureContext);
   controller.setStereo(support);
-  const way = wayToStereo(support, matchMedia("(pointer: coarse)").matches);
+  const way = wayToStereo(support, isTouch);
   stereoButton.offer(way, () => way && controller.perform(way));
   return viewer;
 }

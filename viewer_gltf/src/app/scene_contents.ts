@@ -3,6 +3,7 @@ import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
 import { memoryBudget } from "../gpu/memory_budget";
+import type { Box } from "../math/box";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
@@ -42,7 +43,7 @@ export class Contents {
   private readonly ahead = new Vector3();
   private readonly loader: SurfaceLoader;
   /** Volumes come after the first picture of all tiles. */
-  private hasOverview = false;
+  hasOverview = false;
 
   constructor(options: ContentsOptions) {
     const { bundle, renderer, picture, onChange, onError } = options;
@@ -118,6 +119,12 @@ export class Contents {
     this.traced.retryFailed();
     this.transferFunctions2d.retryFailed();
     this.marks.readAnew();
+  }
+
+  /** The box round all that shows, um, as far as it is known: a volume may fill all of its box. */
+  occupied({ channels }: ViewerState): Box | null {
+    const isAllSurface = channels.every(({ shown, hasSurface }) => !shown || hasSurface);
+    return isAllSurface ? this.surfaces.bounds : null;
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -22,12 +22,13 @@ export class StereoTransition {
   /** The specimen turns the same side to the head as to the screen, what was looked at ahead. */
   enter(): void {
     const { navigation, specimen } = this;
+    navigation.stopTurning();
     navigation.controls.enabled = false;
     const ahead_m = new Vector3(0, 0, -XR_DISTANCE_M);
     const onScreen = this.poseOnScreen;
     const pose = intoRoom(specimen.pose, this.screenHold, ahead_m);
     specimen.anchorAt(ahead_m);
-    if (navigation.look !== null || onScreen !== null) specimen.moveTo(pose, new Vector3());
+    if (!navigation.isStraight || onScreen !== null) specimen.moveTo(pose, new Vector3());
     this.entered = { inRoom: specimen.pose, onScreen };
   }
 
@@ -73,7 +74,7 @@ export class StereoTransition {
     const { anchor, home, isMoved, pose } = this.specimen;
     if (entered === null) return isMoved ? pose : null;
     if (pose === entered.inRoom) return entered.onScreen; // nobody has moved it there
-    if (!isMoved && navigation.look === null) return null;
+    if (!isMoved && navigation.isStraight) return null;
     return ontoScreen(isMoved ? pose : home, this.screenHold, anchor);
   }
 }

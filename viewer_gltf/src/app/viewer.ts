@@ -5,7 +5,7 @@ import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
-import { Navigation } from "../interaction/orbit_camera";
+import { Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
@@ -23,6 +23,7 @@ import { discLimit } from "../state/focus_tiles";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
+import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
@@ -36,6 +37,8 @@ import { StereoTransition } from "./stereo_transition";
 
 /** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
+/** The switch distance of the opening at least, as a multiple of the eye's from what it looks at. */
+const NEAR_AT_START = 1.1;
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
@@ -231,6 +234,30 @@ export class Viewer {
   /** From where the specimen is seen; null: as it opens. */
   get cameraView(): CameraView | null {
     return this.transition.cameraView;
+  }
+
+  /**
+   * Open the view: as the address has it, or with what there is of the specimen in the picture, near
+   * enough for volumes, and slowly turning until someone touches it.
+   */
+  openWith(stand: Stand | null, saysDistance: boolean): void {
+    const { navigation } = this;
+    if (stand !== null) navigation.openAt(stand);
+    else {
+      const { position, target } = navigation.lookNow;
+      const away_m = NEAR_AT_START * Math.hypot(...position.map((v, i) => v - target[i]));
+      const isFar = away_m > this.state.switchDistance_m;
+      if (isFar && !saysDistance) this.dispatch(setTo(SWITCH_DISTANCE, away_m));
+      // light is gathered while nothing moves
+      const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+      if (!isCalm && !isTraced(this.state)) navigation.turnSlowly();
+    }
+    this.loop.change();
+  }
+
+  /** Someone has touched the page. */
+  stopTurning(): void {
+    this.navigation.stopTurning();
   }
 
   lookFrom(view: CameraView): void {

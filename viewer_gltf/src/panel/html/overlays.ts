@@ -70,6 +70,28 @@ export class Notices {
   }
 }
 
+/** How to begin, under a picture that nobody has touched yet. */
+export class FirstHint {
+  readonly root: HTMLElement;
+
+  constructor(isTouch: boolean) {
+    const [turn, zoom] = isTouch ? ["drag", "pinch"] : ["drag", "wheel"];
+    this.root = element(
+      "p",
+      {
+        className: "first-hint",
+        textContent: `${turn} to turn, ${zoom} to zoom, go near for volumes`,
+      },
+      { overlay: "hint" },
+    );
+  }
+
+  /** From the first touch on nobody needs it. */
+  leave(): void {
+    this.root.classList.add("gone");
+  }
+}
+
 /** The way into stereo, on the picture itself; hidden where there is none. */
 export class StereoButton {
   readonly root = element(
