@@ -40,6 +40,8 @@ function describeSize({ specimen, tiles }: Manifest): string {
   return `${edges.join(" × ")} µm · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
 }
 
+const said = new Said();
+
 /** On the page that stands until there is a picture: see boot/. */
 function sayAtStart(text: string): void {
   const words = document.querySelector("[data-boot] p");
@@ -72,7 +74,6 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     (text) => viewer.dispatch({ type: "dismiss", text }),
     () => viewer.run("retry"),
   );
-  const said = new Said();
   const stereoButton = new StereoButton();
   const isTouch = matchMedia("(pointer: coarse)").matches;
   const hint = new FirstHint(isTouch);
@@ -148,7 +149,11 @@ void opened.then(
   },
   () => undefined, // reported above
 );
-void ready.then(keepOffline, () => undefined);
+const sayReady = () => said.say("Ready offline: what has been shown opens without a network, too.");
+void ready.then(
+  () => keepOffline(sayReady),
+  () => undefined,
+);
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 watchWaiting((isWaiting) =>
   viewer?.dispatch({ type: isWaiting ? "notify" : "dismiss", text: WAITING }),

@@ -37,7 +37,7 @@ import { StereoTransition } from "./stereo_transition";
 
 /** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
-/** The switch distance of the opening at least, as a multiple of the eye's from what it looks at. */
+/** The switch distance of the opening at least, as a multiple of the eye's from the middle. */
 const NEAR_AT_START = 1.1;
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
@@ -242,10 +242,10 @@ export class Viewer {
    */
   openWith(stand: Stand | null, saysDistance: boolean): void {
     const { navigation } = this;
+    this.fit(); // the panel has its place by now
     if (stand !== null) navigation.openAt(stand);
     else {
-      const { position, target } = navigation.lookNow;
-      const away_m = NEAR_AT_START * Math.hypot(...position.map((v, i) => v - target[i]));
+      const away_m = NEAR_AT_START * navigation.openingDistance_m;
       const isFar = away_m > this.state.switchDistance_m;
       if (isFar && !saysDistance) this.dispatch(setTo(SWITCH_DISTANCE, away_m));
       // light is gathered while nothing moves

@@ -50,12 +50,16 @@ describe("the opening", () => {
     const navigation = start();
     const still = azimuth(navigation);
     navigation.turnSlowly();
+    const away: number[] = [];
     const turned = Array.from({ length: 120 }, () => {
       navigation.update(0.5);
+      away.push(navigation.camera.position.distanceTo(navigation.controls.target));
       return azimuth(navigation) - still;
     });
     expect(Math.max(...turned)).toBeCloseTo(Math.PI / 10, 1);
     expect(Math.min(...turned)).toBeCloseTo(-Math.PI / 10, 1);
+    expect(navigation.openingDistance_m).toBeGreaterThan(Math.max(...away) - 1e-3);
+    expect(navigation.openingDistance_m).toBeLessThan(Math.max(...away) + 0.01);
     navigation.update(3);
     const before = eye(navigation);
     expect(navigation.look).not.toBeNull(); // a link has to say where it is

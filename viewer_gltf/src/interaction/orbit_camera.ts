@@ -25,6 +25,8 @@ const PAN = 0.1;
 /** The turn that a specimen opens with: so far to either side, and the time to and fro, s. */
 const SWAY_RAD = Math.PI / 10;
 const SWAY_S = 30;
+/** Parts of it at which the eye may be farthest. */
+const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
 
 /** A view that has a name: it follows the window's shape as long as nobody moves. */
 export const STANDS = ["opening", "front", "side", "top"] as const;
@@ -232,17 +234,30 @@ export class Navigation {
   /** The whole specimen: x to the right and y up from the front. */
   private lookAt(stand: Stand): Look {
     const target = [0, 0, 0] as const;
+    if (stand === "opening") return this.lookAround(this.swayed_s ?? 0);
     if (stand === "front") return { position: [0, 0, this.framing(2)], target };
     if (stand === "side") return { position: [this.framing(0), 0, 0], target };
-    if (stand === "top") return { position: [0, this.framing(1), 1e-4], target };
+    return { position: [0, this.framing(1), 1e-4], target };
+  }
+
+  /** The opening after so much of its turn. */
+  private lookAround(swayed_s: number): Look {
     const lens = { fov_rad: (FIELD_OF_VIEW_DEG * Math.PI) / 180, aspect: this.camera.aspect };
     const still = openingView(this.occupied, lens);
-    const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * (this.swayed_s ?? 0)) / SWAY_S);
+    const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
     const direction = { ...still, aside_rad: still.aside_rad + sway_rad };
     const distance = Math.min(FARTHEST_M, distanceToFrame(this.occupied, direction, lens));
     const middle = centerOf(this.occupied);
     const [x, y, z] = towardsEye(direction).map((v, i) => middle[i] + v * distance);
     return { position: [x, y, z], target: middle };
+  }
+
+  /** Farthest distance of the eye from the middle during the opening's turn. */
+  get openingDistance_m(): number {
+    const looks = TURNED.map((part) => this.lookAround(part * SWAY_S));
+    return Math.max(
+      ...looks.map(({ position, target }) => Math.hypot(...position.map((v, i) => v - target[i]))),
+    );
   }
 
   private framing(axis: 0 | 1 | 2): number {
