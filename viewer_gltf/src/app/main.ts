@@ -5,6 +5,7 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
+import { sizeText } from "../annotations/measure";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -33,11 +34,10 @@ function checkWebGl2(): void {
   );
 }
 
-/** For example `512 x 205 x 54 um`. */
+/** For example `512 x 205 x 54 um`, or `231 x 215 x 255 mm`. */
 function describeSize({ specimen, tiles }: Manifest): string {
   const { min, max } = specimen.bounds_um;
-  const edges = max.map((v, i) => (v - min[i]).toPrecision(3)).map(Number);
-  return `${edges.join(" × ")} µm · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
+  return `${sizeText(max.map((v, i) => v - min[i]))} · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
 }
 
 const said = new Said();
@@ -71,7 +71,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   stage.role = "img";
   const progress = new ProgressBar();
   const notices = new Notices(
-    (text) => viewer.dispatch({ type: "dismiss", text }),
+    (texts) => viewer.dispatch({ type: "dismiss", texts }),
     () => viewer.run("retry"),
   );
   const stereoButton = new StereoButton();
@@ -156,7 +156,9 @@ void ready.then(
 );
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 watchWaiting((isWaiting) =>
-  viewer?.dispatch({ type: isWaiting ? "notify" : "dismiss", text: WAITING }),
+  viewer?.dispatch(
+    isWaiting ? { type: "notify", text: WAITING } : { type: "dismiss", texts: [WAITING] },
+  ),
 );
 ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 

@@ -8,6 +8,7 @@ import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Action } from "../state/actions";
+import { isTraced } from "../state/parameters/volumes";
 import { wantedTiles } from "../state/representation";
 import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
@@ -82,7 +83,7 @@ export class Contents {
       manifest: bundle.manifest,
       base: bundle.base,
       surfaces: () => this.surfaces.meshes,
-      volumes: () => [...this.volumes.shown(), ...this.traced.shown()],
+      volumes: () => (this.traced.isShown ? this.traced.shown() : this.volumes.shown()),
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
       sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
@@ -103,7 +104,9 @@ export class Contents {
   }
 
   follow(state: ViewerState, { focusTiles, mayRefine }: Hybrid): void {
-    const wanted = this.hasOverview ? wantedTiles(state, focusTiles) : [];
+    // a host that sends bricks sends those of a tile to one place
+    const isMarched = this.hasOverview && !(isTraced(state) && this.bricks !== null);
+    const wanted = isMarched ? wantedTiles(state, focusTiles) : [];
     for (const channel of volumeChannels(state))
       if (isTwoD(channel)) this.transferFunctions2d.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);

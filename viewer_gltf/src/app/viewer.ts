@@ -23,6 +23,7 @@ import { discLimit } from "../state/focus_tiles";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
+import { START_TOOLS } from "../state/parameters/tools";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
@@ -49,6 +50,8 @@ export class Viewer {
   state: ViewerState;
   /** The content of a panel in the room; the owner of the panel sets it. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
+  /** Of this screen; null: guessed from the browser's name. */
+  cssPixelsPerInch: number | null = null;
   /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;
   readonly contents: Contents;
@@ -153,7 +156,7 @@ export class Viewer {
       this.contents.traced.forget();
       this.loop.renew(); // the times that were asked for went, too
       this.follow();
-      this.dispatch({ type: "dismiss", text: lost });
+      this.dispatch({ type: "dismiss", texts: [lost] });
     });
     addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
@@ -168,7 +171,9 @@ export class Viewer {
     const notice = newNotice(this.state, next);
     const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
+    const larger = next.specimenSize_m / this.state.specimenSize_m;
     this.state = next;
+    if (larger !== 1) this.stereo.resize(larger, next);
     if (notice !== null) this.stereo.announce(notice);
     if (announcement !== null) this.onAnnounce(announcement);
     this.follow();
@@ -318,7 +323,7 @@ export class Viewer {
 
   /** Ask again for all that has failed. */
   private retry(): void {
-    for (const text of this.state.mendable) this.dispatch({ type: "dismiss", text });
+    this.dispatch({ type: "dismiss", texts: this.state.mendable });
     this.contents.retryFailed();
     this.follow();
   }
@@ -330,7 +335,12 @@ export class Viewer {
   }
 
   private follow(): void {
-    const { isolated, selected, quality } = this.state;
+    const { isolated, selected, quality, eyeDistance_mm, stereoStrength } = this.state;
+    this.stereo.setEyes({
+      distance_m: eyeDistance_mm / 1000,
+      strength: stereoStrength,
+      cssPixelsPerInch: this.cssPixelsPerInch,
+    });
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
@@ -358,7 +368,7 @@ export class Viewer {
   }
 
   private enterStereo(): void {
-    this.transition.enter();
+    this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m);
     this.onState(this.state);
   }
 

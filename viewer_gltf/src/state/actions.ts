@@ -22,4 +22,4 @@ export type Action =
   /** Where a lamp is dragged to. */
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
-  | Readonly<{ type: "dismiss"; text: string }>;
+  | Readonly<{ type: "dismiss"; texts: readonly string[] }>;
