@@ -9,7 +9,15 @@ import { copyText } from "../dom/clipboard";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import { handleOf } from "../panel/clip_by_key";
-import { changePanel, type Layout, type PanelView, START_VIEW, type Wish } from "../panel/controls";
+import {
+  changePanel,
+  type Layout,
+  type Lenses,
+  type PanelView,
+  START_VIEW,
+  type Wish,
+} from "../panel/controls";
+import { CardMeasure, PER_INCH } from "../panel/html/card_measure";
 import { Help } from "../panel/html/key_list";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
@@ -22,11 +30,15 @@ import type { Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
+import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { setTo } from "../state/parameters/kinds";
+import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
 import type { XrSupport } from "../state/stereo";
+import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
   BUILT_IN,
@@ -43,6 +55,7 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 const REFRESH_MS = 250;
 
 const LENS_KEY = "stereocell-lens";
+const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
 
 /** The user's phone viewer, from the visit before. */
 function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
@@ -52,6 +65,41 @@ function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
     return isKnown && typeof code === "string" ? { lenses, code } : {};
   } catch {
     return {}; // no storage here, or another's words in it: then as at first
+  }
+}
+
+const SCREEN_KEY = "stereocell-screen";
+const EYES_KEY = "stereocell-eyes";
+
+/** CSS pixels in an inch of this screen, as it was measured; null: it was not. */
+function rememberedScreen(): number | null {
+  const [least, most] = PER_INCH;
+  const perInch = Number(remembered(SCREEN_KEY));
+  return perInch >= least && perInch <= most ? perInch : null;
+}
+
+/** What the user has set for the eyes, on a visit before. */
+function rememberedEyes(): readonly Action[] {
+  const texts = (remembered(EYES_KEY) ?? "").split(",");
+  return EYE_ROWS.flatMap((row, i) => {
+    const value = Number(texts[i] || Number.NaN);
+    return Number.isFinite(value) ? [setTo(row, value)] : [];
+  });
+}
+
+function remembered(key: string): string | null {
+  try {
+    return localStorage.getItem(key);
+  } catch {
+    return null; // no storage here
+  }
+}
+
+function remember(key: string, text: string): void {
+  try {
+    localStorage.setItem(key, text);
+  } catch {
+    // no storage here: it has to be set anew next time
   }
 }
 
@@ -76,9 +124,12 @@ export class Controller {
   private view: PanelView = { ...START_VIEW, ...rememberedLens() };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
+  private readonly card: CardMeasure;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
+  /** As they were when they were last remembered. */
+  private eyes = EYE_ROWS.map((row) => row.get(START_TOOLS)).join();
   private canScan = false;
 
   constructor(
@@ -94,7 +145,19 @@ export class Controller {
     this.help = new Help(parent, () => {
       if (this.view.isHelpOpen) this.perform({ panel: "help" });
     });
+    this.card = new CardMeasure(parent, (perInch) => {
+      remember(SCREEN_KEY, String(perInch));
+      viewer.setScreen(perInch);
+      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
+    });
+    viewer.setScreen(rememberedScreen());
+    for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
+    viewer.onCommand = (command) => {
+      if (command === "share") void this.share();
+      return command === "share";
+    };
+    viewer.onLenses = (lenses) => this.changeLenses(lenses);
     listenForKeys((name) => this.press(name), this.disposed.signal);
     // A link to another view of the same bundle: what it leaves out is as the bundle opens.
     addEventListener("hashchange", () => location.reload(), { signal: this.disposed.signal });
@@ -120,6 +183,9 @@ export class Controller {
     clearTimeout(this.timer);
     this.timer = 0;
     this.panel.update(this.layOut());
+    const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
+    if (eyes !== this.eyes) remember(EYES_KEY, eyes);
+    this.eyes = eyes;
     this.help.update(this.view.isHelpOpen);
   }
 
@@ -159,6 +225,9 @@ export class Controller {
       this.splitScreen();
     } else if (command === "scan") {
       void this.scan();
+    } else if (command === "measure-screen") {
+      const { userAgent } = navigator;
+      this.card.open(this.viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
     } else if (command === "own-light") {
       void this.lightByFile();
     } else if (command === "find") {
@@ -188,8 +257,20 @@ export class Controller {
 
   private splitScreen(): void {
     const { lenses, code } = this.view;
+    this.viewer.stereo.hands.panel.take({ lenses, code });
+    this.withProfile((profile) => this.options.onSplit(profile));
+  }
+
+  /** In stereo: the phone is in another viewer. */
+  private changeLenses(lenses: Lenses): void {
+    this.perform({ panel: "lenses", lenses });
+    this.withProfile((profile) => this.viewer.stereo.setLenses(profile));
+  }
+
+  private withProfile(use: (profile: Profile) => void): void {
+    const { lenses, code } = this.view;
     try {
-      this.options.onSplit(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
+      use(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
       rememberLens({ lenses, code });
     } catch (error) {
       if (!(error instanceof ProfileError)) throw error;
@@ -251,7 +332,10 @@ export class Controller {
     history.replaceState(history.state, "", address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
-    if (await copyText(address.href)) this.say("The link is in the clipboard.");
+    viewer.stereo.hands.panel.take({ link: address.href });
+    if (viewer.stereo.kind !== null) {
+      this.say("The link is in the page's address, for when you leave.");
+    } else if (await copyText(address.href)) this.say("The link is in the clipboard.");
     else {
       this.goTo("share", "link"); // which selects it
       this.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
@@ -290,7 +374,7 @@ export class Controller {
       discLimit_deg,
       isStereo,
       stereo,
-      split: SPLIT,
+      split: viewer.stereo.kind === "headset" ? null : SPLIT,
       canScan: this.canScan,
       faultOfCode,
       frame_ms: frame_ms > 0 ? frame_ms : null,
@@ -308,5 +392,6 @@ export class Controller {
     this.disposed.abort();
     this.panel.root.remove();
     this.help.dispose();
+    this.card.dispose();
   }
 }

@@ -9,7 +9,7 @@ import { Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
-import type { Layout, PanelView } from "../panel/controls";
+import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
@@ -50,8 +50,12 @@ export class Viewer {
   state: ViewerState;
   /** The content of a panel in the room; the owner of the panel sets it. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
+  /** What is asked for in stereo and is the page's; whether it was. */
+  onCommand: (command: Command) => boolean = () => false;
+  /** The phone is in a viewer of other lenses, it was said in stereo. */
+  onLenses: (lenses: Lenses) => void = () => undefined;
   /** Of this screen; null: guessed from the browser's name. */
-  cssPixelsPerInch: number | null = null;
+  private perInch: number | null = null;
   /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;
   readonly contents: Contents;
@@ -121,8 +125,9 @@ export class Viewer {
       layOut: (view) => this.layOut(view),
       onAction: (action) => this.dispatch(action),
       onCommand: (command) => {
-        if (!this.run(command)) this.stereo.announce(CANT);
+        if (!this.run(command) && !this.onCommand(command)) this.stereo.announce(CANT);
       },
+      onLenses: (lenses) => this.onLenses(lenses),
       onChoose: (ray, tile) => this.choose(ray, tile),
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
@@ -260,6 +265,16 @@ export class Viewer {
     this.loop.change();
   }
 
+  get cssPixelsPerInch(): number | null {
+    return this.perInch;
+  }
+
+  /** @param perInch CSS pixels in an inch of this screen; null: guessed from the browser's name */
+  setScreen(perInch: number | null): void {
+    this.perInch = perInch;
+    this.follow();
+  }
+
   /** Someone has touched the page. */
   stopTurning(): void {
     this.navigation.stopTurning();
@@ -339,7 +354,7 @@ export class Viewer {
     this.stereo.setEyes({
       distance_m: eyeDistance_mm / 1000,
       strength: stereoStrength,
-      cssPixelsPerInch: this.cssPixelsPerInch,
+      cssPixelsPerInch: this.perInch,
     });
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));

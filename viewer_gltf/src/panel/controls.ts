@@ -182,7 +182,14 @@ export type HistogramEditor = Base &
   }>;
 /** What can only be read. */
 export type Text = Base & Readonly<{ kind: "text"; value: string }>;
-export type Search = Base & Readonly<{ kind: "search"; value: string; to: (text: string) => Wish }>;
+export type Search = Base &
+  Readonly<{
+    kind: "search";
+    value: string;
+    /** Texts to choose from where nobody can type. */
+    hints?: readonly string[];
+    to: (text: string) => Wish;
+  }>;
 /** An address to copy. */
 export type Link = Base & Readonly<{ kind: "link"; value: string }>;
 

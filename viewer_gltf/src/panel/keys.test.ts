@@ -94,6 +94,7 @@ describe("the keys", () => {
       "pan-down": true,
       find: true,
       "own-light": true,
+      "measure-screen": true,
     };
     const asked = wishes.filter((wish) => typeof wish === "string");
     expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));

@@ -16,6 +16,8 @@ export type Command =
   | "press"
   /** To the panel's search among the channels that are not shown. */
   | "find"
+  /** How large the screen is, by a card that is held to it. */
+  | "measure-screen"
   /** Light the traced picture by a .hdr or .exr file. */
   | "own-light"
   | "front"

@@ -16,10 +16,11 @@ import { TILE, TileTarget } from "../interaction/tile_target";
 import { type HandPose, zoomAbout } from "../math/grab";
 import { type BoxedTile, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
-import type { Layout, PanelView } from "../panel/controls";
+import type { Layout, Lenses, PanelView } from "../panel/controls";
 import type { Specimen } from "../render/specimen_pose";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
+import { DWELL } from "../state/parameters/tools";
 import type { ViewerState } from "../state/viewer_state";
 import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
@@ -34,7 +35,7 @@ import {
   STEPS_PER_S,
 } from "./hold_specimen";
 import { RoomNotice } from "./panel/notice";
-import { RoomPanel } from "./panel/panel";
+import { PANEL, RoomPanel } from "./panel/panel";
 import { hullOf, middleOf } from "./shown_hull";
 
 export type HandsOptions = Readonly<{
@@ -51,11 +52,17 @@ export type HandsOptions = Readonly<{
   onChoose: (ray: Ray, tile: string) => void;
   /** Stereo is to end. */
   onLeave: () => void;
+  /** The phone is in a viewer of other lenses. */
+  onLenses?: (lenses: Lenses) => void;
 }>;
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;
 const HOLD_M = 0.02;
+
+/** By gaze alone it is not switched off: nothing would be left to switch it on by. */
+const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
+const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
 
 /** A trigger that is down. */
 type Press = {
@@ -100,9 +107,11 @@ export class Hands {
 
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
+    const { onLenses = () => undefined } = options;
     this.panel = new RoomPanel({
       layOut,
       onLeave,
+      onLenses,
       onAnnounce: (text) => this.announce(text),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
@@ -215,7 +224,8 @@ export class Hands {
     const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
-    if (fired !== null) {
+    if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);
+    else if (fired !== null) {
       this.choose(fired);
       if (fired.repeats !== undefined) this.goesOn = { met: fired, source: null, elapsed_s: 0 };
     }

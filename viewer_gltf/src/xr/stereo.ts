@@ -23,6 +23,24 @@ export type EyeSettings = Readonly<{
   cssPixelsPerInch: number | null;
 }>;
 
+/** On a card before the eyes when stereo begins. */
+export const HOW_IT_WORKS =
+  "Menu: look down and press. A press chooses what you look at; held, it takes the specimen along " +
+  "with your head: tilt down, and it comes nearer.";
+/** Whoever has seen it so often knows. */
+const TOLD_OFTEN = 3;
+const TOLD_KEY = "stereocell-told";
+
+function isToBeTold(): boolean {
+  try {
+    const times = Number(localStorage.getItem(TOLD_KEY) ?? 0);
+    localStorage.setItem(TOLD_KEY, String(times + 1));
+    return times < TOLD_OFTEN;
+  } catch {
+    return true; // nothing can be kept here
+  }
+}
+
 const NOT_LOADED =
   "The part of the page that splits the screen could not be loaded. Check the connection, load " +
   "the page again, and tap again.";
@@ -155,6 +173,11 @@ export class Stereo {
     split.present();
   }
 
+  /** The phone is in another viewer; nothing changes where there is no split screen. */
+  setLenses(profile: Profile): void {
+    this.split?.setProfile(profile);
+  }
+
   /** The specimen becomes so much larger where it is; on a flat screen nothing does. */
   resize(factor: number, state: ViewerState): void {
     if (this.kind !== null) this.hands.resize(factor, state);
@@ -187,6 +210,7 @@ export class Stereo {
   private begin(session: XRSession | null): void {
     this.options.onStart();
     this.hands.start(session);
+    if (isToBeTold()) this.hands.announce(HOW_IT_WORKS);
   }
 
   private leave(): void {

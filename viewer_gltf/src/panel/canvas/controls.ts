@@ -1,7 +1,7 @@
 /**
  * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
-import type { Button, Control, Group, Toggle } from "../controls";
+import type { Button, Choice, Control, Group, Search, Toggle } from "../controls";
 import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
 import {
   type Block,
@@ -19,13 +19,15 @@ import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
 import { sliderRow, windowRow } from "./sliders";
 import { histogramBlock } from "./transfer_function_2d";
 
-/** Controls without use in a headset: it has no keyboard and no clipboard, and stereo has begun. */
-const ELSEWHERE: ReadonlySet<string> = new Set([
-  "stereo",
-  "split",
-  "scan",
-  "lenses",
-  "share",
+/**
+ * Controls without use before the eyes: the way into stereo, from which *Leave* leads back, the code of a
+ * phone viewer, which is read with the phone out of it, the screen's size, which is measured by a
+ * card held to it, a file of the user's, and the list of a keyboard's keys.
+ */
+export const ELSEWHERE: ReadonlySet<string> = new Set([
+  ...["stereo", "split"],
+  ...["scan", "lens-code", "measure-screen"],
+  "own-light",
   "help",
 ]);
 /** Widths in a channel's row. */
@@ -56,9 +58,16 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "text":
       return item.value === "" ? [] : [textBlock(item.label, item.value, width)];
     case "search":
+      return item.hints === undefined ? [] : [stepper(asChoice(item, item.hints), row)];
     case "link":
-      return [];
+      return [textBlock(item.label, "It is in the page's address: take it from there.", width)];
   }
+}
+
+/** Nobody types by gaze: one hint after the other. */
+function asChoice({ id, value, to }: Search, hints: readonly string[]): Choice {
+  const options = ["", ...hints].map((hint) => ({ value: hint, label: hint || "all" }));
+  return { kind: "choice", id, label: "Begins with", value, options, isInline: false, to };
 }
 
 /** The blocks of a section; buttons that go on while they are held share a row with their opposite. */

@@ -114,6 +114,14 @@ export function pagesOf(state: ViewerState, search: string): number {
   return Math.max(1, Math.ceil(foundChannels(state, search).length / PAGE));
 }
 
+/** Beginnings of the hidden channels' names, as `CD`: the letters up to a digit, three at most. */
+function beginningsOf(state: ViewerState): readonly string[] {
+  const found = foundChannels(state, "").map(
+    ({ name }) => /^\p{L}{1,3}/u.exec(name)?.[0] ?? name.slice(0, 1),
+  );
+  return [...new Set(found)].sort((a, b) => a.localeCompare(b, "en"));
+}
+
 function addingOf(state: ViewerState, view: PanelView): readonly (Control | Group)[] {
   const hidden = foundChannels(state, "").length;
   if (hidden === 0) return [];
@@ -130,6 +138,7 @@ function addingOf(state: ViewerState, view: PanelView): readonly (Control | Grou
       id: "find-channel",
       label: `Add one of ${hidden} more channels`,
       value: view.search,
+      hints: beginningsOf(state),
       to: (text) => ({ panel: "find", text }),
     });
   }

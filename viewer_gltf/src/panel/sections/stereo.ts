@@ -57,5 +57,6 @@ function splitItems(
     if (canScan) items.push(command("scan", "Scan the code"));
   }
   const support = split.isAvailable && fault !== "" ? { isAvailable: false, reason: fault } : split;
+  items.push(command("measure-screen", "Measure the screen by a card"));
   return [...items, { ...command("split", "Split screen"), ...onlyIf(support) }];
 }

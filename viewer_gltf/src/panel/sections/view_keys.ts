@@ -25,5 +25,6 @@ export const VIEW_KEYS: readonly Key[] = [
   }),
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),
+  key("&", "Measure the screen by a card, for the split screen", "measure-screen"),
   ...STEREO_PARAMETERS.flatMap(keysOf),
 ];

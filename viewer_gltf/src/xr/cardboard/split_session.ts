@@ -62,6 +62,12 @@ export class SplitSession {
     this.target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
   }
 
+  /** The phone is in another viewer. */
+  setProfile(profile: Profile): void {
+    this.profile = profile;
+    this.layout = "";
+  }
+
   /** Another screen, or other eyes than the lenses are made for. */
   set(options: SplitOptions): void {
     this.options = options;

@@ -5,7 +5,7 @@
 import { type Mark, type Rect, TEXT, text } from "../../panel/canvas/draw_list";
 
 /** Time for the oldest notice, s: then it goes, and the next one has as long. */
-export const ANNOUNCED_S = 6;
+export const ANNOUNCED_S = 5;
 const MOST = 3;
 
 export type Announcements = Readonly<{

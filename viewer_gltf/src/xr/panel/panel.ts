@@ -14,7 +14,13 @@ import {
   START_CANVAS,
   WIDTH,
 } from "../../panel/canvas/page";
-import { changePanel, type Layout, type PanelView, START_VIEW } from "../../panel/controls";
+import {
+  changePanel,
+  type Layout,
+  type Lenses,
+  type PanelView,
+  START_VIEW,
+} from "../../panel/controls";
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
@@ -40,6 +46,8 @@ export type RoomPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onWish: (wish: Action | Command) => void;
   onLeave: () => void;
+  /** The phone is in a viewer of other lenses. */
+  onLenses: (lenses: Lenses) => void;
   /** Reports why a request can't be granted. */
   onAnnounce: (text: string) => void;
 }>;
@@ -83,6 +91,12 @@ export class RoomPanel {
       },
     ];
     this.paintOpener();
+  }
+
+  /** What the page's own panel has chosen, and this one shows. */
+  take(view: Partial<PanelView>): void {
+    this.view = { ...this.view, ...view };
+    this.isStale = true;
   }
 
   get isOpen(): boolean {
@@ -244,8 +258,10 @@ export class RoomPanel {
   private grant(wish: CanvasWish): void {
     this.isStale = true;
     if (typeof wish === "string") this.options.onWish(wish);
-    else if ("panel" in wish) this.view = changePanel(this.view, wish);
-    else if ("type" in wish) this.options.onWish(wish);
+    else if ("panel" in wish) {
+      this.view = changePanel(this.view, wish);
+      if (wish.panel === "lenses") this.options.onLenses(wish.lenses);
+    } else if ("type" in wish) this.options.onWish(wish);
     else if (wish.canvas === "tab") this.section = { tab: wish.section, page: 0 };
     else if (wish.canvas === "page") this.section = { ...this.section, page: wish.page };
     else if (wish.canvas === "announce") this.options.onAnnounce(wish.text);

@@ -164,6 +164,18 @@ class Stand {
     return this.step([0]);
   }
 
+  /**
+   * Look at a control of the panel, or away from all (null), for some seconds, in frames of a tenth that are not
+   * drawn: the gaze alone, of a head that has no session.
+   */
+  gazeFor(id: string | null, seconds: number): void {
+    const at = id === null ? new Vector3(0, 5, -1) : new Vector3(...this.controlAt(id));
+    const head = new Matrix4().makeRotationFromQuaternion(facing(at));
+    for (let k = 0; k <= Math.round(10 * seconds); k++) {
+      this.hands.update(k === 0 ? 0 : 0.1, head, this.state);
+    }
+  }
+
   /** Put a controller at a point of the room, pointing at another. */
   point(side: Side, from: At, at: At): Promise<void> {
     const controller = this.device.controllers[side];
