@@ -25,6 +25,7 @@ export const LAYERS: readonly string[] = [
   "xr",
   "share",
   "offline",
+  "bench",
   "app",
 ];
 

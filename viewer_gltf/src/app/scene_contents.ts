@@ -50,7 +50,7 @@ export class Contents {
     this.loader = new SurfaceLoader(renderer);
     const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
     const budget = memoryBudget(navigator);
-    const limits = { bytes: budget.volumes, side };
+    const limits = { bytes: budget.volumes, side, edge: Number.POSITIVE_INFINITY };
     this.bricks =
       bundle.bricks === undefined
         ? null
@@ -118,6 +118,12 @@ export class Contents {
     this.traced.retryFailed();
     this.transferFunctions2d.retryFailed();
     this.marks.readAnew();
+  }
+
+  /** Draw volumes of at most so many voxels along a tile's edge; then `follow`. */
+  limitEdge(edge: number): void {
+    this.volumes.limitEdge(edge);
+    this.traced.limitEdge(edge);
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Vector2, Vector3, WebGLRenderer } from "three";
+import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
@@ -246,6 +246,7 @@ export class Viewer {
       overview: surfaces.overview,
       isLoading: this.contents.isLoading,
       triangles: surfaces.triangles,
+      drawCalls: this.renderer.info.render.calls,
       volumes: volumes.status(),
       volumeBytes: volumes.bytes,
       traced: this.contents.traced.status(),
@@ -267,6 +268,22 @@ export class Viewer {
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
     return this.loop.settled();
+  }
+
+  /** Resolves when the next frame has been drawn. */
+  nextFrame(): Promise<void> {
+    return this.loop.nextFrame();
+  }
+
+  /** Draw volumes of at most so many voxels along a tile's edge. */
+  limitEdge(edge: number): void {
+    this.contents.limitEdge(edge);
+    this.follow();
+  }
+
+  /** Pose of the head in the room, or of the mono camera. */
+  get head(): Matrix4 {
+    return this.loop.head;
   }
 
   report(error: unknown): void {
