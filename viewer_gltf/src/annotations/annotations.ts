@@ -74,10 +74,10 @@ export class Marks {
   readonly target: HandleTarget;
   readonly measured: MeasureMark;
   readonly scaleBar = new ScaleBarMark();
-  readonly orientation = new OrientationMark();
+  readonly orientation: OrientationMark;
   readonly name = new NameMark();
   readonly ruler = new Ruler();
-  readonly axes = new Axes();
+  readonly axes: Axes;
   private readonly reading: Reading;
   private readonly toSpecimen = new Matrix4();
   private sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
@@ -91,6 +91,9 @@ export class Marks {
     private readonly options: MarksOptions,
     private state: ViewerState,
   ) {
+    const { sides } = options.manifest.specimen;
+    this.orientation = new OrientationMark(sides);
+    this.axes = new Axes(sides);
     this.reading = new Reading(options, state);
     this.target = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
     this.measured = new MeasureMark((point) => this.reading.valuesAt(point), options.onChange);

@@ -245,6 +245,43 @@ describeInChromium("marks", () => {
     expect(await label()).toBe("x leads away, y up, z right");
   });
 
+  it("letter a patient's sides, on the glass and beside the specimen", async () => {
+    await page.evaluate(() => {
+      window.bench?.dispose();
+      const stage = document.querySelector<HTMLElement>(".stage");
+      stage?.replaceChildren();
+      // a head whose left is the world's right, as the reader lays it, but lying on its back
+      const sides = { left: [1, 0, 0], posterior: [0, -1, 0], superior: [0, 0, -1] } as const;
+      const given = JSON.parse(JSON.stringify(sides));
+      if (stage !== null) window.bench = window.makeBench?.(stage, given);
+    });
+    await look([0, 0, 1.6]);
+    const mark = page.locator(".orientation-mark");
+    expect(await mark.getAttribute("aria-label")).toBe(
+      "the patient's left leads right, the head away, the front up",
+    );
+    const placeOf = async (letter: string) => {
+      const box = await mark.locator(`[data-axis="${letter}"] text`).boundingBox();
+      return {
+        x: (box?.x ?? 0) + (box?.width ?? 0) / 2,
+        y: (box?.y ?? 0) + (box?.height ?? 0) / 2,
+      };
+    };
+    const [l, r, a, p] = await Promise.all(["L", "R", "A", "P"].map(placeOf));
+    expect(l.x - r.x).toBeGreaterThan(40);
+    expect(p.y - a.y).toBeGreaterThan(40);
+    const visibility = (letter: string) =>
+      mark.locator(`[data-axis="${letter}"] text`).getAttribute("visibility");
+    expect(await Promise.all(["S", "I"].map(visibility))).toEqual(["hidden", "visible"]);
+    await page.evaluate(() => window.bench?.turn([0, 1, 0], Math.PI)); // seen from behind
+    expect((await placeOf("L")).x - (await placeOf("R")).x).toBeLessThan(-40);
+    await look([0.8, 0.7, 1.5]);
+    await shoot("sides");
+    await look([0.8, 0.7, 1.5], [0, 0, 0], { isStereo: true });
+    await shoot("sides-stereo");
+    expect(await mark.isVisible()).toBe(false);
+  });
+
   it("stand beside the specimen in a headset, and not on the glass", async () => {
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true });
     const ruler = await page.evaluate(() => window.bench?.ruler());

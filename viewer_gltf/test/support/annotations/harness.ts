@@ -119,7 +119,10 @@ class Bench {
   /** The list of volumes comes when it is asked for. */
   private isKnown = false;
 
-  constructor(private readonly stage: HTMLElement) {
+  constructor(
+    private readonly stage: HTMLElement,
+    sides?: Manifest["specimen"]["sides"],
+  ) {
     const { clientWidth, clientHeight } = stage;
     const canvas = this.renderer.domElement;
     this.renderer.setSize(clientWidth, clientHeight);
@@ -136,7 +139,7 @@ class Bench {
       this.draw();
     };
     const options = {
-      manifest: MANIFEST,
+      manifest: { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } },
       base: location.href,
       surfaces: () => surfaces,
       volumes: () => [],
@@ -313,7 +316,7 @@ class Bench {
 declare global {
   interface Window {
     bench?: Bench;
-    makeBench?: (stage: HTMLElement) => Bench;
+    makeBench?: (stage: HTMLElement, sides?: Manifest["specimen"]["sides"]) => Bench;
   }
 }
-window.makeBench = (stage) => new Bench(stage);
+window.makeBench = (stage, sides) => new Bench(stage, sides);
