@@ -143,6 +143,7 @@ export class Controller {
     const { actions, camera } = readLink(hash, viewer.state, bounds_um);
     for (const action of [...settingsOf(search), ...actions]) viewer.dispatch(action);
     if (camera !== null) viewer.lookFrom(camera);
+    viewer.forgetSteps();
   }
 
   private run(command: Command): void {
@@ -296,6 +297,8 @@ export class Controller {
       samples: traced.level === null ? null : traced.samples,
       isLoading,
       values: viewer.snapshot().measuredValues,
+      undo: viewer.undoes,
+      redo: viewer.redoes,
     };
   }
 

@@ -20,6 +20,7 @@ import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { discLimit } from "../state/focus_tiles";
+import { isSameView, keyOfChange, nameOfChange } from "../state/history";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
@@ -32,10 +33,14 @@ import { Stereo } from "../xr/stereo";
 import type { Snapshot } from "./automation_api";
 import { FrameLoop } from "./frame_loop";
 import { Contents } from "./scene_contents";
+import { Steps } from "./steps";
 import { StereoTransition } from "./stereo_transition";
 
 /** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
+
+/** Before these the place from which the specimen is seen is a step of its own. */
+const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
@@ -54,6 +59,7 @@ export class Viewer {
   private readonly loop: FrameLoop;
   private readonly transition: StereoTransition;
   private readonly size: StageSize;
+  private readonly steps: Steps;
   private readonly disposed = new AbortController();
 
   /**
@@ -121,6 +127,11 @@ export class Viewer {
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
     });
+    this.steps = new Steps(
+      () => ({ state: this.state, camera: this.cameraView, isInRoom: this.stereo.kind !== null }),
+      this.disposed.signal,
+    );
+    this.navigation.controls.addEventListener("start", () => this.steps.note());
     const rayAt = (point: Vector2) =>
       rayUnder(point, this.navigation.camera, this.room.specimen.group);
     const { signal } = this.disposed;
@@ -165,6 +176,9 @@ export class Viewer {
     const notice = newNotice(this.state, next);
     const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
+    if (action.type !== "restore" && !isSameView(this.state, next)) {
+      this.steps.add(nameOfChange(action, this.state), keyOfChange(action));
+    }
     this.state = next;
     if (notice !== null) this.stereo.announce(notice);
     if (announcement !== null) this.onAnnounce(announcement);
@@ -175,7 +189,11 @@ export class Viewer {
 
   /** Do what is no change of the state; whether this was one of the viewer's commands. */
   run(command: Command): boolean {
+    if (ENDS_A_LOOK.has(command)) this.steps.note();
     switch (command) {
+      case "undo":
+      case "redo":
+        return this.step(command);
       case "reset":
         this.dispatch({ type: "isolate", tile: null });
         this.recentre();
@@ -202,6 +220,37 @@ export class Viewer {
     }
     this.loop.change();
     return true;
+  }
+
+  private step(command: "undo" | "redo"): boolean {
+    const found = command === "undo" ? this.steps.undo() : this.steps.redo();
+    if (found === null) {
+      this.onAnnounce(`Nothing to ${command}.`);
+      return true;
+    }
+    const { state, camera, isInRoom } = found.moment;
+    this.dispatch({ type: "restore", state });
+    // in a room the head looks, and what stands there was put there
+    if (!isInRoom && this.stereo.kind === null) this.transition.restore(camera);
+    this.loop.change();
+    this.onAnnounce(`${command === "undo" ? "Undone" : "Redone"}: ${found.name}.`);
+    this.onState(this.state);
+    return true;
+  }
+
+  /** What undoing would change; null: nothing. */
+  get undoes(): string | null {
+    return this.steps.undoes;
+  }
+
+  get redoes(): string | null {
+    return this.steps.redoes;
+  }
+
+  /** From here on: what came before was no user's. */
+  forgetSteps(): void {
+    this.steps.forget();
+    this.onState(this.state);
   }
 
   /** Lamps may be beside and behind the eye. In stereo the head finds them. */

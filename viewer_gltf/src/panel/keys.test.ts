@@ -64,6 +64,7 @@ describe("the keys", () => {
       measure: true,
       "move-lamp": false, // a drag
       dismiss: true,
+      restore: false, // by the commands undo and redo
       notify: false, // the viewer's own
     };
     for (const [type, isWanted] of Object.entries(wanted)) {
@@ -73,6 +74,8 @@ describe("the keys", () => {
       reset: true,
       back: true,
       stereo: true,
+      undo: true,
+      redo: true,
       split: true,
       scan: true,
       share: true,

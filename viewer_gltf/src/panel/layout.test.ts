@@ -36,6 +36,8 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  undo: null,
+  redo: null,
 };
 const start = (channels = 3) => initialState(sampleManifest(channels));
 

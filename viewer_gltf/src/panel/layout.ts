@@ -45,6 +45,9 @@ export type Facts = StereoSupport &
     isLoading: boolean;
     /** Of each measured point: the channels' values there, as `DAPI 1210`. */
     values: readonly (readonly string[])[];
+    /** What undoing and redoing would change, in words; null: there is nothing. */
+    undo: string | null;
+    redo: string | null;
   }>;
 
 /** Most notices on the panel: the newest few are enough. */
@@ -91,6 +94,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         command("side", "Side"),
         command("top", "Top"),
         command("reset", "Reset"),
+        ...historyItems(facts),
       ]),
       // a screen has fingers, wheel and arrow keys for it
       ...(facts.isStereo ? [section("move", "Move", MOVES)] : []),
@@ -108,6 +112,21 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     ],
     status: statusOf(facts),
   };
+}
+
+function historyItems({ undo, redo }: Facts): readonly Control[] {
+  return [
+    {
+      ...command("undo", "Undo"),
+      name: `Undo ${undo ?? ""}`.trim(),
+      refusal: undo === null ? "Nothing to undo." : "",
+    },
+    {
+      ...command("redo", "Redo"),
+      name: `Redo ${redo ?? ""}`.trim(),
+      refusal: redo === null ? "Nothing to redo." : "",
+    },
+  ];
 }
 
 /** Why the disc is smaller than it was set; "": it is not, and so there is nothing to see. */

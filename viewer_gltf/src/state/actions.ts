@@ -4,6 +4,7 @@ import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import type { SetAction } from "./parameters/kinds";
+import type { ViewerState } from "./viewer_state";
 
 export type Action =
   /** The user sets a number, a switch, a choice or a colour: see parameters/. */
@@ -21,5 +22,7 @@ export type Action =
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
   /** Where a lamp is dragged to. */
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
+  /** Back to a state of before, but for what is no user's: see history.ts. */
+  | Readonly<{ type: "restore"; state: ViewerState }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
   | Readonly<{ type: "dismiss"; text: string }>;

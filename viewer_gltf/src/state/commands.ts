@@ -5,6 +5,9 @@ export type Command =
   /** One step out: from an isolated tile to all, from a selected one to none. */
   | "back"
   | "stereo"
+  /** One step of the history back, or on again. */
+  | "undo"
+  | "redo"
   /** Split screen for a phone in a viewer without WebXR. */
   | "split"
   /** Read the phone viewer's code by the camera. */

@@ -1,5 +1,6 @@
 /** The state after an action. Pure. */
 import type { Action } from "./actions";
+import { withOwn } from "./history";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
 import { faultOfValue, withParameter } from "./parameters/table";
@@ -82,6 +83,8 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       return { ...state, clip: action.clip };
     case "measure":
       return { ...state, measured: action.points.slice(-2) };
+    case "restore":
+      return withOwn(action.state, state);
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {

@@ -27,6 +27,8 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  undo: null,
+  redo: null,
 };
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
