@@ -80,7 +80,8 @@ export class Marks {
   readonly axes: Axes;
   private readonly reading: Reading;
   private readonly toSpecimen = new Matrix4();
-  private sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
+  /** From where the last frame was seen. */
+  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
   /** The lamp that the ray which drags it has lost over its rim. */
   private beside: HandleId | null = null;
   /** How many surfaces are on screen. */

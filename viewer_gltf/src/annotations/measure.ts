@@ -1,5 +1,6 @@
 /** A measurement's text: the distance of two points, the channel's value at one. Pure. */
 import { Matrix4, Vector3 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
 import type { Vec3 } from "../math/vec3";
@@ -62,11 +63,16 @@ export function valueAt(
   return start + ((end - start) * trilinear(level, at[0], at[1], at[2])) / 255;
 }
 
-/** As many digits as 8 bits of the window hold. */
-export function valueText(value: number, [start, end]: Window): string {
+/** The unit of the source's values; "": it states none. DICOM's CT values are Hounsfield units. */
+export function unitOf({ specimen }: Pick<Manifest, "specimen">): string {
+  return specimen.modality === "CT" ? "HU" : "";
+}
+
+/** As many digits as 8 bits of the window hold, and the unit. */
+export function valueText(value: number, [start, end]: Window, unit = ""): string {
   const step = Math.abs(end - start) / 255;
   const decimals = step > 0 ? Math.max(0, -Math.floor(Math.log10(step))) : 0;
-  return value.toFixed(Math.min(decimals, 100));
+  return `${value.toFixed(Math.min(decimals, 100))} ${unit}`.trim();
 }
 
 /** At a place in texels, 0 the centre of the first; clamped to the edge, as the GPU does. */

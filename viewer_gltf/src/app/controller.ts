@@ -297,6 +297,7 @@ export class Controller {
       samples: traced.level === null ? null : traced.samples,
       isLoading,
       values: viewer.snapshot().measuredValues,
+      sliceValues: viewer.sliceValues,
       undo: viewer.undoes,
       redo: viewer.redoes,
     };

@@ -212,14 +212,14 @@ export class FrameLoop {
   private draw(camera: Camera, pace: FramePace): void {
     const { picture, head } = this;
     const { contents, stereo, state } = this.options.shown();
-    const { volumes, traced, surfaces, marks } = contents;
+    const { volumes, traced, surfaces, marks, slicePlanes: slices } = contents;
     const drawn = {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, slices.marks, ...stereo.hands.overlays],
       bounds: this.options.bounds,
-      solids: surfaces.triangles,
+      solids: surfaces.triangles + slices.solid,
     };
     stereo.present(() => picture.draw(camera, head, drawn, state.clip, pace));
   }

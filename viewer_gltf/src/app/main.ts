@@ -5,6 +5,7 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
+import "../slices/slices.css";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";

@@ -6,6 +6,8 @@ import { memoryBudget } from "../gpu/memory_budget";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
+import { SliceImages } from "../slices/slice_images";
+import { SlicePlanes } from "../slices/slice_planes";
 import type { Action } from "../state/actions";
 import { wantedTiles } from "../state/representation";
 import { isTwoD } from "../state/transfer_functions_2d";
@@ -36,6 +38,9 @@ export class Contents {
   /** Two-dimensional transfer functions. */
   readonly transferFunctions2d: TransferFunctions2dLoader;
   readonly marks: Marks;
+  /** Pictures of the slices, and the planes that show them in the specimen. */
+  readonly slices: SliceImages;
+  readonly slicePlanes: SlicePlanes;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
   private readonly point = new Vector3();
@@ -88,7 +93,14 @@ export class Contents {
       onChange,
       onError,
     };
-    this.marks = new Marks(reading, options.state);
+    const { manifest, base } = bundle;
+    const { sourceOf } = reading;
+    this.slices = new SliceImages({ manifest, base, sourceOf, onChange, onError });
+    this.slicePlanes = new SlicePlanes(this.slices);
+    this.marks = new Marks(
+      { ...reading, slices: () => (this.slicePlanes.group.visible ? this.slices : null) },
+      options.state,
+    );
   }
 
   get isLoading(): boolean {
@@ -97,6 +109,7 @@ export class Contents {
       this.volumes.isLoading ||
       this.traced.isLoading ||
       this.transferFunctions2d.isLoading ||
+      this.slices.isLoading ||
       !this.surfaces.overview.isComplete
     );
   }
@@ -108,6 +121,8 @@ export class Contents {
     this.volumes.follow(state, wanted, mayRefine);
     this.traced.follow(state);
     this.surfaces.follow(state, focusTiles);
+    this.slices.follow(state);
+    this.slicePlanes.follow(state.hasSlicePlanes);
     this.marks.follow(state);
   }
 
@@ -117,6 +132,7 @@ export class Contents {
     this.volumes.retryFailed();
     this.traced.retryFailed();
     this.transferFunctions2d.retryFailed();
+    this.slices.retryFailed();
     this.marks.readAnew();
   }
 
@@ -132,6 +148,7 @@ export class Contents {
     const isFading = this.volumes.advance(view.dt_s);
     this.traced.advance(view.dt_s);
     this.marks.update(view);
+    this.slicePlanes.update(this.marks.sight);
     return isFading;
   }
 
@@ -160,6 +177,8 @@ export class Contents {
 
   dispose(): void {
     this.marks.dispose();
+    this.slicePlanes.dispose();
+    this.slices.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
     this.traced.dispose();

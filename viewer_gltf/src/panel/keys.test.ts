@@ -5,6 +5,7 @@ import type { Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
 import { LIGHT_NUMBERS } from "../state/parameters/light";
+import { SLICE_NUMBERS } from "../state/parameters/slices";
 import { PARAMETERS } from "../state/parameters/table";
 import { reduce } from "../state/reduce";
 import { makeShape } from "../state/transfer_shapes";
@@ -63,6 +64,7 @@ describe("the keys", () => {
       "set-clip": true,
       measure: true,
       "move-lamp": false, // a drag
+      "move-slices": true,
       dismiss: true,
       restore: false, // by the commands undo and redo
       notify: false, // the viewer's own
@@ -108,7 +110,7 @@ describe("the keys", () => {
         wish !== null && typeof wish !== "string" && "id" in wish ? [wish.id] : [],
       ),
     );
-    const turned = new Set<string>(LIGHT_NUMBERS.map(({ id }) => id));
+    const turned = new Set<string>([...LIGHT_NUMBERS, ...SLICE_NUMBERS].map(({ id }) => id));
     // the choice of a tone map and lamps' colours are the panel's alone
     const others = PARAMETERS.filter(
       ({ id, kind }) => !turned.has(id) && kind !== "colour" && id !== "trace-tone-map",

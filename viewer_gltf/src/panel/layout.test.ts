@@ -36,6 +36,7 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  sliceValues: [],
   undo: null,
   redo: null,
 };

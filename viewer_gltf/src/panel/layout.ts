@@ -14,6 +14,7 @@ import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
 import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
+import { sliceItems } from "./sections/slices";
 import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
 
@@ -45,6 +46,8 @@ export type Facts = StereoSupport &
     isLoading: boolean;
     /** Of each measured point: the channels' values there, as `DAPI 1210`. */
     values: readonly (readonly string[])[];
+    /** The channels' values where the slices meet. */
+    sliceValues: readonly string[];
     /** What undoing and redoing would change, in words; null: there is nothing. */
     undo: string | null;
     redo: string | null;
@@ -101,6 +104,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       section("stereo", "Stereo", stereoItems(state, facts, view)),
       section("measure", "Measure", measureItems(state, facts.values)),
       section("cut", "Cut open", cutItems(state, facts.shown)),
+      section("slices", "Slices", sliceItems(state, facts.sliceValues)),
       section("quality", "Quality", qualityItems(state, facts)),
       section("share", "Share", [
         command("share", "Copy a link to this view"),

@@ -20,6 +20,8 @@ export type Action =
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "set-clip"; clip: Clip }>
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
+  /** The point where the slices meet (shares of the specimen's box) and their turn; absent: as it is. */
+  | Readonly<{ type: "move-slices"; at?: Vec3; turn_deg?: Vec3 }>
   /** Where a lamp is dragged to. */
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
   /** Back to a state of before, but for what is no user's: see history.ts. */

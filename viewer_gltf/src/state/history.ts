@@ -113,6 +113,7 @@ export function keyOfChange(action: Action): string | null {
     case "move-lamp":
       return `${action.type} ${action.lamp}`;
     case "set-clip":
+    case "move-slices":
       return action.type;
     default:
       return null;
@@ -141,6 +142,8 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
       return "only tile";
     case "set-clip":
       return "cut";
+    case "move-slices":
+      return "slices";
     case "measure":
       return "measuring";
     case "move-lamp":

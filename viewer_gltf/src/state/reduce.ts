@@ -3,6 +3,7 @@ import type { Action } from "./actions";
 import { withOwn } from "./history";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
+import { SLICE_AT, SLICE_TURN } from "./parameters/slices";
 import { faultOfValue, withParameter } from "./parameters/table";
 import { withShapes } from "./transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "./viewer_state";
@@ -54,6 +55,11 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
         (moved, axis, i) => withValue(axis, moved, action.place[i]),
         state,
       );
+    case "move-slices": {
+      const { at = [], turn_deg = [] } = action;
+      const moved = at.reduce((on, share, i) => withValue(SLICE_AT[i], on, share), state);
+      return turn_deg.reduce((on, angle, i) => withValue(SLICE_TURN[i], on, angle), moved);
+    }
     case "show":
       if (action.shown) return withShown(state, action.channel);
       return withChannel(state, action.channel, (c) => ({ ...c, shown: false }));

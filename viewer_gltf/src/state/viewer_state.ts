@@ -8,6 +8,7 @@ import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
 import type { ChannelSettings } from "./parameters/channel";
 import type { LightSettings } from "./parameters/light";
+import type { SliceSettings } from "./parameters/slices";
 import type { ToolSettings } from "./parameters/tools";
 import type { VolumeSettings } from "./parameters/volumes";
 import type { Functions } from "./transfer_functions_2d";
@@ -43,6 +44,7 @@ export type TileState = Readonly<{ id: string; representation: Representation }>
 export type ViewerState = VolumeSettings &
   ToolSettings &
   LightSettings &
+  SliceSettings &
   Readonly<{
     channels: readonly ChannelState[];
     tiles: readonly TileState[];

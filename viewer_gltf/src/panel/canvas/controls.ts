@@ -25,6 +25,7 @@ const ELSEWHERE: ReadonlySet<string> = new Set([
   "split",
   "scan",
   "lenses",
+  "slice-pictures", // the planes in the specimen are what a headset shows
   "share",
   "help",
 ]);

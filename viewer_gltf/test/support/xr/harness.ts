@@ -52,6 +52,7 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  sliceValues: [],
   undo: null,
   redo: null,
 };
