@@ -29,12 +29,16 @@ import { Ruler } from "./ruler";
 import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
 import { type Sight, screenZoom } from "./style";
 
+/** Why no point is set. */
+const NOTHING_MET = "Nothing there to measure: no surface, no volume and no slice.";
 /** Largest move of a head at rest, m. */
 const TREMBLE_M = 0.03;
 
 export type MarksOptions = ReadingOptions &
   Readonly<{
     dispatch: (action: Action) => void;
+    /** Say why nothing has come of it. */
+    announce: (text: string) => void;
     /** The picture differs now. */
     onChange: () => void;
   }>;
@@ -154,7 +158,7 @@ export class Marks {
   get values(): readonly (readonly string[])[] {
     return this.state.measured.map((_, i) =>
       this.measured
-        .valuesAt(i === 0 ? 0 : 1)
+        .valuesAt(i)
         .split("\n")
         .filter((line) => line !== ""),
     );
@@ -192,13 +196,12 @@ export class Marks {
     this.options.onChange();
   }
 
-  /** Measure from or to what a ray (um) means: the first point, the second, a first one again. */
+  /** Measure from or to what a ray (um) means: a point of the newest measurement, or of another. */
   async measure(ray: Ray): Promise<void> {
     const found = await this.reading.probe(ray);
-    if (found === null || this.isDisposed) return;
-    const { measured } = this.state;
-    const points = measured.length === 1 ? [...measured, found.point] : [found.point];
-    this.options.dispatch({ type: "measure", points });
+    if (this.isDisposed) return;
+    if (found === null) this.options.announce(NOTHING_MET);
+    else this.options.dispatch({ type: "add-point", point: found.point });
   }
 
   /** Box of what is shown: the specimen, or the isolated tile. */
@@ -237,8 +240,9 @@ export class Marks {
   }
 
   private showMeasured(): void {
-    const { measured } = this.state;
-    this.measured.show(measured, this.reading.sourcesKey(measured));
+    const { measured, measuredAs, measurements } = this.state;
+    this.measured.show(measured, measuredAs, this.reading.sourcesKey(measured));
+    this.measured.list(measurements);
   }
 
   private nameOf(gaze: Ray): Named | null {

@@ -4,6 +4,8 @@ import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
 import type { Vec3 } from "../math/vec3";
+import { angleOf, lengthOf } from "../state/measurements";
+import type { MeasureKind } from "../state/parameters/tools";
 import { textureCorners } from "../volumes/texture_space";
 
 /** One mip level: texels along x, y, z and their bytes, x fastest. */
@@ -21,8 +23,14 @@ export type Window = readonly [number, number];
 const RIM = 1e-6;
 const DIGITS = 3;
 
-export function distanceBetween(a: Vec3, b: Vec3): number {
-  return Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+/** What a measurement comes to: a length, an angle, a length and how many points. */
+export function measurementText(kind: MeasureKind, points: readonly Vec3[]): string {
+  if (kind === "angle") {
+    const angle = angleOf(points);
+    return angle === null ? "two of its points are one" : `${angle.toFixed(1)}°`;
+  }
+  const length = distanceText(lengthOf(points));
+  return kind === "line" ? `${length}, ${points.length} points` : length;
 }
 
 /** Three digits are more than a hand can point: mm from 1000 um on, nm below 1 um. */

@@ -58,7 +58,7 @@ export class Reading {
     this.cache = new TexelCache((volume) => new VolumeSource(options.base, volume));
   }
 
-  /** What a ray (um) means; null: it meets nothing. */
+  /** What a ray (um) means; null: it meets no surface, no volume and no slice. */
   async probe(ray: Ray): Promise<Probed | null> {
     const along = unitRay(ray);
     const surface = this.probeSurfaces(along);
@@ -66,7 +66,7 @@ export class Reading {
     const disc = mode === "disc" ? this.disc : null;
     const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
     const met = [surface, volume, this.probeSlices(along)].filter((each) => each !== null);
-    if (met.length === 0) return probeBoxes(along, this.tiles, clip);
+    if (met.length === 0) return null;
     return met.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
 

@@ -6,6 +6,7 @@
 
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { fileName, saveFile } from "../dom/save_file";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import { handleOf } from "../panel/clip_by_key";
@@ -25,6 +26,7 @@ import { readLink, writeLink } from "../share/permalink";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { allOf, measurementsCsv } from "../state/measurements";
 import type { XrSupport } from "../state/stereo";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -158,6 +160,8 @@ export class Controller {
       void this.scan();
     } else if (command === "own-light") {
       void this.lightByFile();
+    } else if (command === "save-csv") {
+      this.saveMeasurements();
     } else if (command === "find") {
       const isLong = this.goTo("channels", "find-channel");
       if (!isLong) this.say("The panel lists all channels.");
@@ -253,6 +257,18 @@ export class Controller {
       this.goTo("share", "link"); // which selects it
       this.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
     }
+  }
+
+  private saveMeasurements(): void {
+    const { state, bundle } = this.viewer;
+    const list = allOf(state);
+    if (list.length === 0) {
+      this.say("Nothing is measured.");
+      return;
+    }
+    const name = fileName(bundle.manifest.specimen.name, "measurements", "csv");
+    saveFile(name, new Blob([measurementsCsv(list)], { type: "text/csv" }));
+    this.say(`Saved: ${name}`);
   }
 
   private get shown(): Box {

@@ -25,6 +25,7 @@ export type ContentsOptions = Readonly<{
   picture: Picture;
   state: ViewerState;
   dispatch: (action: Action) => void;
+  announce: (text: string) => void;
   /** The picture is no longer true. */
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -90,6 +91,7 @@ export class Contents {
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
       sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
+      announce: options.announce,
       onChange,
       onError,
     };

@@ -105,6 +105,7 @@ export class Viewer {
       picture: this.loop.picture,
       state: this.state,
       dispatch: (action) => this.dispatch(action),
+      announce: (text) => this.onAnnounce(text),
       onChange: () => this.loop.come(),
       onError: (error) => this.report(error),
     });

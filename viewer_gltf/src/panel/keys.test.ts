@@ -17,7 +17,13 @@ import { spokenFeedback } from "./spoken_feedback";
 const ALL = KEYS.flatMap(({ keys }) => keys);
 const CONTEXT: KeyContext = {
   state: [
-    { type: "measure", points: [[0, 0, 0]] } as const,
+    {
+      type: "measure",
+      points: [
+        [0, 0, 0],
+        [3, 4, 0],
+      ],
+    } as const,
     { type: "notify", text: "a fault", isMendable: true } as const,
     { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
     {
@@ -63,6 +69,9 @@ describe("the keys", () => {
       isolate: true,
       "set-clip": true,
       measure: true,
+      "add-point": false, // a tap
+      "finish-measuring": true,
+      "set-measurements": false, // the panel's list
       "move-lamp": false, // a drag
       "move-slices": true,
       dismiss: true,
@@ -81,6 +90,7 @@ describe("the keys", () => {
       split: true,
       scan: true,
       share: true,
+      "save-csv": true,
       retry: true,
       press: true,
       front: true,

@@ -234,7 +234,7 @@ describe("the panel's layout", () => {
           : [],
       );
     expect(textsOf(laid(state, START_VIEW, facts))).toEqual([
-      "Distance: 5.00 µm",
+      "Measured: 5.00 µm",
       "First point: Marker 0 12 · Marker 1 7",
       "Second point: Marker 0 512",
     ]);

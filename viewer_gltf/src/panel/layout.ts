@@ -1,9 +1,8 @@
 /** The panel's content for a state: see controls.ts. Pure. */
-import { distanceBetween, distanceText } from "../annotations/measure";
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MAX_DISC_TILES } from "../state/focus_tiles";
-import { MEASURE_PARAMETERS, QUALITY_PARAMETERS } from "../state/parameters/tools";
+import { QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { VOLUMES } from "../state/parameters/volumes";
 import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
@@ -12,6 +11,7 @@ import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
+import { measureItems } from "./sections/measure";
 import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
 import { sliceItems } from "./sections/slices";
@@ -55,8 +55,6 @@ export type Facts = StereoSupport &
 
 /** Most notices on the panel: the newest few are enough. */
 const MOST_NOTICES = 3;
-
-const POINT_NAMES = ["First point", "Second point"] as const;
 
 /** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
 export function middleBox({ min, max }: Box): Box {
@@ -154,32 +152,6 @@ function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
     },
   ]);
   return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
-}
-
-/** `12.3 µm`, or what is missing to it. */
-export function measuredText({ tool, measured }: ViewerState): string {
-  const [from, to] = measured;
-  if (from !== undefined && to !== undefined) return distanceText(distanceBetween(from, to));
-  if (from !== undefined) return "Now the other point.";
-  return tool === "measure" ? "Choose two points of the specimen." : "";
-}
-
-function measureItems(state: ViewerState, values: Facts["values"]): readonly Control[] {
-  return [
-    ...controlsOf(MEASURE_PARAMETERS, state),
-    { kind: "text", id: "distance", label: "Distance", value: measuredText(state) },
-    ...POINT_NAMES.map((label, i): Control => {
-      const value = (values[i] ?? []).join(" · ");
-      return { kind: "text", id: `values-${i}`, label, value };
-    }),
-    {
-      kind: "button",
-      id: "clear-measured",
-      label: "Clear",
-      refusal: state.measured.length === 0 ? "Nothing is measured." : "",
-      to: () => ({ type: "measure", points: [] }),
-    },
-  ];
 }
 
 function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {

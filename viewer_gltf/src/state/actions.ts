@@ -3,6 +3,7 @@
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
+import type { Measurement } from "./measurements";
 import type { SetAction } from "./parameters/kinds";
 import type { ViewerState } from "./viewer_state";
 
@@ -19,7 +20,14 @@ export type Action =
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "set-clip"; clip: Clip }>
+  /** The points of the newest measurement, of the kind that is chosen. */
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
+  /** One more, or the first of another. */
+  | Readonly<{ type: "add-point"; point: Vec3 }>
+  /** The newest measurement is done. */
+  | Readonly<{ type: "finish-measuring" }>
+  /** Those that are done: named otherwise, fewer, or another's. */
+  | Readonly<{ type: "set-measurements"; measurements: readonly Measurement[] }>
   /** The point where the slices meet (shares of the specimen's box) and their turn; absent: as it is. */
   | Readonly<{ type: "move-slices"; at?: Vec3; turn_deg?: Vec3 }>
   /** Where a lamp is dragged to. */

@@ -13,6 +13,8 @@ export type Command =
   /** Read the phone viewer's code by the camera. */
   | "scan"
   | "share"
+  /** The measurements as a file. */
+  | "save-csv"
   /** Ask again for all that has failed. */
   | "retry"
   /** A tap in the middle of the view: for hands that have only keys. */

@@ -113,6 +113,7 @@ export function keyOfChange(action: Action): string | null {
     case "move-lamp":
       return `${action.type} ${action.lamp}`;
     case "set-clip":
+    case "set-measurements":
     case "move-slices":
       return action.type;
     default:
@@ -145,6 +146,9 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
     case "move-slices":
       return "slices";
     case "measure":
+    case "add-point":
+    case "finish-measuring":
+    case "set-measurements":
       return "measuring";
     case "move-lamp":
       return "lamp";

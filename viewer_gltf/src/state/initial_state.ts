@@ -63,6 +63,8 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     isolated: null,
     clip: { box: null, plane: null },
     measured: [],
+    measuredAs: "distance",
+    measurements: [],
     canTrace,
     notices:
       staged.length > VOLUME_TILES_AT_START

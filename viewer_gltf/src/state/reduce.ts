@@ -1,6 +1,7 @@
 /** The state after an action. Pure. */
 import type { Action } from "./actions";
 import { withOwn } from "./history";
+import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
 import { SLICE_AT, SLICE_TURN } from "./parameters/slices";
@@ -88,7 +89,17 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "set-clip":
       return { ...state, clip: action.clip };
     case "measure":
-      return { ...state, measured: action.points.slice(-2) };
+      return {
+        ...state,
+        measured: action.points.slice(-MAX_POINTS),
+        measuredAs: state.measureKind,
+      };
+    case "add-point":
+      return withPoint(state, action.point);
+    case "finish-measuring":
+      return finished(state);
+    case "set-measurements":
+      return { ...state, measurements: withinLimits(action.measurements) };
     case "restore":
       return withOwn(action.state, state);
     case "notify":

@@ -131,7 +131,40 @@ describeInChromium("marks", () => {
     [250, -200, 190, 750, -200, 190].forEach((v, i) => {
       expect(Math.abs((measured?.flat()[i] ?? 0) - v)).toBeLessThan(0.5); // balls of flat faces
     });
-    expect(await tap([20, -380, 200])).toHaveLength(1); // begins anew, on the tile's box
+    expect(await tap([250, -200, 190])).toHaveLength(1); // begins anew
+    expect((await stateNow()).measurements).toHaveLength(1);
+  });
+
+  it("set no point where a ray meets nothing, and say so", async () => {
+    await look([0.3, 0.2, 1.6]);
+    const at = await project([500, -200, 100]); // between the balls, inside both boxes
+    const points = await page.evaluate((p) => window.bench?.measureAt(p.x, p.y), at);
+    expect(points).toEqual([]);
+    expect(await page.evaluate(() => window.bench?.announced)).toContain("Nothing there");
+  });
+
+  it("show an angle, and a line with its name in the list", async () => {
+    await look([0.1, 0.1, 1.5]);
+    await page.evaluate(() => {
+      const { bench } = window;
+      const at = (x: number, y: number) =>
+        bench?.dispatch({ type: "add-point", point: [x, y, 190] });
+      bench?.dispatch({ type: "set", id: "measure-kind", value: "line" });
+      for (const [x, y] of [
+        [100, -300],
+        [300, -340],
+        [450, -250],
+        [700, -340],
+      ])
+        at(x, y);
+      bench?.dispatch({ type: "set", id: "measure-kind", value: "angle" });
+      at(250, -200);
+      at(250, -50);
+      at(400, -50);
+    });
+    expect((await page.evaluate(() => window.bench?.label()))?.text).toBe("90.0°");
+    expect((await stateNow()).measurements.map(({ name }) => name)).toEqual(["Line 1"]);
+    await shoot("angle-and-line");
   });
 
   it("show the channels' values there, on the source's scale", async () => {

@@ -27,6 +27,7 @@ const ELSEWHERE: ReadonlySet<string> = new Set([
   "lenses",
   "slice-pictures", // the planes in the specimen are what a headset shows
   "share",
+  "save-csv",
   "help",
 ]);
 /** Widths in a channel's row. */

@@ -114,6 +114,7 @@ class Bench {
   private readonly marks: Marks;
   private view: View = { position: [0, 0, 2], target: [0, 0, 0] };
   state = initialState(MANIFEST);
+  announced = "";
   /** What would have turned the camera. */
   leaked = 0;
   /** The list of volumes comes when it is asked for. */
@@ -149,6 +150,9 @@ class Bench {
         return tile === "r0_c1" ? VOLUME : null;
       },
       dispatch,
+      announce: (text: string) => {
+        this.announced = text;
+      },
       onChange: () => this.draw(),
       onError: (error: unknown) => {
         throw error;
@@ -249,7 +253,7 @@ class Bench {
   }
 
   /** What is written at a measured point. */
-  valuesAt(index: 0 | 1): string {
+  valuesAt(index: number): string {
     return this.marks.measured.valuesAt(index);
   }
 
