@@ -21,6 +21,7 @@ export const LAYERS: readonly string[] = [
   "render",
   "interaction",
   "annotations",
+  "slices",
   "panel",
   "xr",
   "share",

@@ -1,7 +1,15 @@
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
-import { distanceBetween, distanceText, type VolumeLevel, valueAt, valueText } from "./measure";
+import { distanceBetween } from "../math/distance";
+import {
+  distanceText,
+  measurementText,
+  sizeText,
+  type VolumeLevel,
+  valueAt,
+  valueText,
+} from "./measure";
 
 const IDENTITY: TileVolume["matrix"] = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const FILE = { path: "x", bytes: 0, sha256: "" };
@@ -112,6 +120,21 @@ describe("the distance of two points", () => {
     expect(distanceBetween([1, 2, 3], [3, 5, 9])).toBe(7);
   });
 
+  it("and what an angle and a line come to", () => {
+    const line = [
+      [0, 0, 0],
+      [3, 4, 0],
+      [3, 4, 5],
+    ] as const;
+    expect(measurementText("distance", line.slice(0, 2))).toBe("5.00 µm");
+    expect(measurementText("line", line)).toBe("10.0 µm, 3 points");
+    expect(measurementText("angle", line)).toBe("90.0°");
+  });
+
+  it("has a unit of values where the source states one", () => {
+    expect(valueText(-1000.4, [-1024, 2000], "HU")).toBe("-1000 HU");
+  });
+
   it("is written with three digits in the unit that keeps it short", () => {
     const said = [0, 0.0123, 0.4567, 0.9996, 1, 9.996, 12.34, 123.4, 999.4, 999.9, 12345, 1.5e6];
     expect(said.map(distanceText)).toEqual([
@@ -128,5 +151,14 @@ describe("the distance of two points", () => {
       "12.3 mm",
       "1500 mm",
     ]);
+  });
+});
+
+describe("a size", () => {
+  it("is in the unit of its longest edge", () => {
+    expect(sizeText([231_000, 215_000, 255_000])).toBe("231 × 215 × 255 mm");
+    expect(sizeText([67.06, 26.74, 13.16])).toBe("67.1 × 26.7 × 13.2 µm");
+    expect(sizeText([1200, 90, 4.5])).toBe("1.2 × 0.09 × 0.0045 mm");
+    expect(sizeText([0.5, 0, 0.25])).toBe("500 × 0 × 250 nm");
   });
 });

@@ -6,6 +6,7 @@
 
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { fileName, saveFile } from "../dom/save_file";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import { handleOf } from "../panel/clip_by_key";
@@ -20,11 +21,13 @@ import { wishOf } from "../panel/keys";
 import { type Facts, layOut } from "../panel/layout";
 import type { Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
-import { SETTINGS, settingsOf } from "../share/page_parameters";
+import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { allOf, measurementsCsv } from "../state/measurements";
+import { SWITCH_DISTANCE } from "../state/parameters/volumes";
 import type { XrSupport } from "../state/stereo";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -141,8 +144,12 @@ export class Controller {
     const { viewer } = this;
     const { bounds_um } = viewer.bundle.manifest.specimen;
     const { actions, camera } = readLink(hash, viewer.state, bounds_um);
-    for (const action of [...settingsOf(search), ...actions]) viewer.dispatch(action);
+    const asked = [...settingsOf(search), ...actions];
+    for (const action of asked) viewer.dispatch(action);
+    const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
     if (camera !== null) viewer.lookFrom(camera);
+    else viewer.openWith(standOf(search), saysDistance);
+    viewer.forgetSteps();
   }
 
   private run(command: Command): void {
@@ -157,6 +164,8 @@ export class Controller {
       void this.scan();
     } else if (command === "own-light") {
       void this.lightByFile();
+    } else if (command === "save-csv") {
+      this.saveMeasurements();
     } else if (command === "find") {
       const isLong = this.goTo("channels", "find-channel");
       if (!isLong) this.say("The panel lists all channels.");
@@ -254,6 +263,18 @@ export class Controller {
     }
   }
 
+  private saveMeasurements(): void {
+    const { state, bundle } = this.viewer;
+    const list = allOf(state);
+    if (list.length === 0) {
+      this.say("Nothing is measured.");
+      return;
+    }
+    const name = fileName(bundle.manifest.specimen.name, "measurements", "csv");
+    saveFile(name, new Blob([measurementsCsv(list)], { type: "text/csv" }));
+    this.say(`Saved: ${name}`);
+  }
+
   private get shown(): Box {
     return shownBox(this.viewer.bundle.manifest, this.viewer.state.isolated);
   }
@@ -296,6 +317,9 @@ export class Controller {
       samples: traced.level === null ? null : traced.samples,
       isLoading,
       values: viewer.snapshot().measuredValues,
+      sliceValues: viewer.sliceValues,
+      undo: viewer.undoes,
+      redo: viewer.redoes,
     };
   }
 

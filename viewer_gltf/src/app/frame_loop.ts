@@ -180,7 +180,8 @@ export class FrameLoop {
   }
 
   private poseMono(dt_s: number): Camera {
-    const { navigation } = this.options.shown();
+    const { navigation, contents, state } = this.options.shown();
+    if (!contents.hasOverview) navigation.surround(contents.occupied(state));
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;
@@ -219,14 +220,14 @@ export class FrameLoop {
   private draw(camera: Camera, pace: FramePace): void {
     const { picture, head } = this;
     const { contents, stereo, state } = this.options.shown();
-    const { volumes, traced, surfaces, marks } = contents;
+    const { volumes, traced, surfaces, marks, slicePlanes: slices } = contents;
     const drawn = {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, slices.marks, ...stereo.hands.overlays],
       bounds: this.options.bounds,
-      solids: surfaces.triangles,
+      solids: surfaces.triangles + slices.solid,
     };
     stereo.present(() => picture.draw(camera, head, drawn, state.clip, pace));
   }

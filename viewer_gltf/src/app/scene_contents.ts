@@ -3,10 +3,14 @@ import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
 import { memoryBudget } from "../gpu/memory_budget";
+import type { Box } from "../math/box";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
+import { SliceImages } from "../slices/slice_images";
+import { SlicePlanes } from "../slices/slice_planes";
 import type { Action } from "../state/actions";
+import { isTraced } from "../state/parameters/volumes";
 import { wantedTiles } from "../state/representation";
 import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
@@ -23,6 +27,7 @@ export type ContentsOptions = Readonly<{
   picture: Picture;
   state: ViewerState;
   dispatch: (action: Action) => void;
+  announce: (text: string) => void;
   /** The picture is no longer true. */
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -36,13 +41,16 @@ export class Contents {
   /** Two-dimensional transfer functions. */
   readonly transferFunctions2d: TransferFunctions2dLoader;
   readonly marks: Marks;
+  /** Pictures of the slices, and the planes that show them in the specimen. */
+  readonly slices: SliceImages;
+  readonly slicePlanes: SlicePlanes;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
   private readonly point = new Vector3();
   private readonly ahead = new Vector3();
   private readonly loader: SurfaceLoader;
   /** Volumes come after the first picture of all tiles. */
-  private hasOverview = false;
+  hasOverview = false;
 
   constructor(options: ContentsOptions) {
     const { bundle, renderer, picture, onChange, onError } = options;
@@ -81,14 +89,22 @@ export class Contents {
       manifest: bundle.manifest,
       base: bundle.base,
       surfaces: () => this.surfaces.meshes,
-      volumes: () => [...this.volumes.shown(), ...this.traced.shown()],
+      volumes: () => (this.traced.isShown ? this.traced.shown() : this.volumes.shown()),
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
       sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
+      announce: options.announce,
       onChange,
       onError,
     };
-    this.marks = new Marks(reading, options.state);
+    const { manifest, base } = bundle;
+    const { sourceOf } = reading;
+    this.slices = new SliceImages({ manifest, base, sourceOf, onChange, onError });
+    this.slicePlanes = new SlicePlanes(this.slices);
+    this.marks = new Marks(
+      { ...reading, slices: () => (this.slicePlanes.group.visible ? this.slices : null) },
+      options.state,
+    );
   }
 
   get isLoading(): boolean {
@@ -97,17 +113,22 @@ export class Contents {
       this.volumes.isLoading ||
       this.traced.isLoading ||
       this.transferFunctions2d.isLoading ||
+      this.slices.isLoading ||
       !this.surfaces.overview.isComplete
     );
   }
 
   follow(state: ViewerState, { focusTiles, mayRefine }: Hybrid): void {
-    const wanted = this.hasOverview ? wantedTiles(state, focusTiles) : [];
+    // a host that sends bricks sends those of a tile to one place
+    const isMarched = this.hasOverview && !(isTraced(state) && this.bricks !== null);
+    const wanted = isMarched ? wantedTiles(state, focusTiles) : [];
     for (const channel of volumeChannels(state))
       if (isTwoD(channel)) this.transferFunctions2d.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);
     this.traced.follow(state);
     this.surfaces.follow(state, focusTiles);
+    this.slices.follow(state);
+    this.slicePlanes.follow(state.hasSlicePlanes);
     this.marks.follow(state);
   }
 
@@ -117,6 +138,7 @@ export class Contents {
     this.volumes.retryFailed();
     this.traced.retryFailed();
     this.transferFunctions2d.retryFailed();
+    this.slices.retryFailed();
     this.marks.readAnew();
   }
 
@@ -124,6 +146,12 @@ export class Contents {
   limitEdge(edge: number): void {
     this.volumes.limitEdge(edge);
     this.traced.limitEdge(edge);
+  }
+
+  /** The box round all that shows, um, as far as it is known: a volume may fill all of its box. */
+  occupied({ channels }: ViewerState): Box | null {
+    const isAllSurface = channels.every(({ shown, hasSurface }) => !shown || hasSurface);
+    return isAllSurface ? this.surfaces.bounds : null;
   }
 
   /** True once, when the overview has come: then `follow` again. */
@@ -138,6 +166,7 @@ export class Contents {
     const isFading = this.volumes.advance(view.dt_s);
     this.traced.advance(view.dt_s);
     this.marks.update(view);
+    this.slicePlanes.update(this.marks.sight);
     return isFading;
   }
 
@@ -166,6 +195,8 @@ export class Contents {
 
   dispose(): void {
     this.marks.dispose();
+    this.slicePlanes.dispose();
+    this.slices.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
     this.traced.dispose();

@@ -15,6 +15,7 @@ import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
 import { showsBelow } from "../volumes/volume_set";
 import type { VolumeSource } from "../volumes/volume_source";
+import type { Marched } from "./denoise_and_tone";
 import { loadEnvironment, readEnvironment } from "./environment_file";
 import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium_loader";
 import type { Tracer } from "./path_tracer";
@@ -90,6 +91,11 @@ export class TracedVolume {
     return this.isShown && this.samples < ENOUGH_SAMPLES;
   }
 
+  /** Whether its picture was shown alone: nothing was seen of the march. */
+  get standsAlone(): boolean {
+    return this.samples >= 1 && this.tracer?.isStoodIn === false;
+  }
+
   status(): Readonly<{ samples: number; level: number | null }> {
     return { samples: this.samples, level: this.isShown ? (this.texels?.level ?? 0) : null };
   }
@@ -162,6 +168,7 @@ export class TracedVolume {
   /**
    * @param resolution of the march, 0..1: the frame's budget
    * @param passes samples of every pixel
+   * @param standIn the march's picture of the same view; null: there is none
    */
   render(
     renderer: WebGLRenderer,
@@ -170,13 +177,17 @@ export class TracedVolume {
     resolution: number,
     isMoving: boolean,
     passes: number,
+    standIn: Marched | null,
   ): void {
     const { tracer, overlay } = this;
     if (this.state === null || tracer === null || overlay === null) return;
     const isWorn = eyes.all.length > 1; // by a head, which never rests
     const isOther = isMoving && !tracer.goesOn(eyes, scene, isWorn);
+    // a view that moves is marched where it can be: sharp, and without a trace of the view before
+    if (isOther && !isWorn && standIn !== null) return;
     // what came to rest first clears up as it is, then is begun anew at its full size
-    const isFirst = isOther || (this.isSmall && tracer.rested < FIRST_SAMPLES);
+    const isClearing = this.isSmall && tracer.rested < FIRST_SAMPLES && standIn === null;
+    const isFirst = isOther || isClearing;
     this.isSmall = isFirst;
     const most = isFirst ? MOST_MOVING_PIXELS : MOST_PIXELS;
     const fits = Math.sqrt(most / (eyes.width_px * eyes.height_px));
@@ -188,6 +199,7 @@ export class TracedVolume {
       passes: isFirst ? 1 : isMoving ? Math.min(1, passes) : passes,
       mayTremble: isWorn,
       isDraft: isFirst,
+      standIn,
     });
     overlay.show(eyes, tracer.scale);
   }
@@ -199,6 +211,10 @@ export class TracedVolume {
 
   hide(): void {
     this.overlay?.hide();
+  }
+
+  get isOnScreen(): boolean {
+    return this.overlay?.mesh.visible === true;
   }
 
   /** What follows the paths: a part of the page that is fetched when it is first asked for. */

@@ -5,6 +5,7 @@ import type { Bundle } from "../bundle/load";
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
 import type { ShownVolume } from "../state/on_screen";
+import { isTraced } from "../state/parameters/volumes";
 import { isInDisc, type WantedTile } from "../state/representation";
 import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
@@ -24,6 +25,8 @@ import type { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
+/** Of each channel in a tile, where the march only stands in for paths of light. */
+const STAND_IN_BYTES = 2 ** 21;
 type MadeTable2d = Readonly<{
   shapes: Shapes;
   transfer2d: Transfer2d;
@@ -220,9 +223,11 @@ export class VolumeSet {
     const [first] = sources.values();
     if (first === undefined) return;
     this.reportLimit(first);
+    const isStandIn = this.state !== null && isTraced(this.state);
+    const share = this.share / stride(sources.size);
     const levels = levelsToFetch(
       first.volume.levels,
-      this.share / stride(sources.size),
+      isStandIn ? Math.min(share, STAND_IN_BYTES) : share,
       Math.min(this.limits.side, this.limits.edge),
     );
     const finest = levels[levels.length - 1];

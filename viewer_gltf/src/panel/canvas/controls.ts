@@ -25,7 +25,9 @@ const ELSEWHERE: ReadonlySet<string> = new Set([
   "split",
   "scan",
   "lenses",
+  "slice-pictures", // the planes in the specimen are what a headset shows
   "share",
+  "save-csv",
   "help",
 ]);
 /** Widths in a channel's row. */
@@ -42,7 +44,7 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "button":
       return [buttonIn(item, row)];
     case "slider":
-      return [sliderRow(item, row)];
+      return [sliderRow(item, row), ...(item.about ? [textBlock("", item.about, width)] : [])];
     case "window":
       return [windowRow(item, 0, row), windowRow(item, 1, row)];
     case "choice":

@@ -27,6 +27,9 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  sliceValues: [],
+  undo: null,
+  redo: null,
 };
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
@@ -43,6 +46,7 @@ const TABS = [
     "stereo",
     "measure",
     "cut",
+    "slices",
     "quality",
   ],
 ];
@@ -116,7 +120,8 @@ describe("the panel on a plane", () => {
         const controls = isOpen ? [...inRow, ...item.more] : inRow;
         for (const { id, kind, refusal } of controls) {
           const isElsewhere =
-            ["stereo", "lenses", "share", "help"].includes(id) || kind === "search";
+            ["stereo", "lenses", "share", "help", "slice-pictures"].includes(id) ||
+            kind === "search";
           const isClosed = item.kind === "group" && !isOpen && kind === "choice";
           if (isElsewhere || isClosed || refusal || kind === "text") continue;
           expect(ids, id).toContain(id);
@@ -145,7 +150,7 @@ describe("the panel on a plane", () => {
     }
     const missing = [...offered].filter((id) => !inStereo.has(id)).sort();
     // the way in, which is taken; the list of keys; a link, of which a headset has no clipboard; typing;
-    // a file of the user's
+    // a file of the user's; pictures beside the specimen, which stands alone before the eyes
     expect(missing).toEqual(
       [
         "stereo",
@@ -157,6 +162,7 @@ describe("the panel on a plane", () => {
         "help",
         "find-channel",
         "own-light",
+        "slice-pictures",
       ].sort(),
     );
   });

@@ -18,6 +18,8 @@ export const VIEW_KEYS: readonly Key[] = [
   key("a", "From the side (along x)", "side"),
   key("y", "From the top (along y)", "top"),
   key("r", "Reset the view", "reset"),
+  key("Ctrl+z", "Undo the last change of the view", "undo"),
+  key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
   key("V", "Enter stereo (VR), or leave it", "stereo"),
   key("L", "Next phone viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);

@@ -1,18 +1,36 @@
 /** The parameters of what a tap and a gaze do, and of how finely is drawn. Pure. */
 import { QUALITY_LEVELS, type QualityLevel } from "../quality_controller";
-import { type ChoiceParameter, lensesOf, type Parameter, type SwitchParameter } from "./kinds";
+import {
+  type ChoiceParameter,
+  lensesOf,
+  type NumberParameter,
+  type Parameter,
+  type SwitchParameter,
+} from "./kinds";
 
 const TOOLS = ["select", "measure"] as const;
 /** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
 export type Tool = (typeof TOOLS)[number];
 
+const MEASURES = ["distance", "angle", "line"] as const;
+/** Between two points, at the second of three, through several. */
+export type MeasureKind = (typeof MEASURES)[number];
+
 /** The tools of a bundle that has just opened. */
 export const START_TOOLS = {
   /** The effect of a tap or a dwell on the specimen. */
   tool: "select" as Tool,
+  /** What the next measurement will be. */
+  measureKind: "distance" as MeasureKind,
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,
   quality: "auto" as QualityLevel,
+  /** Between the user's pupils, mm: adults have 54 to 74. */
+  eyeDistance_mm: 63,
+  /** Factor to it: 0 shows both eyes the same. */
+  stereoStrength: 1,
+  /** Of the specimen's longest edge in stereo, m. */
+  specimenSize_m: 1.2,
 };
 
 export type ToolSettings = Readonly<typeof START_TOOLS>;
@@ -29,6 +47,19 @@ export const TOOL: ChoiceParameter<ToolSettings, Tool> = {
   names: { select: "Select", measure: "Measure" },
   key: ["p", "A tap selects or measures"],
   spoken: ({ tool }) => `A tap ${tool}s`,
+};
+
+export const MEASURE_KIND: ChoiceParameter<ToolSettings, MeasureKind> = {
+  kind: "choice",
+  id: "measure-kind",
+  label: "Measure",
+  link: "measure",
+  ...lens("measureKind"),
+  values: MEASURES,
+  names: { distance: "Distance", angle: "Angle", line: "Line" },
+  refusal: ({ tool }) => (tool === "measure" ? "" : "A tap does not measure now."),
+  key: ["&", "Next: distance, angle, line through points"],
+  spoken: ({ measureKind }) => `Measure: ${measureKind}`,
 };
 
 export const DWELL: SwitchParameter<ToolSettings> = {
@@ -53,7 +84,55 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   spoken: ({ quality }) => `Quality: ${quality}`,
 };
 
+export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
+  kind: "number",
+  id: "eye-distance",
+  label: "Eye distance",
+  about: "Between your pupils, on a split screen; a headset knows its own.",
+  ...lens("eyeDistance_mm"),
+  limits: [50, 76],
+  steps: 52,
+  rounded: (value) => Math.round(2 * value) / 2,
+  text: (value) => `${value} mm`,
+  spoken: ({ eyeDistance_mm }) => `Eye distance ${eyeDistance_mm} mm`,
+};
+
+export const STEREO_STRENGTH: NumberParameter<ToolSettings> = {
+  kind: "number",
+  id: "stereo-strength",
+  label: "Strength of stereo",
+  ...lens("stereoStrength"),
+  limits: [0, 2],
+  steps: 40,
+  rounded: (value) => Number(value.toFixed(2)),
+  text: (value) => `${Math.round(100 * value)} %`,
+  spoken: ({ stereoStrength }) => `Strength of stereo ${Math.round(100 * stereoStrength)} %`,
+};
+
+const size = (value: number) =>
+  value < 1 ? `${Math.round(100 * value)} cm` : `${value.toFixed(1)} m`;
+
+export const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
+  kind: "number",
+  id: "specimen-size",
+  label: "Size in stereo",
+  ...lens("specimenSize_m"),
+  limits: [0.2, 6],
+  steps: 60,
+  isLogarithmic: true,
+  rounded: (value) => Number(value.toPrecision(2)),
+  text: size,
+  spoken: ({ specimenSize_m }) => `The specimen's longest edge: ${size(specimenSize_m)}`,
+};
+
+/** They have the keys of the light's numbers. */
+export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
+  EYE_DISTANCE,
+  STEREO_STRENGTH,
+  SPECIMEN_SIZE,
+];
+
 /** By the panel's section that lists them. */
-export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL];
-export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL];
+export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
+export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];
