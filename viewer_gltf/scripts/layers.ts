@@ -21,10 +21,12 @@ export const LAYERS: readonly string[] = [
   "render",
   "interaction",
   "annotations",
+  "slices",
   "panel",
   "xr",
   "share",
   "offline",
+  "bench",
   "app",
 ];
 

@@ -104,6 +104,7 @@ def settle(source: str, settings: Settings) -> Plan:
         settings=settings,
         modality=modality,
         placement=dataset.placement,
+        has_sides=dataset.has_sides,
     )
     gaps = told_of_gaps(dataset, plan)
     for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
@@ -173,6 +174,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             about,
             names,
             list(plan.placement),
+            plan.has_sides,
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
         if phase.is_done(key, partial(_digest_of_stage, out_folder)):
@@ -193,6 +195,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             provenance=about,
             modality=plan.modality,
             placement=plan.placement,
+            has_sides=plan.has_sides,
         )
         out_folder.remove_other_folders(
             out_folder.stage_dir / "tiles", {tile.id for tile in plan.tiles}

@@ -50,6 +50,8 @@ class Plan:
     modality    DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
     placement   rows of a (4, 4) matrix for columns, um: from the world of the voxels
                 (volume.zyx_to_xyz) to the specimen's place
+    has_sides   whether the source states where the patient's left, back and head are: then the
+                specimen's place is the patient's world (read/anatomical_axes.py)
     """
 
     source: str
@@ -66,6 +68,7 @@ class Plan:
     settings: Settings
     modality: str = ""
     placement: Matrix = IDENTITY
+    has_sides: bool = False
 
     @property
     def repair(self) -> RepairOptions:
@@ -156,6 +159,7 @@ def make_plan(
     settings: Settings,
     modality: str = "",
     placement: Matrix = IDENTITY,
+    has_sides: bool = False,
 ) -> Plan:
     """Return the plan for these channels at this level (index and reason).
 
@@ -202,6 +206,7 @@ def make_plan(
         settings=settings,
         modality=modality,
         placement=placement,
+        has_sides=has_sides,
     )
 
 

@@ -43,6 +43,7 @@ from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
+    sides_of,
     open_stage,
     specimen_name,
     tile_prims,
@@ -158,7 +159,9 @@ def _fill(
         files += _copy_viewer(viewer_dist, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
-    specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    specimen: dict[str, Any] = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    if (sides := sides_of(stage)) is not None:
+        specimen["sides"] = sides
     write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels=channels, index=index))
     for tile in tiles:
         for channel in tile.channels:
@@ -167,7 +170,7 @@ def _fill(
 
 
 def describe_bundle(
-    specimen: dict[str, str],
+    specimen: dict[str, Any],
     tiles: Sequence[BundleTile],
     *,
     channels: Sequence[dict[str, Any]],
@@ -175,7 +178,7 @@ def describe_bundle(
 ) -> bytes:
     """Return manifest.json.
 
-    specimen  its name and modality
+    specimen  its name and modality, and where a patient's sides are
     channels  as `describe_channel` returns them
     index     files.json
     """

@@ -114,6 +114,8 @@ class Dataset:
     placement    rows of a (4, 4) matrix for columns, um: from the world whose origin is the centre
                  of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
                  read/anatomical_axes.py
+    has_sides    whether the source states where the patient's left, back and head are; False where
+                 it is no patient, or the reader had to guess
     remarks      changes and omissions of the reader, a sentence each
     acquired     the source's own images: the axis across which they lie
     labels       what in the metadata says that the voxels number objects; empty: nothing does
@@ -132,6 +134,7 @@ class Dataset:
     on_close: Callable[[], None] | None = field(repr=False, default=None)
     modality: str = ""
     placement: Matrix = IDENTITY
+    has_sides: bool = False
     remarks: tuple[str, ...] = ()
     labels: str = ""
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)

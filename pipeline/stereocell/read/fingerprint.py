@@ -36,6 +36,8 @@ class Fingerprinted(Protocol):
     def modality(self) -> str: ...
     @property
     def placement(self) -> Any: ...
+    @property
+    def has_sides(self) -> bool: ...
 
 
 def fingerprint_of(dataset: Fingerprinted) -> str:
@@ -47,6 +49,7 @@ def fingerprint_of(dataset: Fingerprinted) -> str:
         "channels": [[channel.name, channel.color] for channel in dataset.channels],
         "modality": dataset.modality,
         "placement": dataset.placement,
+        "has_sides": dataset.has_sides,
     }
     digest = hashlib.sha256(json.dumps(metadata, sort_keys=True).encode())
     last = len(dataset.levels) - 1

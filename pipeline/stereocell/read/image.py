@@ -21,7 +21,7 @@ class Image:
     images         the number of images in the source
     close          frees open files, or None
     title          the image's name; None: the file's name is used
-    modality, placement, acquired, labels  as in Dataset
+    modality, placement, has_sides, acquired, labels  as in Dataset
     notes          become Dataset's `remarks`
     notes_at       returns more notes, about one time point; it may read that point's voxels
     """
@@ -35,6 +35,7 @@ class Image:
     title: str | None = None
     modality: str = ""
     placement: Matrix = IDENTITY
+    has_sides: bool = False
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
     labels: str = ""
     notes: tuple[str, ...] = ()

@@ -61,7 +61,9 @@ def read_image(location: Location) -> Image:
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, fields, len(shape))
-    return place(where, array, axes, affine, "TransformMatrix").image(NAME, notes)
+    return place(where, array, axes, affine, "TransformMatrix").image(
+        NAME, notes, has_sides="TransformMatrix" in fields
+    )
 
 
 def _header(location: Location) -> tuple[dict[str, str], int]:

@@ -82,10 +82,11 @@ def read_image(location: Location) -> Image:
     is_sound = np.isfinite(image.affine).all() and lengths.min() > 0
     if not is_sound or abs(np.linalg.det(affine[:3, :3] / lengths)) < 0.1:
         raise SourceError(f"{where}: sform and qform: found no three axes, expected an affine")
+    has_sides = is_nifti and bool(header["sform_code"] or header["qform_code"])
     notes = []
     if not is_nifti:
         notes.append("Analyze states no orientation: x to the left of the patient is a guess")
-    elif not (header["sform_code"] or header["qform_code"]):
+    elif not has_sides:
         notes.append(
             "neither sform nor qform: which side is left is a guess, x to the left of the patient"
         )
@@ -115,6 +116,7 @@ def read_image(location: Location) -> Image:
         images=1,
         title=title,
         placement=canonical.placement,
+        has_sides=has_sides,
         labels=_labels(header) if is_nifti else "",
         acquired=Acquired(_image_axis(header.get_dim_info()[2] if is_nifti else None, canonical)),
         notes=tuple(notes),

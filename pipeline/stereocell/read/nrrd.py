@@ -79,7 +79,9 @@ def read_image(location: Location) -> Image:
     affine[:3, :3] = to_lps @ spatial.T * (unit / 1000.0)
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
     affine[:3, 3] = to_lps @ np.where(np.isfinite(origin), origin, 0.0) * (unit / 1000.0)
-    return place(where, array, axes, affine, "space directions").image(NAME)
+    return place(where, array, axes, affine, "space directions").image(
+        NAME, has_sides=_names_sides(fields)
+    )
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:
@@ -151,10 +153,21 @@ def _axes(
     return names
 
 
+def _names_sides(fields: Mapping[str, Any]) -> bool:
+    """Return whether the space is one of the patient's; of a scanner's own nothing says that."""
+    return all(word in _SIDES for word in _words(fields))
+
+
+def _words(fields: Mapping[str, Any]) -> list[str]:
+    """Return what the axes of the file's space lead to: `left`, `posterior`, `superior`."""
+    space = str(fields.get("space", ""))
+    return _SHORT.get(space.upper()[:3], space).lower().removesuffix("-time").split("-")
+
+
 def _to_lps(where: str, fields: Mapping[str, Any]) -> NDArray[np.float64] | None:
     """Return the matrix (3, 3) from the file's space to LPS; None: it names no anatomical axes."""
     space = str(fields.get("space", ""))
-    words = _SHORT.get(space.upper()[:3], space).lower().removesuffix("-time").split("-")
+    words = _words(fields)
     if not all(word in _SIDES for word in words):
         return np.eye(3) if space.lower() in _IN_MM else None
     matrix = np.zeros((3, 3))

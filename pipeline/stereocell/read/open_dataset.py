@@ -232,6 +232,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         on_close=image.close,
         modality=image.modality,
         placement=image.placement,
+        has_sides=image.has_sides,
         remarks=(
             *map(_shown, image.notes),  # which may name files
             *filter(None, [cast_note(finest.array.dtype)]),

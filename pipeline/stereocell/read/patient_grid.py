@@ -31,7 +31,7 @@ class Placed:
     placement: Matrix
     notes: tuple[str, ...] = ()
 
-    def image(self, title: str, notes: Sequence[str] = ()) -> Image:
+    def image(self, title: str, notes: Sequence[str] = (), *, has_sides: bool) -> Image:
         """Return the image of a format whose files name no channel, after more notes."""
         count = self.array.size("c")
         return Image(
@@ -42,6 +42,7 @@ class Placed:
             images=1,
             title=title,
             placement=self.placement,
+            has_sides=has_sides,
             notes=(*notes, *self.notes),
         )
 

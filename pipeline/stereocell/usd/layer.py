@@ -25,8 +25,16 @@ TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
 CHANNEL_API = "StereoCellChannelAPI"
 SPECIMEN_API = "StereoCellSpecimenAPI"
+PATIENT_API = "StereoCellPatientAPI"
 SURFACE_API = "StereoCellSurfaceAPI"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
+
+# where the patient's sides are, on the group of the tiles: directions (x, y, z) among its own axes
+SIDES = {
+    "left": "stereocell:left",
+    "posterior": "stereocell:posterior",
+    "superior": "stereocell:superior",
+}
 
 # attributes of a surface's mesh
 SHAPE_HASH = "stereocell:shapeHash"

@@ -24,8 +24,10 @@ from stereocell.usd.layer import (
     DISTANCE,
     LARGEST_DISTANCE,
     METERS_PER_UNIT,
+    PATIENT_API,
     ROOT,
     SHAPE_HASH,
+    SIDES,
     TILES,
     hash_shape,
     move_box,
@@ -47,6 +49,7 @@ from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
 from stereocell.usd.written_files import AsWritten
 
+_SIDE_DIGITS = 9  # of the unit vectors to a patient's sides: finer than any scanner states them
 _FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -182,6 +185,27 @@ def modality_of(stage: Usd.Stage) -> str:
     """Return DICOM's code of the modality, `MR` or the like; empty: the stage states none."""
     attribute = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality")
     return str((attribute.Get() if attribute else None) or "")
+
+
+def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
+    """Return where the patient's sides are: unit vectors, world; None: the stage does not state it.
+
+    They are turned, and mirrored, as the group of the tiles is. Raises StageError for a side that
+    is no direction.
+    """
+    group = stage.GetPrimAtPath(TILES)
+    if PATIENT_API not in group.GetAppliedSchemas():
+        return None
+    to_world = _to_world(group)[:3, :3]
+    sides = {}
+    for side, name in SIDES.items():
+        along = np.array(point_of(group, name)) @ to_world
+        length = np.linalg.norm(along)
+        if not length > 0:
+            raise StageError(f"{group.GetPath()}.{name}: found no length, expected a direction")
+        x, y, z = (float(part) for part in np.round(along / length, _SIDE_DIGITS) + 0.0)
+        sides[side] = (x, y, z)
+    return sides
 
 
 def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:

@@ -32,6 +32,8 @@ from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
     LAYER_SUFFIXES,
     ROOT,
+    PATIENT_API,
+    SIDES,
     SPECIMEN_API,
     TILES,
     export,
@@ -82,6 +84,7 @@ def write_stage(
     provenance: Provenance,
     modality: str = "",
     placement: Matrix = IDENTITY,
+    has_sides: bool = False,
 ) -> None:
     """Write stage.usda and looks/ over tiles that `write_tile` has written.
 
@@ -93,6 +96,8 @@ def write_stage(
     modality    DICOM's code of the modality (`MR`, `CT`, ...), on /Specimen; empty: not known
     placement   rows of a (4, 4) matrix for columns, um: a transform on /Specimen/Tiles; the
                 identity is not written
+    has_sides   whether the placed specimen lies as read/anatomical_axes.py has it: then the group
+                of the tiles says where left, posterior and superior are
 
     Raises OutputError where a file can't be written.
     """
@@ -111,6 +116,8 @@ def write_stage(
     move = np.array(placement).T  # USD's matrices are for row vectors
     if placement != IDENTITY:
         group.AddTransformOp().Set(Gf.Matrix4d(*move.ravel().tolist()))
+    if has_sides:
+        _state_sides(group.GetPrim(), move)
     boxes = np.zeros((len(tiles), 2, 3))
     for box, tile in zip(boxes, tiles, strict=True):
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
@@ -134,6 +141,18 @@ def write_stage(
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
     export(layer, stage_dir / STAGE_NAME)
+
+
+def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:
+    """State the patient's sides among the group's own axes, so that they turn with it.
+
+    move  (4, 4) for row vectors: from the group's axes to the patient's world, (L, S, -P)
+    """
+    group.AddAppliedSchema(PATIENT_API)
+    world = {"left": (1, 0, 0), "posterior": (0, 0, -1), "superior": (0, 1, 0)}
+    for side, name in SIDES.items():
+        own = np.array(world[side]) @ np.linalg.inv(move[:3, :3])
+        set_attribute(group, name, Sdf.ValueTypeNames.Vector3d, Gf.Vec3d(*own.tolist()))
 
 
 def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:

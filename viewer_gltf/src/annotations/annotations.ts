@@ -30,12 +30,16 @@ import { Ruler } from "./ruler";
 import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
 import { type Sight, screenZoom } from "./style";
 
+/** Why no point is set. */
+const NOTHING_MET = "Nothing there to measure: no surface, no volume and no slice.";
 /** Largest move of a head at rest, m. */
 const TREMBLE_M = 0.03;
 
 export type MarksOptions = ReadingOptions &
   Readonly<{
     dispatch: (action: Action) => void;
+    /** Say why nothing has come of it. */
+    announce: (text: string) => void;
     /** The picture differs now. */
     onChange: () => void;
   }>;
@@ -75,13 +79,14 @@ export class Marks {
   readonly target: HandleTarget;
   readonly measured: MeasureMark;
   readonly scaleBar = new ScaleBarMark();
-  readonly orientation = new OrientationMark();
+  readonly orientation: OrientationMark;
   readonly name = new NameMark();
   readonly ruler = new Ruler();
-  readonly axes = new Axes();
+  readonly axes: Axes;
   private readonly reading: Reading;
   private readonly toSpecimen = new Matrix4();
-  private sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
+  /** From where the last frame was seen. */
+  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
   /** The lamp that the ray which drags it has lost over its rim. */
   private beside: HandleId | null = null;
   /** How many surfaces are on screen. */
@@ -92,6 +97,9 @@ export class Marks {
     private readonly options: MarksOptions,
     private state: ViewerState,
   ) {
+    const { sides } = options.manifest.specimen;
+    this.orientation = new OrientationMark(sides);
+    this.axes = new Axes(sides);
     this.reading = new Reading(options, state);
     this.target = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
     this.measured = new MeasureMark((point) => this.reading.valuesAt(point), options.onChange);
@@ -151,7 +159,7 @@ export class Marks {
   get values(): readonly (readonly string[])[] {
     return this.state.measured.map((_, i) =>
       this.measured
-        .valuesAt(i === 0 ? 0 : 1)
+        .valuesAt(i)
         .split("\n")
         .filter((line) => line !== ""),
     );
@@ -189,13 +197,12 @@ export class Marks {
     this.options.onChange();
   }
 
-  /** Measure from or to what a ray (um) means: the first point, the second, a first one again. */
+  /** Measure from or to what a ray (um) means: a point of the newest measurement, or of another. */
   async measure(ray: Ray): Promise<void> {
     const found = await this.reading.probe(ray);
-    if (found === null || this.isDisposed) return;
-    const { measured } = this.state;
-    const points = measured.length === 1 ? [...measured, found.point] : [found.point];
-    this.options.dispatch({ type: "measure", points });
+    if (this.isDisposed) return;
+    if (found === null) this.options.announce(NOTHING_MET);
+    else this.options.dispatch({ type: "add-point", point: found.point });
   }
 
   /** Box of what is shown: the specimen, or the isolated tile. */
@@ -234,8 +241,9 @@ export class Marks {
   }
 
   private showMeasured(): void {
-    const { measured } = this.state;
-    this.measured.show(measured, this.reading.sourcesKey(measured));
+    const { measured, measuredAs, measurements } = this.state;
+    this.measured.show(measured, measuredAs, this.reading.sourcesKey(measured));
+    this.measured.list(measurements);
   }
 
   private nameOf(gaze: Ray): Named | null {

@@ -1,9 +1,10 @@
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
+import { distanceBetween } from "../math/distance";
 import {
-  distanceBetween,
   distanceText,
+  measurementText,
   sizeText,
   type VolumeLevel,
   valueAt,
@@ -117,6 +118,21 @@ describe("the value at a point", () => {
 describe("the distance of two points", () => {
   it("is Euclid's, in um", () => {
     expect(distanceBetween([1, 2, 3], [3, 5, 9])).toBe(7);
+  });
+
+  it("and what an angle and a line come to", () => {
+    const line = [
+      [0, 0, 0],
+      [3, 4, 0],
+      [3, 4, 5],
+    ] as const;
+    expect(measurementText("distance", line.slice(0, 2))).toBe("5.00 µm");
+    expect(measurementText("line", line)).toBe("10.0 µm, 3 points");
+    expect(measurementText("angle", line)).toBe("90.0°");
+  });
+
+  it("has a unit of values where the source states one", () => {
+    expect(valueText(-1000.4, [-1024, 2000], "HU")).toBe("-1000 HU");
   });
 
   it("is written with three digits in the unit that keeps it short", () => {

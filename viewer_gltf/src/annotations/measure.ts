@@ -1,8 +1,11 @@
 /** A measurement's text: the distance of two points, the channel's value at one. Pure. */
 import { Matrix4, Vector3 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
 import type { Vec3 } from "../math/vec3";
+import { angleOf, lengthOf } from "../state/measurements";
+import type { MeasureKind } from "../state/parameters/tools";
 import { textureCorners } from "../volumes/texture_space";
 
 /** One mip level: texels along x, y, z and their bytes, x fastest. */
@@ -20,19 +23,25 @@ export type Window = readonly [number, number];
 const RIM = 1e-6;
 const DIGITS = 3;
 
-export function distanceBetween(a: Vec3, b: Vec3): number {
-  return Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+/** What a measurement comes to: a length, an angle, a length and how many points. */
+export function measurementText(kind: MeasureKind, points: readonly Vec3[]): string {
+  if (kind === "angle") {
+    const angle = angleOf(points);
+    return angle === null ? "two of its points are one" : `${angle.toFixed(1)}°`;
+  }
+  const length = distanceText(lengthOf(points));
+  return kind === "line" ? `${length}, ${points.length} points` : length;
 }
 
 /** mm from 1000 um on, nm below 1 um. */
-function unitOf(rounded_um: number): readonly [string, number] {
+function lengthUnitOf(rounded_um: number): readonly [string, number] {
   return rounded_um >= 1000 ? ["mm", 1e-3] : rounded_um < 1 ? ["nm", 1e3] : ["µm", 1];
 }
 
 /** Edges in the unit of the longest: `231 × 215 × 255 mm`. */
 export function sizeText(edges_um: readonly number[]): string {
   const rounded = edges_um.map((edge) => Number(edge.toPrecision(DIGITS)));
-  const [unit, factor] = unitOf(Math.max(...rounded));
+  const [unit, factor] = lengthUnitOf(Math.max(...rounded));
   const texts = rounded.map((edge) => String(Number((edge * factor).toPrecision(DIGITS))));
   return `${texts.join(" × ")} ${unit}`;
 }
@@ -41,7 +50,7 @@ export function sizeText(edges_um: readonly number[]): string {
 export function distanceText(distance_um: number): string {
   const rounded = Number(distance_um.toPrecision(DIGITS)); // so that 999.9 um is 1.00 mm
   if (rounded === 0) return "0 µm";
-  const [unit, factor] = unitOf(rounded);
+  const [unit, factor] = lengthUnitOf(rounded);
   const value = distance_um * factor;
   const whole = Math.floor(Math.log10(rounded * factor) + 1e-9) + 1;
   return `${value.toFixed(Math.max(0, DIGITS - Math.max(1, whole)))} ${unit}`;
@@ -75,11 +84,16 @@ export function valueAt(
   return start + ((end - start) * trilinear(level, at[0], at[1], at[2])) / 255;
 }
 
-/** As many digits as 8 bits of the window hold. */
-export function valueText(value: number, [start, end]: Window): string {
+/** The unit of the source's values; "": it states none. DICOM's CT values are Hounsfield units. */
+export function unitOf({ specimen }: Pick<Manifest, "specimen">): string {
+  return specimen.modality === "CT" ? "HU" : "";
+}
+
+/** As many digits as 8 bits of the window hold, and the unit. */
+export function valueText(value: number, [start, end]: Window, unit = ""): string {
   const step = Math.abs(end - start) / 255;
   const decimals = step > 0 ? Math.max(0, -Math.floor(Math.log10(step))) : 0;
-  return value.toFixed(Math.min(decimals, 100));
+  return `${value.toFixed(Math.min(decimals, 100))} ${unit}`.trim();
 }
 
 /** At a place in texels, 0 the centre of the first; clamped to the edge, as the GPU does. */

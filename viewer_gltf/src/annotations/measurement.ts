@@ -1,12 +1,15 @@
-/** The measured points, the line between them, their distance, and the channels' values there. */
+/** Measurements in the scene: points, the stretches between them, what they come to, and the channels' values. */
 import { CylinderGeometry, Object3D, SphereGeometry, Vector3 } from "three";
 import type { Vec3 } from "../math/vec3";
+import { type Measurement, missing } from "../state/measurements";
+import type { MeasureKind } from "../state/parameters/tools";
 import { Label } from "./label";
-import { distanceBetween, distanceText } from "./measure";
+import { measurementText } from "./measure";
 import {
   disposeMarks,
   LINE_RADIUS,
   lengthAt,
+  type MarkMesh,
   MEASURE,
   markMesh,
   POINT_RADIUS,
@@ -18,13 +21,93 @@ const UP = new Vector3(0, 1, 0);
 /** Colour of points and labels, as hex. */
 const COLOR = "#ffd24a";
 
+/** One measurement: what is drawn of it is made when it is needed, and stays. */
+class Strand {
+  readonly group = new Object3D();
+  readonly label = new Label("above", COLOR);
+  private readonly points: MarkMesh[] = [];
+  private readonly stretches: MarkMesh[] = [];
+  private readonly middle = new Vector3();
+  private count = 0;
+
+  constructor() {
+    this.group.add(this.label.sprite);
+  }
+
+  show(places: readonly Vec3[], text: string): void {
+    this.count = places.length;
+    while (this.points.length < places.length) {
+      const point = rimmed(markMesh(new SphereGeometry(0.5, 16, 10), MEASURE));
+      this.points.push(point);
+      this.group.add(point);
+    }
+    while (this.stretches.length < places.length - 1) {
+      const line = markMesh(new CylinderGeometry(0.5, 0.5, 1, 8, 1, true), MEASURE);
+      this.stretches.push(line);
+      this.group.add(line);
+    }
+    this.points.forEach((mesh, i) => {
+      mesh.visible = i < places.length;
+      if (mesh.visible) mesh.position.set(...places[i]);
+    });
+    this.stretches.forEach((mesh, i) => {
+      mesh.visible = i < places.length - 1;
+      if (mesh.visible) stretch(mesh, places[i], places[i + 1]);
+    });
+    this.label.write(places.length > 1 ? text : "");
+    if (places.length < 2) return;
+    // of three points beside the second, else in the middle of the stretch halfway
+    const half = (places.length - 1) / 2;
+    const [a, b] = [places[Math.floor(half - 1e-9)], places[Math.floor(half - 1e-9) + 1]];
+    this.middle.set(...a).lerp(new Vector3(...b), places.length % 2 === 0 ? 0.5 : 0.85);
+  }
+
+  get isLine(): boolean {
+    return this.count > 1;
+  }
+
+  /** From one point to the next. */
+  along(index: number, out: Vector3): Vector3 {
+    return out.subVectors(this.points[index + 1].position, this.points[index].position);
+  }
+
+  placeOf(index: number): Vector3 {
+    return this.points[index].position;
+  }
+
+  update(sight: Sight): void {
+    for (const mesh of this.points) {
+      if (mesh.visible) mesh.scale.setScalar(lengthAt(mesh.position, sight, 2 * POINT_RADIUS));
+    }
+    for (const mesh of this.stretches) {
+      if (!mesh.visible) continue;
+      const width = lengthAt(mesh.position, sight, 2 * LINE_RADIUS);
+      mesh.scale.setX(width).setZ(width);
+    }
+    this.label.place(this.middle, sight);
+  }
+
+  dispose(): void {
+    this.group.removeFromParent();
+    this.label.dispose();
+    disposeMarks(this.group);
+  }
+}
+
+function stretch(mesh: MarkMesh, from: Vec3, to: Vec3): void {
+  const a = new Vector3(...from);
+  const along = new Vector3(...to).sub(a);
+  mesh.position.copy(a).addScaledVector(along, 0.5);
+  mesh.scale.setY(along.length());
+  mesh.quaternion.setFromUnitVectors(UP, along.normalize());
+}
+
 export class MeasureMark {
   readonly group = new Object3D();
-  readonly distance = new Label("above", COLOR);
-  private readonly line = markMesh(new CylinderGeometry(0.5, 0.5, 1, 8, 1, true), MEASURE);
-  private readonly ends = [new End(), new End()] as const;
-  private readonly middle = new Vector3();
-  /** From the first point to the second. */
+  private readonly newest = new Strand();
+  private readonly kept: Strand[] = [];
+  /** The channels' values at the newest one's points. */
+  private readonly values: Label[] = [];
   private readonly stretched = new Vector3();
   private count = 0;
   private key = "";
@@ -37,24 +120,42 @@ export class MeasureMark {
     private readonly read: (point: Vec3) => Promise<readonly string[]>,
     private readonly onChange: () => void,
   ) {
-    this.group.add(this.line, this.distance.sprite);
-    for (const { mesh, values } of this.ends) this.group.add(mesh, values.sprite);
-    this.show([], "");
+    this.group.add(this.newest.group);
+    this.show([], "distance", "");
+  }
+
+  /** What the newest one comes to. */
+  get distance(): Label {
+    return this.newest.label;
+  }
+
+  /** Those that are done, with their names. */
+  list(measurements: readonly Measurement[]): void {
+    while (this.kept.length < measurements.length) {
+      const strand = new Strand();
+      this.kept.push(strand);
+      this.group.add(strand.group);
+    }
+    this.kept.forEach((strand, i) => {
+      const each = measurements[i];
+      if (each === undefined) strand.show([], "");
+      else strand.show(each.points, `${each.name}\n${measurementText(each.kind, each.points)}`);
+    });
   }
 
   /** `key` names what else the values depend on: they are read anew when it differs. */
-  show(points: readonly Vec3[], key: string): void {
+  show(points: readonly Vec3[], kind: MeasureKind, key: string): void {
     this.count = points.length;
-    this.ends.forEach(({ mesh, values }, i) => {
-      mesh.visible = i < points.length;
-      if (mesh.visible) mesh.position.set(...points[i]);
-      else values.write("");
+    const isDone = missing(kind, points) === 0;
+    this.newest.show(points, isDone ? measurementText(kind, points) : "");
+    while (this.values.length < points.length) {
+      const label = new Label("below");
+      this.values.push(label);
+      this.group.add(label.sprite);
+    }
+    this.values.forEach((label, i) => {
+      if (i >= points.length) label.write("");
     });
-    const [a, b] = points;
-    const isLine = a !== undefined && b !== undefined;
-    this.line.visible = isLine;
-    this.distance.write(isLine ? distanceText(distanceBetween(a, b)) : "");
-    if (isLine) this.stretch();
     const next = `${points.join(" ")} ${key}`;
     if (next === this.key) return;
     this.key = next;
@@ -69,54 +170,37 @@ export class MeasureMark {
   }
 
   update(sight: Sight): void {
-    for (const { mesh, values } of this.ends) {
-      if (!mesh.visible) continue;
-      mesh.scale.setScalar(lengthAt(mesh.position, sight, 2 * POINT_RADIUS));
-      values.place(mesh.position, sight);
+    this.newest.update(sight);
+    for (const strand of this.kept) strand.update(sight);
+    for (let i = 0; i < this.count; i++) {
+      // away from the line, so that none lies on what it comes to
+      const before = i === 0 ? 0 : i - 1;
+      const { isLine } = this.newest;
+      const leadsDown = isLine && this.newest.along(before, this.stretched).dot(sight.up) < 0;
+      const isAbove = isLine && (i === 0) === leadsDown;
+      this.values[i].turnTo(isAbove ? "above" : "below");
+      this.values[i].place(this.newest.placeOf(i), sight);
     }
-    const [a, b] = this.ends;
-    // away from each other, so that none lies on the distance
-    const isHigher = this.line.visible && this.stretched.dot(sight.up) < 0;
-    a.values.turnTo(isHigher ? "above" : "below");
-    b.values.turnTo(isHigher || !this.line.visible ? "below" : "above");
-    if (!this.line.visible) return;
-    const width = lengthAt(this.middle, sight, 2 * LINE_RADIUS);
-    this.line.scale.setX(width).setZ(width);
-    this.distance.place(this.middle, sight);
   }
 
   /** The text at a point. */
-  valuesAt(index: 0 | 1): string {
-    const { values } = this.ends[index];
-    return values.sprite.visible ? values.text : "";
-  }
-
-  private stretch(): void {
-    const [a, b] = this.ends.map(({ mesh }) => mesh.position);
-    const along = this.stretched.subVectors(b, a);
-    this.middle.copy(a).addScaledVector(along, 0.5);
-    this.line.position.copy(this.middle);
-    this.line.scale.setY(along.length());
-    this.line.quaternion.setFromUnitVectors(UP, along.clone().normalize());
+  valuesAt(index: number): string {
+    const label = this.values[index];
+    return label?.sprite.visible ? label.text : "";
   }
 
   private async readAt(index: number, point: Vec3, key: string): Promise<void> {
     const lines = await this.read(point);
     if (key !== this.key || index >= this.count) return; // measured anew meanwhile
-    this.ends[index].values.write(lines.join("\n"));
+    this.values[index].write(lines.join("\n"));
     this.onChange();
   }
 
   dispose(): void {
     this.key = "disposed";
     this.group.removeFromParent();
-    this.distance.dispose();
-    for (const { values } of this.ends) values.dispose();
-    disposeMarks(this.group);
+    this.newest.dispose();
+    for (const strand of this.kept) strand.dispose();
+    for (const label of this.values) label.dispose();
   }
-}
-
-class End {
-  readonly mesh = rimmed(markMesh(new SphereGeometry(0.5, 16, 10), MEASURE));
-  readonly values = new Label("below");
 }

@@ -1,6 +1,6 @@
 import { Matrix4, PerspectiveCamera, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { axesSeen } from "./orientation_axes";
+import { axesOf, axesSeen } from "./orientation_axes";
 import { rulerLength } from "./ruler";
 import { umPerPixelAt } from "./scale_bar";
 
@@ -61,5 +61,56 @@ describe("the ruler", () => {
       expect(angle_deg).toBeGreaterThan(6);
     }
     expect(rulerLength(0)).toBeNull();
+  });
+});
+
+describe("a patient's axes", () => {
+  const letters = (sides?: Parameters<typeof axesOf>[0]) =>
+    axesOf(sides).flatMap(({ direction, ends: [forth, back] }) => [
+      [forth, ...direction],
+      ...(back === null ? [] : [[back, ...direction.map((part) => -part)]]),
+    ]);
+
+  it("are lettered at both ends, for each of the 48 ways to lie along the axes", () => {
+    const signs = [1, -1] as const;
+    const unit = (axis: number, sign: number) => {
+      const along: [number, number, number] = [0, 0, 0];
+      along[axis] = sign;
+      return along;
+    };
+    let count = 0;
+    for (const [i, j, k] of [
+      [0, 1, 2],
+      [0, 2, 1],
+      [1, 0, 2],
+      [1, 2, 0],
+      [2, 0, 1],
+      [2, 1, 0],
+    ]) {
+      for (const a of signs) {
+        for (const b of signs) {
+          for (const c of signs) {
+            const sides = { left: unit(i, a), posterior: unit(j, b), superior: unit(k, c) };
+            const placed = new Map(letters(sides).map(([name, ...at]) => [name, at.join()]));
+            const wanted = { L: [i, a], R: [i, -a], P: [j, b], A: [j, -b], S: [k, c], I: [k, -c] };
+            for (const [name, [axis, sign]] of Object.entries(wanted)) {
+              const at = placed.get(name)?.split(",").map(Number) ?? [];
+              expect(at.findIndex((part) => part !== 0)).toBe(axis);
+              expect(at[axis]).toBe(sign);
+            }
+            count++;
+          }
+        }
+      }
+    }
+    expect(count).toBe(48);
+  });
+
+  it("are the lattice's x, y and z where no side is known", () => {
+    expect(letters()).toEqual([
+      ["x", 1, 0, 0],
+      ["y", 0, 1, 0],
+      ["z", 0, 0, 1],
+    ]);
   });
 });

@@ -1,19 +1,47 @@
 /**
  * How the specimen is turned, as three labelled axes: x to the right, y up, z to the viewer at the
- * start. A small drawing over a flat picture's lower right corner; in a headset an object beside the
- * specimen.
+ * start; of a patient whose sides are known the sides at both ends, L R, S I, A P. A small drawing over
+ * a flat picture's lower right corner; in a headset an object beside the specimen.
  */
 import { ConeGeometry, CylinderGeometry, type Matrix4, Object3D, Quaternion, Vector3 } from "three";
+import type { Sides } from "../bundle/generated/bundle";
 import type { Box } from "../math/box";
+import { type Vec3, withPart } from "../math/vec3";
 import { Label } from "./label";
 import { AXIS_COLORS, disposeMarks, lengthAt, markMesh, type Sight } from "./style";
 
-export const AXIS_NAMES = ["x", "y", "z"] as const;
+/** A line through the specimen: `ends` are the letters where `direction` leads to, and opposite. */
+export type Axis = Readonly<{
+  direction: Vec3;
+  ends: readonly [string, string | null];
+  /** Where `direction` leads, for a screen reader. */
+  word: string;
+}>;
+
+/** The lattice's axes, or where a patient's sides are; in the colours' order. */
+export function axesOf(sides: Sides | undefined): readonly Axis[] {
+  if (sides === undefined) {
+    return (["x", "y", "z"] as const).map((name, i) => ({
+      direction: withPart([0, 0, 0], i as 0 | 1 | 2, 1),
+      ends: [name, null],
+      word: name,
+    }));
+  }
+  const [x, y, z] = sides.posterior;
+  return [
+    { direction: sides.left, ends: ["L", "R"], word: "the patient's left" },
+    { direction: sides.superior, ends: ["S", "I"], word: "the head" },
+    { direction: [-x, -y, -z], ends: ["A", "P"], word: "the front" },
+  ];
+}
+
 const SVG = "http://www.w3.org/2000/svg";
 /** Of the drawing, in its own units. */
 const HALF = 40;
 const LENGTH = 26;
 const LETTER = 33;
+/** An axis that leads so far to the eye or away (of 1) has one letter: the other would lie under it. */
+const END_ON = 0.9;
 
 /**
  * The specimen's axes as the eye sees them: unit vectors, x to the right, y up, z to the eye. Pure.
@@ -21,59 +49,83 @@ const LETTER = 33;
  * @param head from the eye to the room
  * @param specimen from um to the room
  */
-export function axesSeen(head: Matrix4, specimen: Matrix4): readonly Vector3[] {
+export function axesSeen(
+  head: Matrix4,
+  specimen: Matrix4,
+  axes = axesOf(undefined),
+): readonly Vector3[] {
   const toEye = head.clone().invert();
-  return AXIS_NAMES.map((_, i) =>
-    new Vector3(...unit(i)).transformDirection(specimen).transformDirection(toEye),
+  return axes.map(({ direction }) =>
+    new Vector3(...direction).transformDirection(specimen).transformDirection(toEye),
   );
 }
 
-function unit(axis: number): [number, number, number] {
-  return [axis === 0 ? 1 : 0, axis === 1 ? 1 : 0, axis === 2 ? 1 : 0];
+/** One end of an axis: the line from the middle, and its letter. */
+class End {
+  readonly whole: SVGElement;
+  private readonly line: SVGElement;
+  private readonly letter: SVGElement;
+
+  constructor(
+    root: SVGElement,
+    readonly axis: number,
+    readonly sign: 1 | -1,
+    text: string,
+  ) {
+    this.whole = append("g", root);
+    this.whole.dataset.axis = text;
+    this.line = append("line", this.whole);
+    this.line.setAttribute("stroke", AXIS_COLORS[axis]);
+    this.letter = append("text", this.whole);
+    this.letter.setAttribute("fill", AXIS_COLORS[axis]);
+    this.letter.textContent = text;
+  }
+
+  /** @param seen the axis, as the eye sees it */
+  place(seen: Vector3, hasOpposite: boolean): void {
+    const [x, y, z] = seen.toArray().map((part) => this.sign * part);
+    this.line.setAttribute("x2", (LENGTH * x).toFixed(2));
+    this.line.setAttribute("y2", (-LENGTH * y).toFixed(2));
+    this.letter.setAttribute("x", (LETTER * x).toFixed(2));
+    this.letter.setAttribute("y", (-LETTER * y).toFixed(2));
+    this.letter.setAttribute("visibility", hasOpposite && z < -END_ON ? "hidden" : "visible");
+    this.whole.setAttribute("opacity", z < -0.1 ? "0.55" : "1"); // leads away
+  }
+}
+
+function append(tag: "g" | "line" | "text", parent: SVGElement): SVGElement {
+  const made = document.createElementNS(SVG, tag);
+  parent.append(made);
+  return made;
 }
 
 export class OrientationMark {
   readonly root: SVGSVGElement;
-  private readonly axes: readonly { whole: SVGElement; line: SVGElement; letter: SVGElement }[];
+  private readonly axes: readonly Axis[];
+  private readonly ends: readonly End[];
 
-  constructor() {
+  constructor(sides?: Sides) {
     this.root = document.createElementNS(SVG, "svg");
     this.root.setAttribute("class", "orientation-mark");
     this.root.setAttribute("viewBox", `${-HALF} ${-HALF} ${2 * HALF} ${2 * HALF}`);
     this.root.setAttribute("role", "img");
-    this.axes = AXIS_NAMES.map((name, i) => {
-      const whole = this.add("g", this.root);
-      whole.dataset.axis = name;
-      const line = this.add("line", whole);
-      line.setAttribute("stroke", AXIS_COLORS[i]);
-      const letter = this.add("text", whole);
-      letter.setAttribute("fill", AXIS_COLORS[i]);
-      letter.textContent = name;
-      return { whole, line, letter };
-    });
-  }
-
-  private add(tag: "g" | "line" | "text", parent: SVGElement): SVGElement {
-    const made = document.createElementNS(SVG, tag);
-    parent.append(made);
-    return made;
+    this.axes = axesOf(sides);
+    this.ends = this.axes.flatMap(({ ends: [forth, back] }, i) => [
+      new End(this.root, i, 1, forth),
+      ...(back === null ? [] : [new End(this.root, i, -1, back)]),
+    ]);
   }
 
   update(head: Matrix4, specimen: Matrix4): void {
-    const seen = axesSeen(head, specimen);
-    seen.forEach(({ x, y, z }, i) => {
-      const { whole, line, letter } = this.axes[i];
-      line.setAttribute("x2", (LENGTH * x).toFixed(2));
-      line.setAttribute("y2", (-LENGTH * y).toFixed(2));
-      letter.setAttribute("x", (LETTER * x).toFixed(2));
-      letter.setAttribute("y", (-LETTER * y).toFixed(2));
-      whole.setAttribute("opacity", z < -0.1 ? "0.55" : "1"); // leads away
-    });
-    const order = this.axes.map((_, i) => i).sort((a, b) => seen[a].z - seen[b].z);
-    const isDrawn = order.every((axis, i) => this.root.children[i] === this.axes[axis].whole);
-    if (!isDrawn) this.root.append(...order.map((i) => this.axes[i].whole));
-    const [x, y, z] = seen.map((axis) => whither(axis));
-    this.root.setAttribute("aria-label", `x leads ${x}, y ${y}, z ${z}`);
+    const seen = axesSeen(head, specimen, this.axes);
+    for (const end of this.ends) end.place(seen[end.axis], this.axes[end.axis].ends[1] !== null);
+    const depth = (end: End) => end.sign * seen[end.axis].z;
+    const order = [...this.ends].sort((a, b) => depth(a) - depth(b));
+    const isDrawn = order.every(({ whole }, i) => this.root.children[i] === whole);
+    if (!isDrawn) this.root.append(...order.map(({ whole }) => whole));
+    const [first, ...others] = this.axes.map(({ word }, i) => [word, whither(seen[i])]);
+    const rest = others.map(([word, where]) => `${word} ${where}`).join(", ");
+    this.root.setAttribute("aria-label", `${first[0]} leads ${first[1]}, ${rest}`);
   }
 
   dispose(): void {
@@ -97,22 +149,37 @@ function whither(axis: Vector3): string {
 export class Axes {
   readonly group = new Object3D();
   private readonly arrows = new Object3D();
-  private readonly labels = AXIS_COLORS.map((color) => new Label("above", color));
+  /** Where each arm leads, and its letter. */
+  private readonly arms: readonly { direction: Vector3; label: Label }[];
+  /** Arms lead both ways, so that the middle lies farther from the specimen. */
+  private readonly isCross: boolean;
   private readonly tip = new Vector3();
 
-  constructor() {
-    this.group.add(this.arrows, ...this.labels.map(({ sprite }) => sprite));
-    AXIS_NAMES.forEach((name, i) => {
-      const arrow = new Object3D();
-      const shaft = markMesh(SHAFT, AXIS_COLORS[i]);
-      const head = markMesh(HEAD, AXIS_COLORS[i]);
-      shaft.position.y = 0.4;
+  constructor(sides?: Sides) {
+    const axes = axesOf(sides);
+    this.isCross = sides !== undefined;
+    this.arms = axes.flatMap(({ direction, ends: [forth, back] }, i) => [
+      this.makeArm(new Vector3(...direction), forth, i, true),
+      ...(back === null ? [] : [this.makeArm(new Vector3(...direction).negate(), back, i, false)]),
+    ]);
+    this.group.add(this.arrows, ...this.arms.map(({ label }) => label.sprite));
+  }
+
+  private makeArm(direction: Vector3, text: string, axis: number, hasHead: boolean) {
+    const arrow = new Object3D();
+    const shaft = markMesh(SHAFT, AXIS_COLORS[axis]);
+    shaft.position.y = 0.4;
+    arrow.add(shaft);
+    if (hasHead) {
+      const head = markMesh(HEAD, AXIS_COLORS[axis]);
       head.position.y = 0.9;
-      arrow.add(shaft, head);
-      arrow.quaternion.copy(new Quaternion().setFromUnitVectors(UP, new Vector3(...unit(i))));
-      this.arrows.add(arrow);
-      this.labels[i].write(name);
-    });
+      arrow.add(head);
+    }
+    arrow.quaternion.copy(new Quaternion().setFromUnitVectors(UP, direction));
+    this.arrows.add(arrow);
+    const label = new Label("above", AXIS_COLORS[axis]);
+    label.write(text);
+    return { direction, label };
   }
 
   /** Left of the front lower corner of what is shown. */
@@ -120,19 +187,20 @@ export class Axes {
     const aside = GAP * Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
     this.arrows.position.set(min[0] - aside, min[1] - aside / 2, max[2]);
     const length = lengthAt(this.arrows.position, sight, ARROW_RAD);
+    if (this.isCross) this.arrows.position.x -= length;
     this.arrows.scale.setScalar(length);
-    this.labels.forEach((label, i) => {
+    for (const { direction, label } of this.arms) {
       this.tip
-        .set(...unit(i))
+        .copy(direction)
         .multiplyScalar(1.1 * length)
         .add(this.arrows.position);
       label.place(this.tip, sight);
-    });
+    }
   }
 
   dispose(): void {
     this.group.removeFromParent();
-    for (const label of this.labels) label.dispose();
+    for (const { label } of this.arms) label.dispose();
     disposeMarks(this.arrows);
   }
 }

@@ -2,12 +2,14 @@
 
 import { Box3, type Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
+import type { Box } from "../math/box";
 import { pickTile, shownTiles } from "../math/pick";
+import { meetSlices, type SliceFrame } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
 import { VolumeSource } from "../volumes/volume_source";
-import { valueAt, valueText } from "./measure";
+import { unitOf, valueAt, valueText } from "./measure";
 import {
   type Cone,
   nearestIn,
@@ -34,6 +36,8 @@ export type ReadingOptions = Readonly<{
   source: (tile: string, channel: string) => LevelSource | null;
   /** The same, once it is known. */
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
+  /** The planes that cut through the specimen; null or absent: none show. */
+  slices?: () => Readonly<{ frames: readonly SliceFrame[] | null; box: Box }> | null;
   onError: (error: unknown) => void;
 }>;
 
@@ -54,17 +58,16 @@ export class Reading {
     this.cache = new TexelCache((volume) => new VolumeSource(options.base, volume));
   }
 
-  /** What a ray (um) means; null: it meets nothing. */
+  /** What a ray (um) means; null: it meets no surface, no volume and no slice. */
   async probe(ray: Ray): Promise<Probed | null> {
     const along = unitRay(ray);
     const surface = this.probeSurfaces(along);
     const { clip, mode } = this.state;
     const disc = mode === "disc" ? this.disc : null;
     const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
-    if (surface !== null && volume !== null) {
-      return surface.distance_um <= volume.distance_um ? surface : volume;
-    }
-    return surface ?? volume ?? probeBoxes(along, this.tiles, clip);
+    const met = [surface, volume, this.probeSlices(along)].filter((each) => each !== null);
+    if (met.length === 0) return null;
+    return met.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
 
   /** The same, but at once and without volumes. */
@@ -84,7 +87,9 @@ export class Reading {
         if (source === null || place === null) return [];
         const level = await this.orReport(this.cache.best(source));
         const value = level && valueAt(source.volume, level, channel.window, place);
-        return value === null ? [] : [`${channel.name} ${valueText(value, channel.window)}`];
+        return value === null
+          ? []
+          : [`${channel.name} ${valueText(value, channel.window, unitOf(this.options.manifest))}`];
       }),
     );
     return lines.flat();
@@ -100,6 +105,19 @@ export class Reading {
       });
     });
     return known.join();
+  }
+
+  private probeSlices(along: Ray): Probed | null {
+    const slices = this.options.slices?.() ?? null;
+    if (slices?.frames == null) return null;
+    const met = meetSlices(along, slices.frames, slices.box);
+    if (met === null) return null;
+    return {
+      point: met.point,
+      tile: this.tileAt(met.point),
+      channel: null,
+      distance_um: met.distance,
+    };
   }
 
   private get tiles() {

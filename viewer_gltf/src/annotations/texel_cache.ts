@@ -45,6 +45,14 @@ export class TexelCache {
     return this.decoded(this.reopen(source.volume), order[order.length - 1]);
   }
 
+  /** The finest level of at most so many texels, or the coarsest; fetched, if need be. Throws BundleError, AbortError. */
+  within(source: LevelSource, most: number): Promise<VolumeLevel> {
+    const { levels } = source.volume;
+    const found = levels.findIndex((level) => texels(level) <= most);
+    const index = found === -1 ? levels.length - 1 : found;
+    return this.decoded(source.has(index) ? source : this.reopen(source.volume), index);
+  }
+
   private decoded(source: LevelSource, index: number): Promise<VolumeLevel> {
     const { file, levels } = source.volume;
     const key = `${file.path} ${file.sha256} ${index}`;

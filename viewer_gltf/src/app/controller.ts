@@ -6,6 +6,7 @@
 
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { fileName, saveFile } from "../dom/save_file";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import { handleOf } from "../panel/clip_by_key";
@@ -34,6 +35,7 @@ import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { allOf, measurementsCsv } from "../state/measurements";
 import { setTo } from "../state/parameters/kinds";
 import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
@@ -213,6 +215,7 @@ export class Controller {
     const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
     if (camera !== null) viewer.lookFrom(camera);
     else viewer.openWith(standOf(search), saysDistance);
+    viewer.forgetSteps();
   }
 
   private run(command: Command): void {
@@ -230,6 +233,8 @@ export class Controller {
       this.card.open(this.viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
     } else if (command === "own-light") {
       void this.lightByFile();
+    } else if (command === "save-csv") {
+      this.saveMeasurements();
     } else if (command === "find") {
       const isLong = this.goTo("channels", "find-channel");
       if (!isLong) this.say("The panel lists all channels.");
@@ -342,6 +347,18 @@ export class Controller {
     }
   }
 
+  private saveMeasurements(): void {
+    const { state, bundle } = this.viewer;
+    const list = allOf(state);
+    if (list.length === 0) {
+      this.say("Nothing is measured.");
+      return;
+    }
+    const name = fileName(bundle.manifest.specimen.name, "measurements", "csv");
+    saveFile(name, new Blob([measurementsCsv(list)], { type: "text/csv" }));
+    this.say(`Saved: ${name}`);
+  }
+
   private get shown(): Box {
     return shownBox(this.viewer.bundle.manifest, this.viewer.state.isolated);
   }
@@ -384,6 +401,9 @@ export class Controller {
       samples: traced.level === null ? null : traced.samples,
       isLoading,
       values: viewer.snapshot().measuredValues,
+      sliceValues: viewer.sliceValues,
+      undo: viewer.undoes,
+      redo: viewer.redoes,
     };
   }
 

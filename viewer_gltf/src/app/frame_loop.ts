@@ -55,6 +55,7 @@ export class FrameLoop {
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
   private waiting: (() => void)[] = [];
+  private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
     const { renderer, room, hybrid } = options;
@@ -96,6 +97,11 @@ export class FrameLoop {
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
     return new Promise((resolve) => this.waiting.push(resolve));
+  }
+
+  /** Resolves when the next frame has been drawn. */
+  nextFrame(): Promise<void> {
+    return new Promise((resolve) => this.drawn.push(resolve));
   }
 
   /** The graphics context is gone, and the times that were asked of it. */
@@ -163,6 +169,7 @@ export class FrameLoop {
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;
       onFrame();
+      for (const resolve of this.drawn.splice(0)) resolve();
     }
     this.pace.end();
     this.wasMoving = isMoving;
@@ -213,14 +220,14 @@ export class FrameLoop {
   private draw(camera: Camera, pace: FramePace): void {
     const { picture, head } = this;
     const { contents, stereo, state } = this.options.shown();
-    const { volumes, traced, surfaces, marks } = contents;
+    const { volumes, traced, surfaces, marks, slicePlanes: slices } = contents;
     const drawn = {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, slices.marks, ...stereo.hands.overlays],
       bounds: this.options.bounds,
-      solids: surfaces.triangles,
+      solids: surfaces.triangles + slices.solid,
     };
     stereo.present(() => picture.draw(camera, head, drawn, state.clip, pace));
   }

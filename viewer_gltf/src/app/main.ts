@@ -5,7 +5,9 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
+import "../slices/slices.css";
 import { sizeText } from "../annotations/measure";
+import { flightAsked } from "../bench/flight";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -21,6 +23,7 @@ import {
   StereoButton,
   showFatal,
 } from "../panel/html/overlays";
+import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import { findXrSupport, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
@@ -109,7 +112,34 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   controller.setStereo(support);
   const way = wayToStereo(support, isTouch);
   stereoButton.offer(way, () => way && controller.perform(way));
+  const flight_s = flightAsked(location.search);
+  if (flight_s !== null) await offerBench(viewer, parent, flight_s, support.isAvailable);
   return viewer;
+}
+
+/** The benchmark, a part of the page that few ask for. */
+async function offerBench(
+  viewer: Viewer,
+  parent: HTMLElement,
+  flight_s: number,
+  hasHeadset: boolean,
+): Promise<void> {
+  const [{ benchCard }, { subjectOf }] = await Promise.all([
+    import("../bench/page"),
+    import("./bench_subject"),
+  ]);
+  const card = benchCard(flight_s, {
+    subject: subjectOf(viewer),
+    stereo: hasHeadset ? ["headset", "split"] : ["split"],
+    startStereo: async (kind) => {
+      if (kind === "split") await viewer.startSplit(CARDBOARD_V2);
+      else if (navigator.xr !== undefined) await viewer.stereo.headset.start(navigator.xr);
+    },
+    onReport: (report) => {
+      api.bench = report;
+    },
+  });
+  parent.append(card);
 }
 
 async function enterStereo(viewer: Viewer): Promise<void> {
@@ -172,6 +202,7 @@ addEventListener("unhandledrejection", (event) => reportBug(event.reason));
 
 const api: StereoCellApi = {
   apiVersion: 1,
+  bench: null,
   ready,
   get frames() {
     return viewer?.frames ?? 0;

@@ -7,6 +7,8 @@ import type { Box } from "../math/box";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
+import { SliceImages } from "../slices/slice_images";
+import { SlicePlanes } from "../slices/slice_planes";
 import type { Action } from "../state/actions";
 import { isTraced } from "../state/parameters/volumes";
 import { wantedTiles } from "../state/representation";
@@ -25,6 +27,7 @@ export type ContentsOptions = Readonly<{
   picture: Picture;
   state: ViewerState;
   dispatch: (action: Action) => void;
+  announce: (text: string) => void;
   /** The picture is no longer true. */
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -38,6 +41,9 @@ export class Contents {
   /** Two-dimensional transfer functions. */
   readonly transferFunctions2d: TransferFunctions2dLoader;
   readonly marks: Marks;
+  /** Pictures of the slices, and the planes that show them in the specimen. */
+  readonly slices: SliceImages;
+  readonly slicePlanes: SlicePlanes;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
   private readonly point = new Vector3();
@@ -52,7 +58,7 @@ export class Contents {
     this.loader = new SurfaceLoader(renderer);
     const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
     const budget = memoryBudget(navigator);
-    const limits = { bytes: budget.volumes, side };
+    const limits = { bytes: budget.volumes, side, edge: Number.POSITIVE_INFINITY };
     this.bricks =
       bundle.bricks === undefined
         ? null
@@ -87,10 +93,18 @@ export class Contents {
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
       sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
+      announce: options.announce,
       onChange,
       onError,
     };
-    this.marks = new Marks(reading, options.state);
+    const { manifest, base } = bundle;
+    const { sourceOf } = reading;
+    this.slices = new SliceImages({ manifest, base, sourceOf, onChange, onError });
+    this.slicePlanes = new SlicePlanes(this.slices);
+    this.marks = new Marks(
+      { ...reading, slices: () => (this.slicePlanes.group.visible ? this.slices : null) },
+      options.state,
+    );
   }
 
   get isLoading(): boolean {
@@ -99,6 +113,7 @@ export class Contents {
       this.volumes.isLoading ||
       this.traced.isLoading ||
       this.transferFunctions2d.isLoading ||
+      this.slices.isLoading ||
       !this.surfaces.overview.isComplete
     );
   }
@@ -112,6 +127,8 @@ export class Contents {
     this.volumes.follow(state, wanted, mayRefine);
     this.traced.follow(state);
     this.surfaces.follow(state, focusTiles);
+    this.slices.follow(state);
+    this.slicePlanes.follow(state.hasSlicePlanes);
     this.marks.follow(state);
   }
 
@@ -121,7 +138,14 @@ export class Contents {
     this.volumes.retryFailed();
     this.traced.retryFailed();
     this.transferFunctions2d.retryFailed();
+    this.slices.retryFailed();
     this.marks.readAnew();
+  }
+
+  /** Draw volumes of at most so many voxels along a tile's edge; then `follow`. */
+  limitEdge(edge: number): void {
+    this.volumes.limitEdge(edge);
+    this.traced.limitEdge(edge);
   }
 
   /** The box round all that shows, um, as far as it is known: a volume may fill all of its box. */
@@ -142,6 +166,7 @@ export class Contents {
     const isFading = this.volumes.advance(view.dt_s);
     this.traced.advance(view.dt_s);
     this.marks.update(view);
+    this.slicePlanes.update(this.marks.sight);
     return isFading;
   }
 
@@ -170,6 +195,8 @@ export class Contents {
 
   dispose(): void {
     this.marks.dispose();
+    this.slicePlanes.dispose();
+    this.slices.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
     this.traced.dispose();

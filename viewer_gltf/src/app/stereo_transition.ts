@@ -57,6 +57,13 @@ export class StereoTransition {
     return { ...eye, specimen };
   }
 
+  /** Back to where `cameraView` was. */
+  restore(view: CameraView | null): void {
+    this.specimen.goHome();
+    if (view === null) this.navigation.reset();
+    else this.lookFrom(view);
+  }
+
   lookFrom({ position, target, specimen }: CameraView): void {
     this.navigation.lookFrom({ position, target });
     if (specimen === null) return;

@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Vector2, Vector3, WebGLRenderer } from "three";
+import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
@@ -8,7 +8,8 @@ import type { Bundle } from "../bundle/load";
 import { Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
-import type { Ray } from "../math/vec3";
+import { sharesOf, turnedBy } from "../math/slice_frame";
+import type { Ray, Vec3 } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
@@ -16,10 +17,12 @@ import { Hybrid } from "../render/gaze_focus";
 import { place, XR_DISTANCE_M } from "../render/placement";
 import { Room } from "../render/scene";
 import type { CameraView } from "../share/camera_link";
+import { SliceView } from "../slices/slice_view";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { discLimit } from "../state/focus_tiles";
+import { isSameView, keyOfChange, nameOfChange } from "../state/history";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
@@ -34,12 +37,16 @@ import { Stereo } from "../xr/stereo";
 import type { Snapshot } from "./automation_api";
 import { FrameLoop } from "./frame_loop";
 import { Contents } from "./scene_contents";
+import { Steps } from "./steps";
 import { StereoTransition } from "./stereo_transition";
 
 /** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
 /** The switch distance of the opening at least, as a multiple of the eye's from the middle. */
 const NEAR_AT_START = 1.1;
+
+/** Before these the place from which the specimen is seen is a step of its own. */
+const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
@@ -64,6 +71,8 @@ export class Viewer {
   private readonly loop: FrameLoop;
   private readonly transition: StereoTransition;
   private readonly size: StageSize;
+  private readonly steps: Steps;
+  private readonly sliceView: SliceView;
   private readonly disposed = new AbortController();
 
   /**
@@ -106,12 +115,21 @@ export class Viewer {
       picture: this.loop.picture,
       state: this.state,
       dispatch: (action) => this.dispatch(action),
+      announce: (text) => this.onAnnounce(text),
       onChange: () => this.loop.come(),
       onError: (error) => this.report(error),
     });
     const { marks, surfaces, volumes } = this.contents;
     stage.append(...marks.overlayElements);
-    this.room.specimen.group.add(surfaces.group, marks.group);
+    this.room.specimen.group.add(surfaces.group, marks.group, this.contents.slicePlanes.group);
+    this.sliceView = new SliceView(stage.parentElement ?? stage, this.contents.slices, {
+      move: (point) => {
+        const at = sharesOf(point, manifest.specimen.bounds_um);
+        this.dispatch({ type: "move-slices", at });
+      },
+      turn: (about, by_deg) => this.turnSlices(about, by_deg),
+      window: (wider, higher) => this.shiftWindow(wider, higher),
+    });
 
     this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), () =>
       this.loop.change(),
@@ -132,6 +150,11 @@ export class Viewer {
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
     });
+    this.steps = new Steps(
+      () => ({ state: this.state, camera: this.cameraView, isInRoom: this.stereo.kind !== null }),
+      this.disposed.signal,
+    );
+    this.navigation.controls.addEventListener("start", () => this.steps.note());
     const rayAt = (point: Vector2) =>
       rayUnder(point, this.navigation.camera, this.room.specimen.group);
     const { signal } = this.disposed;
@@ -177,6 +200,9 @@ export class Viewer {
     const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
     const larger = next.specimenSize_m / this.state.specimenSize_m;
+    if (action.type !== "restore" && !isSameView(this.state, next)) {
+      this.steps.add(nameOfChange(action, this.state), keyOfChange(action));
+    }
     this.state = next;
     if (larger !== 1) this.stereo.resize(larger, next);
     if (notice !== null) this.stereo.announce(notice);
@@ -188,7 +214,11 @@ export class Viewer {
 
   /** Do what is no change of the state; whether this was one of the viewer's commands. */
   run(command: Command): boolean {
+    if (ENDS_A_LOOK.has(command)) this.steps.note();
     switch (command) {
+      case "undo":
+      case "redo":
+        return this.step(command);
       case "reset":
         this.dispatch({ type: "isolate", tile: null });
         this.recentre();
@@ -215,6 +245,37 @@ export class Viewer {
     }
     this.loop.change();
     return true;
+  }
+
+  private step(command: "undo" | "redo"): boolean {
+    const found = command === "undo" ? this.steps.undo() : this.steps.redo();
+    if (found === null) {
+      this.onAnnounce(`Nothing to ${command}.`);
+      return true;
+    }
+    const { state, camera, isInRoom } = found.moment;
+    this.dispatch({ type: "restore", state });
+    // in a room the head looks, and what stands there was put there
+    if (!isInRoom && this.stereo.kind === null) this.transition.restore(camera);
+    this.loop.change();
+    this.onAnnounce(`${command === "undo" ? "Undone" : "Redone"}: ${found.name}.`);
+    this.onState(this.state);
+    return true;
+  }
+
+  /** What undoing would change; null: nothing. */
+  get undoes(): string | null {
+    return this.steps.undoes;
+  }
+
+  get redoes(): string | null {
+    return this.steps.redoes;
+  }
+
+  /** From here on: what came before was no user's. */
+  forgetSteps(): void {
+    this.steps.forget();
+    this.onState(this.state);
   }
 
   /** Lamps may be beside and behind the eye. In stereo the head finds them. */
@@ -293,6 +354,7 @@ export class Viewer {
       overview: surfaces.overview,
       isLoading: this.contents.isLoading,
       triangles: surfaces.triangles,
+      drawCalls: this.renderer.info.render.calls,
       volumes: volumes.status(),
       volumeBytes: volumes.bytes,
       traced: this.contents.traced.status(),
@@ -316,6 +378,22 @@ export class Viewer {
     return this.loop.settled();
   }
 
+  /** Resolves when the next frame has been drawn. */
+  nextFrame(): Promise<void> {
+    return this.loop.nextFrame();
+  }
+
+  /** Draw volumes of at most so many voxels along a tile's edge. */
+  limitEdge(edge: number): void {
+    this.contents.limitEdge(edge);
+    this.follow();
+  }
+
+  /** Pose of the head in the room, or of the mono camera. */
+  get head(): Matrix4 {
+    return this.loop.head;
+  }
+
   report(error: unknown): void {
     if (!(error instanceof BundleError)) throw error;
     const isMendable = error instanceof TemporaryError;
@@ -334,6 +412,27 @@ export class Viewer {
   /** Voxels of a channel by value and gradient; null: not yet, it is being fetched. */
   histogram(channel: string): Histogram | null {
     return this.contents.transferFunctions2d.histogram(channel);
+  }
+
+  /** The channels' values where the slices meet, in the source's units; none: no slices show. */
+  get sliceValues(): readonly string[] {
+    const { slices } = this.contents;
+    return slices.frames === null ? [] : slices.valuesAt(slices.point);
+  }
+
+  private turnSlices(about: Vec3, by_deg: number): void {
+    const { sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg } = this.state;
+    const turned = turnedBy([sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg], about, by_deg);
+    this.dispatch({ type: "move-slices", turn_deg: turned });
+  }
+
+  /** Of the first channel that is shown. */
+  private shiftWindow(wider: number, higher: number): void {
+    const channel = this.state.channels.find(({ shown }) => shown);
+    if (channel === undefined) return;
+    const [low, high] = channel.window;
+    const window = [low - wider / 2 - higher, high + wider / 2 - higher] as const;
+    this.dispatch({ type: "window", channel: channel.id, window });
   }
 
   /** Ask again for all that has failed. */
@@ -359,6 +458,7 @@ export class Viewer {
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
+    this.sliceView.update(this.state.hasSlicePictures);
     this.room.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.loop.change();
@@ -410,6 +510,7 @@ export class Viewer {
     this.size.dispose();
     this.disposed.abort();
     this.stereo.dispose();
+    this.sliceView.dispose();
     this.navigation.dispose();
     this.contents.dispose();
     this.loop.dispose();

@@ -1,6 +1,16 @@
 import { describe, expect, it } from "vitest";
 import { type Focus, firesOn, keyName } from "./key_events";
 
+describe("a key with Ctrl or Command", () => {
+  it("is named by it, on a keyboard without Latin letters too", () => {
+    const z = { key: "z", code: "KeyZ", shiftKey: false };
+    expect(keyName({ ...z, ctrlKey: true })).toBe("Ctrl+z");
+    expect(keyName({ ...z, metaKey: true })).toBe("Ctrl+z");
+    expect(keyName({ ...z, key: "Z", shiftKey: true, ctrlKey: true })).toBe("Ctrl+Z");
+    expect(keyName({ ...z, key: "я", ctrlKey: true })).toBe("Ctrl+z");
+  });
+});
+
 describe("a key that is pressed", () => {
   it("has a name on every keyboard", () => {
     const named = (key: string, code: string, shiftKey = false) => keyName({ key, code, shiftKey });

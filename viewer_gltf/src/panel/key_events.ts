@@ -1,14 +1,21 @@
 /** Keys as the browser reports them: their names, and the elements that want them too. */
 
+type Pressed = Pick<KeyboardEvent, "key" | "code" | "shiftKey"> &
+  Partial<Pick<KeyboardEvent, "ctrlKey" | "metaKey">>;
+
 /**
  * The name of a key that was pressed: as `KeyboardEvent.key` has it, with Shift where that leaves no
- * mark on it. Where a keyboard writes other letters than Latin ones, their place counts.
+ * mark on it, with Ctrl for Ctrl and for a Mac's Command. Where a keyboard writes other letters than
+ * Latin ones, their place counts.
  */
-export function keyName({
-  key: written,
-  code,
-  shiftKey,
-}: Pick<KeyboardEvent, "key" | "code" | "shiftKey">): string {
+export function keyName(pressed: Pressed): string {
+  const name = plainName(pressed);
+  if (!pressed.ctrlKey && !pressed.metaKey) return name;
+  // whatever Caps Lock makes of the letter
+  return `Ctrl+${pressed.shiftKey ? name.toUpperCase() : name.toLowerCase()}`;
+}
+
+function plainName({ key: written, code, shiftKey }: Pressed): string {
   if (written.length > 1) return shiftKey ? `Shift+${written}` : written;
   const [, letter] = /^Key([A-Z])$/.exec(code) ?? [];
   if (letter === undefined || written <= "~") return written;
@@ -54,7 +61,7 @@ export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSig
     "keydown",
     (event) => {
       if (event.defaultPrevented || event.isComposing) return;
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.altKey) return;
       if (document.querySelector("dialog[open]") !== null) return;
       const { target } = event;
       const name = keyName(event);

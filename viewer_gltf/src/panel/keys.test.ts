@@ -5,6 +5,7 @@ import type { Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
 import { LIGHT_NUMBERS } from "../state/parameters/light";
+import { SLICE_NUMBERS } from "../state/parameters/slices";
 import { PARAMETERS } from "../state/parameters/table";
 import { STEREO_NUMBERS } from "../state/parameters/tools";
 import { reduce } from "../state/reduce";
@@ -17,7 +18,13 @@ import { spokenFeedback } from "./spoken_feedback";
 const ALL = KEYS.flatMap(({ keys }) => keys);
 const CONTEXT: KeyContext = {
   state: [
-    { type: "measure", points: [[0, 0, 0]] } as const,
+    {
+      type: "measure",
+      points: [
+        [0, 0, 0],
+        [3, 4, 0],
+      ],
+    } as const,
     { type: "notify", text: "a fault", isMendable: true } as const,
     { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
     {
@@ -63,8 +70,13 @@ describe("the keys", () => {
       isolate: true,
       "set-clip": true,
       measure: true,
+      "add-point": false, // a tap
+      "finish-measuring": true,
+      "set-measurements": false, // the panel's list
       "move-lamp": false, // a drag
+      "move-slices": true,
       dismiss: true,
+      restore: false, // by the commands undo and redo
       notify: false, // the viewer's own
     };
     for (const [type, isWanted] of Object.entries(wanted)) {
@@ -74,9 +86,12 @@ describe("the keys", () => {
       reset: true,
       back: true,
       stereo: true,
+      undo: true,
+      redo: true,
       split: true,
       scan: true,
       share: true,
+      "save-csv": true,
       retry: true,
       press: true,
       front: true,
@@ -107,7 +122,9 @@ describe("the keys", () => {
         wish !== null && typeof wish !== "string" && "id" in wish ? [wish.id] : [],
       ),
     );
-    const turned = new Set<string>([...LIGHT_NUMBERS, ...STEREO_NUMBERS].map(({ id }) => id));
+    const turned = new Set<string>(
+      [...LIGHT_NUMBERS, ...SLICE_NUMBERS, ...STEREO_NUMBERS].map(({ id }) => id),
+    );
     // the choice of a tone map and lamps' colours are the panel's alone
     const others = PARAMETERS.filter(
       ({ id, kind }) => !turned.has(id) && kind !== "colour" && id !== "trace-tone-map",

@@ -3,6 +3,7 @@ import type { Wish } from "./controls";
 import type { Key, KeyContext, KeyGroup } from "./key";
 import { CHANNEL_KEYS } from "./sections/channel_keys";
 import { LIGHT_KEYS } from "./sections/path_trace_keys";
+import { SLICE_KEYS } from "./sections/slice_keys";
 import { TILE_KEYS } from "./sections/tile_keys";
 import { TOOL_KEYS } from "./sections/tool_keys";
 import { SHAPE_KEYS } from "./sections/transfer_function_2d_keys";
@@ -14,6 +15,7 @@ export const KEYS: readonly KeyGroup[] = [
   { name: "Channels", keys: CHANNEL_KEYS },
   { name: "Value and gradient", keys: SHAPE_KEYS },
   { name: "Volumes", keys: VOLUME_KEYS },
+  { name: "Slices", keys: SLICE_KEYS },
   { name: "Light", keys: LIGHT_KEYS },
   { name: "Tiles", keys: TILE_KEYS },
   { name: "Tools", keys: TOOL_KEYS },

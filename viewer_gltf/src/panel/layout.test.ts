@@ -36,6 +36,9 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  sliceValues: [],
+  undo: null,
+  redo: null,
 };
 const start = (channels = 3) => initialState(sampleManifest(channels));
 
@@ -231,7 +234,7 @@ describe("the panel's layout", () => {
           : [],
       );
     expect(textsOf(laid(state, START_VIEW, facts))).toEqual([
-      "Distance: 5.00 µm",
+      "Measured: 5.00 µm",
       "First point: Marker 0 12 · Marker 1 7",
       "Second point: Marker 0 512",
     ]);

@@ -1,10 +1,9 @@
 /** The panel's content for a state: see controls.ts. Pure. */
-import { distanceBetween, distanceText } from "../annotations/measure";
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MAX_DISC_TILES } from "../state/focus_tiles";
 import { groupNotices } from "../state/notice_groups";
-import { MEASURE_PARAMETERS, QUALITY_PARAMETERS } from "../state/parameters/tools";
+import { QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
@@ -14,8 +13,10 @@ import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
+import { measureItems } from "./sections/measure";
 import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
+import { sliceItems } from "./sections/slices";
 import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
 
@@ -47,12 +48,15 @@ export type Facts = StereoSupport &
     isLoading: boolean;
     /** Of each measured point: the channels' values there, as `DAPI 1210`. */
     values: readonly (readonly string[])[];
+    /** The channels' values where the slices meet. */
+    sliceValues: readonly string[];
+    /** What undoing and redoing would change, in words; null: there is nothing. */
+    undo: string | null;
+    redo: string | null;
   }>;
 
 /** Most notices on the panel: the newest few are enough. */
 const MOST_NOTICES = 3;
-
-const POINT_NAMES = ["First point", "Second point"] as const;
 
 /** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
 export function middleBox({ min, max }: Box): Box {
@@ -93,12 +97,14 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         command("side", "Side"),
         command("top", "Top"),
         command("reset", "Reset"),
+        ...historyItems(facts),
       ]),
       // a screen has fingers, wheel and arrow keys for it
       ...(facts.isStereo ? [section("move", "Move", MOVES)] : []),
       section("stereo", "Stereo", stereoItems(state, facts, view)),
       section("measure", "Measure", measureItems(state, facts.values)),
       section("cut", "Cut open", cutItems(state, facts.shown)),
+      section("slices", "Slices", sliceItems(state, facts.sliceValues)),
       section("quality", "Quality", qualityItems(state, facts)),
       section("share", "Share", [
         command("share", "Copy a link to this view"),
@@ -110,6 +116,21 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     ],
     status: statusOf(facts),
   };
+}
+
+function historyItems({ undo, redo }: Facts): readonly Control[] {
+  return [
+    {
+      ...command("undo", "Undo"),
+      name: `Undo ${undo ?? ""}`.trim(),
+      refusal: undo === null ? "Nothing to undo." : "",
+    },
+    {
+      ...command("redo", "Redo"),
+      name: `Redo ${redo ?? ""}`.trim(),
+      refusal: redo === null ? "Nothing to redo." : "",
+    },
+  ];
 }
 
 /** Why the disc is smaller than it was set; "": it is not, and so there is nothing to see. */
@@ -134,32 +155,6 @@ function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
     },
   ]);
   return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
-}
-
-/** `12.3 µm`, or what is missing to it. */
-export function measuredText({ tool, measured }: ViewerState): string {
-  const [from, to] = measured;
-  if (from !== undefined && to !== undefined) return distanceText(distanceBetween(from, to));
-  if (from !== undefined) return "Now the other point.";
-  return tool === "measure" ? "Choose two points of the specimen." : "";
-}
-
-function measureItems(state: ViewerState, values: Facts["values"]): readonly Control[] {
-  return [
-    ...controlsOf(MEASURE_PARAMETERS, state),
-    { kind: "text", id: "distance", label: "Distance", value: measuredText(state) },
-    ...POINT_NAMES.map((label, i): Control => {
-      const value = (values[i] ?? []).join(" · ");
-      return { kind: "text", id: `values-${i}`, label, value };
-    }),
-    {
-      kind: "button",
-      id: "clear-measured",
-      label: "Clear",
-      refusal: state.measured.length === 0 ? "Nothing is measured." : "",
-      to: () => ({ type: "measure", points: [] }),
-    },
-  ];
 }
 
 function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {

@@ -1,5 +1,6 @@
 /** The effect of a key, in words: the user may not see the control that it stands for. Pure. */
 
+import { measurementText } from "../annotations/measure";
 import type { Action } from "../state/actions";
 import type { SetAction } from "../state/parameters/kinds";
 import { channelParameterOf, parameterOf } from "../state/parameters/table";
@@ -10,8 +11,8 @@ import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
-import { measuredText } from "./layout";
 import { intensityText, type Ranges } from "./sections/channels";
+import { measuredText } from "./sections/measure";
 import { LENS_NAMES } from "./sections/stereo";
 
 /** @param state after the wish was granted; "" where the picture shows it all */
@@ -62,7 +63,14 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
     case "isolate":
       return action.tile === null ? "All tiles" : `Only ${tileName(action.tile)}`;
     case "measure":
+    case "add-point":
       return measuredText(state);
+    case "finish-measuring": {
+      const made = state.measurements.at(-1);
+      return made === undefined ? "" : `${made.name}: ${measurementText(made.kind, made.points)}`;
+    }
+    case "set-measurements":
+      return `${state.measurements.length} measurements`;
     case "move-lamp":
       return `Lamp ${action.lamp + 1}: moved`;
     default:

@@ -9,6 +9,7 @@ import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "../state/path_t
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickTile } from "../volumes/bricks/brick_atlas";
 import type { BrickService } from "../volumes/bricks/brick_service";
+import type { VolumeLimits } from "../volumes/mip_levels";
 import type { Appearance } from "../volumes/tile_raymarch";
 import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
@@ -68,7 +69,7 @@ export class TracedVolume {
   constructor(
     private readonly volumes: Volumes,
     private readonly bricks: BrickService | null,
-    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private limits: VolumeLimits,
     private readonly sceneDepth: { value: Texture },
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
@@ -145,6 +146,12 @@ export class TracedVolume {
     const [tables, tracer] = await Promise.all([readEnvironment(file), this.prepare()]);
     tracer.lightBy(tables);
     this.environment = "own";
+  }
+
+  /** From the next `follow` on. */
+  limitEdge(edge: number): void {
+    this.limits = { ...this.limits, edge };
+    this.drop();
   }
 
   retryFailed(): void {

@@ -117,6 +117,55 @@ describe("a link to a view", () => {
     expect(state.selected).toBeNull();
   });
 
+  it("has the measurements with their names, and the slices", () => {
+    const changes: readonly Action[] = [
+      {
+        type: "set-measurements",
+        measurements: [
+          {
+            name: "wall: left; 1",
+            kind: "angle",
+            points: [
+              [1, -3, 4],
+              [5, -17, 0],
+              [9, -1, 8],
+            ],
+          },
+          {
+            name: "",
+            kind: "line",
+            points: [
+              [1, -3, 4],
+              [5, -17, 0],
+              [9, -1, 8],
+              [9, -2, 8],
+            ],
+          },
+        ],
+      },
+      { type: "move-slices", at: [0.25, 0.5, 0.75], turn_deg: [10, -20, 30] },
+      { type: "set", id: "slice-planes", value: true },
+    ];
+    const state = after(start(), changes);
+    const hash = writeLink(state, start(), null);
+    expect(new URL(hash, "https://host.test/").hash).toBe(hash);
+    expect(viewOf(opened(hash))).toEqual(viewOf(state));
+    // the newest one too: an angle that is done goes to the list
+    const angle = after(state, [
+      { type: "set", id: "measure-kind", value: "angle" },
+      {
+        type: "measure",
+        points: [
+          [1, -1, 1],
+          [2, -2, 2],
+          [3, -1, 3],
+        ],
+      },
+    ]);
+    const again = opened(writeLink(angle, start(), null));
+    expect(again.measurements.map(({ name }) => name)).toEqual(["wall: left; 1", "", "Angle 1"]);
+  });
+
   it("of another bundle altogether leaves the channels that open", () => {
     const shown = (state: ViewerState) => state.channels.map((channel) => channel.shown);
     expect(shown(opened("#v=1&c=CD8,CD4"))).toEqual(shown(start()));
@@ -146,6 +195,8 @@ describe("a link to a view", () => {
     ["#v=1&box=40,-10,4,10,-5,6", "box"],
     ["#v=1&cut=0,0,0,5", "cut"],
     ["#v=1&points=1,2", "points"],
+    ["#v=1&measures=d:one:1,2,3", "measures d:one:1,2,3"],
+    ["#v=1&measures=a:%ff:1,2,3,1,2,3,1,2,9", "measures a:%ff:1,2,3,1,2,3,1,2,9"],
     ["#v=1&points=1,2,3,4,5,6,7", "points"],
     ["#v=1&eye=0,0,0,0,0,0", "eye"],
     ["#v=1&eye=0,0,1e6,0,0,0", "eye"],

@@ -7,7 +7,7 @@
  * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
  * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
- * corner), cut (a plane's normal and offset), points (um), tool, dwell, quality, light (see
+ * corner), cut (a plane's normal and offset), points (um), measures (see measurements_link.ts), tool, dwell, quality, light (see
  * path_trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken; an unreadable part is reported and left out.
@@ -26,6 +26,7 @@ import { VOLUMES } from "../state/parameters/volumes";
 import { OWN } from "../state/transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
 import { type CameraView, readLook, writeLook } from "./camera_link";
+import { linkedMeasurements, readMeasurements } from "./measurements_link";
 import { readNumbers, written } from "./numbers";
 import { readWord, type SwitchWords, writeWords } from "./parameter_words";
 import { readLight, writeLight } from "./path_trace_link";
@@ -85,7 +86,9 @@ function linkOf(
   const { box, plane } = state.clip;
   if (box !== null) parts.box = written([...box.min, ...box.max]);
   if (plane !== null) parts.cut = written([...plane.normal, plane.offset_um]);
-  if (state.measured.length > 0) parts.points = written(state.measured.flat());
+  const [list, newest] = linkedMeasurements(state);
+  if (list !== "") parts.measures = list;
+  if (newest.length > 0) parts.points = written(newest.flat());
   Object.assign(parts, Object.fromEntries(writeWords(OTHERS, state, start, WORDS)));
   const light = writeLight(state, start);
   if (light !== "") parts.light = light;
@@ -179,8 +182,9 @@ class LinkReader {
     this.tile("tile", "select");
     this.tile("only", "isolate");
     this.readClip();
-    this.readPoints();
     this.readParameters(OTHERS);
+    this.readPoints();
+    this.readMeasurements();
     this.readLight();
     const eye = this.parts.get("eye");
     const camera = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
@@ -302,6 +306,14 @@ class LinkReader {
       const points = [values.slice(0, 3), values.slice(3)].filter(({ length }) => length > 0);
       this.actions.push({ type: "measure", points: points.map((point) => this.within(point)) });
     }
+  }
+
+  private readMeasurements(): void {
+    const text = this.parts.get("measures");
+    if (text === undefined) return;
+    const { read, unread } = readMeasurements(text, (point) => this.within(point));
+    if (read.length > 0) this.actions.push({ type: "set-measurements", measurements: read });
+    for (const entry of unread) this.unread.push(`measures ${shortened(entry)}`);
   }
 
   /** The nearest point of the specimen. */

@@ -3,7 +3,9 @@
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
+import type { Measurement } from "./measurements";
 import type { SetAction } from "./parameters/kinds";
+import type { ViewerState } from "./viewer_state";
 
 export type Action =
   /** The user sets a number, a switch, a choice or a colour: see parameters/. */
@@ -18,8 +20,19 @@ export type Action =
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "set-clip"; clip: Clip }>
+  /** The points of the newest measurement, of the kind that is chosen. */
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
+  /** One more, or the first of another. */
+  | Readonly<{ type: "add-point"; point: Vec3 }>
+  /** The newest measurement is done. */
+  | Readonly<{ type: "finish-measuring" }>
+  /** Those that are done: named otherwise, fewer, or another's. */
+  | Readonly<{ type: "set-measurements"; measurements: readonly Measurement[] }>
+  /** The point where the slices meet (shares of the specimen's box) and their turn; absent: as it is. */
+  | Readonly<{ type: "move-slices"; at?: Vec3; turn_deg?: Vec3 }>
   /** Where a lamp is dragged to. */
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
+  /** Back to a state of before, but for what is no user's: see history.ts. */
+  | Readonly<{ type: "restore"; state: ViewerState }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
   | Readonly<{ type: "dismiss"; texts: readonly string[] }>;

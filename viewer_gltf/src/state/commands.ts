@@ -5,11 +5,16 @@ export type Command =
   /** One step out: from an isolated tile to all, from a selected one to none. */
   | "back"
   | "stereo"
+  /** One step of the history back, or on again. */
+  | "undo"
+  | "redo"
   /** Split screen for a phone in a viewer without WebXR. */
   | "split"
   /** Read the phone viewer's code by the camera. */
   | "scan"
   | "share"
+  /** The measurements as a file. */
+  | "save-csv"
   /** Ask again for all that has failed. */
   | "retry"
   /** A tap in the middle of the view: for hands that have only keys. */

@@ -2,6 +2,7 @@
 import type { Manifest } from "../bundle/generated/bundle";
 import { START_CHANNEL } from "./parameters/channel";
 import { START_LIGHT } from "./parameters/light";
+import { START_SLICES } from "./parameters/slices";
 import { START_TOOLS } from "./parameters/tools";
 import { type Mode, START_VOLUMES } from "./parameters/volumes";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
@@ -34,6 +35,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     ...START_VOLUMES,
     ...START_TOOLS,
     ...START_LIGHT,
+    ...START_SLICES,
     channels: manifest.channels.map((channel, index) => ({
       id: channel.id,
       name: channel.name,
@@ -61,6 +63,8 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     isolated: null,
     clip: { box: null, plane: null },
     measured: [],
+    measuredAs: "distance",
+    measurements: [],
     canTrace,
     notices:
       staged.length > VOLUME_TILES_AT_START

@@ -1,7 +1,10 @@
 /** The state after an action. Pure. */
 import type { Action } from "./actions";
+import { withOwn } from "./history";
+import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
+import { SLICE_AT, SLICE_TURN } from "./parameters/slices";
 import { faultOfValue, withParameter } from "./parameters/table";
 import { withShapes } from "./transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "./viewer_state";
@@ -53,6 +56,11 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
         (moved, axis, i) => withValue(axis, moved, action.place[i]),
         state,
       );
+    case "move-slices": {
+      const { at = [], turn_deg = [] } = action;
+      const moved = at.reduce((on, share, i) => withValue(SLICE_AT[i], on, share), state);
+      return turn_deg.reduce((on, angle, i) => withValue(SLICE_TURN[i], on, angle), moved);
+    }
     case "show":
       if (action.shown) return withShown(state, action.channel);
       return withChannel(state, action.channel, (c) => ({ ...c, shown: false }));
@@ -81,7 +89,19 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "set-clip":
       return { ...state, clip: action.clip };
     case "measure":
-      return { ...state, measured: action.points.slice(-2) };
+      return {
+        ...state,
+        measured: action.points.slice(-MAX_POINTS),
+        measuredAs: state.measureKind,
+      };
+    case "add-point":
+      return withPoint(state, action.point);
+    case "finish-measuring":
+      return finished(state);
+    case "set-measurements":
+      return { ...state, measurements: withinLimits(action.measurements) };
+    case "restore":
+      return withOwn(action.state, state);
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {

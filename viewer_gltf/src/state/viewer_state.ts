@@ -5,9 +5,10 @@
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Clip } from "../math/clip";
 import type { Rgb } from "../math/color";
-import type { Vec3 } from "../math/vec3";
+import type { Measuring } from "./measurements";
 import type { ChannelSettings } from "./parameters/channel";
 import type { LightSettings } from "./parameters/light";
+import type { SliceSettings } from "./parameters/slices";
 import type { ToolSettings } from "./parameters/tools";
 import type { VolumeSettings } from "./parameters/volumes";
 import type { Functions } from "./transfer_functions_2d";
@@ -43,6 +44,8 @@ export type TileState = Readonly<{ id: string; representation: Representation }>
 export type ViewerState = VolumeSettings &
   ToolSettings &
   LightSettings &
+  SliceSettings &
+  Measuring &
   Readonly<{
     channels: readonly ChannelState[];
     tiles: readonly TileState[];
@@ -54,8 +57,6 @@ export type ViewerState = VolumeSettings &
     isolated: string | null;
     /** The part of the specimen that the cuts leave, um. */
     clip: Clip;
-    /** The measured points, um: none, one, or two. */
-    measured: readonly Vec3[];
     /** Whether this device can gather light: draw into textures of floats. */
     canTrace: boolean;
     /** Faults that leave the rest usable, newest last. */

@@ -14,7 +14,7 @@ import type { BrickService } from "./bricks/brick_service";
 import { ChannelLists } from "./channel_volumes";
 import { OccupancyClient } from "./empty_space_client";
 import { LoadQueue } from "./load_queue";
-import { levelsToFetch } from "./mip_levels";
+import { levelsToFetch, type VolumeLimits } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
 import { brickCounts } from "./skip_bricks";
 import { type Appearance, floorOf, type MarchFrame, TileMarch } from "./tile_raymarch";
@@ -61,7 +61,7 @@ export class VolumeSet {
   constructor(
     bundle: Bundle,
     private readonly frame: MarchFrame,
-    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private limits: VolumeLimits,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
     /** From a host that sends bricks by view; null: volumes come as files. */
@@ -196,6 +196,11 @@ export class VolumeSet {
     for (const resident of this.residents.all) this.setAppearances(resident);
   }
 
+  /** From the next `follow` on. */
+  limitEdge(edge: number): void {
+    this.limits = { ...this.limits, edge };
+  }
+
   /** With the next `follow`, what has failed is loaded anew. */
   retryFailed(): void {
     this.channels.forgetFailed();
@@ -223,7 +228,7 @@ export class VolumeSet {
     const levels = levelsToFetch(
       first.volume.levels,
       isStandIn ? Math.min(share, STAND_IN_BYTES) : share,
-      this.limits.side,
+      Math.min(this.limits.side, this.limits.edge),
     );
     const finest = levels[levels.length - 1];
     resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
@@ -249,7 +254,7 @@ export class VolumeSet {
       if (resident !== undefined) this.setAppearances(resident);
       this.onChange();
     };
-    const limits = { bytes: this.share, side: this.limits.side };
+    const limits = { ...this.limits, bytes: this.share };
     const texture =
       this.bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
       new TileTexture(this.queue, onChange, this.onError);

@@ -131,7 +131,40 @@ describeInChromium("marks", () => {
     [250, -200, 190, 750, -200, 190].forEach((v, i) => {
       expect(Math.abs((measured?.flat()[i] ?? 0) - v)).toBeLessThan(0.5); // balls of flat faces
     });
-    expect(await tap([20, -380, 200])).toHaveLength(1); // begins anew, on the tile's box
+    expect(await tap([250, -200, 190])).toHaveLength(1); // begins anew
+    expect((await stateNow()).measurements).toHaveLength(1);
+  });
+
+  it("set no point where a ray meets nothing, and say so", async () => {
+    await look([0.3, 0.2, 1.6]);
+    const at = await project([500, -200, 100]); // between the balls, inside both boxes
+    const points = await page.evaluate((p) => window.bench?.measureAt(p.x, p.y), at);
+    expect(points).toEqual([]);
+    expect(await page.evaluate(() => window.bench?.announced)).toContain("Nothing there");
+  });
+
+  it("show an angle, and a line with its name in the list", async () => {
+    await look([0.1, 0.1, 1.5]);
+    await page.evaluate(() => {
+      const { bench } = window;
+      const at = (x: number, y: number) =>
+        bench?.dispatch({ type: "add-point", point: [x, y, 190] });
+      bench?.dispatch({ type: "set", id: "measure-kind", value: "line" });
+      for (const [x, y] of [
+        [100, -300],
+        [300, -340],
+        [450, -250],
+        [700, -340],
+      ])
+        at(x, y);
+      bench?.dispatch({ type: "set", id: "measure-kind", value: "angle" });
+      at(250, -200);
+      at(250, -50);
+      at(400, -50);
+    });
+    expect((await page.evaluate(() => window.bench?.label()))?.text).toBe("90.0°");
+    expect((await stateNow()).measurements.map(({ name }) => name)).toEqual(["Line 1"]);
+    await shoot("angle-and-line");
   });
 
   it("show the channels' values there, on the source's scale", async () => {
@@ -243,6 +276,43 @@ describeInChromium("marks", () => {
     expect(await label()).toBe("x leads right, y up, z towards you");
     await page.evaluate(() => window.bench?.turn([0, 1, 0], Math.PI / 2));
     expect(await label()).toBe("x leads away, y up, z right");
+  });
+
+  it("letter a patient's sides, on the glass and beside the specimen", async () => {
+    await page.evaluate(() => {
+      window.bench?.dispose();
+      const stage = document.querySelector<HTMLElement>(".stage");
+      stage?.replaceChildren();
+      // a head whose left is the world's right, as the reader lays it, but lying on its back
+      const sides = { left: [1, 0, 0], posterior: [0, -1, 0], superior: [0, 0, -1] } as const;
+      const given = JSON.parse(JSON.stringify(sides));
+      if (stage !== null) window.bench = window.makeBench?.(stage, given);
+    });
+    await look([0, 0, 1.6]);
+    const mark = page.locator(".orientation-mark");
+    expect(await mark.getAttribute("aria-label")).toBe(
+      "the patient's left leads right, the head away, the front up",
+    );
+    const placeOf = async (letter: string) => {
+      const box = await mark.locator(`[data-axis="${letter}"] text`).boundingBox();
+      return {
+        x: (box?.x ?? 0) + (box?.width ?? 0) / 2,
+        y: (box?.y ?? 0) + (box?.height ?? 0) / 2,
+      };
+    };
+    const [l, r, a, p] = await Promise.all(["L", "R", "A", "P"].map(placeOf));
+    expect(l.x - r.x).toBeGreaterThan(40);
+    expect(p.y - a.y).toBeGreaterThan(40);
+    const visibility = (letter: string) =>
+      mark.locator(`[data-axis="${letter}"] text`).getAttribute("visibility");
+    expect(await Promise.all(["S", "I"].map(visibility))).toEqual(["hidden", "visible"]);
+    await page.evaluate(() => window.bench?.turn([0, 1, 0], Math.PI)); // seen from behind
+    expect((await placeOf("L")).x - (await placeOf("R")).x).toBeLessThan(-40);
+    await look([0.8, 0.7, 1.5]);
+    await shoot("sides");
+    await look([0.8, 0.7, 1.5], [0, 0, 0], { isStereo: true });
+    await shoot("sides-stereo");
+    expect(await mark.isVisible()).toBe(false);
   });
 
   it("stand beside the specimen in a headset, and not on the glass", async () => {

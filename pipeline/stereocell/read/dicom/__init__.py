@@ -87,6 +87,7 @@ def read_image(location: Location, series: int = 0) -> Image:
         title=modality or UNKNOWN,
         modality=modality,
         placement=canonical.placement,
+        has_sides=not stack.first.is_quadruped,  # its axes are left, dorsal and cranial
         labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),

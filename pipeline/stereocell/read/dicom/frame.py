@@ -48,6 +48,7 @@ class Frame:
     tile, corner       which slice of a mosaic, and its first pixel (row, column) in the image
     segment            the number of the one that it shows, in a segmentation; 0: of none or all
     segments           how many the file has; 0: it is no segmentation
+    is_quadruped       the axes of the place are those of an animal on four legs
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -71,3 +72,4 @@ class Frame:
     corner: tuple[int, int] = (0, 0)
     segment: int = 0
     segments: int = 0
+    is_quadruped: bool = False

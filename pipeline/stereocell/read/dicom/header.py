@@ -56,6 +56,7 @@ _TAGS: list[Any] = [
     "PixelSpacing",
     "ImagePositionPatient",
     "ImageOrientationPatient",
+    "AnatomicalOrientationType",
     "RescaleSlope",
     "RescaleIntercept",
     "ModalityLUTSequence",
@@ -161,6 +162,7 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
     if "SOPInstanceUID" not in header:  # then nothing identifies copies
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
+    is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
     shared = _first(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     offsets = None
@@ -200,6 +202,7 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
                 tile.corner,
                 int(segment or 0) if segments else 0,
                 segments,
+                is_quadruped,
             )
             for number, tile in enumerate(mosaic.tiles)
         ]

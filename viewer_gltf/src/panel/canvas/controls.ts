@@ -22,12 +22,13 @@ import { histogramBlock } from "./transfer_function_2d";
 /**
  * Controls without use before the eyes: the way into stereo, from which *Leave* leads back, the code of a
  * phone viewer, which is read with the phone out of it, the screen's size, which is measured by a
- * card held to it, a file of the user's, and the list of a keyboard's keys.
+ * card held to it, files of the user's, the list of a keyboard's keys, and pictures beside the specimen.
  */
 export const ELSEWHERE: ReadonlySet<string> = new Set([
   ...["stereo", "split"],
   ...["scan", "lens-code", "measure-screen"],
-  "own-light",
+  ...["own-light", "save-csv"],
+  "slice-pictures", // the planes in the specimen are what a headset shows
   "help",
 ]);
 /** Widths in a channel's row. */

@@ -27,6 +27,9 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  sliceValues: [],
+  undo: null,
+  redo: null,
 };
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const SPLIT = { isAvailable: true, reason: "" };
@@ -44,6 +47,7 @@ const TABS = [
     "stereo",
     "measure",
     "cut",
+    "slices",
     "quality",
     "share",
   ],
@@ -118,7 +122,8 @@ describe("the panel on a plane", () => {
         const controls = isOpen ? [...inRow, ...item.more] : inRow;
         for (const { id, kind, refusal } of controls) {
           const isElsewhere =
-            ["stereo", "split", "measure-screen", "help"].includes(id) || kind === "link";
+            ["stereo", "split", "measure-screen", "help", "slice-pictures"].includes(id) ||
+            kind === "link";
           const isClosed = item.kind === "group" && !isOpen && kind === "choice";
           if (isElsewhere || isClosed || refusal || kind === "text") continue;
           expect(ids, id).toContain(id);
@@ -147,9 +152,11 @@ describe("the panel on a plane", () => {
     }
     expect(inStereo).toContain("leave"); // for what leads in: `stereo` and `split`
     const missing = [...offered].filter((id) => !inStereo.has(id)).sort();
-    // what is done with the phone out of its viewer: its code, its screen; a file; a keyboard's list
+    // what is done with the phone out of its viewer: its code, its screen; files; a keyboard's list; pictures
+    // beside the specimen, which stands alone before the eyes
+    const phone = ["lens-code", "scan", "measure-screen"];
     expect(missing).toEqual(
-      ["stereo", "split", "lens-code", "scan", "measure-screen", "own-light", "help"].sort(),
+      ["stereo", "split", ...phone, "own-light", "help", "slice-pictures"].sort(),
     );
   });
 

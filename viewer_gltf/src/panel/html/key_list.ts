@@ -14,6 +14,11 @@ const NAMES: Readonly<Record<string, string>> = {
 
 /** With Shift where it belongs to the key. */
 function textOf(key: string): string {
+  const [, control, letter] = /^(Ctrl\+)(.)$/.exec(key) ?? [];
+  if (control !== undefined) {
+    const capital = letter.toUpperCase();
+    return letter === capital ? `Ctrl ⇧ ${capital}` : `Ctrl ${capital}`;
+  }
   const [, shift = "", name = key] = /^(Shift\+)(.+)$/.exec(key) ?? [];
   return `${shift && "⇧ "}${NAMES[name] ?? name}`;
 }

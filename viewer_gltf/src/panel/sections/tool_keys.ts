@@ -1,9 +1,12 @@
 /** The keys of measuring, cutting open, sharing and of the panel itself. Pure. */
+
+import { allOf, missing } from "../../state/measurements";
 import { groupNotices } from "../../state/notice_groups";
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
 import { chosenClipPart, clipPartsOf, moveClipPart } from "../clip_by_key";
 import { type Key, key, keysOf, neighbour } from "../key";
 import { middleBox, middlePlane } from "../layout";
+import { clearMeasured } from "./measure";
 
 function nextClipPart(by: number): Key["to"] {
   return ({ state: { clip }, view }) => {
@@ -22,8 +25,12 @@ function push(steps: number): Key["to"] {
 export const TOOL_KEYS: readonly Key[] = [
   ...MEASURE_PARAMETERS.flatMap(keysOf),
   key("Enter", "Tap in the middle of the view", "press"),
-  key("u", "Clear what was measured", ({ state }) =>
-    state.measured.length === 0 ? null : { type: "measure", points: [] },
+  key("_", "The measurement is done: it goes to the list", ({ state }) =>
+    missing(state.measuredAs, state.measured) > 0 ? null : { type: "finish-measuring" },
+  ),
+  key("u", "Clear the newest measurement", ({ state }) => clearMeasured(state)),
+  key("(", "Save the measurements as CSV", ({ state }) =>
+    allOf(state).length === 0 ? null : "save-csv",
   ),
   key("b", "Cut by a box: on or off", ({ state: { clip }, shown }) => ({
     type: "set-clip",

@@ -18,6 +18,8 @@ export const VIEW_KEYS: readonly Key[] = [
   key("a", "From the side (along x)", "side"),
   key("y", "From the top (along y)", "top"),
   key("r", "Reset the view", "reset"),
+  key("Ctrl+z", "Undo the last change of the view", "undo"),
+  key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
   key("V", "Enter stereo (VR), or leave it", "stereo"),
   key("L", "Next phone viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);
@@ -25,6 +27,6 @@ export const VIEW_KEYS: readonly Key[] = [
   }),
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),
-  key("&", "Measure the screen by a card, for the split screen", "measure-screen"),
+  key(":", "Measure the screen by a card, for the split screen", "measure-screen"),
   ...STEREO_PARAMETERS.flatMap(keysOf),
 ];

@@ -3,12 +3,14 @@ import type { ChannelState, ViewerState } from "../viewer_state";
 import { CHANNEL } from "./channel";
 import { type Parameter, type SetAction, type Value, withValue } from "./kinds";
 import { LAMPS_SHOWN, LIGHT } from "./light";
+import { SLICES } from "./slices";
 import { MEASURE_PARAMETERS, QUALITY, QUALITY_PARAMETERS, STEREO_PARAMETERS } from "./tools";
 import { DISC_RADIUS, MODE, SWITCH_DISTANCE, VOLUMES } from "./volumes";
 
 /** Besides those of the channels. */
 export const PARAMETERS: readonly Parameter<ViewerState>[] = [
   ...VOLUMES,
+  ...SLICES,
   ...MEASURE_PARAMETERS,
   ...STEREO_PARAMETERS,
   ...QUALITY_PARAMETERS,

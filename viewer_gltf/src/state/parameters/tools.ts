@@ -12,10 +12,16 @@ const TOOLS = ["select", "measure"] as const;
 /** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
 export type Tool = (typeof TOOLS)[number];
 
+const MEASURES = ["distance", "angle", "line"] as const;
+/** Between two points, at the second of three, through several. */
+export type MeasureKind = (typeof MEASURES)[number];
+
 /** The tools of a bundle that has just opened. */
 export const START_TOOLS = {
   /** The effect of a tap or a dwell on the specimen. */
   tool: "select" as Tool,
+  /** What the next measurement will be. */
+  measureKind: "distance" as MeasureKind,
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,
   quality: "auto" as QualityLevel,
@@ -41,6 +47,19 @@ export const TOOL: ChoiceParameter<ToolSettings, Tool> = {
   names: { select: "Select", measure: "Measure" },
   key: ["p", "A tap selects or measures"],
   spoken: ({ tool }) => `A tap ${tool}s`,
+};
+
+export const MEASURE_KIND: ChoiceParameter<ToolSettings, MeasureKind> = {
+  kind: "choice",
+  id: "measure-kind",
+  label: "Measure",
+  link: "measure",
+  ...lens("measureKind"),
+  values: MEASURES,
+  names: { distance: "Distance", angle: "Angle", line: "Line" },
+  refusal: ({ tool }) => (tool === "measure" ? "" : "A tap does not measure now."),
+  key: ["&", "Next: distance, angle, line through points"],
+  spoken: ({ measureKind }) => `Measure: ${measureKind}`,
 };
 
 export const DWELL: SwitchParameter<ToolSettings> = {
@@ -115,5 +134,5 @@ export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
 
 /** By the panel's section that lists them. */
 export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
-export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL];
+export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

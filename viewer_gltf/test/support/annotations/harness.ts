@@ -114,12 +114,16 @@ class Bench {
   private readonly marks: Marks;
   private view: View = { position: [0, 0, 2], target: [0, 0, 0] };
   state = initialState(MANIFEST);
+  announced = "";
   /** What would have turned the camera. */
   leaked = 0;
   /** The list of volumes comes when it is asked for. */
   private isKnown = false;
 
-  constructor(private readonly stage: HTMLElement) {
+  constructor(
+    private readonly stage: HTMLElement,
+    sides?: Manifest["specimen"]["sides"],
+  ) {
     const { clientWidth, clientHeight } = stage;
     const canvas = this.renderer.domElement;
     this.renderer.setSize(clientWidth, clientHeight);
@@ -136,7 +140,7 @@ class Bench {
       this.draw();
     };
     const options = {
-      manifest: MANIFEST,
+      manifest: { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } },
       base: location.href,
       surfaces: () => surfaces,
       volumes: () => [],
@@ -146,6 +150,9 @@ class Bench {
         return tile === "r0_c1" ? VOLUME : null;
       },
       dispatch,
+      announce: (text: string) => {
+        this.announced = text;
+      },
       onChange: () => this.draw(),
       onError: (error: unknown) => {
         throw error;
@@ -246,7 +253,7 @@ class Bench {
   }
 
   /** What is written at a measured point. */
-  valuesAt(index: 0 | 1): string {
+  valuesAt(index: number): string {
     return this.marks.measured.valuesAt(index);
   }
 
@@ -313,7 +320,7 @@ class Bench {
 declare global {
   interface Window {
     bench?: Bench;
-    makeBench?: (stage: HTMLElement) => Bench;
+    makeBench?: (stage: HTMLElement, sides?: Manifest["specimen"]["sides"]) => Bench;
   }
 }
-window.makeBench = (stage) => new Bench(stage);
+window.makeBench = (stage, sides) => new Bench(stage, sides);

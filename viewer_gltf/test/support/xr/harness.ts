@@ -52,6 +52,9 @@ const FACTS: Facts = {
   samples: null,
   isLoading: false,
   values: [],
+  sliceValues: [],
+  undo: null,
+  redo: null,
 };
 /** Before the specimen's upper edge. */
 export const HANDLE_m: At = [0, 0.45, -1.2];

@@ -1,0 +1,172 @@
+/** The slices in the scene: each plane's polygon within the specimen, with its picture, and their sides. */
+import {
+  BufferAttribute,
+  BufferGeometry,
+  CanvasTexture,
+  DoubleSide,
+  LinearFilter,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  Object3D,
+  SRGBColorSpace,
+  Vector3,
+} from "three";
+import { Label } from "../annotations/label";
+import type { Sight } from "../annotations/style";
+import { leaveUncut } from "../gpu/unclipped_material";
+import { AHEAD, type Box, boxSpan } from "../math/box";
+import { MOST_CORNERS } from "../math/plane_box_section";
+import { outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
+import type { Vec3 } from "../math/vec3";
+import type { SliceImages } from "./slice_images";
+
+const LINE = 0xffd24a;
+const LETTER = "#ffd24a";
+
+class Plane {
+  readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
+  private readonly texture: CanvasTexture;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    this.texture = new CanvasTexture(canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.minFilter = LinearFilter;
+    this.texture.generateMipmaps = false;
+    const corners = Array.from({ length: MOST_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
+    const geometry = new BufferGeometry()
+      .setAttribute("position", new BufferAttribute(new Float32Array(3 * MOST_CORNERS), 3))
+      .setAttribute("uv", new BufferAttribute(new Float32Array(2 * MOST_CORNERS), 2))
+      .setIndex(corners.flat());
+    const material = new MeshBasicMaterial({
+      map: this.texture,
+      side: DoubleSide,
+      toneMapped: false,
+      fog: false,
+    });
+    this.mesh = new Mesh(geometry, material);
+    this.mesh.frustumCulled = false;
+    leaveUncut(this.mesh); // a cut lays it open
+  }
+
+  place(frame: SliceFrame, box: Box): void {
+    const outline = outlineOf(frame, box);
+    this.mesh.visible = outline.length > 2;
+    const { geometry } = this.mesh;
+    outline.forEach((corner, i) => {
+      const { x, y } = placeIn(frame, corner);
+      geometry.attributes.position.setXYZ(i, ...corner);
+      geometry.attributes.uv.setXY(i, x, 1 - y);
+    });
+    geometry.attributes.position.needsUpdate = true;
+    geometry.attributes.uv.needsUpdate = true;
+    geometry.setDrawRange(0, 3 * Math.max(0, outline.length - 2));
+  }
+
+  /** The canvas has another picture. */
+  refresh(): void {
+    const { image } = this.texture;
+    if (image !== this.canvas) this.texture.image = this.canvas;
+    this.texture.dispose(); // its size on the GPU is fixed
+    this.texture.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+    this.texture.dispose();
+  }
+}
+
+export class SlicePlanes {
+  /** Child of the specimen's group: um, world. */
+  readonly group = new Object3D();
+  /** Lines and letters, which no depth knows of. */
+  readonly marks = new Object3D();
+  private readonly planes: readonly Plane[];
+  private readonly lines: LineSegments<BufferGeometry, LineBasicMaterial>;
+  private readonly letters = Array.from({ length: 6 }, () => new Label("above", LETTER));
+  private readonly places = Array.from({ length: 6 }, () => new Vector3());
+  private version = -1;
+  /** How often they were placed otherwise. */
+  private placed = 0;
+  private place = "";
+
+  constructor(private readonly images: SliceImages) {
+    this.planes = images.canvases.map((canvas) => new Plane(canvas));
+    const positions = new BufferAttribute(new Float32Array(3 * 6), 3);
+    const material = new LineBasicMaterial({ color: LINE, toneMapped: false, fog: false });
+    this.lines = new LineSegments(
+      new BufferGeometry().setAttribute("position", positions),
+      material,
+    );
+    this.lines.frustumCulled = false;
+    this.marks.add(this.lines, ...this.letters.map(({ sprite }) => sprite));
+    this.group.name = "slices";
+    this.group.add(this.marks, ...this.planes.map(({ mesh }) => mesh));
+    this.group.visible = false;
+  }
+
+  follow(areShown: boolean): void {
+    const { frames, box, point } = this.images;
+    this.group.visible = areShown && frames !== null;
+    if (!this.group.visible || frames === null) return;
+    this.planes.forEach((plane, i) => {
+      plane.place(frames[i], box);
+    });
+    const place = JSON.stringify(frames);
+    if (place !== this.place) this.placed++;
+    this.place = place;
+    const [first, second] = frames;
+    // the planes' lines in common: along the first's right and up, and along the second's up
+    const arms: readonly (readonly [Vec3, string, string])[] = [
+      [first.right, first.ends[1], first.ends[0]],
+      [first.up, first.ends[2], first.ends[3]],
+      [first.normal, "", ""],
+    ];
+    const [, , isUp] = [0, 0, dotOf(second.up, first.normal) > 0];
+    const through = isUp ? [second.ends[2], second.ends[3]] : [second.ends[3], second.ends[2]];
+    arms.forEach(([along, forth, back], i) => {
+      const names = i === 2 ? through : [forth, back];
+      const span = boxSpan([-AHEAD[1], AHEAD[1]], { origin: point, direction: along }, box);
+      [1, 0].forEach((end, k) => {
+        const at = span === null ? 0 : span[end];
+        const place = this.places[2 * i + k];
+        place
+          .set(...along)
+          .multiplyScalar(at)
+          .add(new Vector3(...point));
+        this.lines.geometry.attributes.position.setXYZ(2 * i + k, place.x, place.y, place.z);
+        this.letters[2 * i + k].write(names[k]);
+      });
+    });
+    this.lines.geometry.attributes.position.needsUpdate = true;
+  }
+
+  /** Changes with what the planes hide: so many of them, however they lie; 0: none. */
+  get solid(): number {
+    return this.group.visible ? 1 + this.placed : 0;
+  }
+
+  update(sight: Sight): void {
+    if (!this.group.visible) return;
+    if (this.version !== this.images.version) {
+      this.version = this.images.version;
+      for (const plane of this.planes) plane.refresh();
+    }
+    this.letters.forEach((letter, i) => {
+      letter.place(this.places[i], sight);
+    });
+  }
+
+  dispose(): void {
+    this.group.removeFromParent();
+    for (const plane of this.planes) plane.dispose();
+    for (const letter of this.letters) letter.dispose();
+    this.lines.geometry.dispose();
+    this.lines.material.dispose();
+  }
+}
+
+const dotOf = (a: Vec3, b: Vec3) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -1,0 +1,225 @@
+/**
+ * The slices as pictures in the page: crosshair, sides, values under the pointer. A drag moves the
+ * crosshair, the wheel goes through the planes, a drag with Shift turns the other two about this one's
+ * normal, the right button widens (to the right) and brightens (up) the window. By key: arrows, Page Up
+ * and Page Down, Shift with the arrows.
+ */
+import { element, setText } from "../dom/element";
+import { placeIn, pointIn, type SliceFrame } from "../math/slice_frame";
+import type { Vec3 } from "../math/vec3";
+import type { SliceImages } from "./slice_images";
+
+export type SliceChanges = Readonly<{
+  move: (point: Vec3) => void;
+  turn: (about: Vec3, by_deg: number) => void;
+  /** Shares of all intensities by which the window becomes wider and goes up. */
+  window: (wider: number, higher: number) => void;
+}>;
+
+/** One press of a key: a share of the picture's edge, and an angle. */
+const KEY_STEP = 0.01;
+const KEY_TURN_DEG = 5;
+const WHEEL_STEP = 0.01;
+const EDGES = ["left", "right", "top", "bottom"] as const;
+
+class Picture {
+  readonly root: HTMLElement;
+  private readonly plane: HTMLElement;
+  private readonly across = element("i", { className: "line across" });
+  private readonly down = element("i", { className: "line down" });
+  private readonly letters = EDGES.map((edge) => element("b", { className: `end ${edge}` }));
+  private readonly name = element("figcaption");
+  private readonly values = element("p", { className: "values" });
+  private frame: SliceFrame | null = null;
+  /** Where the pointer is. */
+  private pointed: Vec3 | null = null;
+
+  constructor(
+    index: number,
+    private readonly images: SliceImages,
+    private readonly changes: SliceChanges,
+    onEnlarge: () => void,
+  ) {
+    const canvas = images.canvases[index];
+    this.plane = element(
+      "div",
+      { className: "plane", tabIndex: 0, role: "application" },
+      { slice: String(index) },
+      canvas,
+      this.across,
+      this.down,
+      ...this.letters,
+    );
+    const enlarge = element("button", {
+      type: "button",
+      className: "enlarge",
+      textContent: "⤢",
+      ariaLabel: "This slice alone, or all three",
+      title: "This slice alone, or all three",
+      onclick: onEnlarge,
+    });
+    this.root = element("figure", {}, {}, this.plane, this.name, this.values, enlarge);
+    this.listen();
+  }
+
+  update(frame: SliceFrame): void {
+    this.frame = frame;
+    const { x, y } = placeIn(frame, this.images.point);
+    this.plane.style.setProperty("--ratio", (frame.half[0] / frame.half[1]).toFixed(4));
+    this.down.style.left = `${(100 * x).toFixed(3)}%`;
+    this.across.style.top = `${(100 * y).toFixed(3)}%`;
+    this.letters.forEach((letter, i) => {
+      setText(letter, frame.ends[i]);
+    });
+    setText(this.name, frame.name);
+    this.showValues();
+  }
+
+  private showValues(): void {
+    const at = this.pointed ?? this.images.point;
+    const text = this.images.valuesAt(at).join(" · ");
+    setText(this.values, text);
+    const [left, right, top, bottom] = this.frame?.ends ?? [];
+    this.plane.ariaLabel =
+      `Slice ${this.frame?.name}: ${left} on the left, ${right} on the right, ${top} up, ` +
+      `${bottom} down. ${text}`;
+  }
+
+  private placeOf({ clientX, clientY }: MouseEvent) {
+    const { left, top, width, height } = this.plane.getBoundingClientRect();
+    const within = (v: number) => Math.min(1, Math.max(0, v));
+    return { x: within((clientX - left) / width), y: within((clientY - top) / height) };
+  }
+
+  private listen(): void {
+    const { plane, changes } = this;
+    let last: MouseEvent | null = null;
+    plane.addEventListener("contextmenu", (event) => event.preventDefault());
+    plane.addEventListener("pointerdown", (event) => {
+      plane.setPointerCapture(event.pointerId);
+      last = event;
+      if (event.button === 0 && !event.shiftKey && this.frame !== null) {
+        changes.move(pointIn(this.frame, this.placeOf(event)));
+      }
+    });
+    plane.addEventListener("pointermove", (event) => {
+      if (this.frame === null) return;
+      this.pointed = pointIn(this.frame, this.placeOf(event));
+      if (last === null) this.showValues();
+      else if (event.buttons & 2) {
+        const { width, height } = plane.getBoundingClientRect();
+        const [dx, dy] = [event.clientX - last.clientX, event.clientY - last.clientY];
+        changes.window(dx / width, -dy / height);
+      } else if (event.shiftKey) this.turnBy(last, event);
+      else changes.move(this.pointed);
+      if (last !== null) last = event;
+    });
+    const end = () => {
+      last = null;
+    };
+    plane.addEventListener("pointerup", end);
+    plane.addEventListener("pointercancel", end);
+    plane.addEventListener("pointerleave", () => {
+      this.pointed = null;
+      if (this.frame !== null) this.showValues();
+    });
+    plane.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        this.go(Math.sign(event.deltaY) * WHEEL_STEP);
+      },
+      { passive: false },
+    );
+    plane.addEventListener("keydown", (event) => {
+      if (this.byKey(event)) event.preventDefault();
+    });
+  }
+
+  /** Round the crosshair, as the pointer went. */
+  private turnBy(from: MouseEvent, to: MouseEvent): void {
+    const { frame } = this;
+    if (frame === null) return;
+    const { left, top, width, height } = this.plane.getBoundingClientRect();
+    const middle = placeIn(frame, this.images.point);
+    const angle = ({ clientX, clientY }: MouseEvent) =>
+      Math.atan2(top + middle.y * height - clientY, clientX - left - middle.x * width);
+    const by = ((angle(to) - angle(from) + 3 * Math.PI) % (2 * Math.PI)) - Math.PI;
+    this.changes.turn(frame.normal, (by * 180) / Math.PI);
+  }
+
+  /** Through the plane, towards the eye: a share of the picture's longer edge. */
+  private go(share: number): void {
+    const { frame } = this;
+    if (frame === null) return;
+    this.shift(frame.normal, 2 * share * Math.max(...frame.half));
+  }
+
+  private shift(along: Vec3, by_um: number): void {
+    const [x, y, z] = this.images.point;
+    this.changes.move([x + by_um * along[0], y + by_um * along[1], z + by_um * along[2]]);
+  }
+
+  private byKey({ key, shiftKey }: KeyboardEvent): boolean {
+    const { frame } = this;
+    if (frame === null) return false;
+    const turn = { ArrowLeft: 1, ArrowRight: -1, ArrowUp: 1, ArrowDown: -1 }[key];
+    if (shiftKey && turn !== undefined) {
+      this.changes.turn(frame.normal, turn * KEY_TURN_DEG);
+      return true;
+    }
+    const [across, along] = frame.half.map((half) => 2 * KEY_STEP * half);
+    if (key === "ArrowLeft") this.shift(frame.right, -across);
+    else if (key === "ArrowRight") this.shift(frame.right, across);
+    else if (key === "ArrowUp") this.shift(frame.up, along);
+    else if (key === "ArrowDown") this.shift(frame.up, -along);
+    else if (key === "PageUp") this.go(KEY_STEP);
+    else if (key === "PageDown") this.go(-KEY_STEP);
+    else return false;
+    return true;
+  }
+}
+
+export class SliceView {
+  readonly root = element("div", { className: "slices", role: "group", ariaLabel: "Slices" });
+  private readonly pictures: readonly Picture[];
+  private large: number | null = null;
+
+  /** @param view the part of the page with the stage, which makes room */
+  constructor(
+    private readonly view: HTMLElement,
+    private readonly images: SliceImages,
+    changes: SliceChanges,
+  ) {
+    this.pictures = images.canvases.map(
+      (_, i) => new Picture(i, images, changes, () => this.enlarge(i)),
+    );
+    this.root.append(...this.pictures.map(({ root }) => root));
+    this.root.hidden = true;
+    view.append(this.root);
+    images.onPaint = () => this.update(!this.root.hidden);
+  }
+
+  update(areShown: boolean): void {
+    const { frames } = this.images;
+    this.root.hidden = !areShown || frames === null;
+    this.view.classList.toggle("with-slices", !this.root.hidden);
+    if (this.root.hidden || frames === null) return;
+    this.pictures.forEach((picture, i) => {
+      picture.update(frames[i]);
+    });
+  }
+
+  private enlarge(index: number): void {
+    this.large = this.large === index ? null : index;
+    this.root.classList.toggle("alone", this.large !== null);
+    this.pictures.forEach(({ root }, i) => {
+      root.hidden = this.large !== null && i !== this.large;
+    });
+  }
+
+  dispose(): void {
+    this.view.classList.remove("with-slices");
+    this.root.remove();
+  }
+}

@@ -1,0 +1,102 @@
+/** The three slices in the page: pictures, crosshair, keys, values, and planes in the specimen. */
+import { beforeAll, expect, it } from "vitest";
+import { difference, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const SHOTS = process.env.STEREOCELL_SHOTS;
+
+describeInChromium("slices", () => {
+  const stand = prepareStand({
+    viewport: { width: 720, height: 420 },
+    pixelRatio: 0.5,
+    sharesPage: true,
+  });
+  const page = () => stand.viewer.page;
+  const state = async () => (await stand.viewer.snapshot()).state;
+  const plane = (i: number) => page().locator(`[data-slice="${i}"]`);
+  /** Share of a picture's pixels that aren't dark. */
+  const lit = (i: number) =>
+    plane(i)
+      .locator("canvas")
+      .evaluate((canvas: HTMLCanvasElement) => {
+        const context = canvas.getContext("2d");
+        const { data } = context?.getImageData(0, 0, canvas.width, canvas.height) ?? { data: [] };
+        let count = 0;
+        for (let k = 0; k < data.length; k += 4)
+          if (data[k] + data[k + 1] + data[k + 2] > 90) count++;
+        return count / (data.length / 4);
+      });
+
+  beforeAll(async () => {
+    await stand.open("&mode=off#v=1&slices=on&slice-x=0.2");
+    await stand.viewer.settled();
+  });
+
+  it("show all three, with axes at the edges and the values where they meet", async () => {
+    for (const i of [0, 1, 2]) expect(await lit(i), `${i}`).toBeGreaterThan(0.01);
+    const ends = await plane(0).locator(".end").allTextContents();
+    expect(ends).toEqual(["−x", "+x", "+y", "−y"]);
+    expect(await page().locator(".slices .values").first().textContent()).toMatch(/ \d+/);
+    if (SHOTS) await page().screenshot({ path: `${SHOTS}/slices.png` });
+  });
+
+  it("move the crosshair by a click and by keys, and go back by one step each", async () => {
+    const box = await plane(0).boundingBox();
+    if (box === null) throw new Error("no picture");
+    const before = await state();
+    await page().mouse.click(box.x + 0.3 * box.width, box.y + 0.25 * box.height);
+    const clicked = await state();
+    expect(clicked.sliceX).toBeCloseTo(0.3, 1);
+    expect(clicked.sliceY).toBeGreaterThan(0.6); // y runs up
+    expect(clicked.sliceZ).toBe(before.sliceZ);
+    await plane(0).press("ArrowRight");
+    expect((await state()).sliceX).toBeCloseTo(clicked.sliceX + 0.01, 3);
+    await plane(0).press("PageUp");
+    expect((await state()).sliceZ).toBeGreaterThan(before.sliceZ);
+    await plane(0).press("Shift+ArrowLeft");
+    expect((await state()).sliceTurnZ_deg).toBeCloseTo(5, 6);
+    for (let i = 0; i < 9 && (await state()).sliceX !== before.sliceX; i++) {
+      await page().keyboard.press("Control+z");
+    }
+    const back = await state();
+    expect([back.sliceX, back.sliceY, back.sliceZ, back.sliceTurnZ_deg]).toEqual([
+      before.sliceX,
+      before.sliceY,
+      before.sliceZ,
+      0,
+    ]);
+  });
+
+  it("turn by a drag with Shift, and widen the window by the right button", async () => {
+    const box = await plane(0).boundingBox();
+    if (box === null) throw new Error("no picture");
+    const at = (x: number, y: number) => [box.x + x * box.width, box.y + y * box.height] as const;
+    await page().keyboard.down("Shift");
+    await page().mouse.move(...at(0.9, 0.5));
+    await page().mouse.down();
+    await page().mouse.move(...at(0.5, 0.1), { steps: 4 });
+    await page().mouse.up();
+    await page().keyboard.up("Shift");
+    expect(Math.abs((await state()).sliceTurnZ_deg)).toBeGreaterThan(45);
+    await page().keyboard.press("~");
+    expect((await state()).sliceTurnZ_deg).toBe(0);
+    await page().mouse.move(...at(0.5, 0.5));
+    await page().mouse.down({ button: "right" });
+    await page().mouse.move(...at(0.2, 0.5), { steps: 3 });
+    await page().mouse.up({ button: "right" });
+    const [low, high] = (await state()).channels[0].window;
+    expect(high - low).toBeCloseTo(0.7, 1);
+  });
+
+  it("stand in the specimen as planes", async () => {
+    await page().keyboard.press("\\");
+    await stand.viewer.still();
+    const without = await takePicture(page());
+    await page().keyboard.press("|");
+    await stand.viewer.settled();
+    await stand.viewer.still();
+    expect(difference(await takePicture(page()), without)).toBeGreaterThan(0.1);
+    if (SHOTS) await page().screenshot({ path: `${SHOTS}/planes.png` });
+  });
+});
