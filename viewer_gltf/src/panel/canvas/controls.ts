@@ -28,6 +28,13 @@ const ELSEWHERE: ReadonlySet<string> = new Set([
   "slice-pictures", // the planes in the specimen are what a headset shows
   "share",
   "save-csv",
+  // of the screen's camera, as files
+  "picture-size",
+  "save-picture",
+  "save-video",
+  "keep-view",
+  "next-view",
+  "forget-views",
   "help",
 ]);
 /** Widths in a channel's row. */

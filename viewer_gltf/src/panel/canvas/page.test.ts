@@ -28,9 +28,19 @@ const FACTS: Facts = {
   isLoading: false,
   values: [],
   sliceValues: [],
+  isFilming: false,
   undo: null,
   redo: null,
 };
+/** By the camera of the flat screen, into files. */
+const OF_THE_SCREEN = [
+  "picture-size",
+  "save-picture",
+  "save-video",
+  "keep-view",
+  "next-view",
+  "forget-views",
+];
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
   layOut(state, FACTS, { ...START_VIEW, ...view });
@@ -120,8 +130,9 @@ describe("the panel on a plane", () => {
         const controls = isOpen ? [...inRow, ...item.more] : inRow;
         for (const { id, kind, refusal } of controls) {
           const isElsewhere =
-            ["stereo", "lenses", "share", "help", "slice-pictures"].includes(id) ||
-            kind === "search";
+            ["stereo", "lenses", "share", "help", "slice-pictures", ...OF_THE_SCREEN].includes(
+              id,
+            ) || kind === "search";
           const isClosed = item.kind === "group" && !isOpen && kind === "choice";
           if (isElsewhere || isClosed || refusal || kind === "text") continue;
           expect(ids, id).toContain(id);
@@ -150,7 +161,7 @@ describe("the panel on a plane", () => {
     }
     const missing = [...offered].filter((id) => !inStereo.has(id)).sort();
     // the way in, which is taken; the list of keys; a link, of which a headset has no clipboard; typing;
-    // a file of the user's; pictures beside the specimen, which stands alone before the eyes
+    // a file of the user's, or for the user; the screen's own camera; pictures beside the specimen, which stands alone before the eyes
     expect(missing).toEqual(
       [
         "stereo",
@@ -163,6 +174,7 @@ describe("the panel on a plane", () => {
         "find-channel",
         "own-light",
         "slice-pictures",
+        ...OF_THE_SCREEN.filter((id) => !["next-view", "forget-views"].includes(id)),
       ].sort(),
     );
   });
