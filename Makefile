@@ -51,7 +51,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-unit bench-wrap bench-serve bench-viewer object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-unit bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -181,8 +181,10 @@ test: setup browser ## All tests, in headless Chromium too
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
 # Three processes for two cores: builds, servers and clusters wait for one another, and each process
-# reads all tests first. A file's tests share what it has built, so they stay together
+# reads all tests first. A file's tests share what it has built, so they stay together. In a fresh clone
+# one process compiles all for the three, which would each do it, side by side
 test-python: setup
+	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
@@ -276,6 +278,13 @@ bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, 
 	    || { npm ci --ignore-scripts --no-audit --no-fund --loglevel=error && touch node_modules/.ready; }; } \
 	  && "$$OLDPWD/$(BIN)/python" bench.py "$$OLDPWD/out/bench-viewer"; \
 	fi
+
+bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes of 64^3 to 512^3, mono and stereo
+	@mkdir -p out/samples
+	test -e out/samples/head-512.ome.tif || $(BIN)/python tests/bench/fps_volume.py out/samples/head-512.ome.tif 512
+	$(RUN) build out/samples/head-512.ome.tif --out=out/head-512 --workers="$$WORKERS" --preset mri --grid 1x1
+	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
+	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
 
 wheel: setup ## A wheel with the built viewer in it: out/wheel
 	$(BIN)/hatchling build -t wheel -d out/wheel

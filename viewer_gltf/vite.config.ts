@@ -1,39 +1,8 @@
-import { readdir, readFile, writeFile } from "node:fs/promises";
-import { join } from "node:path";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+import { finishBuild } from "./scripts/finish_build.ts";
 
 const SERVICE_WORKER = "sw.js";
-const PLACEHOLDER = /(["'`])__VIEWER_FILES__\1/;
-
-/** Tell the service worker, which has a fixed name, what the viewer of this build consists of. */
-function listViewerFiles(): Plugin {
-  let folder = "";
-  return {
-    name: "list-viewer-files",
-    apply: "build",
-    configResolved(config) {
-      folder = join(config.root, config.build.outDir);
-    },
-    async writeBundle(_, bundle) {
-      if (!(SERVICE_WORKER in bundle)) return; // the tests' own small pages have none
-      const path = join(folder, SERVICE_WORKER);
-      const code = await readFile(path, "utf8");
-      if (!PLACEHOLDER.test(code)) this.error(`${path}: no place for the list of files`);
-      const entries = await readdir(folder, { recursive: true, withFileTypes: true });
-      const names = entries
-        .filter((entry) => entry.isFile())
-        .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1))
-        .filter((name) => name !== SERVICE_WORKER && name !== "index.html")
-        .sort();
-      const list = JSON.stringify(JSON.stringify(names));
-      await writeFile(
-        path,
-        code.replace(PLACEHOLDER, () => list),
-      );
-    },
-  };
-}
 
 /** Shaders travel without their comments: the reader has the sources. */
 function stripShaders(): Plugin {
@@ -54,7 +23,7 @@ function stripShaders(): Plugin {
 export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
-  plugins: [listViewerFiles(), stripShaders()],
+  plugins: [stripShaders(), finishBuild()],
   build: { target: "es2022", outDir: "dist", emptyOutDir: true, chunkSizeWarningLimit: 1500 },
   server: { fs: { allow: [".."] } }, // the schemas lie beside this folder
   worker: {

@@ -1,5 +1,6 @@
 """The local server: byte ranges, types, nothing outside the bundle, nobody from elsewhere."""
 
+import gzip
 import http.client
 import socket
 import time
@@ -14,10 +15,11 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import StereoCellError
 from stereocell.serve import server as serve_module
 from stereocell.serve.server import LOCALHOST, BundleServer
-from stereocell.serve.static_files import parse_range
+from stereocell.serve.static_files import accepted_encodings, parse_range
 from support.server.timeouts import PATIENCE_S, connect
 
 DATA = bytes(range(256)) * 1000
+CODE = b"let sum = 0;" * 1000
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,9 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "lod0.glb").write_bytes(b"glTF")
     (folder / "assets" / "decoder.wasm").write_bytes(b"\0asm")
     (folder / "assets" / "index.js").write_text("0")
+    (folder / "assets" / "code.js").write_bytes(CODE)
+    (folder / "assets" / "code.js.gz").write_bytes(gzip.compress(CODE))
+    (folder / "assets" / "code.js.br").write_bytes(b"as brotli has it")
     return folder
 
 
@@ -117,6 +122,46 @@ def test_ranges_are_answered_as_they_mean(
 ) -> None:
     response, body = ask(port, "/volumes/r0_c0/CD31.ktx2", Range=header)
     assert (response.status, body) == (status, expected)
+
+
+def test_a_compressed_file_is_sent_to_those_that_accept_it(port: int) -> None:
+    path = "/assets/code.js"
+    plain, body = ask(port, path)
+    assert (plain.headers["Content-Encoding"], body) == (None, CODE)
+    packed, body = ask(port, path, **{"Accept-Encoding": "gzip;q=0.5, deflate"})
+    assert packed.headers["Content-Encoding"] == "gzip"
+    assert gzip.decompress(body) == CODE
+    shortest, body = ask(port, path, **{"Accept-Encoding": "gzip, br"})
+    assert (shortest.headers["Content-Encoding"], body) == ("br", b"as brotli has it")
+    for response in (plain, packed, shortest):
+        assert response.headers["Content-Type"] == "text/javascript; charset=utf-8"
+        assert response.headers["Vary"] == "Accept-Encoding"
+    tags = {response.headers["ETag"] for response in (plain, packed, shortest)}
+    assert len(tags) == 3
+    again, _ = ask(
+        port, path, **{"Accept-Encoding": "br", "If-None-Match": shortest.headers["ETag"]}
+    )
+    assert again.status == 304
+
+
+def test_a_range_is_one_of_the_file_itself(port: int) -> None:
+    headers = {"Accept-Encoding": "gzip, br", "Range": "bytes=4-6"}
+    response, body = ask(port, "/assets/code.js", **headers)
+    assert (response.status, response.headers["Content-Encoding"], body) == (206, None, b"sum")
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("", set()),
+        ("gzip", {"gzip"}),
+        ("GZIP , br;q=0.1", {"gzip", "br"}),
+        ("br;q=0, gzip;q=0.000", set()),
+        ("br; q=1.0", {"br"}),
+    ],
+)
+def test_encodings_are_accepted_as_rfc_9110_says(header: str, expected: set[str]) -> None:
+    assert accepted_encodings(header) - {""} == expected
 
 
 def test_what_a_browser_has_is_not_sent_again(port: int, bundle: Path) -> None:

@@ -27,6 +27,7 @@ export const LAYERS: readonly string[] = [
   "share",
   "offline",
   "capture",
+  "bench",
   "app",
 ];
 

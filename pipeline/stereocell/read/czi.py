@@ -18,10 +18,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
+from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple

@@ -40,16 +40,3 @@ class Image:
     labels: str = ""
     notes: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None
-
-
-def linear_color(rgb: tuple[int, int, int]) -> Color:
-    """Return linear RGB, 0..1, of sRGB bytes 0..255.
-
-    References: IEC 61966-2-1:1999.
-    """
-    red, green, blue = (_linear(value / 255.0) for value in rgb)
-    return red, green, blue
-
-
-def _linear(value: float) -> float:
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4

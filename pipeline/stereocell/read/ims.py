@@ -13,10 +13,11 @@ from typing import Any
 import h5py
 import numpy as np
 
+from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree, attribute
-from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
+from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location

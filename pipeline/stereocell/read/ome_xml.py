@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
+from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
-from stereocell.read.image import Color, linear_color
+from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 
 _DEFAULT_UNIT = "\u00b5m"  # of PhysicalSizeX, Y and Z, where none is named

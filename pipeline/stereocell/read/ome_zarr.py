@@ -18,10 +18,11 @@ from typing import Any
 import zarr
 from zarr.abc.store import Store
 
+from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import bare_zarr
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.image import MAX_CHANNELS, Color, Image, linear_color
+from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.read.zarr_collections import (
     ZarrTree,

@@ -55,9 +55,9 @@ class Stain:
 
 
 STAINS = (
-    Stain("Hoechst", "3D6BFF", 1000.0, 120.0),
-    Stain("MART1", "FF7A1A", 900.0, 140.0),
-    Stain("CD31", "2EE66B", 900.0, 110.0),
+    Stain("Hoechst", "4F70F5", 1000.0, 120.0),
+    Stain("MART1", "F0CD3C", 900.0, 140.0),
+    Stain("CD31", "B4566E", 900.0, 110.0),
 )
 
 

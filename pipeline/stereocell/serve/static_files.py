@@ -1,10 +1,13 @@
 """Serve the files of a bundle: types, byte ranges, 304 for cached files, nothing outside the root.
 
+A file with a compressed one beside it, `index.html.br` or `.gz`, is sent as that to clients that
+accept it; a byte range is always one of the file itself.
+
 The viewer fetches single mip levels by ranges. A Range header that is malformed, in another unit,
 or asks for several ranges is ignored, as the RFC allows: the answer is the whole file. All answers
 are `no-cache`, since the bundle may be built anew meanwhile.
 
-References: RFC 9110, section 14 (range requests).
+References: RFC 9110, sections 14 (range requests) and 12.5.3 (Accept-Encoding).
 """
 
 import os
@@ -34,6 +37,7 @@ _TYPES = {
     ".wasm": "application/wasm",
     ".webmanifest": "application/manifest+json",
 }
+_ENCODINGS = {"br": ".br", "gzip": ".gz"}  # the shorter first
 _RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
 _DIGITS = 18  # digits of a number in a Range header: no file has more bytes
 
@@ -65,6 +69,15 @@ class BundleFiles:
         path, status = found
         kind = _TYPES.get(path.suffix, "application/octet-stream")
         headers = {**self._headers, **policy(kind)}
+        beside = await anyio.to_thread.run_sync(_compressed, path)
+        if beside:
+            headers["Vary"] = "Accept-Encoding"
+        if "range" not in request.headers:
+            accepted = accepted_encodings(request.headers.get("accept-encoding", ""))
+            encoding = next((name for name in beside if name in accepted), None)
+            if encoding is not None:
+                path, status = beside[encoding]
+                headers["Content-Encoding"] = encoding
         response = _SentFile(path, headers=headers, media_type=kind, stat_result=status)
         response.headers["content-type"] = kind
         tag = response.headers["etag"]
@@ -86,6 +99,27 @@ class BundleFiles:
             return path, path.stat()
         except (OSError, RuntimeError):  # too long a name, a folder without rights, a ring of links
             return None
+
+
+def _compressed(path: Path) -> dict[str, tuple[Path, os.stat_result]]:
+    """Return the compressed files beside a file, by their encoding."""
+    found = {}
+    for encoding, suffix in _ENCODINGS.items():
+        beside = path.with_name(path.name + suffix)
+        if beside.is_file() and not beside.is_symlink():
+            found[encoding] = beside, beside.stat()
+    return found
+
+
+def accepted_encodings(header: str) -> set[str]:
+    """Return the encodings that an Accept-Encoding header names and does not forbid by `q=0`."""
+    accepted = set()
+    for part in header.lower().split(","):
+        name, _, parameter = part.partition(";")
+        weight = parameter.replace(" ", "").removeprefix("q=")
+        if weight.strip("0.") or not parameter.strip():
+            accepted.add(name.strip())
+    return accepted
 
 
 def parse_range(header: str, size: int) -> range | None:

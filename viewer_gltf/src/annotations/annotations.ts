@@ -7,6 +7,7 @@ import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Action } from "../state/actions";
+import { tileName } from "../state/tile_name";
 import type { ViewerState } from "../state/viewer_state";
 import { ClipMark } from "./clip_gizmo";
 import {
@@ -249,7 +250,8 @@ export class Marks {
     const probed = this.reading.glance(gaze);
     if (probed === null) return null;
     const channel = this.state.channels.find(({ id }) => id === probed.channel);
-    const text = channel === undefined ? probed.tile : `${probed.tile} · ${channel.name}`;
+    const tile = tileName(probed.tile);
+    const text = channel === undefined ? tile : `${tile} · ${channel.name}`;
     return { probed, text };
   }
 

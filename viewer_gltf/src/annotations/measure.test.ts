@@ -2,7 +2,14 @@ import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
 import { distanceBetween } from "../math/distance";
-import { distanceText, measurementText, type VolumeLevel, valueAt, valueText } from "./measure";
+import {
+  distanceText,
+  measurementText,
+  sizeText,
+  type VolumeLevel,
+  valueAt,
+  valueText,
+} from "./measure";
 
 const IDENTITY: TileVolume["matrix"] = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const FILE = { path: "x", bytes: 0, sha256: "" };
@@ -144,5 +151,14 @@ describe("the distance of two points", () => {
       "12.3 mm",
       "1500 mm",
     ]);
+  });
+});
+
+describe("a size", () => {
+  it("is in the unit of its longest edge", () => {
+    expect(sizeText([231_000, 215_000, 255_000])).toBe("231 × 215 × 255 mm");
+    expect(sizeText([67.06, 26.74, 13.16])).toBe("67.1 × 26.7 × 13.2 µm");
+    expect(sizeText([1200, 90, 4.5])).toBe("1.2 × 0.09 × 0.0045 mm");
+    expect(sizeText([0.5, 0, 0.25])).toBe("500 × 0 × 250 nm");
   });
 });

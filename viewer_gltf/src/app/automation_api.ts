@@ -4,6 +4,7 @@
  * `color`, `volume`, `transfer-function`; `[data-mode]`, `[data-tile-choice]`, `[data-action]`).
  */
 
+import type { Report } from "../bench/report";
 import type { QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import type { Progress } from "../surfaces/overview_progress";
@@ -18,6 +19,8 @@ export type Snapshot = Readonly<{
   isLoading: boolean;
   /** Triangles of the surfaces on screen. */
   triangles: number;
+  /** Of the last frame, both eyes and all passes. */
+  drawCalls: number;
   volumes: readonly VolumeStatus[];
   /** Of the GPU's memory. */
   volumeBytes: number;
@@ -51,6 +54,8 @@ export interface StereoCellApi {
   /** Resolves when nothing is loading any more and the picture shows all of it. */
   settled(): Promise<void>;
   snapshot(): Snapshot;
+  /** What the benchmark (`?bench`) has found; null: it has not been run. */
+  bench: Report | null;
 }
 
 declare global {

@@ -22,12 +22,13 @@ import { wishOf } from "../panel/keys";
 import { type Facts, layOut } from "../panel/layout";
 import type { Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
-import { SETTINGS, settingsOf } from "../share/page_parameters";
+import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { allOf, measurementsCsv } from "../state/measurements";
+import { SWITCH_DISTANCE } from "../state/parameters/volumes";
 import type { XrSupport } from "../state/stereo";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -149,8 +150,11 @@ export class Controller {
     const { viewer } = this;
     const { bounds_um } = viewer.bundle.manifest.specimen;
     const { actions, camera } = readLink(hash, viewer.state, bounds_um);
-    for (const action of [...settingsOf(search), ...actions]) viewer.dispatch(action);
+    const asked = [...settingsOf(search), ...actions];
+    for (const action of asked) viewer.dispatch(action);
+    const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
     if (camera !== null) viewer.lookFrom(camera);
+    else viewer.openWith(standOf(search), saysDistance);
     viewer.forgetSteps();
   }
 

@@ -58,6 +58,7 @@ export class FrameLoop {
   private wasMoving = false;
   private waiting: (() => void)[] = [];
   private readonly pixel = new Uint8Array(4);
+  private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
     const { renderer, room, hybrid } = options;
@@ -99,6 +100,11 @@ export class FrameLoop {
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
     return new Promise((resolve) => this.waiting.push(resolve));
+  }
+
+  /** Resolves when the next frame has been drawn. */
+  nextFrame(): Promise<void> {
+    return new Promise((resolve) => this.drawn.push(resolve));
   }
 
   /** The graphics context is gone, and the times that were asked of it. */
@@ -166,6 +172,7 @@ export class FrameLoop {
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;
       onFrame();
+      for (const resolve of this.drawn.splice(0)) resolve();
     }
     this.pace.end();
     this.wasMoving = isMoving;
@@ -217,7 +224,8 @@ export class FrameLoop {
   }
 
   private poseMono(dt_s: number): Camera {
-    const { navigation } = this.options.shown();
+    const { navigation, contents, state } = this.options.shown();
+    if (!contents.hasOverview) navigation.surround(contents.occupied(state));
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;

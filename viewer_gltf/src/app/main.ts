@@ -6,6 +6,8 @@ import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
 import "../slices/slices.css";
+import { sizeText } from "../annotations/measure";
+import { flightAsked } from "../bench/flight";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -13,7 +15,15 @@ import { loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { keepOffline } from "../offline/register";
-import { Notices, ProgressBar, Said, StereoButton, showFatal } from "../panel/html/overlays";
+import {
+  FirstHint,
+  Notices,
+  ProgressBar,
+  Said,
+  StereoButton,
+  showFatal,
+} from "../panel/html/overlays";
+import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import { findXrSupport, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
@@ -27,15 +37,34 @@ function checkWebGl2(): void {
   );
 }
 
-/** For example `512 x 205 x 54 um`. */
+/** For example `512 x 205 x 54 um`, or `231 x 215 x 255 mm`. */
 function describeSize({ specimen, tiles }: Manifest): string {
   const { min, max } = specimen.bounds_um;
-  const edges = max.map((v, i) => (v - min[i]).toPrecision(3)).map(Number);
-  return `${edges.join(" × ")} µm · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
+  return `${sizeText(max.map((v, i) => v - min[i]))} · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
+}
+
+const said = new Said();
+
+/** On the page that stands until there is a picture: see boot/. */
+function sayAtStart(text: string): void {
+  const words = document.querySelector("[data-boot] p");
+  if (words !== null) words.textContent = text;
+}
+
+/** Once: someone has taken the page in hand. */
+function whenTouched(then: () => void): void {
+  const touched = new AbortController();
+  const options = { capture: true, passive: true, signal: touched.signal };
+  const touch = () => {
+    touched.abort();
+    then();
+  };
+  for (const kind of ["pointerdown", "wheel", "keydown"]) addEventListener(kind, touch, options);
 }
 
 async function open(parent: HTMLElement): Promise<Viewer> {
   checkWebGl2();
+  sayAtStart("Reading the bundle");
   const bundle = await loadBundle(bundleAddress(location.href));
   const { manifest } = bundle;
   document.title = `${manifest.specimen.name} · StereoCell`;
@@ -45,12 +74,13 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   stage.role = "img";
   const progress = new ProgressBar();
   const notices = new Notices(
-    (text) => viewer.dispatch({ type: "dismiss", text }),
+    (texts) => viewer.dispatch({ type: "dismiss", texts }),
     () => viewer.run("retry"),
   );
-  const said = new Said();
   const stereoButton = new StereoButton();
-  const over = [progress.root, said.root, notices.root, stereoButton.root];
+  const isTouch = matchMedia("(pointer: coarse)").matches;
+  const hint = new FirstHint(isTouch);
+  const over = [hint.root, progress.root, said.root, notices.root, stereoButton.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   const viewer: Viewer = new Viewer(
@@ -74,11 +104,42 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(location.search, location.hash);
+  whenTouched(() => {
+    viewer.stopTurning();
+    hint.leave();
+  });
   const support = await findXrSupport(navigator.xr, isSecureContext);
   controller.setStereo(support);
-  const way = wayToStereo(support, matchMedia("(pointer: coarse)").matches);
+  const way = wayToStereo(support, isTouch);
   stereoButton.offer(way, () => way && controller.perform(way));
+  const flight_s = flightAsked(location.search);
+  if (flight_s !== null) await offerBench(viewer, parent, flight_s, support.isAvailable);
   return viewer;
+}
+
+/** The benchmark, a part of the page that few ask for. */
+async function offerBench(
+  viewer: Viewer,
+  parent: HTMLElement,
+  flight_s: number,
+  hasHeadset: boolean,
+): Promise<void> {
+  const [{ benchCard }, { subjectOf }] = await Promise.all([
+    import("../bench/page"),
+    import("./bench_subject"),
+  ]);
+  const card = benchCard(flight_s, {
+    subject: subjectOf(viewer),
+    stereo: hasHeadset ? ["headset", "split"] : ["split"],
+    startStereo: async (kind) => {
+      if (kind === "split") await viewer.startSplit(CARDBOARD_V2);
+      else if (navigator.xr !== undefined) await viewer.stereo.headset.start(navigator.xr);
+    },
+    onReport: (report) => {
+      api.bench = report;
+    },
+  });
+  parent.append(card);
 }
 
 async function enterStereo(viewer: Viewer): Promise<void> {
@@ -118,10 +179,16 @@ void opened.then(
   },
   () => undefined, // reported above
 );
-void ready.then(keepOffline, () => undefined);
+const sayReady = () => said.say("Ready offline: what has been shown opens without a network, too.");
+void ready.then(
+  () => keepOffline(sayReady),
+  () => undefined,
+);
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 watchWaiting((isWaiting) =>
-  viewer?.dispatch({ type: isWaiting ? "notify" : "dismiss", text: WAITING }),
+  viewer?.dispatch(
+    isWaiting ? { type: "notify", text: WAITING } : { type: "dismiss", texts: [WAITING] },
+  ),
 );
 ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 
@@ -135,6 +202,7 @@ addEventListener("unhandledrejection", (event) => reportBug(event.reason));
 
 const api: StereoCellApi = {
   apiVersion: 1,
+  bench: null,
   ready,
   get frames() {
     return viewer?.frames ?? 0;

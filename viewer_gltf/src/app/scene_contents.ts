@@ -3,12 +3,14 @@ import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
 import { memoryBudget } from "../gpu/memory_budget";
+import type { Box } from "../math/box";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import { SliceImages } from "../slices/slice_images";
 import { SlicePlanes } from "../slices/slice_planes";
 import type { Action } from "../state/actions";
+import { isTraced } from "../state/parameters/volumes";
 import { wantedTiles } from "../state/representation";
 import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
@@ -48,7 +50,7 @@ export class Contents {
   private readonly ahead = new Vector3();
   private readonly loader: SurfaceLoader;
   /** Volumes come after the first picture of all tiles. */
-  private hasOverview = false;
+  hasOverview = false;
 
   constructor(options: ContentsOptions) {
     const { bundle, renderer, picture, onChange, onError } = options;
@@ -56,7 +58,7 @@ export class Contents {
     this.loader = new SurfaceLoader(renderer);
     const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
     const budget = memoryBudget(navigator);
-    const limits = { bytes: budget.volumes, side };
+    const limits = { bytes: budget.volumes, side, edge: Number.POSITIVE_INFINITY };
     this.bricks =
       bundle.bricks === undefined
         ? null
@@ -87,7 +89,7 @@ export class Contents {
       manifest: bundle.manifest,
       base: bundle.base,
       surfaces: () => this.surfaces.meshes,
-      volumes: () => [...this.volumes.shown(), ...this.traced.shown()],
+      volumes: () => (this.traced.isShown ? this.traced.shown() : this.volumes.shown()),
       source: (tile: string, channel: string) => this.volumes.source(tile, channel),
       sourceOf: (tile: string, channel: string) => this.volumes.sourceOf(tile, channel),
       dispatch: options.dispatch,
@@ -117,7 +119,9 @@ export class Contents {
   }
 
   follow(state: ViewerState, { focusTiles, mayRefine }: Hybrid): void {
-    const wanted = this.hasOverview ? wantedTiles(state, focusTiles) : [];
+    // a host that sends bricks sends those of a tile to one place
+    const isMarched = this.hasOverview && !(isTraced(state) && this.bricks !== null);
+    const wanted = isMarched ? wantedTiles(state, focusTiles) : [];
     for (const channel of volumeChannels(state))
       if (isTwoD(channel)) this.transferFunctions2d.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);
@@ -136,6 +140,18 @@ export class Contents {
     this.transferFunctions2d.retryFailed();
     this.slices.retryFailed();
     this.marks.readAnew();
+  }
+
+  /** Draw volumes of at most so many voxels along a tile's edge; then `follow`. */
+  limitEdge(edge: number): void {
+    this.volumes.limitEdge(edge);
+    this.traced.limitEdge(edge);
+  }
+
+  /** The box round all that shows, um, as far as it is known: a volume may fill all of its box. */
+  occupied({ channels }: ViewerState): Box | null {
+    const isAllSurface = channels.every(({ shown, hasSurface }) => !shown || hasSurface);
+    return isAllSurface ? this.surfaces.bounds : null;
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -4,7 +4,7 @@
  */
 import { Quaternion, Vector3 } from "three";
 import type { Navigation } from "../interaction/orbit_camera";
-import type { HandPose, SpecimenPose } from "../math/grab";
+import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
 import { XR_DISTANCE_M } from "../render/placement";
 import { intoRoom, ontoScreen } from "../render/screen_to_room";
 import type { Specimen } from "../render/specimen_pose";
@@ -19,15 +19,22 @@ export class StereoTransition {
     private readonly specimen: Specimen,
   ) {}
 
-  /** The specimen turns the same side to the head as to the screen, what was looked at ahead. */
-  enter(): void {
+  /**
+   * The specimen turns the same side to the head as to the screen, what was looked at ahead.
+   *
+   * @param larger than it opens, unless someone has made it as large as it is
+   */
+  enter(larger = 1): void {
     const { navigation, specimen } = this;
+    navigation.stopTurning();
     navigation.controls.enabled = false;
     const ahead_m = new Vector3(0, 0, -XR_DISTANCE_M);
     const onScreen = this.poseOnScreen;
     const pose = intoRoom(specimen.pose, this.screenHold, ahead_m);
     specimen.anchorAt(ahead_m);
-    if (navigation.look !== null || onScreen !== null) specimen.moveTo(pose, new Vector3());
+    const sized = onScreen === null ? zoomAbout(pose, ahead_m, larger) : pose;
+    const isOther = !navigation.isStraight || onScreen !== null || larger !== 1;
+    if (isOther) specimen.moveTo(sized, new Vector3());
     this.entered = { inRoom: specimen.pose, onScreen };
   }
 
@@ -80,7 +87,7 @@ export class StereoTransition {
     const { anchor, home, isMoved, pose } = this.specimen;
     if (entered === null) return isMoved ? pose : null;
     if (pose === entered.inRoom) return entered.onScreen; // nobody has moved it there
-    if (!isMoved && navigation.look === null) return null;
+    if (!isMoved && navigation.isStraight) return null;
     return ontoScreen(isMoved ? pose : home, this.screenHold, anchor);
   }
 }

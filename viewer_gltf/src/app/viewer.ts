@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Vector2, Vector3, WebGLRenderer } from "three";
+import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
@@ -11,7 +11,7 @@ import { pathThrough, turntable } from "../capture/camera_path";
 import type { Caption } from "../capture/caption";
 import { type FilmedFile, FRAMES_PER_S } from "../capture/encode_video";
 import { legendOf } from "../capture/legend";
-import { Navigation } from "../interaction/orbit_camera";
+import { Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import { sharesOf, turnedBy } from "../math/slice_frame";
@@ -32,6 +32,8 @@ import { isSameView, keyOfChange, nameOfChange } from "../state/history";
 import { initialState } from "../state/initial_state";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
+import { START_TOOLS } from "../state/parameters/tools";
+import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
@@ -47,6 +49,8 @@ import { StereoTransition } from "./stereo_transition";
 
 /** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
+/** The switch distance of the opening at least, as a multiple of the eye's from the middle. */
+const NEAR_AT_START = 1.1;
 
 /** Length of a video: once round, and from one kept view to the next, s. */
 const ROUND_S = 6;
@@ -64,6 +68,8 @@ export class Viewer {
   state: ViewerState;
   /** The content of a panel in the room; the owner of the panel sets it. */
   layOut: (view: PanelView) => Layout = () => NO_LAYOUT;
+  /** Of this screen; null: guessed from the browser's name. */
+  cssPixelsPerInch: number | null = null;
   /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;
   readonly contents: Contents;
@@ -185,7 +191,7 @@ export class Viewer {
       this.contents.traced.forget();
       this.loop.renew(); // the times that were asked for went, too
       this.follow();
-      this.dispatch({ type: "dismiss", text: lost });
+      this.dispatch({ type: "dismiss", texts: [lost] });
     });
     addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
@@ -200,10 +206,12 @@ export class Viewer {
     const notice = newNotice(this.state, next);
     const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
+    const larger = next.specimenSize_m / this.state.specimenSize_m;
     if (action.type !== "restore" && !isSameView(this.state, next)) {
       this.steps.add(nameOfChange(action, this.state), keyOfChange(action));
     }
     this.state = next;
+    if (larger !== 1) this.stereo.resize(larger, next);
     if (notice !== null) this.stereo.announce(notice);
     if (announcement !== null) this.onAnnounce(announcement);
     this.follow();
@@ -375,6 +383,30 @@ export class Viewer {
     return this.transition.cameraView;
   }
 
+  /**
+   * Open the view: as the address has it, or with what there is of the specimen in the picture, near
+   * enough for volumes, and slowly turning until someone touches it.
+   */
+  openWith(stand: Stand | null, saysDistance: boolean): void {
+    const { navigation } = this;
+    this.fit(); // the panel has its place by now
+    if (stand !== null) navigation.openAt(stand);
+    else {
+      const away_m = NEAR_AT_START * navigation.openingDistance_m;
+      const isFar = away_m > this.state.switchDistance_m;
+      if (isFar && !saysDistance) this.dispatch(setTo(SWITCH_DISTANCE, away_m));
+      // light is gathered while nothing moves
+      const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+      if (!isCalm && !isTraced(this.state)) navigation.turnSlowly();
+    }
+    this.loop.change();
+  }
+
+  /** Someone has touched the page. */
+  stopTurning(): void {
+    this.navigation.stopTurning();
+  }
+
   lookFrom(view: CameraView): void {
     this.transition.lookFrom(view);
     this.loop.change();
@@ -388,6 +420,7 @@ export class Viewer {
       overview: surfaces.overview,
       isLoading: this.contents.isLoading,
       triangles: surfaces.triangles,
+      drawCalls: this.renderer.info.render.calls,
       volumes: volumes.status(),
       volumeBytes: volumes.bytes,
       traced: this.contents.traced.status(),
@@ -409,6 +442,22 @@ export class Viewer {
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
     return this.loop.settled();
+  }
+
+  /** Resolves when the next frame has been drawn. */
+  nextFrame(): Promise<void> {
+    return this.loop.nextFrame();
+  }
+
+  /** Draw volumes of at most so many voxels along a tile's edge. */
+  limitEdge(edge: number): void {
+    this.contents.limitEdge(edge);
+    this.follow();
+  }
+
+  /** Pose of the head in the room, or of the mono camera. */
+  get head(): Matrix4 {
+    return this.loop.head;
   }
 
   report(error: unknown): void {
@@ -454,7 +503,7 @@ export class Viewer {
 
   /** Ask again for all that has failed. */
   private retry(): void {
-    for (const text of this.state.mendable) this.dispatch({ type: "dismiss", text });
+    this.dispatch({ type: "dismiss", texts: this.state.mendable });
     this.contents.retryFailed();
     this.follow();
   }
@@ -466,7 +515,12 @@ export class Viewer {
   }
 
   private follow(): void {
-    const { isolated, selected, quality } = this.state;
+    const { isolated, selected, quality, eyeDistance_mm, stereoStrength } = this.state;
+    this.stereo.setEyes({
+      distance_m: eyeDistance_mm / 1000,
+      strength: stereoStrength,
+      cssPixelsPerInch: this.cssPixelsPerInch,
+    });
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
@@ -495,7 +549,7 @@ export class Viewer {
   }
 
   private enterStereo(): void {
-    this.transition.enter();
+    this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m);
     this.onState(this.state);
   }
 

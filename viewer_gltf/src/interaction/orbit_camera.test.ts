@@ -21,6 +21,7 @@ describe("a glide", () => {
   it("takes as long at few frames a second as at many, and ends at the same place", () => {
     const ways = [60, 10, 5].map((frames) => {
       const navigation = start();
+      navigation.openAt("front");
       navigation.update(1 / frames);
       navigation.controls.rotateLeft(0.6); // moves by its own share of a frame at once
       const first = azimuth(navigation);
@@ -39,5 +40,63 @@ describe("a glide", () => {
       expect(later).toBeCloseTo(1 - 0.88 ** 24, 2);
       expect(end).toBeCloseTo(1, 4);
     }
+  });
+});
+
+const eye = ({ camera }: Navigation) => camera.position.toArray().map((v) => Number(v.toFixed(6)));
+
+describe("the opening", () => {
+  it("turns slowly to and fro until someone moves, and stays where it is then", () => {
+    const navigation = start();
+    const still = azimuth(navigation);
+    navigation.turnSlowly();
+    const away: number[] = [];
+    const turned = Array.from({ length: 120 }, () => {
+      navigation.update(0.5);
+      away.push(navigation.camera.position.distanceTo(navigation.controls.target));
+      return azimuth(navigation) - still;
+    });
+    expect(Math.max(...turned)).toBeCloseTo(Math.PI / 10, 1);
+    expect(Math.min(...turned)).toBeCloseTo(-Math.PI / 10, 1);
+    expect(navigation.openingDistance_m).toBeGreaterThan(Math.max(...away) - 1e-3);
+    expect(navigation.openingDistance_m).toBeLessThan(Math.max(...away) + 0.01);
+    navigation.update(3);
+    const before = eye(navigation);
+    expect(navigation.look).not.toBeNull(); // a link has to say where it is
+    navigation.stopTurning();
+    navigation.update(5);
+    expect(eye(navigation)).toEqual(before);
+    expect(navigation.look).not.toBeNull();
+    navigation.reset();
+    expect(azimuth(navigation)).toBeCloseTo(still);
+    expect(navigation.look).toBeNull();
+  });
+
+  it("is framed on what there is of the specimen, and follows the window's shape", () => {
+    const navigation = start();
+    const far = navigation.camera.position.length();
+    navigation.surround({ min: [0, -16, 0], max: [16, 0, 8] }); // a corner, a third as large
+    const { target } = navigation.controls;
+    expect(target.x).toBeLessThan(0);
+    expect(target.y).toBeGreaterThan(0);
+    const near = navigation.camera.position.distanceTo(target);
+    expect(near).toBeLessThan(far / 2);
+    navigation.fit(0.5);
+    expect(navigation.camera.position.distanceTo(target)).toBeGreaterThan(1.2 * near);
+  });
+
+  it("may be another view, which is then the one to return to", () => {
+    const navigation = start();
+    navigation.openAt("front");
+    navigation.turnSlowly();
+    navigation.update(4);
+    expect(eye(navigation).slice(0, 2)).toEqual([0, 0]);
+    expect(navigation.look).toBeNull();
+    expect(navigation.run("side")).toBe(true);
+    expect(navigation.look).not.toBeNull();
+    navigation.fit(0.5); // it follows the window's shape, too
+    expect(eye(navigation)[0]).toBeGreaterThan(1);
+    navigation.reset();
+    expect(eye(navigation).slice(0, 2)).toEqual([0, 0]);
   });
 });

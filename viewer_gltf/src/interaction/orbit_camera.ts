@@ -6,6 +6,8 @@
  */
 import { PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { type Box, centerOf } from "../math/box";
+import { distanceToFrame, openingView, towardsEye } from "../render/opening_view";
 import { distanceToSee, framingDistance, type Placement } from "../render/placement";
 import type { Command } from "../state/commands";
 
@@ -20,6 +22,16 @@ const ZOOM = 0.8;
 /** Move by one key press, as a share of the picture's height. */
 const PAN = 0.1;
 
+/** The turn that a specimen opens with: so far to either side, and the time to and fro, s. */
+const SWAY_RAD = Math.PI / 10;
+const SWAY_S = 30;
+/** Parts of it at which the eye may be farthest. */
+const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
+
+/** A view that has a name: it follows the window's shape as long as nobody moves. */
+export const STANDS = ["opening", "front", "side", "top"] as const;
+export type Stand = (typeof STANDS)[number];
+
 /** Metres of the room. */
 export type Look = Readonly<{
   position: readonly [number, number, number];
@@ -29,9 +41,17 @@ export type Look = Readonly<{
 export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;
-  /** Whether the start view still holds: then it follows the window's shape. */
-  private isHome = true;
+  /** The view that `reset` returns to. */
+  private home: Stand = "opening";
+  /** The view that still holds; null: someone has moved. */
+  private stand: Stand | null = "opening";
+  /** Since the turn of the opening began, s; null: there is none. */
+  private swayed_s: number | null = null;
   private readonly reach: Vector3;
+  /** What is there of the specimen, room: the opening is framed on it. */
+  private occupied: Box;
+  /** The same as it was told. */
+  private surrounded = "";
 
   constructor(
     canvas: HTMLElement,
@@ -39,6 +59,8 @@ export class Navigation {
     onChange: () => void,
   ) {
     this.reach = new Vector3(...placement.size).multiplyScalar(0.5);
+    const { x, y, z } = this.reach;
+    this.occupied = { min: [-x, -y, -z], max: [x, y, z] };
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
     this.controls.minDistance = NEAREST_M;
@@ -48,12 +70,16 @@ export class Navigation {
       onChange();
     });
     this.controls.addEventListener("start", () => {
-      this.isHome = false;
+      this.stand = null;
     });
   }
 
   /** Go on with a glide, as long in seconds however few the frames; after so many of them. */
   update(dt_s: number): void {
+    if (this.swayed_s !== null) {
+      this.swayed_s += dt_s;
+      this.standAt("opening");
+    }
     this.controls.dampingFactor = 1 - LEFT_AFTER_A_SECOND ** dt_s;
     this.controls.update();
     this.camera.updateMatrixWorld();
@@ -63,18 +89,59 @@ export class Navigation {
   fit(aspect: number): void {
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
-    if (this.isHome) this.reset();
+    if (this.stand !== null) this.standAt(this.stand);
   }
 
-  /** The whole specimen from the front: x to the right, y up. */
+  /** The whole specimen as it opens. */
   reset(): void {
-    this.lookFrom({ position: [0, 0, this.framing(2)], target: [0, 0, 0] });
-    this.isHome = true;
+    this.stopTurning();
+    this.standAt(this.home);
+  }
+
+  /** Open with another view than the usual one. */
+  openAt(stand: Stand): void {
+    this.home = stand;
+    this.reset();
+  }
+
+  /** What is there of the specimen, um: the opening is framed on that. null: not known yet. */
+  surround(box: Box | null): void {
+    if (box === null || this.surrounded === JSON.stringify(box)) return;
+    this.surrounded = JSON.stringify(box);
+    const { min, max } = box;
+    const { center, scale } = this.placement;
+    const inRoom = (at: Box["min"]): Box["min"] => {
+      const [x, y, z] = at.map((v, i) => (v - center[i]) * scale);
+      return [x, y, z];
+    };
+    this.occupied = { min: inRoom(min), max: inRoom(max) };
+    if (this.stand !== null) this.standAt(this.stand);
+  }
+
+  /** Turn slowly to and fro, as long as nobody moves and the opening holds. */
+  turnSlowly(): void {
+    if (this.stand === "opening") this.swayed_s = 0;
+  }
+
+  /** The view stays where the turn has brought it. */
+  stopTurning(): void {
+    if (this.swayed_s === null) return;
+    this.swayed_s = null;
+    this.stand = null;
+  }
+
+  get isTurning(): boolean {
+    return this.swayed_s !== null;
   }
 
   /** null: the start view, which follows the window's shape. */
   get look(): Look | null {
-    return this.isHome ? null : this.lookNow;
+    return this.stand === this.home && !this.isTurning ? null : this.lookNow;
+  }
+
+  /** Whether the specimen is seen as a room has it that nobody has turned. */
+  get isStraight(): boolean {
+    return this.stand === "front";
   }
 
   get lookNow(): Look {
@@ -82,7 +149,12 @@ export class Navigation {
   }
 
   lookFrom({ position, target }: Look): void {
-    this.isHome = false;
+    this.stand = null;
+    this.swayed_s = null;
+    this.place({ position, target });
+  }
+
+  private place({ position, target }: Look): void {
     this.controls.target.fromArray(target).clamp(this.reach.clone().negate(), this.reach);
     this.camera.position.fromArray(position);
     this.camera.up.set(0, 1, 0);
@@ -106,13 +178,10 @@ export class Navigation {
   run(command: Command): boolean {
     switch (command) {
       case "front":
-        this.reset();
-        return true;
       case "side":
-        this.lookFrom({ position: [this.framing(0), 0, 0], target: [0, 0, 0] });
-        return true;
       case "top":
-        this.lookFrom({ position: [0, this.framing(1), 1e-4], target: [0, 0, 0] });
+        this.swayed_s = null;
+        this.standAt(command);
         return true;
       case "zoom-in":
         this.move(0, 0, ZOOM);
@@ -155,6 +224,40 @@ export class Navigation {
     const beyond = target.clone();
     target.clamp(this.reach.clone().negate(), this.reach);
     this.camera.position.add(target).sub(beyond);
+  }
+
+  private standAt(stand: Stand): void {
+    this.place(this.lookAt(stand));
+    this.stand = stand;
+  }
+
+  /** The whole specimen: x to the right and y up from the front. */
+  private lookAt(stand: Stand): Look {
+    const target = [0, 0, 0] as const;
+    if (stand === "opening") return this.lookAround(this.swayed_s ?? 0);
+    if (stand === "front") return { position: [0, 0, this.framing(2)], target };
+    if (stand === "side") return { position: [this.framing(0), 0, 0], target };
+    return { position: [0, this.framing(1), 1e-4], target };
+  }
+
+  /** The opening after so much of its turn. */
+  private lookAround(swayed_s: number): Look {
+    const lens = { fov_rad: (FIELD_OF_VIEW_DEG * Math.PI) / 180, aspect: this.camera.aspect };
+    const still = openingView(this.occupied, lens);
+    const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
+    const direction = { ...still, aside_rad: still.aside_rad + sway_rad };
+    const distance = Math.min(FARTHEST_M, distanceToFrame(this.occupied, direction, lens));
+    const middle = centerOf(this.occupied);
+    const [x, y, z] = towardsEye(direction).map((v, i) => middle[i] + v * distance);
+    return { position: [x, y, z], target: middle };
+  }
+
+  /** Farthest distance of the eye from the middle during the opening's turn. */
+  get openingDistance_m(): number {
+    const looks = TURNED.map((part) => this.lookAround(part * SWAY_S));
+    return Math.max(
+      ...looks.map(({ position, target }) => Math.hypot(...position.map((v, i) => v - target[i]))),
+    );
   }
 
   private framing(axis: 0 | 1 | 2): number {

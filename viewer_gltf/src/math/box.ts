@@ -11,6 +11,13 @@ export function centerOf({ min, max }: Box): Vec3 {
   return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
 }
 
+/** The box round two. */
+export function around(a: Box, b: Box): Box {
+  const [x0, y0, z0] = a.min.map((v, i) => Math.min(v, b.min[i]));
+  const [x1, y1, z1] = a.max.map((v, i) => Math.max(v, b.max[i]));
+  return { min: [x0, y0, z0], max: [x1, y1, z1] };
+}
+
 /**
  * The part of a ray's span inside a box; null: nothing. A box may be flat: then entry and exit
  * are the same. Every frame asks for thousands: nothing is made but the answer.

@@ -16,8 +16,10 @@ export function canKeep(page: string, isSecure: boolean): boolean {
  * Start the service worker and hand it what was loaded before; for after the first picture. Sets
  * `data-offline="ready"` on the page's root once all that was shown is kept, or "refused" where the
  * browser keeps nothing, as on a full disk: the viewer then works as before.
+ *
+ * @param onReady called once on the visit that made it so
  */
-export async function keepOffline(): Promise<void> {
+export async function keepOffline(onReady: () => void): Promise<void> {
   const { serviceWorker } = navigator as { serviceWorker?: ServiceWorkerContainer };
   const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
   if (!isAble || serviceWorker === undefined) {
@@ -36,11 +38,18 @@ export async function keepOffline(): Promise<void> {
   const { port1, port2 } = new MessageChannel();
   port1.onmessage = ({ data }: MessageEvent<boolean>) => {
     document.documentElement.dataset.offline = data ? "ready" : "refused";
+    if (data && !wasServed) onReady();
     port1.close();
   };
   // Requests from now on pass the worker; the page reports the earlier ones to it.
   const asked = takeAsked();
-  const message: Opened = { type: "opened", page: location.href, asked: wasServed ? [] : asked };
+  const loaded = performance.getEntriesByType("resource").map(({ name }) => name);
+  const message: Opened = {
+    type: "opened",
+    page: location.href,
+    asked: wasServed ? [] : asked,
+    loaded,
+  };
   active?.postMessage(message, [port2]);
 }
 

@@ -11,7 +11,14 @@ import { Store } from "./store";
  * A page's report of its first picture. The answer, on the port, comes once all is
  * kept: whether the page would open without a network.
  */
-export type Opened = Readonly<{ type: "opened"; page: string; asked: readonly Asked[] }>;
+export type Opened = Readonly<{
+  type: "opened";
+  page: string;
+  /** Of the bundle, before this worker answered. */
+  asked: readonly Asked[];
+  /** Addresses of all that the page has loaded, the viewer's own parts among them. */
+  loaded: readonly string[];
+}>;
 
 // TypeScript's types of pages and of service workers exclude each other; this is what is used here.
 type Extendable = Event & { waitUntil(work: Promise<unknown>): void };
@@ -98,9 +105,11 @@ worker.addEventListener("fetch", (event) => {
 
 worker.addEventListener("message", (event) => {
   if (event.data.type !== "opened") return;
-  const { page, asked } = event.data;
+  const { page, asked, loaded } = event.data;
   const adopt = async () => {
     const keeper = await opened;
+    // a part that decodes textures has others, which its own worker has loaded unseen
+    if (loaded.some(isOptional)) await keeper?.keepViewer(FILES.filter(isOptional));
     await keeper?.adopt(page, asked).catch(() => undefined); // the network went; the next visit does
     await keeper?.save();
     event.ports[0]?.postMessage(keeper?.hasPage === true);

@@ -43,6 +43,7 @@ function baseOf<On>(row: Parameter<On>, on: On, channel?: string) {
     id: channel === undefined ? row.id : `${channel}/${row.id}`,
     label: row.label,
     ...(row.name === undefined ? {} : { name: row.name(on) }),
+    ...(row.about === undefined ? {} : { about: row.about }),
     ...(row.refusal === undefined ? {} : { refusal: row.refusal(on) }),
   };
 }

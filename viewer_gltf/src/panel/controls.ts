@@ -89,6 +89,8 @@ type Base = Readonly<{
   name?: string;
   /** Why it can't be used; "" or absent: it can. */
   refusal?: string;
+  /** What it does, in a sentence under it. */
+  about?: string;
   /** Whether the refusal is always in view. */
   showsReason?: boolean;
 }>;

@@ -7,6 +7,7 @@ import { CHANNEL } from "../state/parameters/channel";
 import { LIGHT_NUMBERS } from "../state/parameters/light";
 import { SLICE_NUMBERS } from "../state/parameters/slices";
 import { PARAMETERS } from "../state/parameters/table";
+import { STEREO_NUMBERS } from "../state/parameters/tools";
 import { reduce } from "../state/reduce";
 import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
@@ -120,14 +121,16 @@ describe("the keys", () => {
     expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));
   });
 
-  it("reach every parameter, the light's numbers by three keys", () => {
+  it("reach every parameter, the light's and stereo's numbers by three keys", () => {
     const wishes = ALL.flatMap(({ to, keys }) => keys.map((name) => to(CONTEXT, name)));
     const set = new Set(
       wishes.flatMap((wish) =>
         wish !== null && typeof wish !== "string" && "id" in wish ? [wish.id] : [],
       ),
     );
-    const turned = new Set<string>([...LIGHT_NUMBERS, ...SLICE_NUMBERS].map(({ id }) => id));
+    const turned = new Set<string>(
+      [...LIGHT_NUMBERS, ...SLICE_NUMBERS, ...STEREO_NUMBERS].map(({ id }) => id),
+    );
     // the choice of a tone map and lamps' colours are the panel's alone
     const others = PARAMETERS.filter(
       ({ id, kind }) => !turned.has(id) && kind !== "colour" && id !== "trace-tone-map",

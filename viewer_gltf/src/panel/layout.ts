@@ -2,8 +2,10 @@
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MAX_DISC_TILES } from "../state/focus_tiles";
+import { groupNotices } from "../state/notice_groups";
 import { QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { VOLUMES } from "../state/parameters/volumes";
+import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
@@ -146,13 +148,14 @@ function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Contro
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
 function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
-  const items = notices.slice(-MOST_NOTICES).flatMap((text, i): Control[] => [
+  const groups = groupNotices(notices).slice(-MOST_NOTICES);
+  const items = groups.flatMap(({ text, of }, i): Control[] => [
     { kind: "text", id: `notice-${i}`, label: "Notice", value: text },
     {
       kind: "button",
       id: `dismiss-${i}`,
       label: "Dismiss",
-      to: () => ({ type: "dismiss", text }),
+      to: () => ({ type: "dismiss", texts: of }),
     },
   ]);
   return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
@@ -208,11 +211,19 @@ function frameText(frame_ms: number | null): string {
   return frame_ms === null ? "" : `${frame_ms.toFixed(frame_ms < 10 ? 1 : 0)} ms`;
 }
 
+/** How far a path-traced picture is, in whole samples. */
+function samplesText(samples: number): string {
+  const whole = Math.floor(samples);
+  if (whole < 1) return "first paths of light";
+  if (whole >= ENOUGH_SAMPLES) return `all ${ENOUGH_SAMPLES} samples of light`;
+  return `${whole} of ${ENOUGH_SAMPLES} samples of light`;
+}
+
 function statusOf({ triangles, volumeLevel, samples, frame_ms, isLoading }: Facts): string {
   return [
     `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`,
     volumeLevel === null ? "" : `volume level ${volumeLevel}`,
-    samples === null ? "" : `${samples} samples`,
+    samples === null ? "" : samplesText(samples),
     frameText(frame_ms),
     isLoading ? "refining …" : "",
   ]

@@ -5,6 +5,7 @@ import type { Action } from "../state/actions";
 import type { SetAction } from "../state/parameters/kinds";
 import { channelParameterOf, parameterOf } from "../state/parameters/table";
 import { TOOL } from "../state/parameters/tools";
+import { tileName } from "../state/tile_name";
 import { shapesOf } from "../state/transfer_functions_2d";
 import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
@@ -58,9 +59,9 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
       if (action.id === TOOL.id && state.tool === "measure") return measuredText(state);
       return parameterOf(action.id).spoken(state);
     case "select":
-      return action.tile === null ? "No tile chosen" : `Tile ${action.tile}`;
+      return action.tile === null ? "No tile chosen" : `Tile: ${tileName(action.tile)}`;
     case "isolate":
-      return action.tile === null ? "All tiles" : `Only tile ${action.tile}`;
+      return action.tile === null ? "All tiles" : `Only ${tileName(action.tile)}`;
     case "measure":
     case "add-point":
       return measuredText(state);

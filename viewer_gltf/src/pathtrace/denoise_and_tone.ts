@@ -7,12 +7,13 @@ import {
   Matrix4,
   type Texture,
   Vector3,
+  Vector4,
   type WebGLRenderer,
   type WebGLRenderTarget,
 } from "three";
 import type { Eyes } from "../gpu/eyes";
 import { byteTarget, floatTarget, nothing } from "../gpu/float_targets";
-import { drawEyes } from "../gpu/offscreen_target";
+import { drawEyes, partOf } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import type { TraceSettings } from "../state/path_trace_settings";
 import { areSame, type TraceView } from "./eye_rays";
@@ -21,6 +22,13 @@ import { TRACE_DENOISE, TRACE_MEAN, TRACE_SHOW, TRACE_WARP } from "./shaders/sou
 /** Samples with which a pixel is left as it is: see denoise.frag.glsl. */
 const DENOISED = 192;
 const DENOISE_GAPS = [1, 2, 4] as const;
+
+/** A marched picture of the same view, linear and premultiplied. */
+export type Marched = Readonly<{
+  picture: Texture;
+  /** Its pixels to one of the frame buffer. */
+  scale: number;
+}>;
 
 export class DenoiseAndTone {
   /** Encoded, premultiplied. */
@@ -61,6 +69,9 @@ export class DenoiseAndTone {
     uSharpness: { value: 0 },
     uIsFilmic: { value: true },
     uTone: { value: new Vector3(0, 1, 0) },
+    uGuide: nothing(),
+    uMarched: nothing(),
+    uMarchedPart: { value: new Vector4() },
   });
 
   /** @param size um: what is gathered from now on is of another box */
@@ -107,13 +118,23 @@ export class DenoiseAndTone {
     this.shown = [];
   }
 
-  /** Make the picture of what was developed, as these eyes see it; if that differs. */
+  /** Whether the picture is of paths that began there. */
+  isOf(views: readonly TraceView[]): boolean {
+    return areSame(this.began, views);
+  }
+
+  /**
+   * Make the picture of what was developed, as these eyes see it; if that differs.
+   *
+   * @param standIn what is shown where pixels have few samples
+   */
   show(
     renderer: WebGLRenderer,
     eyes: Eyes,
     views: readonly TraceView[],
     settings: TraceSettings,
     isOther: boolean,
+    standIn: Marched | null = null,
   ): void {
     const { began, showPass, scale } = this;
     if (began.length !== views.length) return;
@@ -129,8 +150,12 @@ export class DenoiseAndTone {
     if (isPostOn) {
       uniforms.uTone.value.set(settings.hue / 360, settings.saturation, settings.lightness);
     }
-    drawEyes(renderer, showPass.scene, eyes, this.picture, scale, (_, part) => {
+    uniforms.uGuide.value = this.mean.textures[1];
+    uniforms.uMarched.value = standIn?.picture ?? null;
+    drawEyes(renderer, showPass.scene, eyes, this.picture, scale, (eye, part) => {
       showPass.uPart.value.copy(part);
+      if (standIn === null) uniforms.uMarchedPart.value.setZ(0);
+      else partOf(eye, standIn.scale, uniforms.uMarchedPart.value);
     });
   }
 

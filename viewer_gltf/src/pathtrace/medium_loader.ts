@@ -6,7 +6,7 @@ import type { Data3DTexture } from "three";
 import { decodeTexels } from "../bundle/decode";
 import type { Size3 } from "../bundle/ktx2";
 import { LoadQueue } from "../volumes/load_queue";
-import { levelsToFetch, texels as texelsOf } from "../volumes/mip_levels";
+import { levelsToFetch, texels as texelsOf, type VolumeLimits } from "../volumes/mip_levels";
 import type { VolumeSource } from "../volumes/volume_source";
 import { stride, volumeTexture } from "../volumes/volume_texture";
 import type { Assembled, AssembleRequest, Part } from "./assemble_tiles";
@@ -46,7 +46,7 @@ export class MediumLoader {
   async load(
     channels: readonly ChannelSources[],
     tiles: readonly string[],
-    limits: Readonly<{ bytes: number; side: number }>,
+    limits: VolumeLimits,
     signal: AbortSignal,
     onLevel: (texels: MediumTexels) => void,
   ): Promise<void> {
@@ -57,7 +57,9 @@ export class MediumLoader {
     const parts = volumes.filter(({ tile }) => frame.places.has(tile));
     const share = limits.bytes / stride(channels.length) / parts.length;
     const isWithin = (level: number) => Math.max(...coarser(frame.size, level)) <= limits.side;
-    const wanted = levelsToFetch(parts[0].levels, share, limits.side).filter(isWithin);
+    const wanted = levelsToFetch(parts[0].levels, share, Math.min(limits.side, limits.edge)).filter(
+      isWithin,
+    );
     const [coarsest = parts[0].levels.length - 1] = wanted;
     for (const level of new Set([coarsest, wanted.at(-1) ?? coarsest])) {
       const made = await Promise.all(

@@ -24,7 +24,7 @@ import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings
 import { brickCounts } from "../volumes/skip_bricks";
 import { ENTRIES } from "../volumes/transfer_luts";
 import { tablesInto } from "../volumes/transfer_table_2d";
-import { DenoiseAndTone } from "./denoise_and_tone";
+import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import {
   coarserMajorants,
@@ -68,7 +68,14 @@ export type Gathering = Readonly<{
   mayTremble: boolean;
   /** Paths are shorter: a picture that moves has to be quick. */
   isDraft: boolean;
+  /** What stands in for pixels that have few samples of this view; null: nothing can. */
+  standIn?: Marched | null;
 }>;
+
+/** Samples with which nothing stands in for any pixel: see tone_map.frag.glsl. */
+const STOOD_IN = 5;
+/** Parts of a sample that are shown as they come. */
+const SHOWN_PARTS = 8;
 
 export class Tracer {
   /** Samples of a pixel since the picture began anew; tiles that rest have fewer. */
@@ -95,6 +102,8 @@ export class Tracer {
   private key = "";
   private gatheredScale = 1;
   private isDraft = false;
+  /** Whether a marched picture stands in for pixels with few samples. */
+  isStoodIn = false;
   private readonly pathPass: ScreenPass<TraceUniforms>;
   private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
 
@@ -212,7 +221,7 @@ export class Tracer {
     eyes: Eyes,
     scene: TraceScene,
     settings: TraceSettings,
-    { scale, passes, mayTremble, isDraft }: Gathering,
+    { scale, passes, mayTremble, isDraft, standIn = null }: Gathering,
   ): void {
     if (this.texels === null) return;
     const { frame } = this.texels;
@@ -247,15 +256,22 @@ export class Tracer {
       const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
       if (isDue) this.judge(renderer, this.gathered);
     }
-    // a part of the pixels alone is not shown: until all have their turn, the picture before stays
-    const isRound = Math.floor(this.samples) > Math.floor(started);
-    const isOther = this.samples >= 1 && (isRound || settings !== this.shownWith);
+    const { denoiseAndTone } = this;
+    if (standIn === null || this.samples >= STOOD_IN) this.isStoodIn = false;
+    else if (!denoiseAndTone.isOf(begins)) this.isStoodIn = true;
+    // a part of the pixels alone is not shown, unless something stands in for the others: until all have
+    // their turn, the picture before stays
+    const shares = this.isStoodIn ? SHOWN_PARTS : 1;
+    const isRound = Math.floor(shares * this.samples) > Math.floor(shares * started);
+    const isAny = this.isStoodIn || this.samples >= 1;
+    const isOther = isAny && (isRound || settings !== this.shownWith);
     if (isOther) {
-      const { denoiseAndTone, gathered, samples } = this;
+      const { gathered, samples } = this;
       denoiseAndTone.denoise(renderer, eyes, gathered, samples, begins, scale, settings);
       this.shownWith = settings;
     }
-    this.denoiseAndTone.show(renderer, eyes, views, settings, isOther);
+    const marched = this.isStoodIn ? standIn : null;
+    denoiseAndTone.show(renderer, eyes, views, settings, isOther, marched);
   }
 
   private viewsOf(eyes: Eyes, { specimen }: TraceScene): TraceView[] {

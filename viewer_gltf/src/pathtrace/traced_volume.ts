@@ -9,11 +9,13 @@ import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "../state/path_t
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickTile } from "../volumes/bricks/brick_atlas";
 import type { BrickService } from "../volumes/bricks/brick_service";
+import type { VolumeLimits } from "../volumes/mip_levels";
 import type { Appearance } from "../volumes/tile_raymarch";
 import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
 import { showsBelow } from "../volumes/volume_set";
 import type { VolumeSource } from "../volumes/volume_source";
+import type { Marched } from "./denoise_and_tone";
 import { loadEnvironment, readEnvironment } from "./environment_file";
 import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium_loader";
 import type { Tracer } from "./path_tracer";
@@ -67,7 +69,7 @@ export class TracedVolume {
   constructor(
     private readonly volumes: Volumes,
     private readonly bricks: BrickService | null,
-    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private limits: VolumeLimits,
     private readonly sceneDepth: { value: Texture },
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
@@ -87,6 +89,11 @@ export class TracedVolume {
   /** Whether a picture at rest still gathers. */
   get isGathering(): boolean {
     return this.isShown && this.samples < ENOUGH_SAMPLES;
+  }
+
+  /** Whether its picture was shown alone: nothing was seen of the march. */
+  get standsAlone(): boolean {
+    return this.samples >= 1 && this.tracer?.isStoodIn === false;
   }
 
   status(): Readonly<{ samples: number; level: number | null }> {
@@ -141,6 +148,12 @@ export class TracedVolume {
     this.environment = "own";
   }
 
+  /** From the next `follow` on. */
+  limitEdge(edge: number): void {
+    this.limits = { ...this.limits, edge };
+    this.drop();
+  }
+
   retryFailed(): void {
     if (this.hasFailed) this.drop();
     if (this.hasLightFailed) this.environment = "";
@@ -155,6 +168,7 @@ export class TracedVolume {
   /**
    * @param resolution of the march, 0..1: the frame's budget
    * @param passes samples of every pixel
+   * @param standIn the march's picture of the same view; null: there is none
    */
   render(
     renderer: WebGLRenderer,
@@ -163,13 +177,17 @@ export class TracedVolume {
     resolution: number,
     isMoving: boolean,
     passes: number,
+    standIn: Marched | null,
   ): void {
     const { tracer, overlay } = this;
     if (this.state === null || tracer === null || overlay === null) return;
     const isWorn = eyes.all.length > 1; // by a head, which never rests
     const isOther = isMoving && !tracer.goesOn(eyes, scene, isWorn);
+    // a view that moves is marched where it can be: sharp, and without a trace of the view before
+    if (isOther && !isWorn && standIn !== null) return;
     // what came to rest first clears up as it is, then is begun anew at its full size
-    const isFirst = isOther || (this.isSmall && tracer.rested < FIRST_SAMPLES);
+    const isClearing = this.isSmall && tracer.rested < FIRST_SAMPLES && standIn === null;
+    const isFirst = isOther || isClearing;
     this.isSmall = isFirst;
     const most = isFirst ? MOST_MOVING_PIXELS : MOST_PIXELS;
     const fits = Math.sqrt(most / (eyes.width_px * eyes.height_px));
@@ -181,6 +199,7 @@ export class TracedVolume {
       passes: isFirst ? 1 : isMoving ? Math.min(1, passes) : passes,
       mayTremble: isWorn,
       isDraft: isFirst,
+      standIn,
     });
     overlay.show(eyes, tracer.scale);
   }
@@ -192,6 +211,10 @@ export class TracedVolume {
 
   hide(): void {
     this.overlay?.hide();
+  }
+
+  get isOnScreen(): boolean {
+    return this.overlay?.mesh.visible === true;
   }
 
   /** What follows the paths: a part of the page that is fetched when it is first asked for. */

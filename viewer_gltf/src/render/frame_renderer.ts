@@ -80,6 +80,8 @@ export class Picture {
   private readonly encode = new EncodePass();
   /** Frames of moving views. */
   private moved = 0;
+  /** The volumes of the march that stands in for what is traced; "": it has to be made. */
+  private stoodIn = "";
   private readonly point = new Vector3();
   private readonly corner = new Vector3();
   private readonly toSpecimen = new Matrix4();
@@ -106,11 +108,12 @@ export class Picture {
   draw(
     camera: Camera,
     head: Matrix4,
-    { volumes, traced, panes, overlays, bounds, solids }: Drawn,
+    drawn: Drawn,
     clip: Clip,
     { resolution, isMoving, passes, isSmooth, gathers }: FramePace,
   ): void {
     const { renderer, room, hybrid } = this;
+    const { volumes, traced, panes, overlays, bounds, solids } = drawn;
     const specimen = room.specimen.group.matrixWorld;
     const blended = panes.map(({ scene }) => scene);
     renderer.info.reset();
@@ -120,30 +123,31 @@ export class Picture {
     this.marchFrame.uIsCrossing.value = volumes.isInDisc;
     this.march.hide();
     traced.hide();
-    if (traced.isShown) {
+    const opaque = () =>
       this.depth.render(renderer, room.scene, this.eyes, [
         ...room.overlays,
         ...overlays,
         ...blended,
       ]);
-      const scene = { specimen, clip: this.cuts.march, bounds, solids };
-      traced.render(renderer, this.eyes, scene, resolution, isMoving, passes);
-    }
-    if (!volumes.isEmpty) {
+    const isTraced = traced.isShown;
+    if (isTraced || !volumes.isEmpty) opaque();
+    const isMarched = !volumes.isEmpty && !(isTraced && this.needsNoMarch(drawn, isMoving));
+    if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       volumes.placeAs(specimen);
       volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
-      this.depth.render(renderer, room.scene, this.eyes, [
-        ...room.overlays,
-        ...overlays,
-        ...blended,
-      ]);
       const hasPane = panes.some(({ isPane }) => isPane);
       this.marchFrame.uHasPane.value = hasPane;
       if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
       this.shiftNoise(isMoving, gathers);
       this.march.render(volumes.scene, this.eyes, resolution, gathers);
+    }
+    if (isTraced) {
+      const scene = { specimen, clip: this.cuts.march, bounds, solids };
+      const standIn = isMarched || this.stoodIn !== "" ? this.march.marched : null;
+      traced.render(renderer, this.eyes, scene, resolution, isMoving, passes, standIn);
+      if (traced.isOnScreen) this.march.hide();
     }
     this.show(camera, isSmooth ? this.light : this.draft);
   }
@@ -151,6 +155,22 @@ export class Picture {
   /** Whether another frame of the view at rest would make the march's picture better. */
   get canGather(): boolean {
     return this.march.isShown && this.march.gathered < MOST_GATHERED;
+  }
+
+  /**
+   * Whether the march need not stand in for what is traced, or what was marched last still does: the view is
+   * at rest. Before a head, which never rests, it does until the first traced picture.
+   */
+  private needsNoMarch({ volumes, traced }: Drawn, isMoving: boolean): boolean {
+    const isWorn = this.eyes.all.length > 1;
+    if (isWorn && traced.standsAlone) {
+      this.stoodIn = "";
+      return true;
+    }
+    const stoodIn = isMoving ? "" : JSON.stringify(volumes.status());
+    const isSame = stoodIn !== "" && stoodIn === this.stoodIn;
+    this.stoodIn = stoodIn;
+    return isSame;
   }
 
   /** The grain of the march differs from frame to frame; at rest frames begin with the same. */

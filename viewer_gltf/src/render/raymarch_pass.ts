@@ -3,7 +3,7 @@
  * allows, and laid over the scene: what lies behind translucent surfaces before these are drawn,
  * the rest last of all.
  */
-import type { Mesh, Scene, WebGLRenderer, WebGLRenderTarget } from "three";
+import type { Mesh, Scene, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { type Disc, FIRST, LAST, type MarchedUniforms, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
 import { linearTarget } from "../gpu/linear_target";
@@ -16,6 +16,7 @@ export class MarchPass {
   private readonly mean: RunningMean;
   private readonly front: Overlay;
   private readonly behind: Overlay;
+  private scale = 1;
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -32,6 +33,11 @@ export class MarchPass {
   /** They lay the marched pictures over what was drawn before. */
   get overlays(): readonly Mesh[] {
     return [this.front.mesh, this.behind.mesh];
+  }
+
+  /** The last picture that was marched, and its pixels to one of the frame buffer. */
+  get marched(): Readonly<{ picture: Texture; scale: number }> {
+    return { picture: this.front.uniforms.uMarched.value, scale: this.scale };
   }
 
   get isShown(): boolean {
@@ -63,6 +69,7 @@ export class MarchPass {
     const [front, behind] = gathers ? this.mean.textures : this.target.textures;
     this.front.uniforms.uMarched.value = front;
     this.behind.uniforms.uMarched.value = behind;
+    this.scale = scale;
     this.front.show(eyes, scale);
     if (this.frame.uHasPane.value) this.behind.show(eyes, scale);
   }

@@ -1,14 +1,24 @@
 /**
  * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the room), `disc` (degrees). Pure.
+ * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top). Pure.
  */
+import { STANDS, type Stand } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";
 import { type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import { IN_ADDRESS } from "../state/parameters/table";
 import type { ViewerState } from "../state/viewer_state";
 
 /** Their names: a link to a view leaves them out, it has them itself. */
-export const SETTINGS: readonly string[] = IN_ADDRESS.flatMap(({ link }) => link ?? []);
+export const SETTINGS: readonly string[] = [
+  ...IN_ADDRESS.flatMap(({ link }) => link ?? []),
+  "view",
+];
+
+/** The view that the page opens with; null: the usual one. */
+export function standOf(search: string): Stand | null {
+  const asked = new URLSearchParams(search).get("view");
+  return STANDS.find((stand) => stand === asked) ?? null;
+}
 
 /** null: none of the parameter's. */
 function valueIn(row: Parameter<ViewerState>, text: string): Value | null {

@@ -38,4 +38,4 @@ export type Action =
   /** The views to go through. */
   | Readonly<{ type: "keep-views"; views: readonly KeptView[] }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
-  | Readonly<{ type: "dismiss"; text: string }>;
+  | Readonly<{ type: "dismiss"; texts: readonly string[] }>;

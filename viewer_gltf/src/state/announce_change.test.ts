@@ -4,6 +4,7 @@ import type { Action } from "./actions";
 import { announcementOf } from "./announce_change";
 import { initialState } from "./initial_state";
 import { reduce } from "./reduce";
+import { tileName } from "./tile_name";
 import type { ViewerState } from "./viewer_state";
 
 const MANIFEST = sampleManifest(6);
@@ -25,7 +26,7 @@ describe("a remark", () => {
     const far = MANIFEST.tiles.at(-1)?.id ?? "";
     const cutTo: Action = { type: "set-clip", clip: { box: bounds_um, plane: null } };
     const cut = reduce(START, cutTo);
-    const words = `Only tile ${far}: the cut leaves nothing of it.`;
+    const words = `Only ${tileName(far)}: the cut leaves nothing of it.`;
     expect(announcement(START, cutTo)).toBeNull();
     expect(announcement(cut, { type: "isolate", tile: near })).toBeNull();
     expect(announcement(cut, { type: "isolate", tile: far })).toBe(words);

@@ -5,6 +5,7 @@
 
 import { isCutAway } from "../math/clip";
 import type { BoxedTile } from "../math/pick";
+import { tileName } from "./tile_name";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /** null: nothing. */
@@ -38,5 +39,5 @@ function nothingLeft(
     return tile !== undefined && isCutAway(tile.bounds_um, state.clip);
   };
   if (!isEmpty(after) || (isolated === before.isolated && isEmpty(before))) return null;
-  return `Only tile ${isolated}: the cut leaves nothing of it.`;
+  return `Only ${tileName(isolated ?? "")}: the cut leaves nothing of it.`;
 }

@@ -31,6 +31,8 @@ type TraceNumber = Readonly<{
   /** Equal steps are equal factors. */
   isLogarithmic?: boolean;
   text: (value: number) => string;
+  /** What it does, where its name can't say it. */
+  about?: string;
 }>;
 type TraceNumbers = Readonly<Record<string, TraceNumber>>;
 
@@ -43,7 +45,13 @@ const stops = (value: number) => `${value >= 0 ? "+" : ""}${value.toFixed(1)} st
 /** Numbers of the medium that light goes through. */
 export const MEDIUM_NUMBERS = {
   /** Added to the intensities before the transfer function. */
-  bias: { label: "Bias", start: 0, limits: [-1, 1], text: plain },
+  bias: {
+    label: "Bias",
+    start: 0,
+    limits: [-1, 1],
+    text: plain,
+    about: "More shows darker material, too; less leaves the brightest alone.",
+  },
   /** Factor to the extinction. */
   density: { label: "Density", start: 1, limits: [0.05, 20], isLogarithmic: true, text: factor },
   /** How readily a gradient makes a surface. */

@@ -218,8 +218,8 @@ describe("the viewer's state", () => {
       { type: "notify", text },
     );
     expect(twice.notices).toEqual([text]);
-    expect(reduce(twice, { type: "dismiss", text }).notices).toEqual([]);
-    expect(reduce(twice, { type: "dismiss", text: "another" })).toBe(twice);
+    expect(reduce(twice, { type: "dismiss", texts: [text] }).notices).toEqual([]);
+    expect(reduce(twice, { type: "dismiss", texts: ["another"] })).toBe(twice);
   });
 
   it("knows which notices another try may mend, until they are dismissed", () => {
@@ -230,10 +230,10 @@ describe("the viewer's state", () => {
       { type: "notify", text: "no network", isMendable: true },
     );
     expect(faulty.mendable).toEqual(["no network"]);
-    expect(reduce(faulty, { type: "dismiss", text: "a file is spoilt" }).mendable).toEqual([
+    expect(reduce(faulty, { type: "dismiss", texts: ["a file is spoilt"] }).mendable).toEqual([
       "no network",
     ]);
-    expect(reduce(faulty, { type: "dismiss", text: "no network" }).mendable).toEqual([]);
+    expect(reduce(faulty, { type: "dismiss", texts: ["no network"] }).mendable).toEqual([]);
   });
 
   it("returns the notice that a change has brought, also once more", () => {
@@ -248,7 +248,7 @@ describe("the viewer's state", () => {
     expect(brought(faulty, { type: "notify", text: "a" })).toBe("a");
     expect(brought(faulty, { type: "notify", text: "b" })).toBe("b");
     expect(brought(faulty, { type: "show", channel: "c4", shown: true })).toBeNull();
-    expect(brought(faulty, { type: "dismiss", text: "a" })).toBeNull();
+    expect(brought(faulty, { type: "dismiss", texts: ["a"] })).toBeNull();
     expect(brought(faulty, { type: "set", id: "opacity", channel: "c0", value: 0.5 })).toBeNull();
   });
 });

@@ -108,9 +108,10 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {
-      const notices = state.notices.filter((n) => n !== action.text);
+      const isLeft = (notice: string) => !action.texts.includes(notice);
+      const notices = state.notices.filter(isLeft);
       if (notices.length === state.notices.length) return state;
-      return withMendable({ ...state, notices }, action.text, false);
+      return { ...state, notices, mendable: state.mendable.filter(isLeft) };
     }
   }
 }

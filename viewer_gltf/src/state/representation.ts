@@ -74,9 +74,8 @@ export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
   return state.mode === "disc" && !prefersVolume(channel);
 }
 
-/** The tiles that are marched, those in the disc first. */
+/** The tiles that are marched, those in the disc first; where light is followed, until that has come. */
 export function wantedTiles(state: ViewerState, focusTiles: FocusTiles): readonly WantedTile[] {
-  if (isTraced(state)) return [];
   const channels = volumeChannels(state);
   const wanted = state.tiles.flatMap((tile) => {
     const drawn = channels.filter((channel) => {

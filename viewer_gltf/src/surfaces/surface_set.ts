@@ -1,6 +1,7 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
 import { type Camera, Group, Mesh, ShaderMaterial } from "three";
 import type { Bundle } from "../bundle/load";
+import { around, type Box } from "../math/box";
 import { surfaceColor } from "../math/color";
 import type { ShownSurface } from "../state/on_screen";
 import {
@@ -51,6 +52,12 @@ export class SurfaceSet {
   get hasFirst(): boolean {
     const [first] = this.shown();
     return first === undefined || overview([first[1].progress]).isComplete;
+  }
+
+  /** The box round the shown surfaces, um, world; null: one of them is not known yet, or there is none. */
+  get bounds(): Box | null {
+    const boxes = this.shown().map(([, tileset]) => tileset.bounds);
+    return boxes.reduce((all, box) => all && box && around(all, box), boxes[0] ?? null);
   }
 
   get isLoading(): boolean {

@@ -8,6 +8,7 @@
 import { TilesRenderer } from "3d-tiles-renderer";
 import type { Tile } from "3d-tiles-renderer/core";
 import {
+  Box3,
   type Camera,
   Color,
   DoubleSide,
@@ -19,6 +20,7 @@ import {
 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Channel } from "../bundle/generated/bundle";
+import type { Box } from "../math/box";
 import type { Rgb } from "../math/color";
 import { BlendedSurface, type SurfaceFrame } from "./blend_material";
 import { branchOf, leaveOut, putBack } from "./failed_branch";
@@ -103,6 +105,15 @@ export class SurfaceTileset {
     this.tiles.group.scale.setScalar(UM_PER_METRE);
     this.group.name = `surfaces of ${channel.id}`;
     this.group.add(this.tiles.group);
+  }
+
+  /** The box round all of it, um, world; null: it is not known yet. */
+  get bounds(): Box | null {
+    const box = new Box3();
+    if (!this.tiles.getBoundingBox(box)) return null;
+    this.tiles.group.updateMatrix();
+    const { min, max } = box.applyMatrix4(this.tiles.group.matrix);
+    return { min: min.toArray(), max: max.toArray() };
   }
 
   get isShown(): boolean {

@@ -3,6 +3,17 @@ import type { MipLevel } from "../bundle/generated/volumes";
 
 /** Largest level for the first picture, bytes: it comes from the finest one within this. */
 export const FIRST_LEVEL_BYTES = 64 * 1024;
+
+/** What volumes may take, all together or each. */
+export type VolumeLimits = Readonly<{
+  /** Of the GPU's memory. */
+  bytes: number;
+  /** Texels along an edge that a texture may have. */
+  side: number;
+  /** Voxels along an edge that are wanted at most, of a tile; Infinity: as many as fit. */
+  edge: number;
+}>;
+
 export function texels(level: MipLevel): number {
   const [x, y, z] = level.size;
   return x * y * z;

@@ -65,7 +65,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
 
   function makeSet(budget: number): void {
     const onError = (error: unknown) => faults.push(error);
-    const limits = { bytes: budget, side: SIDE };
+    const limits = { bytes: budget, side: SIDE, edge: Number.POSITIVE_INFINITY };
     const frame = makeFrame(new DepthTexture(1, 1));
     set = new VolumeSet({ base: BASE, manifest }, frame, limits, () => undefined, onError);
   }

@@ -5,6 +5,7 @@ import type { Bundle } from "../bundle/load";
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
 import type { ShownVolume } from "../state/on_screen";
+import { isTraced } from "../state/parameters/volumes";
 import { isInDisc, type WantedTile } from "../state/representation";
 import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
@@ -13,7 +14,7 @@ import type { BrickService } from "./bricks/brick_service";
 import { ChannelLists } from "./channel_volumes";
 import { OccupancyClient } from "./empty_space_client";
 import { LoadQueue } from "./load_queue";
-import { levelsToFetch } from "./mip_levels";
+import { levelsToFetch, type VolumeLimits } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
 import { brickCounts } from "./skip_bricks";
 import { type Appearance, floorOf, type MarchFrame, TileMarch } from "./tile_raymarch";
@@ -24,6 +25,8 @@ import type { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
+/** Of each channel in a tile, where the march only stands in for paths of light. */
+const STAND_IN_BYTES = 2 ** 21;
 type MadeTable2d = Readonly<{
   shapes: Shapes;
   transfer2d: Transfer2d;
@@ -58,7 +61,7 @@ export class VolumeSet {
   constructor(
     bundle: Bundle,
     private readonly frame: MarchFrame,
-    private readonly limits: Readonly<{ bytes: number; side: number }>,
+    private limits: VolumeLimits,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
     /** From a host that sends bricks by view; null: volumes come as files. */
@@ -193,6 +196,11 @@ export class VolumeSet {
     for (const resident of this.residents.all) this.setAppearances(resident);
   }
 
+  /** From the next `follow` on. */
+  limitEdge(edge: number): void {
+    this.limits = { ...this.limits, edge };
+  }
+
   /** With the next `follow`, what has failed is loaded anew. */
   retryFailed(): void {
     this.channels.forgetFailed();
@@ -215,10 +223,12 @@ export class VolumeSet {
     const [first] = sources.values();
     if (first === undefined) return;
     this.reportLimit(first);
+    const isStandIn = this.state !== null && isTraced(this.state);
+    const share = this.share / stride(sources.size);
     const levels = levelsToFetch(
       first.volume.levels,
-      this.share / stride(sources.size),
-      this.limits.side,
+      isStandIn ? Math.min(share, STAND_IN_BYTES) : share,
+      Math.min(this.limits.side, this.limits.edge),
     );
     const finest = levels[levels.length - 1];
     resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
@@ -244,7 +254,7 @@ export class VolumeSet {
       if (resident !== undefined) this.setAppearances(resident);
       this.onChange();
     };
-    const limits = { bytes: this.share, side: this.limits.side };
+    const limits = { ...this.limits, bytes: this.share };
     const texture =
       this.bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
       new TileTexture(this.queue, onChange, this.onError);

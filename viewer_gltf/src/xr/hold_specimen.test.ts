@@ -1,4 +1,4 @@
-import { Quaternion, Vector3 } from "three";
+import { MathUtils, Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { HandPose, SpecimenPose } from "../math/grab";
@@ -7,7 +7,13 @@ import { Specimen } from "../render/specimen_pose";
 import type { Command } from "../state/commands";
 import { advanceFocus, FAR_AWAY } from "../state/focus_tiles";
 import { START_VOLUMES } from "../state/parameters/volumes";
-import { moveByCommand, moveByFingers, moveByHolders, moveByStick } from "./hold_specimen";
+import {
+  moveByCommand,
+  moveByFingers,
+  moveByHead,
+  moveByHolders,
+  moveByStick,
+} from "./hold_specimen";
 
 const START: SpecimenPose = {
   position: new Vector3(0, 0, -1.5),
@@ -198,5 +204,41 @@ describe("the way to the specimen", () => {
     expect(near()).toBe(0);
     for (let i = 0; i < 5; i++) go("zoom-in");
     expect(near()).toBe(tiles.length);
+  });
+});
+
+describe("the head that holds the specimen by the button", () => {
+  const EYE = new Vector3(0, 1.6, 0);
+  const gaze = (yaw_deg: number, pitch_deg: number, origin = EYE) => ({
+    origin,
+    direction: new Vector3(0, 0, -1)
+      .applyAxisAngle(new Vector3(1, 0, 0), MathUtils.degToRad(pitch_deg))
+      .applyAxisAngle(new Vector3(0, 1, 0), MathUtils.degToRad(yaw_deg)),
+  });
+  const pivot = new Vector3(0, 1.6, -2);
+  const pose = { position: pivot.clone(), orientation: new Quaternion(), scale: 1 };
+  const hold = { pose, pivot, gaze: gaze(0, 0) };
+
+  it("carries it round the eye, the same side to it", () => {
+    const { position, orientation, scale } = moveByHead(hold, gaze(90, 0));
+    expect(position.toArray().map((v) => Number(v.toFixed(6)) + 0)).toEqual([-2, 1.6, 0]);
+    const front = new Vector3(0, 0, 1).applyQuaternion(orientation);
+    expect(front.x).toBeCloseTo(1);
+    expect(scale).toBe(1);
+  });
+
+  it("brings it nearer tilted down, and farther tilted up, within limits", () => {
+    const away = (pitch_deg: number) =>
+      moveByHead(hold, gaze(0, pitch_deg)).position.distanceTo(EYE);
+    expect(away(-12)).toBeCloseTo(1);
+    expect(away(-24)).toBeCloseTo(0.5);
+    expect(away(12)).toBeCloseTo(4);
+    expect(away(80)).toBeCloseTo(5);
+    expect(away(-80)).toBeCloseTo(0.1);
+  });
+
+  it("takes hold where it was: nothing jumps", () => {
+    const held = { ...hold, gaze: gaze(30, -20) };
+    expect(moveByHead(held, gaze(30, -20)).position.distanceTo(pivot)).toBeLessThan(1e-9);
   });
 });

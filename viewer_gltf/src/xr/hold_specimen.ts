@@ -26,6 +26,8 @@ const HEIGHT_OF_VIEW = 2 * Math.tan(MathUtils.degToRad(40));
 /** So near and so far the middle of what is shown may come, m: no way in leads out at the back. */
 const NEAREST_M = 0.1;
 const FARTHEST_M = 5;
+/** Tilt of a head that holds the specimen. */
+const HALF_NEARER_RAD = MathUtils.degToRad(12);
 /** Steps in a second of a move that goes on. */
 export const STEPS_PER_S = 3;
 
@@ -140,6 +142,30 @@ export function moveByFingers(
   const height_m = pivot.distanceTo(eye) * HEIGHT_OF_VIEW;
   const shift = new Vector3(x, -y, 0).multiplyScalar(height_m).applyQuaternion(toEye);
   return { ...near, position: near.position.clone().add(shift) };
+}
+
+/** The head that holds the specimen by the button, as it took hold. */
+export type HeadHold = Readonly<{ pose: SpecimenPose; pivot: Vector3; gaze: Gaze }>;
+type Gaze = Readonly<{ origin: Vector3; direction: Vector3 }>;
+
+/** To the left, and up. */
+function bearingOf({ direction: { x, y, z } }: Gaze): readonly [yaw: number, pitch: number] {
+  return [Math.atan2(-x, -z), Math.atan2(y, Math.hypot(x, z))];
+}
+
+/**
+ * The specimen goes round the eye with the head that holds it, the same side to it. Tilted down the head
+ * brings it nearer, tilted up sends it away: by a half, or twice as far, for each HALF_NEARER_RAD.
+ */
+export function moveByHead({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze): SpecimenPose {
+  const [yaw, pitch] = bearingOf(gaze);
+  const [yawBefore, pitchBefore] = bearingOf(before);
+  const turn = about(UP, yaw - yawBefore);
+  const eye = gaze.origin;
+  const still = { position: before.origin, orientation: new Quaternion() };
+  const carried = moveByOneHand(pose, still, { position: eye, orientation: turn });
+  const at = pivot.clone().sub(before.origin).applyQuaternion(turn).add(eye);
+  return bringNearer(carried, at, eye, 2 ** ((pitch - pitchBefore) / HALF_NEARER_RAD));
 }
 
 /** With the pivot's distance from the eye multiplied by a factor, within limits. */

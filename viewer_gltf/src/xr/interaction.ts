@@ -13,7 +13,7 @@ import {
   type Target,
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
-import type { HandPose } from "../math/grab";
+import { type HandPose, zoomAbout } from "../math/grab";
 import { type BoxedTile, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Layout, PanelView } from "../panel/controls";
@@ -25,8 +25,10 @@ import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
 import { Controllers, type Hand, type HandEvent } from "./controllers";
 import {
+  type HeadHold,
   moveByCommand,
   moveByFingers,
+  moveByHead,
   moveByHolders,
   moveByStick,
   STEPS_PER_S,
@@ -89,8 +91,10 @@ export class Hands {
   private isRunning = false;
   private shown = "";
   private gestures: Gesture[] = [];
-  /** A finger that rests on the split screen. */
-  private touched: { isUsed: boolean } | null = null;
+  /** A finger that rests on the split screen; `met`: what was gazed at when it came. */
+  private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
+  /** The head holds the specimen by a button that is down. */
+  private headHold: HeadHold | null = null;
   /** What is gone on with. */
   private goesOn: GoesOn | null = null;
 
@@ -152,6 +156,7 @@ export class Hands {
     this.gestures = [];
     this.touched = null;
     this.goesOn = null;
+    this.headHold = null;
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
@@ -182,6 +187,15 @@ export class Hands {
     return true;
   }
 
+  /** The specimen becomes so much larger about its middle. */
+  resize(factor: number, state: ViewerState): void {
+    const { specimen } = this.options;
+    specimen.moveTo(
+      zoomAbout(specimen.pose, middleOf(this.around(state)), factor),
+      this.gaze.origin,
+    );
+  }
+
   /** Once a frame of stereo, before it is drawn. True if the picture differs from the last one. */
   update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
     if (!this.isRunning) return false;
@@ -195,7 +209,8 @@ export class Hands {
     for (; this.taps > 0; this.taps--) this.press(this.gaze);
     this.forgetTheLost();
     const hasHeld = this.hold(dt_s);
-    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched;
+    const hasFollowed = this.followHead(dt_s, state);
+    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
     const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
     const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
@@ -225,6 +240,7 @@ export class Hands {
 
   /** A carried thing covers all else until the gaze puts it down. */
   private get free(): readonly Target[] {
+    if (this.headHold !== null) return []; // nothing is chosen on the way
     return this.carry.isCarrying ? [this.carry] : this.targets;
   }
 
@@ -270,8 +286,8 @@ export class Hands {
     const before = specimen.pose;
     for (const gesture of this.gestures.splice(0)) {
       if (gesture.kind === "press") {
-        this.touched = { isUsed: false };
         const met = meetFirst(this.gaze, this.free);
+        this.touched = { met, isUsed: false, elapsed_s: 0 };
         if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
       } else if (gesture.kind === "release") this.touched = null;
       else if (gesture.kind === "tap") {
@@ -354,6 +370,31 @@ export class Hands {
     return this.run(met.repeats, state, STEPS_PER_S * dt_s);
   }
 
+  /**
+   * A button that is held where no control is takes the specimen along with the head, if no hand is there to
+   * do it; whether it has moved.
+   */
+  private followHead(dt_s: number, state: ViewerState): boolean {
+    if (this.touched !== null) this.touched.elapsed_s += dt_s;
+    const handless = [...this.presses].filter(([source]) => this.handOf(source)?.pose == null);
+    const press = [this.touched, ...handless.map(([, each]) => each)].find(
+      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.met)),
+    );
+    if (press == null || press.elapsed_s < HOLD_S) {
+      this.headHold = null;
+      return false;
+    }
+    const { specimen } = this.options;
+    const { gaze } = this;
+    press.isUsed = true; // letting go of it chooses nothing
+    if (this.headHold === null) {
+      this.headHold = { pose: specimen.pose, pivot: middleOf(this.around(state)), gaze };
+      return false;
+    }
+    specimen.moveTo(moveByHead(this.headHold, gaze), gaze.origin);
+    return true;
+  }
+
   private moveBySticks(dt_s: number, state: ViewerState): boolean {
     if (this.isHolding) return false;
     const { specimen } = this.options;
@@ -393,6 +434,11 @@ export class Hands {
     this.shown = shown;
     return isChanged || this.tracked.length > 0;
   }
+}
+
+/** Of what was met when the button went down: a control has its own use for it. */
+function mayFollow(met: Met | null): boolean {
+  return met === null || met.key?.startsWith(TILE) === true;
 }
 
 function pointOn({ ray, distance_m }: Pick<Met, "ray" | "distance_m">): Vector3 {

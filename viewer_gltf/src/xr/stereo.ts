@@ -10,9 +10,18 @@ import type { Profile } from "./cardboard/viewer_profile";
 import { betweenEyes } from "./head_pose";
 import { Hands, type HandsOptions } from "./interaction";
 import { XrSession } from "./session";
+import { spreadEyes } from "./stereo_strength";
 
 export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
   Readonly<{ onStart: () => void; onEnd: () => void }>;
+
+export type EyeSettings = Readonly<{
+  distance_m: number;
+  /** Factor to it. */
+  strength: number;
+  /** CSS pixels in an inch of the screen; null: guessed from the browser's name. */
+  cssPixelsPerInch: number | null;
+}>;
 
 const NOT_LOADED =
   "The part of the page that splits the screen could not be loaded. Check the connection, load " +
@@ -22,6 +31,7 @@ export class Stereo {
   readonly headset: XrSession;
   readonly hands: Hands;
   private split: SplitSession | null = null;
+  private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   /** A split screen that is being asked for. */
   private starting: Promise<readonly string[]> | null = null;
   private readonly between = new Matrix4();
@@ -36,6 +46,22 @@ export class Stereo {
       () => this.begin(this.headset.current),
       () => this.leave(),
     );
+  }
+
+  /** What the user has set for the eyes. */
+  setEyes(eyes: EyeSettings): void {
+    const { distance_m, strength, cssPixelsPerInch } = this.eyes;
+    const isSame =
+      eyes.distance_m === distance_m &&
+      eyes.strength === strength &&
+      eyes.cssPixelsPerInch === cssPixelsPerInch;
+    this.eyes = eyes;
+    if (!isSame) this.split?.set(this.splitOptions);
+  }
+
+  private get splitOptions() {
+    const { distance_m, strength, cssPixelsPerInch } = this.eyes;
+    return { cssPixelsPerInch, apart_m: distance_m * strength };
   }
 
   get kind(): "headset" | "split" | null {
@@ -76,12 +102,14 @@ export class Stereo {
       () => this.begin(null),
       () => this.leave(),
       (gesture) => this.hands.touch(gesture),
+      this.splitOptions,
     );
   }
 
   /** Where the eyes are in this frame. Returns the camera to draw with; null: no stereo. */
   pose(eyes: Eyes): Camera | null {
     if (this.renderer.xr.isPresenting) {
+      spreadEyes(this.renderer.xr.getCamera().cameras, this.eyes.strength);
       eyes.followHeadset(this.renderer, this.headset.camera);
       return this.headset.camera;
     }
@@ -125,6 +153,11 @@ export class Stereo {
     draw();
     this.renderer.setRenderTarget(null);
     split.present();
+  }
+
+  /** The specimen becomes so much larger where it is; on a flat screen nothing does. */
+  resize(factor: number, state: ViewerState): void {
+    if (this.kind !== null) this.hands.resize(factor, state);
   }
 
   /** Whether a command was one of those that move the specimen before the eyes. */

@@ -254,7 +254,7 @@ describeInChromium("marks", () => {
     await look([-0.3, 0, 1.6], [-0.3, 0, 0], { dt_s: 0.1 });
     expect(await name()).toBe("");
     for (let i = 0; i < 5; i++) await look([-0.3, 0, 1.6], [-0.3, 0, 0], { dt_s: 0.1 });
-    expect(await name()).toBe("r0_c0 · CD8 T cells");
+    expect(await name()).toBe("row 1, column 1 · CD8 T cells");
     await shoot("name");
     const [mark, bar] = await page.evaluate(() =>
       [".name-mark", ".scale-bar"].map((each) =>
@@ -267,7 +267,7 @@ describeInChromium("marks", () => {
     await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
     expect(await name()).toBe("");
     for (let i = 0; i < 5; i++) await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
-    expect(await name()).toBe("r0_c1");
+    expect(await name()).toBe("row 1, column 2");
   });
 
   it("turn the axes with the specimen, and name their directions", async () => {

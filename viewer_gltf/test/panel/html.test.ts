@@ -4,6 +4,7 @@
  */
 import { join } from "node:path";
 import { beforeAll, beforeEach, describe, expect, it } from "vitest";
+import { tileName } from "../../src/state/tile_name";
 import type { ViewerState } from "../../src/state/viewer_state";
 import { addHeadset } from "../support/browser/chromium";
 import { describeInChromium } from "../support/browser/skip";
@@ -203,7 +204,7 @@ describeInChromium("the panel", () => {
     }
     await alone(other.id);
     expect((await state()).isolated).toBe(other.id);
-    expect(await said()).toBe(`Only tile ${other.id}: the cut leaves nothing of it.`);
+    expect(await said()).toBe(`Only ${tileName(other.id)}: the cut leaves nothing of it.`);
   });
 
   it("lists all keys in a dialog that keeps the focus until Escape", async () => {
@@ -320,7 +321,7 @@ describeInChromium("the panel as it lies there", () => {
     expect(await control(`${FIRST}/shown`).getAttribute("aria-label")).toBe("Show F body");
     const [tile] = await page().locator('[data-tile-choice="r0_c0"]').all();
     await tile.click();
-    expect(await tile.getAttribute("aria-label")).toMatch(/^Tile r0_c0, chosen/);
+    expect(await tile.getAttribute("aria-label")).toMatch(/^Tile in row 1, column 1, chosen/);
     expect(await tile.getAttribute("aria-pressed")).toBe("true");
     expect(await page().locator("[data-notices]").getAttribute("role")).toBe("status");
   });

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from tifffile import TiffFile
 
-from stereocell.read.image import Color, linear_color
+from stereocell.model.color import linear_color
+from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 
 _CENTIMETRE = 3  # TIFF tag ResolutionUnit

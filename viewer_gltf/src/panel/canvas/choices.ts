@@ -1,4 +1,5 @@
 /** What the panel on a canvas lets choose from: options, colours, tiles. Pure. */
+import { shortTileName, tileName } from "../../state/tile_name";
 import type { Choice, Colour, TileMap } from "../controls";
 import { nextColour } from "../palettes";
 import {
@@ -117,11 +118,11 @@ export function mapBlock(map: TileMap, width: number): Block {
     const isChosen = tile.isSelected || tile.isIsolated;
     marks.push(box(rect, isChosen ? "accent" : "raised", tile.isFocus ? "text" : "line"));
     if (cell >= ROW) {
-      const label = tile.isIsolated ? "only" : `${tile.row} ${tile.column}`;
+      const label = tile.isIsolated ? "only" : shortTileName(tile.id);
       const tone = isChosen ? "ink" : "dim";
       marks.push(text(rect, label, { align: "center", size: SMALL, tone }));
     }
-    regions.push(region(`${map.id}=${tile.id}`, tile.id, rect, () => map.to(tile.id)));
+    regions.push(region(`${map.id}=${tile.id}`, tileName(tile.id), rect, () => map.to(tile.id)));
   }
   const block = one(marks, unlessRefused(map, regions), Math.ceil(cell * map.rows) + GAP);
   return captioned(map.label, width, block);
@@ -133,7 +134,7 @@ function asChoice({ id, tiles, refusal, to }: TileMap): Choice {
     tiles.find(({ isIsolated }) => isIsolated) ??
     tiles.find(({ isSelected }) => isSelected) ??
     tiles.find(({ isFocus }) => isFocus);
-  const options = tiles.map((tile) => ({ value: tile.id, label: tile.id }));
+  const options = tiles.map((tile) => ({ value: tile.id, label: tileName(tile.id) }));
   const value = now?.id ?? "";
   return { kind: "choice", id, label: "Tile", value, options, isInline: false, refusal, to };
 }

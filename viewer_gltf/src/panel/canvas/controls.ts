@@ -51,7 +51,7 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "button":
       return [buttonIn(item, row)];
     case "slider":
-      return [sliderRow(item, row)];
+      return [sliderRow(item, row), ...(item.about ? [textBlock("", item.about, width)] : [])];
     case "window":
       return [windowRow(item, 0, row), windowRow(item, 1, row)];
     case "choice":

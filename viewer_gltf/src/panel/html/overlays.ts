@@ -1,6 +1,7 @@
 /** Elements over the picture: the progress bar, notices, and the page of a fatal error. */
 
 import { element, setText } from "../../dom/element";
+import { groupNotices } from "../../state/notice_groups";
 import type { ViewerState } from "../../state/viewer_state";
 import type { Progress } from "../../surfaces/overview_progress";
 
@@ -40,7 +41,7 @@ export class Notices {
   );
 
   constructor(
-    private readonly onDismiss: (text: string) => void,
+    private readonly onDismiss: (texts: readonly string[]) => void,
     private readonly onRetry: () => void,
   ) {}
 
@@ -48,11 +49,12 @@ export class Notices {
     if (notices === this.drawn) return; // what is written anew is read out anew
     this.drawn = notices;
     // A broken host fails for every file: the newest few notices are enough.
-    const shown = notices.slice(-3);
-    const hidden = notices.length - shown.length;
+    const groups = groupNotices(notices);
+    const shown = groups.slice(-3);
+    const hidden = groups.length - shown.length;
     this.root.replaceChildren(
       ...(hidden > 0 ? [element("p", { textContent: `and ${hidden} more like these` })] : []),
-      ...shown.map((text) =>
+      ...shown.map(({ text, of }) =>
         element(
           "p",
           {},
@@ -61,12 +63,34 @@ export class Notices {
           element("button", {
             textContent: "×",
             ariaLabel: `Dismiss: ${text}`,
-            onclick: () => this.onDismiss(text),
+            onclick: () => this.onDismiss(of),
           }),
         ),
       ),
       ...(mendable.length > 0 ? [this.retry] : []),
     );
+  }
+}
+
+/** How to begin, under a picture that nobody has touched yet. */
+export class FirstHint {
+  readonly root: HTMLElement;
+
+  constructor(isTouch: boolean) {
+    const [turn, zoom] = isTouch ? ["drag", "pinch"] : ["drag", "wheel"];
+    this.root = element(
+      "p",
+      {
+        className: "first-hint",
+        textContent: `${turn} to turn, ${zoom} to zoom, go near for volumes`,
+      },
+      { overlay: "hint" },
+    );
+  }
+
+  /** From the first touch on nobody needs it. */
+  leave(): void {
+    this.root.classList.add("gone");
   }
 }
 

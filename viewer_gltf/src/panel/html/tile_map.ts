@@ -2,12 +2,13 @@
 
 import { element } from "../../dom/element";
 import { RovingTabindex } from "../../dom/roving_tabindex";
+import { shortTileName, tileName } from "../../state/tile_name";
 import type { MapTile, TileMap } from "../controls";
 import { hooks, type Send, type Widget } from "./widget";
 
 function nameOf({ id, isFocus, isSelected, isIsolated }: MapTile): string {
   const marks = [isIsolated && "shown alone", isSelected && "chosen", isFocus && "looked at"];
-  return [`Tile ${id}`, ...marks.filter(Boolean)].join(", ");
+  return [`Tile in ${tileName(id)}`, ...marks.filter(Boolean)].join(", ");
 }
 
 export function makeMap(first: TileMap, send: Send): Widget<TileMap> {
@@ -18,7 +19,7 @@ export function makeMap(first: TileMap, send: Send): Widget<TileMap> {
   for (const tile of first.tiles) {
     const button = element(
       "button",
-      { type: "button", textContent: tile.id, onclick: () => send(now.to(tile.id)) },
+      { type: "button", textContent: shortTileName(tile.id), onclick: () => send(now.to(tile.id)) },
       { ...hooks(first.id), tileChoice: tile.id },
     );
     button.style.gridRow = String(tile.row + 1);

@@ -98,8 +98,9 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     element("span", {}, {}, first.label),
     text,
   );
+  const about = first.about ? [element("small", { textContent: first.about })] : [];
   return {
-    root: element("label", { className: "slider" }, {}, head, input),
+    root: element("label", { className: "slider" }, {}, head, input, ...about),
     update(control) {
       now = control;
       input.value = String(Math.round(control.value * control.steps));

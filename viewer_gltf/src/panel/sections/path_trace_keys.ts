@@ -1,5 +1,5 @@
 /** The keys of the path-traced picture. Pure. */
-import { setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
+import { type NumberParameter, setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
 import {
   AFTER,
   LAMP,
@@ -8,15 +8,19 @@ import {
   MEDIUM,
   ROOM,
 } from "../../state/parameters/light";
+import { STEREO_NUMBERS } from "../../state/parameters/tools";
 import { isTraced, MODE } from "../../state/parameters/volumes";
+import type { ViewerState } from "../../state/viewer_state";
 import { type Key, key, keysOf, neighbour } from "../key";
 
 /** The keys that switch the lamps. */
 const LAMP_KEYS: readonly string[] = ["!", "@", "#"];
 
+const NUMBERS: readonly NumberParameter<ViewerState>[] = [...LIGHT_NUMBERS, ...STEREO_NUMBERS];
+
 function nextNumber(by: number): Key["to"] {
   return ({ view }) => {
-    const ids = LIGHT_NUMBERS.map(({ id }) => id);
+    const ids = NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, by);
     return parameter === null ? null : { panel: "parameter", parameter };
   };
@@ -24,7 +28,7 @@ function nextNumber(by: number): Key["to"] {
 
 function turn(steps: number): Key["to"] {
   return ({ state, view }) => {
-    const row = LIGHT_NUMBERS.find(({ id }) => id === view.parameter) ?? LIGHT_NUMBERS[0];
+    const row = NUMBERS.find(({ id }) => id === view.parameter) ?? NUMBERS[0];
     const at = shareOf(row, row.get(state)) + (2 * steps) / row.steps;
     return setTo(row, valueAtShare(row, Math.min(1, Math.max(0, at))));
   };
@@ -34,7 +38,7 @@ export const LIGHT_KEYS: readonly Key[] = [
   key("G", "Paths of light on or off", ({ state }) =>
     setTo(MODE, isTraced(state) ? "all" : "traced"),
   ),
-  key("F", "Next number of the light: the two keys below mean it", nextNumber(1)),
+  key("F", "Next number of the light, or of stereo: the two keys below mean it", nextNumber(1)),
   key("X", "The number before", nextNumber(-1)),
   key("[", "Less of it", turn(-1)),
   key("]", "More of it", turn(1)),

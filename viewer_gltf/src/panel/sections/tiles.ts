@@ -1,4 +1,6 @@
 /** The panel's tiles: a map by row and column, or a list. Pure. */
+
+import { tileName } from "../../state/tile_name";
 import type { ViewerState } from "../../state/viewer_state";
 import { command } from "../control_templates";
 import type { Control } from "../controls";
@@ -25,7 +27,7 @@ export function tileItems(state: ViewerState, focusTile: string | null): readonl
         { value: "", label: "by gaze" },
         ...state.tiles.map(({ id }) => ({
           value: id,
-          label: id === focusTile ? `${id} (gazed at)` : id,
+          label: id === focusTile ? `${tileName(id)} (gazed at)` : tileName(id),
         })),
       ],
       isInline: false,
@@ -52,7 +54,7 @@ export function tileItems(state: ViewerState, focusTile: string | null): readonl
     {
       kind: "toggle",
       id: "isolate",
-      label: isolated === null ? "Only this tile" : `Only ${isolated}`,
+      label: isolated === null ? "Only this tile" : `Only ${tileName(isolated)}`,
       value: isolated !== null,
       refusal: alone === null ? "Choose a tile, or look at one." : "",
       to: (value) => ({ type: "isolate", tile: value ? alone : null }),

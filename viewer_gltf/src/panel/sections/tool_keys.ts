@@ -1,6 +1,7 @@
 /** The keys of measuring, cutting open, sharing and of the panel itself. Pure. */
 
 import { allOf, missing } from "../../state/measurements";
+import { groupNotices } from "../../state/notice_groups";
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
 import { chosenClipPart, clipPartsOf, moveClipPart } from "../clip_by_key";
 import { type Key, key, keysOf, neighbour } from "../key";
@@ -45,8 +46,8 @@ export const TOOL_KEYS: readonly Key[] = [
   key(".", "Move or turn that part on", push(1)),
   key("l", "Copy a link to this view", "share"),
   key("Delete", "Dismiss the newest notice", ({ state }) => {
-    const text = state.notices.at(-1);
-    return text === undefined ? null : { type: "dismiss", text };
+    const newest = groupNotices(state.notices).at(-1);
+    return newest === undefined ? null : { type: "dismiss", texts: newest.of };
   }),
   key("R", "Try again what the network failed to bring", ({ state }) =>
     state.mendable.length === 0 ? null : "retry",

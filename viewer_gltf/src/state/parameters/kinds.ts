@@ -20,6 +20,8 @@ type Row<On, T extends Value> = Readonly<{
   link?: string;
   /** Why the panel can't set it now; "": it can. */
   refusal?: (on: On) => string;
+  /** What it does, in a sentence, where its name can't say it. */
+  about?: string;
   /** Whether there is anything that it changes; absent: always. */
   isShown?: (on: On) => boolean;
   get: (on: On) => T;

@@ -1,6 +1,12 @@
 /** The parameters of what a tap and a gaze do, and of how finely is drawn. Pure. */
 import { QUALITY_LEVELS, type QualityLevel } from "../quality_controller";
-import { type ChoiceParameter, lensesOf, type Parameter, type SwitchParameter } from "./kinds";
+import {
+  type ChoiceParameter,
+  lensesOf,
+  type NumberParameter,
+  type Parameter,
+  type SwitchParameter,
+} from "./kinds";
 
 const TOOLS = ["select", "measure"] as const;
 /** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
@@ -24,6 +30,12 @@ export const START_TOOLS = {
   quality: "auto" as QualityLevel,
   /** How many times as large as the screen a saved picture is. */
   pictureSize: "2" as PictureSize,
+  /** Between the user's pupils, mm: adults have 54 to 74. */
+  eyeDistance_mm: 63,
+  /** Factor to it: 0 shows both eyes the same. */
+  stereoStrength: 1,
+  /** Of the specimen's longest edge in stereo, m. */
+  specimenSize_m: 1.2,
 };
 
 export type ToolSettings = Readonly<typeof START_TOOLS>;
@@ -88,8 +100,56 @@ export const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
   spoken: ({ pictureSize }) => `Pictures: ${pictureSize} times the screen`,
 };
 
+export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
+  kind: "number",
+  id: "eye-distance",
+  label: "Eye distance",
+  about: "Between your pupils, on a split screen; a headset knows its own.",
+  ...lens("eyeDistance_mm"),
+  limits: [50, 76],
+  steps: 52,
+  rounded: (value) => Math.round(2 * value) / 2,
+  text: (value) => `${value} mm`,
+  spoken: ({ eyeDistance_mm }) => `Eye distance ${eyeDistance_mm} mm`,
+};
+
+export const STEREO_STRENGTH: NumberParameter<ToolSettings> = {
+  kind: "number",
+  id: "stereo-strength",
+  label: "Strength of stereo",
+  ...lens("stereoStrength"),
+  limits: [0, 2],
+  steps: 40,
+  rounded: (value) => Number(value.toFixed(2)),
+  text: (value) => `${Math.round(100 * value)} %`,
+  spoken: ({ stereoStrength }) => `Strength of stereo ${Math.round(100 * stereoStrength)} %`,
+};
+
+const size = (value: number) =>
+  value < 1 ? `${Math.round(100 * value)} cm` : `${value.toFixed(1)} m`;
+
+export const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
+  kind: "number",
+  id: "specimen-size",
+  label: "Size in stereo",
+  ...lens("specimenSize_m"),
+  limits: [0.2, 6],
+  steps: 60,
+  isLogarithmic: true,
+  rounded: (value) => Number(value.toPrecision(2)),
+  text: size,
+  spoken: ({ specimenSize_m }) => `The specimen's longest edge: ${size(specimenSize_m)}`,
+};
+
+/** They have the keys of the light's numbers. */
+export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
+  EYE_DISTANCE,
+  STEREO_STRENGTH,
+  SPECIMEN_SIZE,
+];
+
 /** By the panel's section that lists them. */
-export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL];
+export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
 export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
 export const PICTURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [PICTURE_SIZE];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

@@ -72,6 +72,7 @@ export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
   id: "switch-distance",
   label: "Switch distance",
   name: () => "Switch distance: volumes show within",
+  about: "Nearer than this the disc or tile shows the volume; farther off, surfaces.",
   link: "switch",
   ...lens("switchDistance_m"),
   limits: [0.1, 10],

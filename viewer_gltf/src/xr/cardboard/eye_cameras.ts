@@ -28,8 +28,14 @@ export class EyeCameras {
     this.both.matrixAutoUpdate = false;
   }
 
-  /** @param width of the target, of which each eye has half, and `height`: pixels */
-  fit(profile: Profile, screen: Screen, width: number, height: number): void {
+  /** @param width of the target, of which each eye has half, and `height`: pixels; `apart_m`: the eyes */
+  fit(
+    profile: Profile,
+    screen: Screen,
+    width: number,
+    height: number,
+    apart_m = profile.interLens_m,
+  ): void {
     const half = Math.floor(width / 2);
     const [left, right] = this.eyes.map(({ side, camera, viewport }, i) => {
       const tangents = eyeTangents(profile, screen, side);
@@ -37,7 +43,7 @@ export class EyeCameras {
       project(camera, NEAR_M, FAR_M, tangents);
       return tangents;
     });
-    this.apart_m = profile.interLens_m;
+    this.apart_m = apart_m;
     this.behind_m = this.apart_m / (left.left + right.right);
     const outer = { ...left, right: right.right };
     project(this.both, NEAR_M + this.behind_m, FAR_M + this.behind_m, outer);

@@ -1,6 +1,13 @@
-import { Euler, type Quaternion, Vector3 } from "three";
+import { Euler, Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { FREE_HEADING, followHeading, headPose, type Reading, toQuaternion } from "./orientation";
+import {
+  FREE_HEADING,
+  followHeading,
+  headPose,
+  predictTurn,
+  type Reading,
+  toQuaternion,
+} from "./orientation";
 
 const reading = (alpha_deg: number, beta_deg: number, gamma_deg: number): Reading => ({
   alpha_deg,
@@ -95,5 +102,30 @@ describe("the way ahead", () => {
     const heading = followHeading(FREE_HEADING, turned(0), true);
     const eyes = new Vector3().setFromMatrixPosition(headPose(turned(90), heading));
     expectVector(eyes.toArray(), [-0.08, 0, 0.08]); // from before the neck to left of it
+  });
+});
+
+describe("a head's turn that is predicted", () => {
+  const turned = (yaw_deg: number, time_ms: number) => ({
+    head: new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), (yaw_deg * Math.PI) / 180),
+    time_ms,
+  });
+  const yaw_deg = (q: Quaternion) => (2 * Math.atan2(q.y, q.w) * 180) / Math.PI;
+
+  it("goes on as fast as it was, by a frame", () => {
+    expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 16))).toBeCloseTo(13.6, 3);
+    expect(yaw_deg(predictTurn(turned(12, 0), turned(10, 20), 16))).toBeCloseTo(8.4, 3);
+  });
+
+  it("is the last report where there is no speed to be had of it", () => {
+    const last = turned(12, 20);
+    for (const before of [null, turned(12, 4), turned(10, 18), turned(10, -200), turned(-30, 0)]) {
+      expect(yaw_deg(predictTurn(before, last, 16))).toBeCloseTo(12, 6);
+    }
+    expect(yaw_deg(predictTurn(turned(10, 0), last, -5))).toBeCloseTo(12, 6);
+  });
+
+  it("goes on for 50 ms at most: then the head may have stopped", () => {
+    expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 500))).toBeCloseTo(17, 1);
   });
 });

@@ -62,6 +62,34 @@ export function headPose(head: Quaternion, heading: Heading, out = new Matrix4()
   return out.compose(vector, turn, unit.setScalar(1));
 }
 
+/** A head's turn at a time, ms. */
+export type Turned = Readonly<{ head: Quaternion; time_ms: number }>;
+
+/** Between two reports, ms: closer ones have no speed, of farther ones nobody knows what was between. */
+const REPORTS_MS = [4, 100] as const;
+/** No head turns faster, radians a millisecond: a sensor that jumps does. */
+const FASTEST = (600 * Math.PI) / 180 / 1000;
+/** Farthest that is predicted, ms. */
+const MOST_AHEAD_MS = 50;
+
+/** The head's turn a little later than the last report, as fast as between the last two. */
+export function predictTurn(
+  before: Turned | null,
+  last: Turned,
+  ahead_ms: number,
+  out = new Quaternion(),
+): Quaternion {
+  out.copy(last.head);
+  if (before === null) return out;
+  const between_ms = last.time_ms - before.time_ms;
+  if (between_ms < REPORTS_MS[0] || between_ms > REPORTS_MS[1]) return out;
+  const angle = before.head.angleTo(last.head);
+  if (angle === 0 || angle / between_ms > FASTEST) return out;
+  const share = Math.min(MOST_AHEAD_MS, Math.max(0, ahead_ms)) / between_ms;
+  // slerp goes on beyond its end at the same speed
+  return out.slerpQuaternions(before.head, last.head, 1 + share);
+}
+
 export const ORIENTATION_REFUSED =
   "This browser was not allowed to tell how the phone is turned, so the picture can't follow your " +
   "head. Close this tab, open the page again, and allow motion and orientation when asked.";
@@ -71,6 +99,10 @@ export const ORIENTATION_ABSENT =
 /** Listens to the phone, and knows which way is ahead. */
 export class HeadSensor {
   private reading: Reading | null = null;
+  private before: Turned | null = null;
+  private last: Turned | null = null;
+  /** Of the screen when they were made: by another they would be other turns. */
+  private screen_deg = 0;
   private heading = FREE_HEADING;
   private readonly head = new Quaternion();
   private readonly stopped = new AbortController();
@@ -78,10 +110,11 @@ export class HeadSensor {
   constructor() {
     addEventListener(
       "deviceorientation",
-      ({ alpha, beta, gamma }) => {
+      ({ alpha, beta, gamma, timeStamp }) => {
         // A device without sensors sends one event of nothing.
         if (alpha === null || beta === null || gamma === null) return;
         this.reading = { alpha_deg: alpha, beta_deg: beta, gamma_deg: gamma };
+        this.take(timeStamp);
       },
       { signal: this.stopped.signal },
     );
@@ -92,12 +125,28 @@ export class HeadSensor {
     this.heading = FREE_HEADING;
   }
 
-  /** The head's pose; the identity as long as nothing is known. */
-  pose(out: Matrix4): Matrix4 {
-    if (this.reading === null) return out.identity();
-    toQuaternion(this.reading, screenAngle_deg(), this.head);
+  /**
+   * The head's pose; the identity as long as nothing is known.
+   *
+   * @param at_ms when the picture will be seen: the head turns on until then
+   */
+  pose(out: Matrix4, at_ms = 0): Matrix4 {
+    if (this.reading === null || this.last === null) return out.identity();
+    if (this.screen_deg !== screenAngle_deg()) {
+      this.last = null;
+      this.take(0);
+    }
+    if (this.last === null) return out.identity();
+    predictTurn(this.before, this.last, at_ms - this.last.time_ms, this.head);
     this.heading = followHeading(this.heading, this.head, innerWidth > innerHeight);
     return headPose(this.head, this.heading, out);
+  }
+
+  private take(time_ms: number): void {
+    if (this.reading === null) return;
+    this.screen_deg = screenAngle_deg();
+    this.before = this.last;
+    this.last = { head: toQuaternion(this.reading, this.screen_deg), time_ms };
   }
 
   dispose(): void {

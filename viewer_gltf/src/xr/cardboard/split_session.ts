@@ -29,9 +29,14 @@ import type { ScreenHold } from "./screen";
 import type { Asked } from "./user_gesture";
 import { CARDBOARD_V2, type Profile } from "./viewer_profile";
 
+/** From a report to the screen's light a frame goes by, ms. */
+const FRAME_MS = 1000 / 60;
+
 export type SplitOptions = Readonly<{
   /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
   cssPixelsPerInch: number | null;
+  /** Between the two pictures' points of view, m; absent: as the lenses. */
+  apart_m?: number;
 }>;
 
 export class SplitSession {
@@ -51,10 +56,16 @@ export class SplitSession {
     private readonly onStart: () => void,
     private readonly onEnd: () => void,
     private readonly onGesture: (gesture: Gesture) => void,
-    private readonly options: SplitOptions = { cssPixelsPerInch: null },
+    private options: SplitOptions = { cssPixelsPerInch: null },
   ) {
     // It takes a finished picture, encoded as on the canvas.
     this.target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
+  }
+
+  /** Another screen, or other eyes than the lenses are made for. */
+  set(options: SplitOptions): void {
+    this.options = options;
+    this.layout = "";
   }
 
   /** Both eyes in one, as in WebXR: render with it into `target`. */
@@ -111,7 +122,7 @@ export class SplitSession {
   /** Read the head's turn, and move the eyes with it. Once a frame, before anything is drawn. */
   update(): void {
     this.fit();
-    this.running?.sensor.pose(this.head);
+    this.running?.sensor.pose(this.head, performance.now() + FRAME_MS);
     this.cameras.follow(this.head);
   }
 
@@ -138,7 +149,8 @@ export class SplitSession {
     const screen = screenOf(css.x, css.y, perInch);
     this.target.setSize(width, height);
     this.pass.setLens(this.profile, screen);
-    this.cameras.fit(this.profile, screen, width, height);
+    const { apart_m = this.profile.interLens_m } = this.options;
+    this.cameras.fit(this.profile, screen, width, height, apart_m);
   }
 }
 

@@ -67,6 +67,7 @@ export async function enter(
     deviceScaleFactor: pixelRatio,
     hasTouch,
     serviceWorkers,
+    reducedMotion: "reduce", // what opens with a turn would never come to rest
   });
   return { context, close: () => browser.close() };
 }

@@ -23,7 +23,7 @@ export type Stand = Readonly<{
   host: Host;
   /** A page, not opened yet. Tests have it one after another: only a test can leave traces in it. */
   viewer: ViewerPage;
-  /** Open the bundle in it; `query` goes behind the bundle's address. */
+  /** Open the bundle in it, seen from the front; `query` goes behind the bundle's address. */
   open: (query?: string) => Promise<void>;
 }>;
 
@@ -120,7 +120,10 @@ export function prepareStand(options: StandOptions): Stand {
     },
     open: (query = "") => {
       const quality = query.includes("&quality=") ? "" : "&quality=low";
-      return viewer.open(`${host.address}/app/?bundle=../bundle/${query}${quality}`);
+      const view = query.includes("&view=") ? "" : "&view=front"; // where points are known to show
+      const [search, ...hash] = query.split(/(?=#)/);
+      const address = `${host.address}/app/?bundle=../bundle/${search ?? ""}${view}${quality}`;
+      return viewer.open(address + hash.join(""));
     },
   };
 }

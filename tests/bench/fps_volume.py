@@ -1,0 +1,21 @@
+"""Write the head phantom in a cube of voxels, for `make bench-fps`: fps_volume.py OUT EDGE."""
+
+import os
+import sys
+from pathlib import Path
+
+from stereocell.samples.head import make_head
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support.phantoms import write_ome_tiff
+
+
+def main(out: Path, edge: int) -> None:
+    head = make_head((edge, edge, edge))
+    temporary = out.with_name(f"{out.name}.part")
+    write_ome_tiff(temporary, head.voxels, spacing=head.spacing_um, names=["T1"], compression=None)
+    os.replace(temporary, out)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))

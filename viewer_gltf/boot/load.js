@@ -1,0 +1,76 @@
+// Fetches the viewer's code packed by gzip, whether or not the host packs, and shows how much has come.
+// BUILD is filled in by scripts/finish_build.ts.
+(() => {
+  const BUILD = {};
+  const bar = document.querySelector("[data-boot] progress");
+  const words = document.querySelector("[data-boot] p");
+  const kB = (bytes) => `${Math.round(bytes / 1000)} kB`;
+  const show = (bytes) => {
+    const come = Math.min(bytes, BUILD.bytes); // a host may have unpacked it on its way
+    bar.value = come / BUILD.bytes;
+    words.textContent = `Loading the viewer: ${kB(come)} of ${kB(BUILD.bytes)}`;
+  };
+
+  const fetchStyle = () =>
+    new Promise((resolve, reject) => {
+      const link = document.createElement("link");
+      Object.assign(link, {
+        rel: "stylesheet",
+        href: BUILD.style,
+        onload: resolve,
+        onerror: reject,
+      });
+      document.head.append(link);
+    });
+
+  const fetchCode = async () => {
+    const { body, ok, status } = await fetch(BUILD.packed);
+    if (!ok || body === null) throw new Error(`the host answers ${status} for ${BUILD.packed}`);
+    const parts = [];
+    let come = 0;
+    for (const reader = body.getReader(); ; ) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      parts.push(value);
+      come += value.length;
+      show(come);
+    }
+    const [first, second] = parts[0] ?? [];
+    const isPacked = first === 0x1f && second === 0x8b;
+    const sent = new Blob(parts);
+    const plain = isPacked
+      ? sent.stream().pipeThrough(new DecompressionStream("gzip"))
+      : sent.stream();
+    const code = await new Response(plain).blob();
+    if (code.size !== BUILD.length) throw new Error(`${BUILD.packed} is cut short`);
+    return URL.createObjectURL(code.slice(0, code.size, "text/javascript"));
+  };
+
+  const start = async () => {
+    globalThis.stereocellBase = new URL(BUILD.base, location.href).href;
+    const style = fetchStyle();
+    style.catch(() => undefined); // it is awaited below
+    // older browsers can't unpack: they take it plain
+    const code =
+      typeof DecompressionStream === "undefined"
+        ? new URL(BUILD.plain, location.href).href
+        : await fetchCode();
+    await style;
+    words.textContent = "Starting the viewer";
+    globalThis.stereocellCode = import(code);
+    await globalThis.stereocellCode;
+  };
+
+  if (location.protocol === "file:") return; // it has been said
+  show(0);
+  start().catch((error) => {
+    // the code itself says what fails once it runs
+    if (document.querySelector("[data-boot]") === null) throw error;
+    bar.hidden = true;
+    words.textContent = `The viewer could not be loaded: ${error.message}. `;
+    const again = document.createElement("button");
+    again.textContent = "Try again";
+    again.onclick = () => location.reload();
+    words.append(again);
+  });
+})();

@@ -1,0 +1,150 @@
+/**
+ * What is done to the built page:
+ *
+ * 1. The viewer's code is packed by gzip into one file that the page's own script fetches and unpacks
+ *    (boot/load.js), so that any static host sends a third of it. In the place of the code stands a
+ *    module that hands its exports on to the parts that are fetched later; the code itself lies beside,
+ *    for browsers that can't unpack.
+ * 2. The page gets that script, a skeleton to look at meanwhile (boot/skeleton.css), and the hashes of
+ *    both in its policy.
+ * 3. The service worker is told what the viewer of this build consists of.
+ * 4. .gz and .br of all that shrinks are written beside, for servers that send those.
+ */
+import { createHash } from "node:crypto";
+import { readdir, readFile, writeFile } from "node:fs/promises";
+import { basename, dirname, extname, join, resolve } from "node:path";
+import { promisify } from "node:util";
+import { brotliCompress, constants, gzip } from "node:zlib";
+import type { Plugin } from "vite";
+
+const SERVICE_WORKER = "sw.js";
+const PAGE = "index.html";
+const FILES = /(["'`])__VIEWER_FILES__\1/;
+const BOOT = new URL("../boot/", import.meta.url);
+/** What is packed already gains nothing. */
+const SHRINKS = new Set([".js", ".css", ".html", ".json", ".svg", ".wasm", ".webmanifest"]);
+/** Less than a packet of the network. */
+const LEAST_BYTES = 1000;
+
+const gzipped = (bytes: Buffer) => promisify(gzip)(bytes, { level: 9 });
+const brotlied = (bytes: Buffer) =>
+  promisify(brotliCompress)(bytes, {
+    params: { [constants.BROTLI_PARAM_SIZE_HINT]: bytes.length },
+  });
+const hashOf = (text: string) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
+
+/** The code as it runs from anywhere: its own address is the one that the page says. */
+export function movable(code: string, name: string): string {
+  const address = `new URL(${JSON.stringify(name)},globalThis.stereocellBase).href`;
+  return code
+    .replaceAll("import.meta.url", `(${address})`)
+    .replaceAll(/import\((["'`])\.\/([^"'`]+)\1\)/g, (_, __, path: string) => {
+      return `import(new URL(${JSON.stringify(path)},globalThis.stereocellBase).href)`;
+    });
+}
+
+/** A module with the exports of the code that the page has fetched. */
+export function handOn(names: readonly string[]): string {
+  const list = names.map((name) => `export const ${name}=code.${name};`).join("");
+  return `const code=await globalThis.stereocellCode;${list}`;
+}
+
+/** The code in a file of its own, to be packed beside; in its old place what hands its exports on. */
+async function splitCode(folder: string, entry: string, exports: readonly string[]) {
+  const code = movable(await readFile(join(folder, entry), "utf8"), basename(entry));
+  const plain = entry.replace(/index(-[^/]*)$/, "viewer$1");
+  if (plain === entry) throw new Error(`${entry}: expected a name with index-`);
+  await writeFile(join(folder, plain), code);
+  await writeFile(join(folder, entry), handOn(exports));
+  return { plain, code: Buffer.from(code) };
+}
+
+/** The page's script, with what it needs to know of the code. */
+async function scriptFor(plain: string, code: Buffer, style: string): Promise<string> {
+  const build = {
+    base: `${dirname(plain)}/`,
+    packed: `${plain}.gz`,
+    plain,
+    style,
+    bytes: (await gzipped(code)).length,
+    length: code.length,
+  };
+  const script = await readFile(new URL("load.js", BOOT), "utf8");
+  const bare = script.replace(/^ *\/\/.*\n/gm, "").replace(/^ +/gm, "");
+  return bare.replace("const BUILD = {}", () => `const BUILD = ${JSON.stringify(build)}`);
+}
+
+/** Put script and skeleton into the page, in place of what loads code and style as they lie. */
+async function writePage(path: string, script: string): Promise<void> {
+  const style = (await readFile(new URL("skeleton.css", BOOT), "utf8"))
+    .replace(/\/\*.*?\*\//gs, "")
+    .replace(/\s+/g, " ");
+  const skeleton =
+    "<div data-boot><main><h1>StereoCell</h1>" +
+    '<progress value="0" aria-label="Loading the viewer"></progress><p role="status"></p></main><aside></aside></div>';
+  const page = (await readFile(path, "utf8"))
+    .replace(/\s*<script type="module"[^>]*><\/script>/, "")
+    .replace(/\s*<link rel="stylesheet"[^>]*>/, "")
+    .replace("</head>", () => `<style>${style}</style>\n  </head>`)
+    .replace('<div id="app">', (opening) => `${opening}${skeleton}`)
+    .replace("</body>", () => `<script>${script}</script>\n  </body>`)
+    .replace("script-src 'self'", `script-src 'self' blob: ${hashOf(script)}`)
+    .replace("style-src 'self'", `style-src 'self' ${hashOf(style)}`);
+  await writeFile(path, page);
+}
+
+/** Tell the service worker, which has a fixed name, the viewer's files. */
+async function listFiles(folder: string, plain: string): Promise<void> {
+  const path = join(folder, SERVICE_WORKER);
+  const code = await readFile(path, "utf8");
+  if (!FILES.test(code)) throw new Error(`${path}: no place for the list of files`);
+  const names = (await filesOf(folder))
+    .filter((name) => name !== SERVICE_WORKER && name !== PAGE && name !== plain)
+    .concat(`${plain}.gz`)
+    .sort();
+  const list = JSON.stringify(JSON.stringify(names));
+  await writeFile(
+    path,
+    code.replace(FILES, () => list),
+  );
+}
+
+async function filesOf(folder: string): Promise<string[]> {
+  const entries = await readdir(folder, { recursive: true, withFileTypes: true });
+  return entries
+    .filter((entry) => entry.isFile())
+    .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1));
+}
+
+async function compressAll(folder: string): Promise<void> {
+  const names = (await filesOf(folder)).filter((name) => SHRINKS.has(extname(name)));
+  const compress = async (name: string) => {
+    const bytes = await readFile(join(folder, name));
+    if (bytes.length < LEAST_BYTES) return;
+    await writeFile(join(folder, `${name}.gz`), await gzipped(bytes));
+    await writeFile(join(folder, `${name}.br`), await brotlied(bytes));
+  };
+  await Promise.all(names.map(compress));
+}
+
+export function finishBuild(): Plugin {
+  let folder = "";
+  return {
+    name: "finish-build",
+    apply: "build",
+    configResolved(config) {
+      folder = resolve(config.root, config.build.outDir);
+    },
+    async writeBundle(_, bundle) {
+      if (!(SERVICE_WORKER in bundle)) return; // the tests' own small pages have none
+      const files = Object.values(bundle);
+      const entry = files.find((file) => file.type === "chunk" && file.isEntry);
+      const style = files.find(({ fileName }) => fileName.endsWith(".css"));
+      if (entry?.type !== "chunk" || style === undefined) throw new Error("no code, or no style");
+      const { plain, code } = await splitCode(folder, entry.fileName, entry.exports);
+      await writePage(join(folder, PAGE), await scriptFor(plain, code, style.fileName));
+      await listFiles(folder, plain);
+      await compressAll(folder);
+    },
+  };
+}

@@ -1,0 +1,110 @@
+/**
+ * The benchmark's card over the picture (`?bench`): it asks for a tap, shows how far it is, and then the
+ * table, the picture and the report to keep. `?bench=2` flies for two seconds a run.
+ */
+import "./bench.css";
+import { element, setText } from "../dom/element";
+import { drawChart } from "./chart";
+import type { Report } from "./report";
+import { runAll, type Step, type Subject } from "./runs";
+
+export type StereoKind = "split" | "headset";
+
+export type BenchOptions = Readonly<{
+  subject: Subject;
+  /** The kinds of stereo that this device has. */
+  stereo: readonly StereoKind[];
+  /** Must be called from a tap. Rejects where the browser or the user refuses. */
+  startStereo: (kind: StereoKind) => Promise<void>;
+  onReport: (report: Report) => void;
+}>;
+
+export function benchCard(flight_s: number, options: BenchOptions): HTMLElement {
+  const { subject, stereo, startStereo } = options;
+  const told = element(
+    "p",
+    {
+      textContent:
+        "The specimen flies once round and towards you, in every mode and at every size of its volumes. " +
+        "Keep this page in front until the table is there.",
+    },
+    {},
+  );
+  const buttons = [null, ...stereo].map((kind) =>
+    element(
+      "button",
+      { type: "button", textContent: kind === null ? "Start" : `Start, with ${WORDS[kind]}` },
+      { bench: kind ?? "mono" },
+    ),
+  );
+  const card = element(
+    "section",
+    { className: "bench", ariaLabel: "Benchmark" },
+    { bench: "card" },
+    element("h2", { textContent: "How fast is this device?" }),
+    told,
+    ...buttons,
+  );
+  buttons.forEach((button, i) => {
+    const kind = [null, ...stereo][i];
+    button.onclick = () => {
+      for (const each of buttons) each.remove();
+      void start(kind);
+    };
+  });
+  const start = async (kind: StereoKind | null) => {
+    try {
+      // asked within the tap
+      const begun = kind === null ? null : await startStereo(kind).then(() => kind, refused);
+      const report = await runAll(subject, begun, flight_s, (step) => setText(told, words(step)));
+      await subject.endStereo();
+      options.onReport(report);
+      told.remove();
+      card.append(...resultOf(report));
+    } catch (error) {
+      setText(told, `The benchmark ended early: ${String(error)}`);
+      throw error;
+    }
+  };
+  const refused = (error: unknown) => {
+    card.append(element("p", { textContent: `No stereo: ${String(error)}` }));
+    return null;
+  };
+  return card;
+}
+
+const WORDS: Record<StereoKind, string> = { split: "the split screen", headset: "the headset" };
+
+function words({ index, count, mode, eyes, edge }: Step): string {
+  const size = edge === null ? "" : `, volumes of ${edge} voxels`;
+  return `${index + 1} of ${count}: ${mode}, ${eyes}${size}`;
+}
+
+function resultOf(report: Report): readonly HTMLElement[] {
+  const canvas = element("canvas", { ariaLabel: "Frames a second by volume size" });
+  canvas.role = "img";
+  drawChart(canvas, report);
+  const head = ["mode", "eyes", "voxels", "frames/s", "median ms", "95 % ms", "draw calls"];
+  const row = (tag: "th" | "td", cells: readonly (string | number)[]) =>
+    element("tr", {}, {}, ...cells.map((cell) => element(tag, { textContent: String(cell) })));
+  const rows = report.runs.map((run) =>
+    row("td", [
+      run.mode,
+      run.eyes,
+      run.edge === null ? "" : `${run.edge}³`,
+      run.fps,
+      run.median_ms,
+      run.p95_ms,
+      run.drawCalls,
+    ]),
+  );
+  const json = new Blob([`${JSON.stringify(report, null, 2)}\n`], { type: "application/json" });
+  const link = (textContent: string, download: string, href: string) =>
+    element("a", { textContent, download, href });
+  return [
+    canvas,
+    element("table", {}, {}, row("th", head), ...rows),
+    link("Save the figures (JSON)", "stereocell-fps.json", URL.createObjectURL(json)),
+    link("Save the picture", "stereocell-fps.png", canvas.toDataURL("image/png")),
+  ];
+}

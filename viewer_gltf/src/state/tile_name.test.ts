@@ -1,0 +1,13 @@
+import { describe, expect, it } from "vitest";
+import { shortTileName, tileName } from "./tile_name";
+
+describe("a tile's name", () => {
+  it("is its row and column, counted from one, or what its maker called it", () => {
+    expect(tileName("r0_c3")).toBe("row 1, column 4");
+    expect(tileName("r12_c0")).toBe("row 13, column 1");
+    expect(tileName("Cortex")).toBe("Cortex");
+    expect(tileName("r0_c3_z1")).toBe("r0_c3_z1"); // of another kind
+    expect(shortTileName("r0_c3")).toBe("1·4");
+    expect(shortTileName("Cortex")).toBe("Cortex");
+  });
+});

@@ -1,0 +1,76 @@
+/** One visit of 40 s is enough: without a network the same picture comes again, and no notice. */
+import { cp, mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, inject, it } from "vitest";
+import type { Browser } from "../support/browser/chromium";
+import { Host } from "../support/browser/host";
+import { ViewerPage } from "../support/browser/page";
+import { difference, isBackground, takePicture } from "../support/browser/picture";
+import { openBrowser } from "../support/browser/shared_browser";
+import { describeInChromium } from "../support/browser/skip";
+import { DIST, MAPS_BUNDLE } from "../support/browser/stand";
+import { Gate } from "../support/offline/gate";
+
+const VISIT_MS = 40_000;
+/** Share of pixels that may differ: what is gathered at rest is noise, averaged. */
+const SAME = 0.01;
+
+describeInChromium("a first visit", () => {
+  let root: string;
+  let host: Host;
+  let gate: Gate;
+  let browser: Browser;
+
+  beforeAll(async () => {
+    root = await mkdtemp(join(tmpdir(), "stereocell-visit-"));
+    // with textures that are transcoded, whose decoder is fetched on its own
+    await cp(MAPS_BUNDLE ?? inject("fixture"), root, { recursive: true });
+    await cp(DIST, root, { recursive: true });
+    host = await Host.start({ "/": root });
+    gate = await Gate.before(host.address);
+    browser = await openBrowser({ viewport: { width: 400, height: 300 } });
+  });
+
+  afterAll(async () => {
+    await browser?.close();
+    await gate?.stop();
+    await host?.stop();
+    if (root !== undefined) await rm(root, { recursive: true, force: true });
+  });
+
+  it("says that it is ready offline; then the network goes, and a reload shows the same", async () => {
+    const viewer = new ViewerPage(await browser.context.newPage());
+    const { page } = viewer;
+    await page.addInitScript(() => {
+      const said: string[] = [];
+      Object.assign(window, { said });
+      new MutationObserver(() => {
+        const text = document.querySelector("[data-said]")?.textContent ?? "";
+        if (text !== "" && said.at(-1) !== text) said.push(text);
+      }).observe(document, { childList: true, subtree: true, characterData: true });
+    });
+    const said = () => page.evaluate(() => (window as unknown as { said: string[] }).said);
+    const started = Date.now();
+    await viewer.open(`${gate.address}/?quality=low`);
+    await viewer.settled();
+    const before = await takePicture(page);
+    await page.waitForTimeout(Math.max(0, VISIT_MS - (Date.now() - started)));
+    expect(await said()).toContain(
+      "Ready offline: what has been shown opens without a network, too.",
+    );
+
+    gate.shut();
+    const asked = host.requests.length;
+    await page.reload();
+    await page.waitForFunction(() => window.stereocell !== undefined);
+    await page.evaluate(() => window.stereocell?.ready);
+    await viewer.settled();
+    const after = await takePicture(page);
+    expect((await viewer.snapshot()).state.notices).toEqual([]);
+    expect(host.requests.length).toBe(asked);
+    expect(before.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    expect(difference(before, after)).toBeLessThan(SAME);
+    expect(await said()).toEqual([]); // it has been said
+  });
+});

@@ -1,0 +1,83 @@
+/** The first half minute: the page before its code has come, the view that opens, its turn, its hint. */
+import { expect, it } from "vitest";
+import { isBackground, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
+
+describeInChromium("the opening", () => {
+  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 560, height: 360 } });
+  const page = () => stand.viewer.page;
+  const address = (query = "") => `${stand.host.address}/app/?bundle=../bundle/${query}`;
+
+  it("counts the code's bytes while they come, says what has failed, and tries again", async () => {
+    const devtools = await page().context().newCDPSession(page());
+    await devtools.send("Network.enable");
+    const slow = { offline: false, latency: 0, uploadThroughput: -1 };
+    await devtools.send("Network.emulateNetworkConditions", { ...slow, downloadThroughput: 1e5 });
+    await page().goto(address(), { waitUntil: "commit" });
+    const words = page().locator("[data-boot] p");
+    const counted = /^Loading the viewer: (\d+) kB of (\d+) kB$/;
+    await expect.poll(() => words.textContent()).toMatch(counted);
+    const [, first, all] = counted.exec((await words.textContent()) ?? "") ?? [];
+    expect(Number(all)).toBeGreaterThan(100);
+    const later = async () => Number(counted.exec((await words.textContent()) ?? "")?.[1]);
+    await expect.poll(later).toBeGreaterThan(Number(first));
+    await devtools.send("Network.emulateNetworkConditions", { ...slow, downloadThroughput: -1 });
+    await devtools.detach();
+
+    await page().route(/viewer-.*\.js\.gz$/, (route) => route.fulfill({ status: 404 }), {
+      times: 1,
+    });
+    await page().goto(address());
+    await expect.poll(() => words.textContent()).toMatch(/could not be loaded: .*404/);
+    await words.locator("button").click();
+    await page().waitForFunction(() => window.stereocell !== undefined);
+    await page().evaluate(() => window.stereocell?.ready);
+  });
+
+  it("fills the picture, volumes in sight, and turns until the first touch", async () => {
+    await page().emulateMedia({ reducedMotion: "no-preference" });
+    await stand.viewer.open(address("&quality=low"));
+    const volumes = async () => (await stand.viewer.snapshot()).volumes.length;
+    await expect.poll(volumes).toBeGreaterThan(0);
+    await expect
+      .poll(async () => (await stand.viewer.snapshot()).discRadius_deg)
+      .toBeGreaterThan(1);
+    const hint = page().locator('[data-overlay="hint"]');
+    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom, go near for volumes");
+    const frames = () => page().evaluate(() => window.stereocell?.frames ?? 0);
+    const before = await frames();
+    await expect.poll(frames).toBeGreaterThan(before + 3);
+
+    const stage = await page().locator(".stage").boundingBox();
+    if (stage === null) throw new Error("no stage");
+    await page().mouse.click(stage.x + 4, stage.y + 4); // where nothing is to be chosen
+    await stand.viewer.still();
+    await expect.poll(() => hint.evaluate((found) => getComputedStyle(found).opacity)).toBe("0");
+    const picture = await takePicture(page());
+    const inside: [number, number][] = [];
+    for (let y = 0; y < picture.height; y += 2) {
+      for (let x = 0; x < picture.width; x += 2) {
+        if (!isBackground(picture.at(x, y))) inside.push([x, y]);
+      }
+    }
+    const extent = (axis: 0 | 1, size: number) => {
+      const all = inside.map((at) => at[axis]);
+      return (Math.max(...all) - Math.min(...all)) / size;
+    };
+    const filled = Math.max(extent(0, picture.width), extent(1, picture.height));
+    expect(filled).toBeGreaterThan(0.7);
+    expect(filled).toBeLessThan(1);
+  });
+
+  it("stands still where less motion is asked for, and where the address says from where", async () => {
+    for (const query of ["&quality=low", "&quality=low&view=top"]) {
+      await page().emulateMedia({
+        reducedMotion: query.includes("view") ? "no-preference" : "reduce",
+      });
+      await stand.viewer.open(address(query));
+      await stand.viewer.still(); // which a turn would never be
+    }
+    await page().emulateMedia({ reducedMotion: "reduce" });
+  });
+});
