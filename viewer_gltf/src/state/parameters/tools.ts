@@ -96,7 +96,7 @@ export const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
   ...lens("pictureSize"),
   values: PICTURE_SIZES,
   names: { "1": "1 x", "2": "2 x", "4": "4 x" },
-  key: [":", "Next size of saved pictures: 1, 2 or 4 times the screen"],
+  key: ["0", "Next size of saved pictures: 1, 2 or 4 times the screen"],
   spoken: ({ pictureSize }) => `Pictures: ${pictureSize} times the screen`,
 };
 
