@@ -218,7 +218,7 @@ describe("the keys", () => {
   });
 
   it("do nothing where there is nothing to do", () => {
-    expect(wishOf("0", CONTEXT)).toBeNull();
+    expect(wishOf("F9", CONTEXT)).toBeNull();
     expect(wishOf("F12", CONTEXT)).toBeNull();
     expect(wishOf("g", { ...CONTEXT, focusTile: null })).toBeNull();
   });
