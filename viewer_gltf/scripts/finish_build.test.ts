@@ -26,9 +26,9 @@ describe("the viewer's code", () => {
 
   it("hands its exports on, the same ones, by their names", async () => {
     const one = { name: "one" };
-    globalThis.stereocellCode = Promise.resolve({ a: one, $: 2 });
-    const { a, $ } = await asModule(handOn(["a", "$"]));
-    expect([a, $]).toEqual([one, 2]);
+    globalThis.stereocellCode = Promise.resolve({ a: one, $: 2, in: 3 });
+    const { a, $, in: reserved } = await asModule(handOn(["a", "$", "in"]));
+    expect([a, $, reserved]).toEqual([one, 2, 3]);
     expect(a).toBe(one);
   });
 });

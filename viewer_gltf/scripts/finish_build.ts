@@ -43,10 +43,11 @@ export function movable(code: string, name: string): string {
     });
 }
 
-/** A module with the exports of the code that the page has fetched. */
+/** A module with the exports of the code that the page has fetched: short names, among them `in` and `do`. */
 export function handOn(names: readonly string[]): string {
-  const list = names.map((name) => `export const ${name}=code.${name};`).join("");
-  return `const code=await globalThis.stereocellCode;${list}`;
+  const local = names.map((name, i) => `$${i}=code.${name}`);
+  const list = names.map((name, i) => `$${i} as ${name}`);
+  return `const code=await globalThis.stereocellCode,${local.join()};export{${list.join()}};`;
 }
 
 /** The code in a file of its own, to be packed beside; in its old place what hands its exports on. */

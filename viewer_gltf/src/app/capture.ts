@@ -1,15 +1,25 @@
 /** Pictures larger than the screen, and videos: drawn apart from the frames of the page, which wait. */
-import type { PerspectiveCamera, WebGLRenderer } from "three";
+import type { Matrix4, WebGLRenderer } from "three";
+import { axesOf } from "../annotations/orientation_axes";
+import { umPerPixelAt } from "../annotations/scale_bar";
+import type { Manifest } from "../bundle/generated/bundle";
+import { pathThrough, turntable } from "../capture/camera_path";
 import { type Caption, drawCaption } from "../capture/caption";
-import { type FilmedFile, FRAMES_PER_S, frameWriter } from "../capture/encode_video";
+import { type FilmedFile, FRAMES_PER_S, frameWriter, pngOf } from "../capture/encode_video";
+import { legendOf } from "../capture/legend";
 import { element } from "../dom/element";
+import type { Navigation } from "../interaction/orbit_camera";
 import type { KeptView } from "../state/kept_views";
+import type { ViewerState } from "../state/viewer_state";
 
 /** Most pixels of a picture: browsers refuse larger canvases, phones at less. */
 const MOST_PIXELS = 120e6;
 /** Longest time for one part of a picture, and for one frame of a video, ms: then it is as good as it is. */
 const PART_MS = 8000;
 const FRAME_MS = 400;
+/** Length of a video: once round, and from one kept view to the next, s. */
+const ROUND_S = 6;
+const LEG_S = 2;
 /** Longest edge of a video, pixels. */
 const LONGEST_FRAME_PX = 1920;
 
@@ -25,11 +35,28 @@ export interface Studio {
 
 export type Scene = Readonly<{
   renderer: WebGLRenderer;
-  camera: PerspectiveCamera;
+  navigation: Navigation;
   studio: Studio;
-  /** What is written on it, now. */
-  caption: () => Caption;
+  /** Of the stage, CSS pixels. */
+  height_px: number;
+  /** From um to the room. */
+  specimen: Matrix4;
+  state: ViewerState;
+  manifest: Manifest;
 }>;
+
+/** What is written on it, as the camera stands now. */
+function captionOf({ navigation, height_px, specimen, state, manifest }: Scene): Caption {
+  const { camera, controls } = navigation;
+  const m_per_um = specimen.getMaxScaleOnAxis();
+  return {
+    um_per_px: umPerPixelAt(controls.target, camera, height_px, m_per_um),
+    legend: legendOf(state, manifest),
+    axes: axesOf(manifest.specimen.sides),
+    head: camera.matrixWorld,
+    specimen,
+  };
+}
 
 /** Let the page do what waits. Not by a timer: those of a page that nobody sees tick once a second. */
 function turn(): Promise<void> {
@@ -54,11 +81,13 @@ function canvasOf(width: number, height: number) {
  * The view, `scale` times as large as the screen has it, part by part: each fills the screen's own canvas,
  * so that no more of the GPU's memory is needed. Scale bar, legend and axes are drawn on it.
  */
-export function drawPicture(
-  { renderer, camera, studio, caption }: Scene,
+export function savePicture(
+  scene: Scene,
   wanted: number,
   onPart: (done: number, of: number) => void,
-): Promise<HTMLCanvasElement> {
+): Promise<Blob> {
+  const { renderer, studio, navigation } = scene;
+  const { camera } = navigation;
   const { width, height } = renderer.domElement;
   const scale = Math.max(
     1,
@@ -66,7 +95,7 @@ export function drawPicture(
   );
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
-    const words = caption(); // before the camera sees parts alone
+    const words = captionOf(scene); // before the camera sees parts alone
     try {
       for (let row = 0; row < scale; row++) {
         for (let column = 0; column < scale; column++) {
@@ -82,18 +111,22 @@ export function drawPicture(
       camera.clearViewOffset();
     }
     drawCaption(context, canvas, scale * renderer.getPixelRatio(), words);
-    return canvas;
+    return pngOf(canvas);
   });
 }
 
-/** Null: it was given up. */
-export function film(
-  { renderer, studio, caption }: Scene,
-  path: readonly KeptView[],
-  lookFrom: (view: KeptView) => void,
-  onFrame: (done: number) => void,
+/** Through views, if there are two, else once round; `onSecond` after each second of it. Null: it was left. */
+export function saveVideo(
+  scene: Scene,
+  views: readonly KeptView[],
+  onSecond: (done: number, of: number) => void,
   signal: AbortSignal,
 ): Promise<FilmedFile | null> {
+  const { renderer, studio, navigation } = scene;
+  const path =
+    views.length > 1
+      ? pathThrough(views, LEG_S * FRAMES_PER_S * (views.length - 1) + 1)
+      : turntable(navigation.lookNow, ROUND_S * FRAMES_PER_S);
   const { width, height } = renderer.domElement;
   const shrink = Math.min(1, LONGEST_FRAME_PX / Math.max(width, height));
   const even = (edge: number) => Math.max(2, 2 * Math.floor((shrink * edge) / 2));
@@ -105,13 +138,13 @@ export function film(
         writer.close();
         return null;
       }
-      lookFrom(view);
+      navigation.lookFrom(view);
       studio.follow(1 / FRAMES_PER_S);
       studio.drawStill(FRAME_MS);
       context.drawImage(renderer.domElement, 0, 0, canvas.width, canvas.height);
-      drawCaption(context, canvas, shrink * renderer.getPixelRatio(), caption());
+      drawCaption(context, canvas, shrink * renderer.getPixelRatio(), captionOf(scene));
       await writer.add(canvas);
-      onFrame(i + 1);
+      if (i % FRAMES_PER_S === 0) onSecond(i + 1, path.length);
       await turn();
     }
     return writer.finish();

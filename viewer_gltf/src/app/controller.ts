@@ -4,7 +4,6 @@
  * `layOut` and hands its wishes to `perform`.
  */
 
-import { FRAMES_PER_S, pngOf } from "../capture/encode_video";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -365,10 +364,10 @@ export class Controller {
     }
     this.filming = new AbortController();
     try {
-      const canvas = await viewer.picture(Number(viewer.state.pictureSize), (done, of) => {
+      const png = await viewer.picture(Number(viewer.state.pictureSize), (done, of) => {
         if (of > 1) this.say(`Picture: part ${done} of ${of}`);
       });
-      this.save("picture", "png", await pngOf(canvas));
+      this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
     } finally {
@@ -391,9 +390,7 @@ export class Controller {
     const { signal } = this.filming;
     this.refresh();
     try {
-      const file = await viewer.film((done, of) => {
-        if (done % FRAMES_PER_S === 1) this.say(`Video: ${done} of ${of}`);
-      }, signal);
+      const file = await viewer.film((done, of) => this.say(`Video: ${done} of ${of}`), signal);
       if (file === null) this.say("The video was left.");
       else this.save("video", file.suffix, file.content);
     } catch (error) {

@@ -3,14 +3,9 @@ import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
-import { axesOf } from "../annotations/orientation_axes";
-import { umPerPixelAt } from "../annotations/scale_bar";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
-import { pathThrough, turntable } from "../capture/camera_path";
-import type { Caption } from "../capture/caption";
-import { type FilmedFile, FRAMES_PER_S } from "../capture/encode_video";
-import { legendOf } from "../capture/legend";
+import type { FilmedFile } from "../capture/encode_video";
 import { Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
@@ -41,7 +36,7 @@ import type { Profile } from "../xr/cardboard/viewer_profile";
 import { ahead } from "../xr/head_pose";
 import { Stereo } from "../xr/stereo";
 import type { Snapshot } from "./automation_api";
-import { drawPicture, type Scene as Filmed, film } from "./capture";
+import type { Scene as Filmed } from "./capture";
 import { FrameLoop } from "./frame_loop";
 import { Contents } from "./scene_contents";
 import { Steps } from "./steps";
@@ -51,10 +46,6 @@ import { StereoTransition } from "./stereo_transition";
 const MAX_PIXEL_RATIO = 2;
 /** The switch distance of the opening at least, as a multiple of the eye's from the middle. */
 const NEAR_AT_START = 1.1;
-
-/** Length of a video: once round, and from one kept view to the next, s. */
-const ROUND_S = 6;
-const LEG_S = 2;
 
 /** Before these the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
@@ -264,53 +255,43 @@ export class Viewer {
     return true;
   }
 
-  /** What the screen shows, so many times as large. */
-  picture(scale: number, onPart: (done: number, of: number) => void): Promise<HTMLCanvasElement> {
-    return drawPicture(this.filmed, scale, onPart);
+  /** What the screen shows as a PNG, so many times as large. Rejects with a DOMException. */
+  async picture(scale: number, onPart: (done: number, of: number) => void): Promise<Blob> {
+    const { savePicture } = await this.loadCapture();
+    return savePicture(this.filmed, scale, onPart);
   }
 
-  /** Through the kept views, or once round; null: it was left. */
+  /** Through the kept views, or once round; null: it was left. Rejects with a DOMException. */
   async film(
-    onFrame: (done: number, of: number) => void,
+    onSecond: (done: number, of: number) => void,
     signal: AbortSignal,
   ): Promise<FilmedFile | null> {
-    const { keptViews } = this.state;
+    const { saveVideo } = await this.loadCapture();
     const before = this.cameraView;
-    const path =
-      keptViews.length > 1
-        ? pathThrough(keptViews, LEG_S * FRAMES_PER_S * (keptViews.length - 1) + 1)
-        : turntable(this.navigation.lookNow, ROUND_S * FRAMES_PER_S);
     try {
-      return await film(
-        this.filmed,
-        path,
-        (view) => this.navigation.lookFrom(view),
-        (done) => onFrame(done, path.length),
-        signal,
-      );
+      return await saveVideo(this.filmed, this.state.keptViews, onSecond, signal);
     } finally {
       this.transition.restore(before);
     }
   }
 
-  private get filmed(): Filmed {
-    const { renderer, navigation, loop, stage } = this;
-    const { sides } = this.bundle.manifest.specimen;
-    const { camera, controls } = navigation;
-    const { specimen } = this.room;
-    const caption = (): Caption => ({
-      um_per_px: umPerPixelAt(
-        controls.target,
-        camera,
-        stage.clientHeight,
-        specimen.group.matrixWorld.getMaxScaleOnAxis(),
-      ),
-      legend: legendOf(this.state, this.bundle.manifest),
-      axes: axesOf(sides),
-      head: camera.matrixWorld,
-      specimen: specimen.group.matrixWorld,
+  private loadCapture() {
+    return import("./capture").catch((cause) => {
+      throw new DOMException(`the code for it has not come (${cause})`, "NetworkError");
     });
-    return { renderer, camera, studio: loop, caption };
+  }
+
+  private get filmed(): Filmed {
+    const { renderer, navigation, loop: studio, stage } = this;
+    return {
+      renderer,
+      navigation,
+      studio,
+      height_px: stage.clientHeight,
+      specimen: this.room.specimen.group.matrixWorld,
+      state: this.state,
+      manifest: this.bundle.manifest,
+    };
   }
 
   /** The flat camera's views that were kept: one more, on to the next one, none. */

@@ -16,8 +16,9 @@ const ON_THE_WIRE_BYTES = 500_000;
 /** Of ten tiles, as the demo has. */
 const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
-/** Fetched where they are wanted: textures of surfaces, bricks from a server, paths of light. */
-const OPTIONAL = /basis|client_worker|assemble_worker|path_tracer|EXRLoader|HDRLoader/;
+/** Fetched where they are wanted: textures, bricks from a server, paths of light, pictures and videos. */
+const OPTIONAL =
+  /basis|client_worker|assemble_worker|path_tracer|EXRLoader|HDRLoader|capture|fflate/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
