@@ -134,9 +134,9 @@ export class Navigation {
     return this.swayed_s !== null;
   }
 
-  /** null: the start view, which follows the window's shape. */
+  /** null: as a bundle opens, which follows the window's shape. */
   get look(): Look | null {
-    return this.stand === this.home && !this.isTurning ? null : this.lookNow;
+    return this.stand === "opening" && !this.isTurning ? null : this.lookNow;
   }
 
   /** Whether the specimen is seen as a room has it that nobody has turned. */

@@ -59,6 +59,8 @@ export type HandsOptions = Readonly<{
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;
 const HOLD_M = 0.02;
+/** Time for which a Cardboard's button is held before the head holds the specimen by it, s: a thumb is slow. */
+const HEAD_HOLD_S = 0.6;
 
 /** By gaze alone it is not switched off: nothing would be left to switch it on by. */
 const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
@@ -390,7 +392,7 @@ export class Hands {
     const press = [this.touched, ...handless.map(([, each]) => each)].find(
       (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.met)),
     );
-    if (press == null || press.elapsed_s < HOLD_S) {
+    if (press == null || press.elapsed_s < HEAD_HOLD_S) {
       this.headHold = null;
       return false;
     }

@@ -261,7 +261,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
     const { isolated } = await state();
     const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toBe(`Only tile ${isolated}: the cut leaves nothing of it.`);
+    expect(told.at(-1)).toBe(`Only ${tileName(isolated ?? "")}: the cut leaves nothing of it.`);
     expect((await state()).notices).toEqual([]);
   });
 

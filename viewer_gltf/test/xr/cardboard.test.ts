@@ -55,10 +55,13 @@ describeInChromium("stereo without WebXR", () => {
     return result;
   };
   const status = () => page.evaluate(() => window.stand.status());
+  /** ... and rest there: a head that has just turned is taken to turn on. */
   const turnTo = (alpha: number, beta: number, gamma: number) =>
     page.evaluate(
-      ([alpha, beta, gamma]) =>
-        void dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha, beta, gamma })),
+      ([alpha, beta, gamma]) => {
+        dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha, beta, gamma }));
+        return new Promise((resolve) => setTimeout(resolve, 120));
+      },
       [alpha, beta, gamma],
     );
   const lookAt = (at: At, radius_m: number): Promise<Spot[]> =>

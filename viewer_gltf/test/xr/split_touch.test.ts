@@ -61,5 +61,34 @@ describeInChromium("fingers in a Cardboard", () => {
     }
     await touch("touchEnd", []);
     expect((await chosen())[1]).toBeNull(); // a drag over a chosen tile isolates nothing
+
+    // held, the specimen goes with the head, nearer as that tilts down
+    const turnHead = async (alpha: number, beta: number) => {
+      await page.evaluate(
+        ([alpha, beta]) =>
+          void dispatchEvent(
+            new DeviceOrientationEvent("deviceorientation", { alpha, beta, gamma: 0 }),
+          ),
+        [alpha, beta],
+      );
+      await page.waitForTimeout(400);
+    };
+    await turnHead(0, 90);
+    const still = await leftEye();
+    await turnHead(25, 90);
+    expect(difference(still, await leftEye())).toBeGreaterThan(0.05); // the head alone looks aside
+    await turnHead(0, 90);
+    const [size, selected] = [await drawn(), await chosen()];
+    await touch("touchStart", [finger(300)]);
+    await page.waitForTimeout(2500);
+    await turnHead(25, 90);
+    expect(difference(still, await leftEye())).toBeLessThan(0.04);
+    await turnHead(25, 80);
+    expect(await drawn()).toBeGreaterThan(1.2 * size);
+    await touch("touchEnd", []);
+    expect(await chosen()).toEqual(selected); // that was no tap
+    const held = await leftEye();
+    await turnHead(0, 90);
+    expect(difference(held, await leftEye())).toBeGreaterThan(0.05); // let go of, it stays
   });
 });

@@ -125,7 +125,8 @@ describe("a head's turn that is predicted", () => {
     expect(yaw_deg(predictTurn(turned(10, 0), last, -5))).toBeCloseTo(12, 6);
   });
 
-  it("goes on for 50 ms at most: then the head may have stopped", () => {
-    expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 500))).toBeCloseTo(17, 1);
+  it("goes on for 50 ms at most, and goes back where nothing more is reported", () => {
+    expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 90))).toBeCloseTo(17, 1);
+    expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 500))).toBeCloseTo(12, 6);
   });
 });

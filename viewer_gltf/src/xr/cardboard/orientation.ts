@@ -80,7 +80,8 @@ export function predictTurn(
   out = new Quaternion(),
 ): Quaternion {
   out.copy(last.head);
-  if (before === null) return out;
+  // a phone that lies still may report nothing more
+  if (before === null || ahead_ms > REPORTS_MS[1]) return out;
   const between_ms = last.time_ms - before.time_ms;
   if (between_ms < REPORTS_MS[0] || between_ms > REPORTS_MS[1]) return out;
   const angle = before.head.angleTo(last.head);
